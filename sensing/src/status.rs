@@ -1,0 +1,80 @@
+//! Why a sample has no force, or how far its force can be trusted.
+
+use core::ops::{BitOr, BitOrAssign};
+
+/// A set of status bits. The numbers are those of the wire format (`docs/wire.md`), which also names
+/// the bits that the pipeline itself never sets (capture, USB, contact).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Status(u32);
+
+macro_rules! bits {
+    ($($(#[$doc:meta])* $name:ident = $bit:literal, $text:literal;)*) => {
+        impl Status {
+            $($(#[$doc])* pub const $name: Status = Status(1 << $bit);)*
+            /// Every bit the pipeline can set, with its name on the wire and in JSON.
+            pub const NAMES: &'static [(Status, &'static str)] = &[$((Status::$name, $text)),*];
+        }
+    };
+}
+
+bits! {
+    /// Fewer than four markers were found: no force.
+    MARKERS_MISSING = 0, "markers_missing";
+    /// More than one reading of the blobs as four markers is plausible, or none is: no force.
+    MARKERS_AMBIGUOUS = 1, "markers_ambiguous";
+    /// More runs or blobs than the fixed storage holds: no force.
+    BLOB_OVERFLOW = 2, "blob_overflow";
+    /// Areas or shapes of the four markers do not fit each other and their distance: no force.
+    MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
+    /// The force lies outside the range that the model was calibrated for.
+    OUT_OF_RANGE = 4, "out_of_range";
+    /// The force is too small for its direction to mean much; its size is still good.
+    DIRECTION_UNRELIABLE = 5, "direction_unreliable";
+    /// Most of the image passed the threshold, or clipped: no force.
+    IMAGE_SATURATED = 6, "image_saturated";
+    /// Nothing passed the threshold: no light, or the lens is covered; no force.
+    IMAGE_DARK = 7, "image_dark";
+    /// The frame had fewer or more rows, or rows of another width, than announced: no force.
+    FRAME_INCOMPLETE = 8, "frame_incomplete";
+    /// No rest position was taken on this unit: the model's own was used.
+    TARE_MISSING = 12, "tare_missing";
+    /// The model was trained on a simulated sensor, not calibrated on this unit.
+    MODEL_SIMULATED = 13, "model_simulated";
+    /// There is no usable model: no force.
+    MODEL_MISSING = 14, "model_missing";
+    /// The model was made for another frame size, format, threshold or centroid estimator: no force.
+    MODEL_MISMATCH = 15, "model_mismatch";
+}
+
+impl Status {
+    /// No bit set.
+    pub const OK: Status = Status(0);
+
+    /// The bits as the wire carries them.
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// True when every bit of `other` is set here.
+    pub const fn contains(self, other: Status) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The names of the bits that are set.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(bit, _)| self.contains(*bit)).map(|(_, name)| *name)
+    }
+}
+
+impl BitOr for Status {
+    type Output = Status;
+    fn bitor(self, other: Status) -> Status {
+        Status(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for Status {
+    fn bitor_assign(&mut self, other: Status) {
+        self.0 |= other.0;
+    }
+}

@@ -1,0 +1,11 @@
+//! The one contract of firmware and host: every message and the framing. Normative text: `docs/wire.md`.
+//!
+//! A frame on the wire is `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod message;
+pub mod status;

@@ -1,0 +1,226 @@
+//! Every message, both ways.
+
+use crate::status::Status;
+use heapless::String;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Raised on every incompatible change of this file.
+pub const PROTOCOL_VERSION: u16 = 1;
+
+/// What the device sends. `Hello` stays variant 0 and keeps its first two fields for ever, so that any two
+/// versions can name each other in an error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum DeviceMessage {
+    /// Answer to a [`HostMessage::Hello`] and to [`Request::GetInfo`].
+    Hello(DeviceHello),
+    /// One frame's force, or why there is none.
+    Sample(Sample),
+    /// Counters since boot; sent once a second while streaming, and on request.
+    Stats(Stats),
+    /// A line for a person.
+    Log(LogLine),
+    /// Answer to a [`Command`].
+    Reply(Reply),
+}
+
+/// What the host sends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum HostMessage {
+    /// First message of a host; the device answers with its own hello and does not stream before.
+    Hello(HostHello),
+    /// A request that is answered by exactly one [`Reply`] with the same `id`.
+    Command(Command),
+}
+
+/// The host's first message.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct HostHello {
+    /// [`PROTOCOL_VERSION`] of the sender.
+    pub protocol: u16,
+    /// Schema hash of the sender.
+    pub schema: u64,
+}
+
+/// The device's first message.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct DeviceHello {
+    /// [`PROTOCOL_VERSION`] of the sender.
+    pub protocol: u16,
+    /// Schema hash of the sender.
+    pub schema: u64,
+    /// The microcontroller's 96-bit unique number.
+    pub device_id: [u8; 12],
+    /// Board and camera, e.g. `weact-h743 + ov7725`.
+    pub board: String<32>,
+    /// Firmware name and version.
+    pub firmware: String<32>,
+    /// The model in use; `None` when there is no usable one.
+    pub model: Option<ModelIdentity>,
+    /// Columns of a frame, px.
+    pub width: u16,
+    /// Rows of a frame, px.
+    pub height: u16,
+    /// The threshold in use.
+    pub threshold: HsvBox,
+}
+
+/// Which model makes the forces.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ModelIdentity {
+    /// CRC-32 of the model file.
+    pub crc: u32,
+    /// Layer widths and preset, e.g. `11-64-64-3 ov7725`.
+    pub name: String<32>,
+    /// True when it was trained on a simulated sensor.
+    pub simulated: bool,
+}
+
+/// An inclusive box in OpenCV's 8-bit HSV (H 0–179). `hue_low > hue_high` wraps through 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct HsvBox {
+    /// Lowest hue, 0–179.
+    pub hue_low: u8,
+    /// Highest hue, 0–179.
+    pub hue_high: u8,
+    /// Lowest saturation.
+    pub saturation_low: u8,
+    /// Highest saturation.
+    pub saturation_high: u8,
+    /// Lowest value.
+    pub value_low: u8,
+    /// Highest value.
+    pub value_high: u8,
+}
+
+/// One frame's result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Sample {
+    /// Counts the samples that were produced; a gap is a sample lost on the way to the host.
+    pub sequence: u32,
+    /// Counts VSYNC edges since the camera was set up; a gap is a frame that was not processed.
+    pub frame: u32,
+    /// Device time of that VSYNC edge, µs since boot.
+    pub time_us: u64,
+    /// Why there is no force, or how far to trust it.
+    pub status: Status,
+    /// The force; `None` exactly when `status` has a bit that says "no force".
+    pub force: Option<Force>,
+}
+
+/// A force on the film. Conventions: `docs/wire.md`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Force {
+    /// α, thousandths of a degree.
+    pub alpha_mdeg: i32,
+    /// β, thousandths of a degree.
+    pub beta_mdeg: i32,
+    /// |F|, µN, never negative.
+    pub magnitude_un: i32,
+    /// Fx, Fy, Fz in the film frame, µN; `None` where the model's angles are not those of the force.
+    pub cartesian_un: Option<[i32; 3]>,
+    /// Standard uncertainty of the direction, thousandths of a degree.
+    pub direction_sigma_mdeg: u32,
+    /// Standard uncertainty of |F|, µN.
+    pub magnitude_sigma_un: u32,
+}
+
+/// Counters since boot. They wrap never in practice (32 bits at 1 kHz: 49 days) and saturate then.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Stats {
+    /// VSYNC edges seen.
+    pub frames_exposed: u32,
+    /// Frames that became a sample.
+    pub frames_processed: u32,
+    /// Frames not captured because both buffers were busy or the next capture was armed too late.
+    pub dropped_busy: u32,
+    /// Frames thrown away after a capture overrun.
+    pub dropped_overrun: u32,
+    /// Frames with too few or too many bytes.
+    pub dropped_size: u32,
+    /// Times the camera fell silent and the capture timed out.
+    pub camera_timeouts: u32,
+    /// Times the camera was set up again.
+    pub camera_restarts: u32,
+    /// Overruns the camera interface reported.
+    pub capture_overruns: u32,
+    /// Samples that were produced but not sent, because the host did not read.
+    pub usb_dropped: u32,
+    /// Frames from the host that were thrown away: bad CRC, COBS or content.
+    pub host_frames_rejected: u32,
+    /// Duration of the last frame's processing, µs.
+    pub processing_us: u32,
+    /// Device time, µs since boot.
+    pub uptime_us: u64,
+}
+
+/// A line for a person.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct LogLine {
+    /// How bad it is.
+    pub level: LogLevel,
+    /// Device time, µs since boot.
+    pub time_us: u64,
+    /// UTF-8 text without a line end; longer text is cut.
+    pub text: String<96>,
+}
+
+/// How bad a log line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum LogLevel {
+    /// Something failed and was recovered or given up.
+    Error,
+    /// Something is unusual.
+    Warning,
+    /// Something happened.
+    Info,
+}
+
+/// A request with a number that its reply repeats.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Command {
+    /// Chosen by the host.
+    pub id: u16,
+    /// What to do.
+    pub request: Request,
+}
+
+/// What a host can ask for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum Request {
+    /// Send a hello and the stats.
+    GetInfo,
+    /// Start streaming samples and stats.
+    Start,
+    /// Stop streaming.
+    Stop,
+    /// Set the threshold, effective from the next frame that starts.
+    SetThreshold(HsvBox),
+    /// Take the mean of the next `frames` good frames (1–256) as the rest position. Answered when done.
+    Tare {
+        /// How many frames to average.
+        frames: u16,
+    },
+}
+
+/// The answer to a command.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Reply {
+    /// The command's number.
+    pub id: u16,
+    /// How it went.
+    pub outcome: Outcome,
+}
+
+/// How a command went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Outcome {
+    /// Done.
+    Done,
+    /// Refused: an argument is outside its range.
+    InvalidArgument,
+    /// Refused: the same thing is already under way.
+    Busy,
+    /// Tare gave up: not enough good frames arrived in time.
+    NoGoodFrames,
+}
