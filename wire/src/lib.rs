@@ -7,5 +7,14 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod decoder;
+pub mod frame;
 pub mod message;
 pub mod status;
+pub mod usb;
+pub mod version;
+
+#[cfg(test)]
+mod examples;
+#[cfg(test)]
+mod properties;

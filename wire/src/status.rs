@@ -57,14 +57,35 @@ bits! {
 }
 
 impl Status {
+    /// The bits that say "no force": a sample has a force exactly when it has none of them.
+    pub const NO_FORCE: Status = Status(
+        Status::MARKERS_MISSING.0
+            | Status::MARKERS_AMBIGUOUS.0
+            | Status::BLOB_OVERFLOW.0
+            | Status::MARKERS_IMPLAUSIBLE.0
+            | Status::IMAGE_SATURATED.0
+            | Status::IMAGE_DARK.0
+            | Status::FRAME_INCOMPLETE.0
+            | Status::MODEL_MISSING.0
+            | Status::MODEL_MISMATCH.0,
+    );
+
     /// True when every bit of `other` is set here.
     pub const fn contains(self, other: Status) -> bool {
         self.0 & other.0 == other.0
     }
 
+    /// True when `self` and `other` have a bit in common.
+    pub const fn intersects(self, other: Status) -> bool {
+        self.0 & other.0 != 0
+    }
+
     /// Names of the known bits that are set, lowest bit first.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        Self::NAMES.iter().filter(move |(bit, _)| self.contains(*bit)).map(|(_, name)| *name)
+        Self::NAMES
+            .iter()
+            .filter(move |(bit, _)| self.contains(*bit))
+            .map(|(_, name)| *name)
     }
 }
 

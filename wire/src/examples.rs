@@ -1,0 +1,269 @@
+//! Messages for tests: the longest of each kind, and arbitrary ones.
+
+use crate::message::*;
+use crate::status::Status;
+use crate::version::SCHEMA_HASH;
+use heapless::String;
+use proptest::prelude::*;
+use std::{vec, vec::Vec};
+
+/// A string as long as it can be.
+fn full<const N: usize>() -> String<N> {
+    String::try_from(std::string::String::from("x").repeat(N).as_str()).unwrap()
+}
+
+/// An ordinary hello.
+pub fn device_hello() -> DeviceHello {
+    DeviceHello {
+        protocol: PROTOCOL_VERSION,
+        schema: SCHEMA_HASH,
+        device_id: [7; 12],
+        board: String::try_from("board").unwrap(),
+        firmware: String::try_from("firmware").unwrap(),
+        model: None,
+        width: 320,
+        height: 240,
+        threshold: HsvBox {
+            hue_low: 170,
+            hue_high: 10,
+            saturation_low: 100,
+            saturation_high: 255,
+            value_low: 45,
+            value_high: 255,
+        },
+    }
+}
+
+/// Every field as many bytes as it can have, for each variant.
+pub fn longest_device_messages() -> Vec<DeviceMessage> {
+    vec![
+        DeviceMessage::Hello(DeviceHello {
+            protocol: u16::MAX,
+            schema: u64::MAX,
+            board: full(),
+            firmware: full(),
+            model: Some(ModelIdentity {
+                crc: u32::MAX,
+                name: full(),
+                simulated: true,
+            }),
+            width: u16::MAX,
+            height: u16::MAX,
+            ..device_hello()
+        }),
+        DeviceMessage::Sample(longest_sample()),
+        DeviceMessage::Stats(longest_stats()),
+        DeviceMessage::Log(LogLine {
+            level: LogLevel::Info,
+            time_us: u64::MAX,
+            text: full(),
+        }),
+        DeviceMessage::Reply(Reply {
+            id: u16::MAX,
+            outcome: Outcome::NoGoodFrames,
+        }),
+    ]
+}
+
+fn longest_sample() -> Sample {
+    Sample {
+        sequence: u32::MAX,
+        frame: u32::MAX,
+        time_us: u64::MAX,
+        status: Status(u32::MAX),
+        force: Some(Force {
+            alpha_mdeg: i32::MIN,
+            beta_mdeg: i32::MIN,
+            magnitude_un: i32::MIN,
+            cartesian_un: Some([i32::MIN; 3]),
+            direction_sigma_mdeg: u32::MAX,
+            magnitude_sigma_un: u32::MAX,
+        }),
+    }
+}
+
+fn longest_stats() -> Stats {
+    Stats {
+        frames_exposed: u32::MAX,
+        frames_processed: u32::MAX,
+        dropped_busy: u32::MAX,
+        dropped_overrun: u32::MAX,
+        dropped_size: u32::MAX,
+        camera_timeouts: u32::MAX,
+        camera_restarts: u32::MAX,
+        capture_overruns: u32::MAX,
+        usb_dropped: u32::MAX,
+        host_frames_rejected: u32::MAX,
+        processing_us: u32::MAX,
+        uptime_us: u64::MAX,
+    }
+}
+
+/// Every field as many bytes as it can have, for each variant.
+pub fn longest_host_messages() -> Vec<HostMessage> {
+    let threshold = device_hello().threshold;
+    let requests = [
+        Request::GetInfo,
+        Request::Start,
+        Request::Stop,
+        Request::SetThreshold(threshold),
+        Request::Tare { frames: u16::MAX },
+    ];
+    let commands = requests.map(|request| {
+        HostMessage::Command(Command {
+            id: u16::MAX,
+            request,
+        })
+    });
+    let hello = HostMessage::Hello(HostHello {
+        protocol: u16::MAX,
+        schema: u64::MAX,
+    });
+    commands.into_iter().chain([hello]).collect()
+}
+
+/// Any message a device of this version can send.
+pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
+    prop_oneof![
+        any_hello().prop_map(DeviceMessage::Hello),
+        any_sample().prop_map(DeviceMessage::Sample),
+        any_stats().prop_map(DeviceMessage::Stats),
+        any_log().prop_map(DeviceMessage::Log),
+        any_reply().prop_map(DeviceMessage::Reply),
+    ]
+}
+
+/// Any message a host of this version can send.
+pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
+    let request = prop_oneof![
+        Just(Request::GetInfo),
+        Just(Request::Start),
+        Just(Request::Stop),
+        any_threshold().prop_map(Request::SetThreshold),
+        any::<u16>().prop_map(|frames| Request::Tare { frames }),
+    ];
+    let command = (any::<u16>(), request)
+        .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
+    let hello = HostHello {
+        protocol: PROTOCOL_VERSION,
+        schema: SCHEMA_HASH,
+    };
+    prop_oneof![Just(HostMessage::Hello(hello)), command]
+}
+
+fn any_hello() -> impl Strategy<Value = DeviceHello> {
+    let names = (any_string(), any_string());
+    let size = any::<(u16, u16)>();
+    let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>()));
+    (any::<[u8; 12]>(), names, size, model, any_threshold()).prop_map(
+        |(device_id, (board, firmware), (width, height), model, threshold)| DeviceHello {
+            device_id,
+            board,
+            firmware,
+            width,
+            height,
+            model: model.map(|(crc, name, simulated)| ModelIdentity {
+                crc,
+                name,
+                simulated,
+            }),
+            threshold,
+            ..device_hello()
+        },
+    )
+}
+
+fn any_sample() -> impl Strategy<Value = Sample> {
+    let force = proptest::option::of(any_force());
+    (any::<(u32, u32, u64, u32)>(), force).prop_map(
+        |((sequence, frame, time_us, status), force)| Sample {
+            sequence,
+            frame,
+            time_us,
+            status: Status(status),
+            force,
+        },
+    )
+}
+
+fn any_force() -> impl Strategy<Value = Force> {
+    (
+        any::<[i32; 3]>(),
+        any::<Option<[i32; 3]>>(),
+        any::<[u32; 2]>(),
+    )
+        .prop_map(
+            |([alpha_mdeg, beta_mdeg, magnitude_un], cartesian_un, sigma)| Force {
+                alpha_mdeg,
+                beta_mdeg,
+                magnitude_un,
+                cartesian_un,
+                direction_sigma_mdeg: sigma[0],
+                magnitude_sigma_un: sigma[1],
+            },
+        )
+}
+
+fn any_stats() -> impl Strategy<Value = Stats> {
+    (any::<[u32; 11]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
+        frames_exposed: counts[0],
+        frames_processed: counts[1],
+        dropped_busy: counts[2],
+        dropped_overrun: counts[3],
+        dropped_size: counts[4],
+        camera_timeouts: counts[5],
+        camera_restarts: counts[6],
+        capture_overruns: counts[7],
+        usb_dropped: counts[8],
+        host_frames_rejected: counts[9],
+        processing_us: counts[10],
+        uptime_us,
+    })
+}
+
+fn any_log() -> impl Strategy<Value = LogLine> {
+    let level = prop_oneof![
+        Just(LogLevel::Error),
+        Just(LogLevel::Warning),
+        Just(LogLevel::Info)
+    ];
+    (level, any::<u64>(), any_string()).prop_map(|(level, time_us, text)| LogLine {
+        level,
+        time_us,
+        text,
+    })
+}
+
+fn any_reply() -> impl Strategy<Value = Reply> {
+    let outcome = prop_oneof![
+        Just(Outcome::Done),
+        Just(Outcome::InvalidArgument),
+        Just(Outcome::Busy),
+        Just(Outcome::NoGoodFrames),
+    ];
+    (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
+}
+
+fn any_threshold() -> impl Strategy<Value = HsvBox> {
+    any::<[u8; 6]>().prop_map(|bounds| HsvBox {
+        hue_low: bounds[0],
+        hue_high: bounds[1],
+        saturation_low: bounds[2],
+        saturation_high: bounds[3],
+        value_low: bounds[4],
+        value_high: bounds[5],
+    })
+}
+
+/// Text of any characters that fits.
+fn any_string<const N: usize>() -> impl Strategy<Value = String<N>> {
+    proptest::collection::vec(any::<char>(), 0..=N).prop_map(|characters| {
+        let mut text = String::new();
+        for character in characters {
+            if text.push(character).is_err() {
+                break;
+            }
+        }
+        text
+    })
+}

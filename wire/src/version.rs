@@ -1,0 +1,82 @@
+//! Which protocol a peer speaks: version number, schema hash, and the part of a hello that never changes.
+
+use crate::message::{DeviceMessage, HostHello, HostMessage, PROTOCOL_VERSION};
+use postcard_schema::key::hash::fnv1a64::hash_ty_path;
+use serde::Deserialize;
+
+/// Changes when any message changes: FNV-1a over names and types of all fields and variants of both message
+/// enums, in order (`postcard-schema`). It does not see the capacity of strings and the meaning of status bits:
+/// a change of those raises [`PROTOCOL_VERSION`].
+pub const SCHEMA_HASH: u64 =
+    u64::from_le_bytes(hash_ty_path::<(DeviceMessage, HostMessage)>("hivtac"));
+
+/// The frozen start of both hellos: variant 0, then these two fields, in every protocol version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(serde::Serialize))]
+pub struct HelloPrefix {
+    /// The sender's [`PROTOCOL_VERSION`].
+    pub protocol: u16,
+    /// The sender's [`SCHEMA_HASH`].
+    pub schema: u64,
+}
+
+impl HelloPrefix {
+    /// The prefix that this crate puts into its hellos.
+    pub const OURS: HelloPrefix = HelloPrefix {
+        protocol: PROTOCOL_VERSION,
+        schema: SCHEMA_HASH,
+    };
+
+    /// Reads the prefix of a message body (COBS and checksum already removed), whatever follows it.
+    /// `None` when it is no hello.
+    pub fn of(body: &[u8]) -> Option<HelloPrefix> {
+        match postcard::take_from_bytes::<(u32, HelloPrefix)>(body) {
+            Ok(((0, prefix), _)) => Some(prefix),
+            _ => None,
+        }
+    }
+
+    /// True when the sender speaks exactly this crate's messages.
+    pub fn is_ours(&self) -> bool {
+        *self == Self::OURS
+    }
+}
+
+impl From<HelloPrefix> for HostHello {
+    fn from(prefix: HelloPrefix) -> HostHello {
+        HostHello {
+            protocol: prefix.protocol,
+            schema: prefix.schema,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::examples;
+
+    /// A change of any message must be seen here, and in `docs/wire.md` and the golden vectors.
+    #[test]
+    fn the_schema_hash_is_that_of_docs_wire_md() {
+        assert_eq!(SCHEMA_HASH, 0x277b_4c2c_7a18_ddfc, "{SCHEMA_HASH:#018x}");
+    }
+
+    #[test]
+    fn both_hellos_begin_with_the_prefix() {
+        let mut buffer = [0; 256];
+        let device = DeviceMessage::Hello(examples::device_hello());
+        let body = postcard::to_slice(&device, &mut buffer).unwrap();
+        assert_eq!(HelloPrefix::of(body), Some(HelloPrefix::OURS));
+        let host = HostMessage::Hello(HelloPrefix::OURS.into());
+        let body = postcard::to_slice(&host, &mut buffer).unwrap();
+        assert_eq!(HelloPrefix::of(body), Some(HelloPrefix::OURS));
+    }
+
+    #[test]
+    fn other_variants_and_short_bodies_have_no_prefix() {
+        assert_eq!(HelloPrefix::of(&[1, 1, 1]), None);
+        assert_eq!(HelloPrefix::of(&[0, 1]), None);
+        assert_eq!(HelloPrefix::of(&[]), None);
+    }
+}
