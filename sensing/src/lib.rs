@@ -10,7 +10,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "encode")]
+#[cfg(any(test, feature = "encode"))]
 extern crate alloc;
 #[cfg(test)]
 extern crate std;

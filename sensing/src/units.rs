@@ -44,3 +44,7 @@ pub struct MicroNewtons(pub i32);
 /// An angle in thousandths of a degree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MilliDegrees(pub i32);
+
+/// A length on the film or in the lens, in thousandths of a millimetre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Micrometres(pub u32);

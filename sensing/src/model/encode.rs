@@ -1,0 +1,195 @@
+//! The writer of the model file.
+
+use super::{
+    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, Model,
+    ModelError, Origin, OutputKind, PixelFormat, Rest, Uncertainty,
+    layout::{CRC, HEADER_LENGTH, MAGIC, VERSION, padded_name},
+};
+use crate::features::Features;
+use alloc::vec::Vec;
+
+/// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelSpec {
+    /// What it was made for.
+    pub conditions: Conditions,
+    /// The rest position of the sensor it was made on.
+    pub rest: Rest,
+    /// How features become the network's input.
+    pub input: InputScaling,
+    /// Its layers, first to last: 1 to 8.
+    pub layers: Vec<LayerSpec>,
+    /// What the three outputs are.
+    pub output: OutputKind,
+    /// The forces it was trained or calibrated on.
+    pub range: CalibratedRange,
+    /// How well it knows them.
+    pub uncertainty: Uncertainty,
+}
+
+/// One layer, to be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LayerSpec {
+    /// Number of inputs, 1–512: 11 in the first layer, the outputs of the layer before in the others.
+    pub inputs: u16,
+    /// Number of outputs, 1–512: 3 in the last layer.
+    pub outputs: u16,
+    /// `outputs` rows of `inputs` weights, −127 to 127.
+    pub weights: Vec<i8>,
+    /// `outputs` biases, in units of the accumulator.
+    pub biases: Vec<i32>,
+    /// `outputs` multipliers m, 1 to 2³¹ − 1.
+    pub multipliers: Vec<u32>,
+    /// `outputs` shifts s, 1–62.
+    pub shifts: Vec<u8>,
+}
+
+impl ModelSpec {
+    /// The bytes of the model file. What it returns can be read: it was.
+    ///
+    /// # Errors
+    /// [`ModelError`], as [`Model::parse`] gives it for such a file, or for a list of the wrong length.
+    pub fn encode(&self) -> Result<Vec<u8>, ModelError> {
+        for (index, layer) in self.layers.iter().enumerate() {
+            layer.check_lengths(index)?;
+        }
+        let mut bytes = self.body();
+        let length = (bytes.len() + 4) as u32;
+        bytes[8..HEADER_LENGTH].copy_from_slice(&length.to_le_bytes());
+        let crc = CRC.checksum(&bytes);
+        bytes.extend(crc.to_le_bytes());
+        Model::parse(&bytes)?;
+        Ok(bytes)
+    }
+
+    fn body(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        bytes.extend(MAGIC);
+        bytes.extend(VERSION.to_le_bytes());
+        bytes.extend([0; 2]);
+        bytes.extend([0; 4]); // the length, filled in when it is known
+        // More layers than 16 bits count are more than the reader accepts.
+        let count = u16::try_from(self.layers.len()).unwrap_or(u16::MAX);
+        bytes.extend(count.to_le_bytes());
+        bytes.extend([output_number(self.output), 0]);
+        push_conditions(&mut bytes, &self.conditions);
+        push_features(&mut bytes, &self.rest.features);
+        for area in self.rest.areas {
+            bytes.extend(area.to_le_bytes());
+        }
+        push_input(&mut bytes, &self.input);
+        let (range, uncertainty) = (&self.range, &self.uncertainty);
+        for value in [range.magnitude.0, range.alpha.0, range.beta.0] {
+            bytes.extend(value.to_le_bytes());
+        }
+        for value in [uncertainty.lateral.0, uncertainty.normal.0] {
+            bytes.extend(value.to_le_bytes());
+        }
+        for layer in &self.layers {
+            push_layer(&mut bytes, layer);
+        }
+        bytes
+    }
+}
+
+impl LayerSpec {
+    fn check_lengths(&self, layer: usize) -> Result<(), ModelError> {
+        let outputs = usize::from(self.outputs);
+        for (name, expected, actual) in [
+            (
+                "weights",
+                outputs * usize::from(self.inputs),
+                self.weights.len(),
+            ),
+            ("biases", outputs, self.biases.len()),
+            ("multipliers", outputs, self.multipliers.len()),
+            ("shifts", outputs, self.shifts.len()),
+        ] {
+            if expected != actual {
+                return Err(ModelError::SpecLength {
+                    layer,
+                    name,
+                    expected,
+                    actual,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
+    let geometry = &conditions.geometry;
+    bytes.extend(padded_name(conditions.preset));
+    bytes.extend(geometry.width.to_le_bytes());
+    bytes.extend(geometry.height.to_le_bytes());
+    bytes.extend(geometry.focal.0.to_le_bytes());
+    bytes.extend(geometry.marker_diameter.0.to_le_bytes());
+    bytes.extend(geometry.marker_radius.0.to_le_bytes());
+    let hsv = &conditions.threshold;
+    bytes.extend([hsv.hue_low, hsv.hue_high]);
+    bytes.extend([hsv.saturation_low, hsv.saturation_high]);
+    bytes.extend([hsv.value_low, hsv.value_high]);
+    bytes.push(conditions.dilations);
+    bytes.push(match conditions.pixel_format {
+        PixelFormat::Rgb565 => 0,
+    });
+    bytes.push(match conditions.centroid {
+        CentroidEstimator::BinaryMask => 0,
+    });
+    bytes.push(match conditions.contact {
+        ContactReading::Force => 0,
+        ContactReading::Stick => 1,
+        ContactReading::Slip => 2,
+    });
+    push_origin(bytes, conditions.origin);
+}
+
+fn push_origin(bytes: &mut Vec<u8>, origin: Origin) {
+    let (number, unit) = match origin {
+        Origin::Simulated => (0, [0; 12]),
+        Origin::Unit(unit) => (1, unit),
+    };
+    bytes.extend([number, 0]);
+    bytes.extend(unit);
+}
+
+fn output_number(output: OutputKind) -> u8 {
+    match output {
+        OutputKind::ForceVector => 0,
+        OutputKind::AnglesMagnitude => 1,
+    }
+}
+
+fn push_features(bytes: &mut Vec<u8>, features: &Features) {
+    for (x, y) in features.centroids.iter().chain([&features.rect_center]) {
+        bytes.extend(x.0.to_le_bytes());
+        bytes.extend(y.0.to_le_bytes());
+    }
+    bytes.extend(features.rect_area.to_le_bytes());
+}
+
+fn push_input(bytes: &mut Vec<u8>, input: &InputScaling) {
+    push_features(bytes, &input.mean);
+    for multiplier in input.multipliers {
+        bytes.extend(multiplier.to_le_bytes());
+    }
+    bytes.extend(input.shifts);
+    bytes.push(0);
+}
+
+fn push_layer(bytes: &mut Vec<u8>, layer: &LayerSpec) {
+    bytes.extend(layer.inputs.to_le_bytes());
+    bytes.extend(layer.outputs.to_le_bytes());
+    bytes.extend(layer.weights.iter().map(|w| *w as u8));
+    pad(bytes);
+    bytes.extend(layer.biases.iter().flat_map(|b| b.to_le_bytes()));
+    bytes.extend(layer.multipliers.iter().flat_map(|m| m.to_le_bytes()));
+    bytes.extend(&layer.shifts);
+    pad(bytes);
+}
+
+/// Zeros up to a multiple of four.
+fn pad(bytes: &mut Vec<u8>) {
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+}

@@ -1,0 +1,351 @@
+//! The reader of the model file: every check that makes a [`Model`] safe to run is here.
+
+use super::{
+    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, Layer,
+    MAX_LAYERS, MAX_WIDTH, Model, ModelError, OUTPUTS, Origin, OutputKind, PixelFormat, Rest,
+    Uncertainty, reader::Reader,
+};
+use crate::{
+    features::{FEATURES, Features},
+    geometry::{Geometry, Preset},
+    threshold::HsvBox,
+    units::{MicroNewtons, Micrometres, MilliDegrees, Px},
+};
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// The first four bytes of a model file.
+pub(super) const MAGIC: [u8; 4] = *b"HVTM";
+/// The layout that this program reads and writes.
+pub(super) const VERSION: u16 = 1;
+/// Bytes of the preset's name, filled up with zeros.
+pub(super) const NAME_LENGTH: usize = 16;
+/// The checksum at the end, over all bytes before it: CRC-32 of IEEE 802.3.
+pub(super) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Magnitude of the first layer's inputs: they are `i16`.
+const LARGEST_INPUT: u32 = 1 << 15;
+/// Magnitude of every other layer's inputs: 7-bit activations.
+const LARGEST_ACTIVATION: u32 = 127;
+const LARGEST_SIDE: u16 = 800;
+/// The rectangle of four centroids in the largest frame, px² in Q16.16.
+const LARGEST_RECT: i64 = (LARGEST_SIDE as i64 * LARGEST_SIDE as i64) << 16;
+
+pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
+    let (body, crc) = frame(bytes)?;
+    let mut reader = Reader {
+        bytes: body,
+        offset: HEADER_LENGTH,
+    };
+    let layer_count = reader.u16_in("layer count", 1, MAX_LAYERS as u16, "1 to 8")? as usize;
+    let output = reader.choice(
+        "output kind",
+        &[OutputKind::ForceVector, OutputKind::AnglesMagnitude],
+        "0 or 1",
+    )?;
+    reader.zero("reserved byte")?;
+    let conditions = conditions(&mut reader)?;
+    let rest = rest(&mut reader)?;
+    let input = input_scaling(&mut reader)?;
+    let range = range(&mut reader)?;
+    let uncertainty = uncertainty(&mut reader)?;
+    let layers = layers(&mut reader, layer_count)?;
+    if reader.offset != body.len() {
+        let announced = (reader.offset + CRC_LENGTH) as u32;
+        return Err(ModelError::Length {
+            announced,
+            actual: bytes.len(),
+        });
+    }
+    Ok(Model {
+        conditions,
+        rest,
+        input,
+        output,
+        range,
+        uncertainty,
+        crc,
+        layers,
+        layer_count,
+    })
+}
+
+/// Magic, version and length.
+pub(super) const HEADER_LENGTH: usize = 12;
+const CRC_LENGTH: usize = 4;
+
+/// Checks what surrounds the body; gives everything before the checksum, and the checksum.
+fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
+    if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
+        return Err(ModelError::NotAModel);
+    }
+    let mut reader = Reader {
+        bytes,
+        offset: MAGIC.len(),
+    };
+    let found = reader.u16()?;
+    if found != VERSION {
+        return Err(ModelError::Version { found });
+    }
+    reader.zero("reserved byte")?;
+    reader.zero("reserved byte")?;
+    let announced = reader.u32()?;
+    if announced as usize != bytes.len() {
+        return Err(ModelError::Length {
+            announced,
+            actual: bytes.len(),
+        });
+    }
+    let short = ModelError::TooShort {
+        offset: bytes.len(),
+        length: bytes.len(),
+    };
+    let (body, end) = bytes.split_last_chunk::<CRC_LENGTH>().ok_or(short)?;
+    let stored = u32::from_le_bytes(*end);
+    let computed = CRC.checksum(body);
+    if stored != computed {
+        return Err(ModelError::Crc { stored, computed });
+    }
+    if body.len() < HEADER_LENGTH {
+        return Err(short);
+    }
+    Ok((body, stored))
+}
+
+fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
+    Ok(Conditions {
+        preset: preset(reader)?,
+        geometry: Geometry {
+            width: reader.u16_in("width", 1, LARGEST_SIDE, "1 to 800")?,
+            height: reader.u16_in("height", 1, LARGEST_SIDE, "1 to 800")?,
+            focal: Px(reader.positive("focal length")?),
+            marker_diameter: Micrometres(reader.positive("marker diameter")? as u32),
+            marker_radius: Micrometres(reader.positive("marker radius")? as u32),
+        },
+        threshold: threshold(reader)?,
+        dilations: reader.u8_in("dilations", 3, "0 to 3")?,
+        pixel_format: reader.choice("pixel format", &[PixelFormat::Rgb565], "0")?,
+        centroid: reader.choice("centroid estimator", &[CentroidEstimator::BinaryMask], "0")?,
+        contact: reader.choice(
+            "contact reading",
+            &[
+                ContactReading::Force,
+                ContactReading::Stick,
+                ContactReading::Slip,
+            ],
+            "0, 1 or 2",
+        )?,
+        origin: origin(reader)?,
+    })
+}
+
+fn preset(reader: &mut Reader<'_>) -> Result<Preset, ModelError> {
+    let offset = reader.offset;
+    let field: [u8; NAME_LENGTH] = reader.array()?;
+    Preset::ALL
+        .into_iter()
+        .find(|preset| padded_name(*preset) == field)
+        .ok_or(ModelError::Field {
+            name: "preset name",
+            offset,
+            allowed: "`paper` or `ov7725`",
+        })
+}
+
+/// A preset's name as the file holds it.
+pub(super) fn padded_name(preset: Preset) -> [u8; NAME_LENGTH] {
+    let mut padded = [0; NAME_LENGTH];
+    let name = preset.name().as_bytes();
+    padded[..name.len()].copy_from_slice(name);
+    padded
+}
+
+fn threshold(reader: &mut Reader<'_>) -> Result<HsvBox, ModelError> {
+    Ok(HsvBox {
+        hue_low: reader.u8_in("lowest hue", 179, "0 to 179")?,
+        hue_high: reader.u8_in("highest hue", 179, "0 to 179")?,
+        saturation_low: reader.u8()?,
+        saturation_high: reader.u8()?,
+        value_low: reader.u8()?,
+        value_high: reader.u8()?,
+    })
+}
+
+fn origin(reader: &mut Reader<'_>) -> Result<Origin, ModelError> {
+    let is_unit = reader.choice("origin", &[false, true], "0 or 1")?;
+    reader.zero("reserved byte")?;
+    let offset = reader.offset;
+    let unit: [u8; 12] = reader.array()?;
+    match (is_unit, unit) {
+        (true, unit) => Ok(Origin::Unit(unit)),
+        (false, [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]) => Ok(Origin::Simulated),
+        _ => Err(ModelError::Field {
+            name: "unit id",
+            offset,
+            allowed: "zero when simulated",
+        }),
+    }
+}
+
+fn rest(reader: &mut Reader<'_>) -> Result<Rest, ModelError> {
+    let features = features(reader)?;
+    let mut areas = [0; 4];
+    for area in &mut areas {
+        *area = reader.positive("rest area")? as u32;
+    }
+    Ok(Rest { features, areas })
+}
+
+fn features(reader: &mut Reader<'_>) -> Result<Features, ModelError> {
+    let mut pairs = [(Px(0), Px(0)); 5];
+    for pair in &mut pairs {
+        *pair = (Px(reader.u32()? as i32), Px(reader.u32()? as i32));
+    }
+    let offset = reader.offset;
+    let rect_area = i64::from_le_bytes(reader.array()?);
+    if !(0..=LARGEST_RECT).contains(&rect_area) {
+        let allowed = "0 to 640000 px² in Q16.16";
+        return Err(ModelError::Field {
+            name: "rectangle area",
+            offset,
+            allowed,
+        });
+    }
+    let [a, b, c, d, rect_center] = pairs;
+    Ok(Features {
+        centroids: [a, b, c, d],
+        rect_center,
+        rect_area,
+    })
+}
+
+fn input_scaling(reader: &mut Reader<'_>) -> Result<InputScaling, ModelError> {
+    let mean = features(reader)?;
+    let mut multipliers = [0; FEATURES];
+    for multiplier in &mut multipliers {
+        let offset = reader.offset;
+        *multiplier = reader.u32()?;
+        if !(1..1 << 24).contains(multiplier) {
+            let allowed = "1 to 16777215";
+            return Err(ModelError::Field {
+                name: "input multiplier",
+                offset,
+                allowed,
+            });
+        }
+    }
+    let mut shifts = [0; FEATURES];
+    for shift in &mut shifts {
+        let offset = reader.offset;
+        *shift = reader.u8()?;
+        if !(1..=62).contains(shift) {
+            return Err(ModelError::Field {
+                name: "input shift",
+                offset,
+                allowed: "1 to 62",
+            });
+        }
+    }
+    reader.zero("reserved byte")?;
+    Ok(InputScaling {
+        mean,
+        multipliers,
+        shifts,
+    })
+}
+
+fn range(reader: &mut Reader<'_>) -> Result<CalibratedRange, ModelError> {
+    Ok(CalibratedRange {
+        magnitude: MicroNewtons(reader.positive("largest force")?),
+        alpha: MilliDegrees(reader.i32_in("largest alpha", 90_000, "0 to 90000")?),
+        beta: MilliDegrees(reader.i32_in("largest beta", 90_000, "0 to 90000")?),
+    })
+}
+
+fn uncertainty(reader: &mut Reader<'_>) -> Result<Uncertainty, ModelError> {
+    Ok(Uncertainty {
+        lateral: MicroNewtons(reader.i32_in("lateral uncertainty", i32::MAX, "0 to 2147483647")?),
+        normal: MicroNewtons(reader.i32_in("normal uncertainty", i32::MAX, "0 to 2147483647")?),
+    })
+}
+
+fn layers<'a>(
+    reader: &mut Reader<'a>,
+    count: usize,
+) -> Result<[Layer<'a>; MAX_LAYERS], ModelError> {
+    let mut layers = [Layer::default(); MAX_LAYERS];
+    let mut fed = FEATURES;
+    for (index, slot) in layers[..count].iter_mut().enumerate() {
+        let layer = layer(reader)?;
+        if layer.inputs != fed {
+            return Err(ModelError::Chain {
+                layer: index,
+                inputs: layer.inputs,
+                fed,
+            });
+        }
+        check_rows(index, &layer)?;
+        fed = layer.outputs;
+        *slot = layer;
+    }
+    if fed != OUTPUTS {
+        return Err(ModelError::Chain {
+            layer: count,
+            inputs: OUTPUTS,
+            fed,
+        });
+    }
+    Ok(layers)
+}
+
+fn layer<'a>(reader: &mut Reader<'a>) -> Result<Layer<'a>, ModelError> {
+    let inputs = reader.u16_in("layer inputs", 1, MAX_WIDTH as u16, "1 to 512")? as usize;
+    let outputs = reader.u16_in("layer outputs", 1, MAX_WIDTH as u16, "1 to 512")? as usize;
+    let weights = reader.take(inputs * outputs)?;
+    reader.pad()?;
+    let biases = reader.take(4 * outputs)?;
+    let multipliers = reader.take(4 * outputs)?;
+    let shifts = reader.take(outputs)?;
+    reader.pad()?;
+    Ok(Layer {
+        inputs,
+        outputs,
+        weights,
+        biases,
+        multipliers,
+        shifts,
+    })
+}
+
+fn check_rows(index: usize, layer: &Layer<'_>) -> Result<(), ModelError> {
+    let largest = if index == 0 {
+        LARGEST_INPUT
+    } else {
+        LARGEST_ACTIVATION
+    };
+    for (number, row) in layer.rows().enumerate() {
+        let error = |name, allowed| ModelError::Row {
+            layer: index,
+            row: number,
+            name,
+            allowed,
+        };
+        if row.weights.contains(&(i8::MIN as u8)) {
+            return Err(error("a weight", "-127 to 127"));
+        }
+        if !(1..1 << 31).contains(&row.multiplier) {
+            return Err(error("the multiplier", "1 to 2147483647"));
+        }
+        if !(1..=62).contains(&row.shift) {
+            return Err(error("the shift", "1 to 62"));
+        }
+        let bound = row.accumulator_bound(largest);
+        if bound > i32::MAX as u64 {
+            return Err(ModelError::Accumulator {
+                layer: index,
+                row: number,
+                bound,
+            });
+        }
+    }
+    Ok(())
+}

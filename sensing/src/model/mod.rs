@@ -1,0 +1,196 @@
+//! The model file: a quantized network, its input scaling, and the conditions it was made under.
+//!
+//! [`Model::parse`] reads a file in place, from flash or from memory, without copying and without alignment
+//! needs, and proves it sound before it can be used. Feature `encode` adds the writer, [`encode::ModelSpec`].
+//! Both follow `docs/model-file.md`.
+
+#[cfg(any(test, feature = "encode"))]
+pub mod encode;
+mod error;
+mod layer;
+mod layout;
+mod reader;
+#[cfg(test)]
+pub(crate) mod samples;
+#[cfg(test)]
+mod tests;
+
+pub use error::ModelError;
+pub use layer::Layer;
+
+use crate::{
+    features::{FEATURES, Features},
+    geometry::{Geometry, Preset},
+    threshold::HsvBox,
+    units::{MicroNewtons, MilliDegrees},
+};
+use core::fmt::Write;
+
+/// The widest layer a model may have, and the size of the network's two activation buffers.
+pub const MAX_WIDTH: usize = 512;
+/// The most layers a model may have.
+pub const MAX_LAYERS: usize = 8;
+/// What the last layer gives: three numbers.
+pub const OUTPUTS: usize = 3;
+
+/// A model, borrowed from the bytes of its file and proven sound.
+#[derive(Clone, Copy, Debug)]
+pub struct Model<'a> {
+    /// What it was made for; a frame made under other conditions has no force.
+    pub conditions: Conditions,
+    /// The rest position of the sensor it was made on.
+    pub rest: Rest,
+    /// How features become the network's input.
+    pub input: InputScaling,
+    /// What the three outputs are.
+    pub output: OutputKind,
+    /// The forces it was trained or calibrated on.
+    pub range: CalibratedRange,
+    /// How well it knows them.
+    pub uncertainty: Uncertainty,
+    crc: u32,
+    layers: [Layer<'a>; MAX_LAYERS],
+    layer_count: usize,
+}
+
+/// Everything about a frame that changes its features, and what the labels of the training meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Conditions {
+    /// The name of the geometry.
+    pub preset: Preset,
+    /// Lens, frame and markers.
+    pub geometry: Geometry,
+    /// What a pixel is.
+    pub pixel_format: PixelFormat,
+    /// The threshold that made the mask.
+    pub threshold: HsvBox,
+    /// 3×3 dilations of the mask, 0–3.
+    pub dilations: u8,
+    /// How a marker's position is taken from its pixels.
+    pub centroid: CentroidEstimator,
+    /// What α and β label.
+    pub contact: ContactReading,
+    /// Where the training data came from.
+    pub origin: Origin,
+}
+
+/// What a pixel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PixelFormat {
+    /// 16 bits: red in bits 15–11, green in 10–5, blue in 4–0.
+    Rgb565,
+}
+
+/// How a marker's position is taken from its pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CentroidEstimator {
+    /// The mean of its pixels in the mask (the paper's).
+    BinaryMask,
+}
+
+/// What α and β label.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ContactReading {
+    /// The direction of the force on the film.
+    Force,
+    /// The pressing direction of a tip that sticks to the film: not the force's.
+    Stick,
+    /// The pressing direction of a tip that slips on the film: not the force's.
+    Slip,
+}
+
+/// Where the training data came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Origin {
+    /// A simulated sensor.
+    Simulated,
+    /// The sensor whose microcontroller has this 96-bit unique number.
+    Unit([u8; 12]),
+}
+
+/// A rest position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Rest {
+    /// Features of the untouched film.
+    pub features: Features,
+    /// Areas of its markers 0–3 in the mask, px.
+    pub areas: [u32; 4],
+}
+
+/// x_i = sat16(rescale(f_i − tare_i + rest_i − mean_i, m_i, s_i)), in units of σ_i / 4096.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct InputScaling {
+    /// Means of the training data.
+    pub mean: Features,
+    /// m_i, 1 to 2²⁴ − 1.
+    pub multipliers: [u32; FEATURES],
+    /// s_i, 1–62.
+    pub shifts: [u8; FEATURES],
+}
+
+/// What the three outputs are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OutputKind {
+    /// Fx, Fy, Fz in µN.
+    ForceVector,
+    /// α and β in thousandths of a degree, |F| in µN.
+    AnglesMagnitude,
+}
+
+/// The forces a model was trained or calibrated on: 0 to `magnitude`, both angles to ± their limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CalibratedRange {
+    /// Largest |F|, > 0.
+    pub magnitude: MicroNewtons,
+    /// Largest |α|, 0–90°.
+    pub alpha: MilliDegrees,
+    /// Largest |β|, 0–90°.
+    pub beta: MilliDegrees,
+}
+
+/// Standard uncertainties of a model's force over its calibrated range, each ≥ 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Uncertainty {
+    /// Of each lateral component, Fx and Fy.
+    pub lateral: MicroNewtons,
+    /// Of the normal component, Fz.
+    pub normal: MicroNewtons,
+}
+
+impl<'a> Model<'a> {
+    /// Reads and proves a model file.
+    ///
+    /// # Errors
+    /// [`ModelError`] says what is wrong and where: not a model file, another version, cut or damaged, a value
+    /// outside its range, or a row of weights whose sum could overflow.
+    pub fn parse(bytes: &'a [u8]) -> Result<Model<'a>, ModelError> {
+        layout::parse(bytes)
+    }
+
+    /// The model's identity: the CRC-32 of its file.
+    pub fn crc(&self) -> u32 {
+        self.crc
+    }
+
+    /// Its layers, first to last.
+    pub fn layers(&self) -> &[Layer<'a>] {
+        &self.layers[..self.layer_count]
+    }
+
+    /// True when the training data was simulated.
+    pub fn is_simulated(&self) -> bool {
+        self.conditions.origin == Origin::Simulated
+    }
+
+    /// Layer widths and preset, such as `11-64-64-3 ov7725`; cut after 32 bytes.
+    pub fn name(&self) -> heapless::String<32> {
+        let mut name = heapless::String::new();
+        // A full string keeps what it has: the end of a very long name is cut.
+        let _ = write!(name, "{FEATURES}");
+        for layer in self.layers() {
+            let _ = write!(name, "-{}", layer.outputs());
+        }
+        let _ = write!(name, " {}", self.conditions.preset.name());
+        name
+    }
+}

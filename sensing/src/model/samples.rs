@@ -1,0 +1,145 @@
+//! Models for tests.
+
+use super::encode::{LayerSpec, ModelSpec};
+use super::*;
+use crate::units::{Micrometres, Px};
+
+/// A model of these layer widths whose values all lie in range and differ from each other.
+pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
+    let features = Features {
+        centroids: [
+            (Px(1), Px(2)),
+            (Px(3), Px(-4)),
+            (Px(5), Px(6)),
+            (Px(7), Px(8)),
+        ],
+        rect_center: (Px(9), Px(10)),
+        rect_area: 11,
+    };
+    ModelSpec {
+        conditions: Conditions {
+            preset: Preset::Ov7725,
+            geometry: Geometry::preset(Preset::Ov7725, 320, 240),
+            pixel_format: PixelFormat::Rgb565,
+            threshold: HsvBox::RED,
+            dilations: 1,
+            centroid: CentroidEstimator::BinaryMask,
+            contact: ContactReading::Force,
+            origin: Origin::Simulated,
+        },
+        rest: Rest {
+            features,
+            areas: [131, 132, 133, 134],
+        },
+        input: InputScaling {
+            mean: features,
+            multipliers: [1 << 20; 11],
+            shifts: [24; 11],
+        },
+        layers: widths
+            .windows(2)
+            .map(|pair| layer(pair[0], pair[1]))
+            .collect(),
+        output: OutputKind::ForceVector,
+        range: CalibratedRange {
+            magnitude: MicroNewtons(1_000_000),
+            alpha: MilliDegrees(15_000),
+            beta: MilliDegrees(14_000),
+        },
+        uncertainty: Uncertainty {
+            lateral: MicroNewtons(900),
+            normal: MicroNewtons(800),
+        },
+    }
+}
+
+fn layer(inputs: u16, outputs: u16) -> LayerSpec {
+    let weights = usize::from(inputs) * usize::from(outputs);
+    LayerSpec {
+        inputs,
+        outputs,
+        weights: (0..weights)
+            .map(|i| ((i * 37) % 255) as i8)
+            .map(|w| w.max(-127))
+            .collect(),
+        biases: (0..i32::from(outputs)).map(|i| 1000 - 7 * i).collect(),
+        multipliers: (0..u32::from(outputs)).map(|i| (1 << 30) + i).collect(),
+        shifts: (0..outputs).map(|i| 30 + (i % 8) as u8).collect(),
+    }
+}
+
+/// What a reader would see of `model`, as a specification.
+pub(super) fn read_back(model: &Model<'_>) -> ModelSpec {
+    let layers = model.layers().iter().map(|layer| LayerSpec {
+        inputs: layer.inputs() as u16,
+        outputs: layer.outputs() as u16,
+        weights: layer
+            .rows()
+            .flat_map(|r| r.weights.iter().map(|w| *w as i8))
+            .collect(),
+        biases: layer.rows().map(|r| r.bias).collect(),
+        multipliers: layer.rows().map(|r| r.multiplier).collect(),
+        shifts: layer.rows().map(|r| r.shift).collect(),
+    });
+    ModelSpec {
+        conditions: model.conditions,
+        rest: model.rest,
+        input: model.input,
+        layers: layers.collect(),
+        output: model.output,
+        range: model.range,
+        uncertainty: model.uncertainty,
+    }
+}
+
+/// Puts random values, each in its range, into every field.
+pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 12]>) -> ModelSpec {
+    let mut numbers = numbers.iter().copied().cycle();
+    let mut next = || numbers.next().unwrap();
+    let c = &mut spec.conditions;
+    c.origin = unit.map_or(Origin::Simulated, Origin::Unit);
+    c.contact = [
+        ContactReading::Force,
+        ContactReading::Stick,
+        ContactReading::Slip,
+    ][next() as usize % 3];
+    c.preset = Preset::ALL[next() as usize % 2];
+    c.geometry.width = 1 + (next() % 800) as u16;
+    c.geometry.height = 1 + (next() % 800) as u16;
+    c.geometry.focal = Px(1 + (next() >> 2) as i32);
+    c.geometry.marker_diameter = Micrometres(1 + (next() >> 2));
+    c.geometry.marker_radius = Micrometres(1 + (next() >> 2));
+    c.dilations = (next() % 4) as u8;
+    c.threshold.hue_low = (next() % 180) as u8;
+    c.threshold.value_high = next() as u8;
+    for (x, y) in &mut spec.rest.features.centroids {
+        (*x, *y) = (Px(next() as i32), Px(next() as i32));
+    }
+    spec.input.mean.rect_area = i64::from(next());
+    spec.rest.areas = [0; 4].map(|_: u32| 1 + (next() >> 2));
+    spec.input.multipliers = [0; 11].map(|_: u32| 1 + (next() >> 9));
+    spec.input.shifts = [0; 11].map(|_: u8| 1 + (next() % 62) as u8);
+    spec.output = [OutputKind::ForceVector, OutputKind::AnglesMagnitude][next() as usize % 2];
+    spec.range.magnitude = MicroNewtons(1 + (next() >> 2) as i32);
+    spec.range.alpha = MilliDegrees((next() % 90_001) as i32);
+    spec.uncertainty.normal = MicroNewtons((next() >> 1) as i32);
+    for layer in &mut spec.layers {
+        layer
+            .weights
+            .iter_mut()
+            .for_each(|w| *w = (next() as i8).max(-127));
+        layer
+            .biases
+            .iter_mut()
+            .for_each(|b| *b = next() as i32 >> 3);
+        layer
+            .multipliers
+            .iter_mut()
+            .for_each(|m| *m = 1 + (next() >> 2));
+        layer
+            .shifts
+            .iter_mut()
+            .for_each(|s| *s = 1 + (next() % 62) as u8);
+    }
+    spec
+}
