@@ -1,0 +1,221 @@
+//! Presets and the equidistant fisheye.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::load::radians;
+use crate::{Mounting, SceneError};
+
+/// Focal length of the lens, mm.
+pub const FOCAL_LENGTH_MM: f64 = 2.1;
+/// Distance from the pinhole to the film at rest along the optical axis, mm.
+pub const FILM_DISTANCE_MM: f64 = 10.0;
+/// Angle of view across the `paper` preset's diagonal, degrees.
+const PAPER_VIEW_DEG: f64 = 150.0;
+/// Width of the OV7725's picture: 640 pixels of 6 µm, in mm.
+const OV7725_WIDTH_MM: f64 = 3.84;
+
+/// A named geometry (`docs/architecture.md`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Preset {
+    /// The paper's lens and picture: 150° across the diagonal at every size.
+    Paper,
+    /// The same lens on an OV7725's 6 µm pixels (QVGA by 2×2 binning: 12 µm).
+    Ov7725,
+}
+
+impl Preset {
+    /// Its name in files and on the command line: `paper` or `ov7725`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Preset::Paper => "paper",
+            Preset::Ov7725 => "ov7725",
+        }
+    }
+
+    /// Pixel pitch at this frame size, mm: 13.744 µm (`paper`) and 12 µm (`ov7725`) at 320×240.
+    fn pitch_mm(self, width: u32, height: u32) -> f64 {
+        let (w, h) = (f64::from(width), f64::from(height));
+        match self {
+            Preset::Paper => FOCAL_LENGTH_MM * radians(PAPER_VIEW_DEG) / (w * w + h * h).sqrt(),
+            Preset::Ov7725 => OV7725_WIDTH_MM / w,
+        }
+    }
+}
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Preset {
+    type Err = SceneError;
+
+    fn from_str(name: &str) -> Result<Preset, SceneError> {
+        [Preset::Paper, Preset::Ov7725]
+            .into_iter()
+            .find(|preset| preset.name() == name)
+            .ok_or_else(|| SceneError::UnknownPreset(name.to_owned()))
+    }
+}
+
+/// Lens and picture: where a point in space is seen.
+///
+/// An equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z), ρ the distance from the optical
+/// axis and Z the *axial* distance from the pinhole. The paper's eq. 15 means this Z; its eq. 23 puts the slant
+/// distance √(ρ² + Z²) in its place, which is not a ray's angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    preset: Preset,
+    width: u32,
+    height: u32,
+    /// Focal length in pixels.
+    focal_px: f64,
+    /// Where the axis meets the picture, px.
+    axis_px: [f64; 2],
+    /// Sine and cosine of the roll about the optical axis.
+    roll: (f64, f64),
+}
+
+impl Camera {
+    /// The camera of a preset at a frame size: 4:3, 160×120 to 800×600.
+    ///
+    /// # Errors
+    /// When the size is another.
+    pub fn new(preset: Preset, width: u32, height: u32) -> Result<Camera, SceneError> {
+        if !(160..=800).contains(&width) || width * 3 != height.saturating_mul(4) {
+            return Err(SceneError::Size { width, height });
+        }
+        Ok(Camera {
+            preset,
+            width,
+            height,
+            focal_px: FOCAL_LENGTH_MM / preset.pitch_mm(width, height),
+            axis_px: [centre(width), centre(height)],
+            roll: (0.0, 1.0),
+        })
+    }
+
+    /// The same camera, mounted a little off.
+    pub(crate) fn mounted(mut self, mounting: &Mounting) -> Camera {
+        let [dx, dy] = mounting.shift_px;
+        self.axis_px = [centre(self.width) + dx, centre(self.height) + dy];
+        self.roll = libm::sincos(radians(mounting.roll_deg));
+        self
+    }
+
+    /// The preset.
+    pub fn preset(&self) -> Preset {
+        self.preset
+    }
+
+    /// Columns of a frame.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows of a frame.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Focal length in pixels: 175 at `ov7725` QVGA.
+    pub fn focal_px(&self) -> f64 {
+        self.focal_px
+    }
+
+    /// Where the point (x, y, z) mm of the film frame is seen, px. z > −10 mm: in front of the pinhole.
+    pub fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
+        let rho = (x * x + y * y).sqrt();
+        if rho == 0.0 {
+            return self.axis_px;
+        }
+        let theta = libm::atan2(rho, FILM_DISTANCE_MM + z);
+        let scale = self.focal_px * theta / rho;
+        let (sin, cos) = self.roll;
+        let [cx, cy] = self.axis_px;
+        [
+            cx + scale * (x * cos - y * sin),
+            cy + scale * (x * sin + y * cos),
+        ]
+    }
+
+    /// The angle from the optical axis at which a pixel looks, radians.
+    pub(crate) fn view_angle(&self, [x, y]: [f64; 2]) -> f64 {
+        let (dx, dy) = (x - self.axis_px[0], y - self.axis_px[1]);
+        (dx * dx + dy * dy).sqrt() / self.focal_px
+    }
+}
+
+/// The middle of `count` pixels whose first has its centre at 0.
+pub(crate) fn centre(count: u32) -> f64 {
+    (f64::from(count) - 1.0) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(preset: Preset, width: u32) -> Camera {
+        Camera::new(preset, width, width / 4 * 3).unwrap()
+    }
+
+    #[test]
+    fn presets_have_their_stated_pitch() {
+        let pitch_um = |preset, width| 2100.0 / camera(preset, width).focal_px();
+        assert!((pitch_um(Preset::Paper, 800) - 5.498).abs() < 0.0005);
+        assert!((pitch_um(Preset::Paper, 320) - 13.744).abs() < 0.0005);
+        assert!((pitch_um(Preset::Ov7725, 320) - 12.0).abs() < 1e-9);
+        assert!((pitch_um(Preset::Ov7725, 640) - 6.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_paper_sees_150_degrees_across_the_diagonal() {
+        for width in [160, 320, 800] {
+            let camera = camera(Preset::Paper, width);
+            let outer_corner = camera.view_angle([-0.5, -0.5]);
+            assert!((outer_corner - radians(75.0)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn projection_is_equidistant_with_the_axial_distance() {
+        let camera = camera(Preset::Ov7725, 320);
+        // 10 mm aside at 10 mm axial distance is 45° off the axis.
+        let [x, y] = camera.project([10.0, 0.0, 0.0]);
+        assert!((x - 159.5 - 175.0 * radians(45.0)).abs() < 1e-9);
+        assert!((y - 119.5).abs() < 1e-9);
+        assert_eq!(camera.project([0.0, 0.0, -3.0]), [159.5, 119.5]);
+    }
+
+    #[test]
+    fn roll_turns_x_towards_y() {
+        let mounting = Mounting {
+            shift_px: [1.0, -2.0],
+            roll_deg: 90.0,
+        };
+        let camera = camera(Preset::Ov7725, 320).mounted(&mounting);
+        let [x, y] = camera.project([10.0, 0.0, 0.0]);
+        assert!((x - 160.5).abs() < 1e-9);
+        assert!((y - 117.5 - 175.0 * radians(45.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn other_sizes_are_refused() {
+        for (width, height) in [(0, 0), (156, 117), (320, 200), (804, 603), (320, u32::MAX)] {
+            assert_eq!(
+                Camera::new(Preset::Paper, width, height),
+                Err(SceneError::Size { width, height })
+            );
+        }
+    }
+
+    #[test]
+    fn names_parse_back() {
+        for preset in [Preset::Paper, Preset::Ov7725] {
+            assert_eq!(preset.to_string().parse(), Ok(preset));
+        }
+        assert!("ov7670".parse::<Preset>().is_err());
+    }
+}

@@ -1,0 +1,196 @@
+//! Discs on the film and their images.
+
+use std::f64::consts::PI;
+
+use crate::{Camera, Film, Load};
+
+/// Distance of the markers' centres from the film's middle along x and along y, mm.
+pub const MARKER_REST_MM: f64 = 3.717;
+/// Radius of a marker, mm (the paper punches 1 mm discs out of red tape).
+pub const MARKER_RADIUS_MM: f64 = 0.5;
+/// The markers by identity: 0 upper left, 1 upper right, 2 lower right, 3 lower left in the image.
+pub const MARKERS: [Disc; 4] = [
+    Disc::marker(-1.0, -1.0),
+    Disc::marker(1.0, -1.0),
+    Disc::marker(1.0, 1.0),
+    Disc::marker(-1.0, 1.0),
+];
+
+/// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than 1e-4 px.
+const CORNERS: u32 = 48;
+
+/// A disc drawn on the film at rest; it follows the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disc {
+    /// Centre at rest, mm.
+    pub centre_mm: [f64; 2],
+    /// Radius at rest, mm.
+    pub radius_mm: f64,
+}
+
+impl Disc {
+    const fn marker(x: f64, y: f64) -> Disc {
+        Disc {
+            centre_mm: [x * MARKER_REST_MM, y * MARKER_REST_MM],
+            radius_mm: MARKER_RADIUS_MM,
+        }
+    }
+
+    /// The disc's image under a load that the film accepts: the image of its rim, not of its centre.
+    pub(crate) fn image(&self, film: &impl Film, load: &Load, camera: &Camera) -> Outline {
+        let rim = rim(self.centre_mm, self.radius_mm);
+        let seen = rim.map(|[x, y]| {
+            let [dx, dy, dz] = film.displacement(load, [x, y]);
+            camera.project([x + dx, y + dy, dz])
+        });
+        Outline {
+            corners: seen.collect(),
+        }
+    }
+}
+
+/// Corners of a regular polygon of the circle's area.
+fn rim([x, y]: [f64; 2], radius: f64) -> impl Iterator<Item = [f64; 2]> {
+    let step = 2.0 * PI / f64::from(CORNERS);
+    let radius = radius * (step / libm::sin(step)).sqrt();
+    (0..CORNERS).map(move |corner| {
+        let (sin, cos) = libm::sincos(step * f64::from(corner));
+        [x + radius * cos, y + radius * sin]
+    })
+}
+
+/// A closed polygon in the picture, px, clockwise on the screen (x towards y).
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Outline {
+    pub(crate) corners: Vec<[f64; 2]>,
+}
+
+impl Outline {
+    /// Its edges, each from a corner to the next, closed.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
+        let next = self.corners.iter().cycle().skip(1);
+        self.corners.iter().copied().zip(next.copied())
+    }
+
+    /// Smallest and largest x and y.
+    pub(crate) fn bounds(&self) -> ([f64; 2], [f64; 2]) {
+        let start = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        self.corners.iter().fold(start, |(low, high), corner| {
+            (
+                [low[0].min(corner[0]), low[1].min(corner[1])],
+                [high[0].max(corner[0]), high[1].max(corner[1])],
+            )
+        })
+    }
+
+    /// Area in px² and its centroid in px. The area must not be 0.
+    pub(crate) fn area_and_centroid(&self) -> (f64, [f64; 2]) {
+        // Moments about a corner, so that no digits are lost far from the origin.
+        let [ox, oy] = self.corners[0];
+        let (mut twice_area, mut mx, mut my) = (0.0, 0.0, 0.0);
+        for ([ax, ay], [bx, by]) in self.edges() {
+            let (ax, ay, bx, by) = (ax - ox, ay - oy, bx - ox, by - oy);
+            let cross = ax * by - bx * ay;
+            twice_area += cross;
+            mx += (ax + bx) * cross;
+            my += (ay + by) * cross;
+        }
+        let centroid = [ox + mx / (3.0 * twice_area), oy + my / (3.0 * twice_area)];
+        (twice_area / 2.0, centroid)
+    }
+
+    /// The part of it inside a frame; without corners where there is none.
+    pub(crate) fn clipped(&self, width: u32, height: u32) -> Outline {
+        let right = f64::from(width) - 0.5;
+        let bottom = f64::from(height) - 0.5;
+        self.clip_half(|[x, _]| x + 0.5)
+            .clip_half(|[x, _]| right - x)
+            .clip_half(|[_, y]| y + 0.5)
+            .clip_half(|[_, y]| bottom - y)
+    }
+
+    /// The part where `inside` (a signed distance) is not negative (Sutherland and Hodgman).
+    fn clip_half(&self, inside: impl Fn([f64; 2]) -> f64) -> Outline {
+        let mut corners = Vec::with_capacity(self.corners.len() + 1);
+        for (a, b) in self.edges() {
+            let (da, db) = (inside(a), inside(b));
+            if da >= 0.0 {
+                corners.push(a);
+            }
+            if (da >= 0.0) != (db >= 0.0) {
+                let t = da / (da - db);
+                corners.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        Outline { corners }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Preset, StandInFilm};
+
+    fn circle(centre: [f64; 2], radius: f64) -> Outline {
+        Outline {
+            corners: rim(centre, radius).collect(),
+        }
+    }
+
+    #[test]
+    fn a_circle_has_its_area_and_centroid() {
+        let (area, [x, y]) = circle([100.25, 7.5], 6.5).area_and_centroid();
+        assert!((area - PI * 42.25).abs() < 1e-9);
+        assert!((x - 100.25).abs() < 1e-12 && (y - 7.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn clipping_keeps_the_half_inside() {
+        let (area, [x, _]) = circle([-0.5, 50.0], 6.0)
+            .clipped(320, 240)
+            .area_and_centroid();
+        assert!((area - PI * 18.0).abs() < 1e-6);
+        // Centroid of a half disc: 4 r / 3π from its straight side.
+        assert!((x + 0.5 - 8.0 / PI).abs() < 0.01);
+        let outside = circle([-20.0, 50.0], 6.0).clipped(320, 240);
+        assert!(outside.corners.is_empty());
+    }
+
+    /// Centroid of a resting disc's image on the diagonal, mm from the axis, by a sum over the disc: every part of
+    /// the film counts by the area of its image, r·r′/ρ with r = f·arctan(ρ / D).
+    fn centroid_radius_mm(centre_mm: f64, radius_mm: f64) -> f64 {
+        const N: i32 = 400;
+        let at = |i: i32| (f64::from(i) + 0.5) / f64::from(N) * radius_mm;
+        let (mut area, mut moment) = (0.0, 0.0);
+        for (i, j) in (-N..N).flat_map(|i| (-N..N).map(move |j| (i, j))) {
+            if at(i) * at(i) + at(j) * at(j) > radius_mm * radius_mm {
+                continue;
+            }
+            let along = centre_mm + at(i);
+            let rho = (along * along + at(j) * at(j)).sqrt();
+            let r = 2.1 * libm::atan(rho / 10.0);
+            let slope = 2.1 / (10.0 * (1.0 + rho * rho / 100.0));
+            area += r * slope / rho;
+            moment += r * slope / rho * (r * along / rho);
+        }
+        moment / area
+    }
+
+    #[test]
+    fn the_centroid_is_that_of_the_disc_and_not_the_image_of_its_centre() {
+        let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
+        let image = MARKERS[2].image(&StandInFilm, &Load::REST, &camera);
+        let (_, [x, y]) = image.area_and_centroid();
+        assert!((x - 159.5 - (y - 119.5)).abs() < 1e-9, "on the diagonal");
+        let radius_px = (x - 159.5) * std::f64::consts::SQRT_2;
+        let expected_mm = centroid_radius_mm(MARKER_REST_MM * std::f64::consts::SQRT_2, 0.5);
+        let error_px = radius_px - expected_mm / 0.012;
+        assert!(error_px.abs() < 5e-4, "{error_px} px");
+        let of_centre_px = 175.0 * libm::atan(MARKER_REST_MM * std::f64::consts::SQRT_2 / 10.0);
+        assert!((of_centre_px - 84.694).abs() < 0.001, "{of_centre_px} px");
+        assert!(
+            of_centre_px - radius_px > 0.1,
+            "the fisheye squeezes the outer half"
+        );
+    }
+}

@@ -1,0 +1,89 @@
+//! Colours and the light they are seen in.
+
+use crate::camera::centre;
+use crate::load::radians;
+use crate::{Camera, Options, Paint};
+
+/// Steps of one 8-bit level: channels are whole numbers of 1/64 level until they become pixels.
+pub(crate) const STEPS: f64 = 64.0;
+/// The brightest channel, in steps.
+pub(crate) const WHITE: i32 = 255 * 64;
+/// The film, a translucent, slightly warm grey: saturation 37 of 255, far below the red threshold's 100.
+const FILM_COLOUR: [f64; 3] = [150.0, 141.0, 128.0];
+/// Red tape: hue 179, saturation 197 of 255, and a value that meets the threshold's 45 at a gain of about 0.3.
+const RED_COLOUR: [f64; 3] = [160.0, 36.0, 40.0];
+/// The angle that [`Options::falloff`] is given for, degrees.
+const FALLOFF_ANGLE_DEG: f64 = 75.0;
+
+impl Paint {
+    fn colour(self) -> [f64; 3] {
+        match self {
+            Paint::Red => RED_COLOUR,
+            Paint::Film => FILM_COLOUR,
+        }
+    }
+}
+
+/// The light on each pixel and the bare film in it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Light {
+    /// Brightness per pixel, row by row; 1 is nominal.
+    brightness: Vec<f64>,
+    /// The film without markers, in steps.
+    film: Vec<[i16; 3]>,
+}
+
+impl Light {
+    pub(crate) fn new(camera: &Camera, options: &Options) -> Light {
+        let pixels = (0..camera.height()).flat_map(|y| (0..camera.width()).map(move |x| [x, y]));
+        let brightness: Vec<f64> = pixels
+            .map(|pixel| brightness(camera, options, pixel.map(f64::from)))
+            .collect();
+        let film = brightness
+            .iter()
+            .map(|&light| seen(Paint::Film, light).map(steps))
+            .collect();
+        Light { brightness, film }
+    }
+
+    /// The film without markers: three channels per pixel, in steps.
+    pub(crate) fn bare_film(&self) -> Vec<[i16; 3]> {
+        self.film.clone()
+    }
+
+    /// What a pixel becomes when `paint` covers a part (0 to 1) of it.
+    pub(crate) fn painted(
+        &self,
+        pixel: usize,
+        below: [i16; 3],
+        paint: Paint,
+        part: f64,
+    ) -> [i16; 3] {
+        let above = seen(paint, self.brightness[pixel]);
+        std::array::from_fn(|c| {
+            let below = f64::from(below[c]);
+            steps(below + (above[c] - below) * part)
+        })
+    }
+}
+
+/// Light at a pixel: gain, gradient across the picture, falloff with the square of the angle off the axis.
+fn brightness(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
+    let across = |v: f64, count: u32| (v - centre(count)) / centre(count);
+    let slope = options.gradient[0] * across(x, camera.width())
+        + options.gradient[1] * across(y, camera.height());
+    let angle = camera.view_angle([x, y]) / radians(FALLOFF_ANGLE_DEG);
+    let falloff = 1.0 - options.falloff * angle * angle;
+    options.gain * (1.0 + slope).max(0.0) * falloff.max(0.0)
+}
+
+/// A paint in the light, in steps, at most white: a camera clips what is too bright.
+fn seen(paint: Paint, light: f64) -> [f64; 3] {
+    paint
+        .colour()
+        .map(|c| (c * light * STEPS).min(f64::from(WHITE)))
+}
+
+fn steps(value: f64) -> i16 {
+    value.round() as i16
+}
