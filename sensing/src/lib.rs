@@ -22,7 +22,14 @@ pub mod blob;
 pub mod features;
 pub mod force;
 pub mod geometry;
+pub mod hsv;
 pub mod markers;
 pub mod model;
 pub mod pipeline;
+pub mod scanner;
 pub mod threshold;
+
+mod dilate;
+mod label;
+mod mask;
+mod runs;

@@ -1,5 +1,9 @@
 //! HSV box threshold, compiled to a bit table over all 65,536 RGB565 values.
 
+use core::fmt;
+
+use crate::hsv::Hsv;
+
 /// An inclusive box in OpenCV's 8-bit HSV (H 0–179). `hue_low > hue_high` wraps through 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct HsvBox {
@@ -27,7 +31,94 @@ impl HsvBox {
         value_low: 45,
         value_high: 255,
     };
+
+    /// Largest hue.
+    pub const MAX_HUE: u8 = 179;
+
+    /// Says whether the box means something.
+    ///
+    /// # Errors
+    /// A hue above 179, or a lowest saturation or value above the highest.
+    pub const fn check(&self) -> Result<(), ThresholdError> {
+        if self.hue_low > Self::MAX_HUE {
+            return Err(ThresholdError::HueOutOfRange(self.hue_low));
+        }
+        if self.hue_high > Self::MAX_HUE {
+            return Err(ThresholdError::HueOutOfRange(self.hue_high));
+        }
+        if self.saturation_low > self.saturation_high {
+            return Err(ThresholdError::SaturationEmpty {
+                low: self.saturation_low,
+                high: self.saturation_high,
+            });
+        }
+        if self.value_low > self.value_high {
+            return Err(ThresholdError::ValueEmpty {
+                low: self.value_low,
+                high: self.value_high,
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether a colour lies in the box, borders included.
+    pub const fn contains(&self, color: Hsv) -> bool {
+        let from_low = self.hue_low <= color.hue;
+        let to_high = color.hue <= self.hue_high;
+        let hue = if self.hue_low <= self.hue_high {
+            from_low && to_high
+        } else {
+            from_low || to_high
+        };
+        hue && self.saturation_low <= color.saturation
+            && color.saturation <= self.saturation_high
+            && self.value_low <= color.value
+            && color.value <= self.value_high
+    }
 }
+
+/// Why a box cannot be a threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ThresholdError {
+    /// This hue is above 179: OpenCV's 8-bit hue counts steps of two degrees.
+    HueOutOfRange(u8),
+    /// The lowest saturation is above the highest: no colour would pass.
+    SaturationEmpty {
+        /// Lowest saturation.
+        low: u8,
+        /// Highest saturation.
+        high: u8,
+    },
+    /// The lowest value is above the highest: no colour would pass.
+    ValueEmpty {
+        /// Lowest value.
+        low: u8,
+        /// Highest value.
+        high: u8,
+    },
+}
+
+impl fmt::Display for ThresholdError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ThresholdError::HueOutOfRange(hue) => write!(
+                f,
+                "threshold hue {hue} is out of range: hues are steps of two degrees, 0 to 179"
+            ),
+            ThresholdError::SaturationEmpty { low, high } => {
+                write!(
+                    f,
+                    "threshold saturation {low} to {high} is empty: swap the two"
+                )
+            }
+            ThresholdError::ValueEmpty { low, high } => {
+                write!(f, "threshold value {low} to {high} is empty: swap the two")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ThresholdError {}
 
 /// How the two bytes of an RGB565 pixel lie in the `u16` that a row is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -36,4 +127,73 @@ pub enum ByteOrder {
     Native,
     /// The bytes are swapped: what DCMI leaves in memory from a camera that sends the high byte first.
     Swapped,
+}
+
+impl ByteOrder {
+    /// The pixel (red in bits 15–11) that lies in memory as `raw`.
+    pub const fn pixel(self, raw: u16) -> u16 {
+        match self {
+            ByteOrder::Native => raw,
+            ByteOrder::Swapped => raw.swap_bytes(),
+        }
+    }
+}
+
+/// One bit per `u16` as it lies in memory: set where its colour lies in the box. 8 KiB.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ThresholdTable {
+    /// Bit r % 32 of word r / 32 belongs to the raw value r.
+    words: [u32; 2048],
+}
+
+impl ThresholdTable {
+    /// A table that accepts nothing, to be [`set`](Self::set) later: for a `static`.
+    pub const fn closed() -> ThresholdTable {
+        ThresholdTable { words: [0; 2048] }
+    }
+
+    /// The table of a box.
+    ///
+    /// # Errors
+    /// Those of [`HsvBox::check`].
+    pub fn new(hsv_box: &HsvBox, order: ByteOrder) -> Result<ThresholdTable, ThresholdError> {
+        let mut table = ThresholdTable::closed();
+        table.set(hsv_box, order)?;
+        Ok(table)
+    }
+
+    /// Compiles a box into this table, in place. It takes a few million instructions: once per setting, never per
+    /// frame.
+    ///
+    /// # Errors
+    /// Those of [`HsvBox::check`]; the table is then unchanged.
+    pub fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
+        hsv_box.check()?;
+        for (high, word) in (0_u16..).zip(&mut self.words) {
+            *word = (0..32).fold(0, |bits, low| {
+                let color = Hsv::from_rgb565(order.pixel(high << 5 | low));
+                bits | u32::from(hsv_box.contains(color)) << low
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the pixel that lies in memory as `raw` passes.
+    pub fn accepts(&self, raw: u16) -> bool {
+        self.rotated(raw) & 1 == 1
+    }
+
+    /// The mask of 32 pixels: bit i is pixel i.
+    pub(crate) fn mask(&self, pixels: &[u16; 32]) -> u32 {
+        pixels
+            .iter()
+            .fold(0, |bits, &raw| bits >> 1 | self.rotated(raw) << 31)
+    }
+
+    /// The bit of `raw` in bit 0, others above it. An index of 11 bits needs no bounds check, and the rotation takes
+    /// its count modulo 32 as the processor does.
+    #[inline(always)]
+    fn rotated(&self, raw: u16) -> u32 {
+        self.words[usize::from(raw >> 5)].rotate_right(u32::from(raw))
+    }
 }

@@ -1,0 +1,121 @@
+//! OpenCV's 8-bit HSV of an RGB565 pixel, in integers.
+//!
+//! `cv2.cvtColor(…, COLOR_RGB2HSV)` on 8-bit pictures multiplies by tables of rounded reciprocals with
+//! twelve fractional bits. The same products are made here, so that the result is the same for every pixel;
+//! `tests/opencv.rs` holds all 65,536 of them against OpenCV's own output.
+
+/// Fractional bits of OpenCV's reciprocals.
+const SHIFT: u32 = 12;
+/// Half a step, for rounding.
+const HALF: i32 = 1 << (SHIFT - 1);
+
+/// A colour in OpenCV's 8-bit HSV.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Hsv {
+    /// Hue in steps of two degrees, 0–179; 0 for a grey.
+    pub hue: u8,
+    /// Saturation, 0–255.
+    pub saturation: u8,
+    /// Value, the largest of red, green and blue, 0–255.
+    pub value: u8,
+}
+
+/// The 8-bit red, green and blue of an RGB565 pixel (red in bits 15–11), by repeating the high bits
+/// below the low ones: black stays 0 and white becomes 255.
+pub const fn rgb888(pixel: u16) -> [u8; 3] {
+    let red = (pixel >> 11) as u8;
+    let green = (pixel >> 5 & 63) as u8;
+    let blue = (pixel & 31) as u8;
+    [
+        red << 3 | red >> 2,
+        green << 2 | green >> 4,
+        blue << 3 | blue >> 2,
+    ]
+}
+
+impl Hsv {
+    /// OpenCV's HSV of an RGB565 pixel (red in bits 15–11), replicated to 8 bits a channel.
+    pub fn from_rgb565(pixel: u16) -> Hsv {
+        Hsv::from_rgb888(rgb888(pixel))
+    }
+
+    /// OpenCV's HSV of an 8-bit red, green and blue.
+    pub fn from_rgb888([red, green, blue]: [u8; 3]) -> Hsv {
+        let value = red.max(green).max(blue);
+        let chroma = i32::from(value - red.min(green).min(blue));
+        Hsv {
+            hue: hue([red, green, blue], value, chroma),
+            // Below 255.5 before rounding, since chroma ≤ value.
+            saturation: rounded(chroma * reciprocal(255, i32::from(value))) as u8,
+            value,
+        }
+    }
+}
+
+/// Hue in units of 1/180 turn: the position within the sixth that the largest channel opens. OpenCV asks for red
+/// first, then green, which decides ties.
+fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
+    let [r, g, b] = [i32::from(red), i32::from(green), i32::from(blue)];
+    let sixths = match value {
+        v if v == red => g - b,
+        v if v == green => b - r + 2 * chroma,
+        _ => r - g + 4 * chroma,
+    };
+    let hue = rounded(sixths * reciprocal(30, chroma));
+    // −30…150 before the turn is added, hence 0…179: −0.5 and above rounds to 0, not to −1.
+    (if hue < 0 { hue + 180 } else { hue }) as u8
+}
+
+/// `scale / divisor` with [`SHIFT`] fractional bits, rounded to nearest (no quotient with a divisor below 256 is a
+/// tie); 0 for a divisor of 0.
+const fn reciprocal(scale: i32, divisor: i32) -> i32 {
+    if divisor == 0 {
+        return 0;
+    }
+    ((scale << (SHIFT + 1)) + divisor) / (2 * divisor)
+}
+
+/// A product with [`SHIFT`] fractional bits as a whole number; halves round up.
+const fn rounded(product: i32) -> i32 {
+    (product + HALF) >> SHIFT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hsv(rgb: [u8; 3]) -> (u8, u8, u8) {
+        let Hsv {
+            hue,
+            saturation,
+            value,
+        } = Hsv::from_rgb888(rgb);
+        (hue, saturation, value)
+    }
+
+    #[test]
+    fn primaries_and_greys() {
+        assert_eq!(hsv([255, 0, 0]), (0, 255, 255));
+        assert_eq!(hsv([255, 255, 0]), (30, 255, 255));
+        assert_eq!(hsv([0, 255, 0]), (60, 255, 255));
+        assert_eq!(hsv([0, 0, 255]), (120, 255, 255));
+        assert_eq!(hsv([255, 0, 255]), (150, 255, 255));
+        assert_eq!(hsv([0, 0, 0]), (0, 0, 0));
+        assert_eq!(hsv([77, 77, 77]), (0, 0, 77));
+    }
+
+    #[test]
+    fn hue_stays_below_180_for_every_colour() {
+        for rgb in 0..1_u32 << 24 {
+            let [_, red, green, blue] = rgb.to_be_bytes();
+            assert!(Hsv::from_rgb888([red, green, blue]).hue < 180, "{rgb:06x}");
+        }
+    }
+
+    #[test]
+    fn rgb565_reaches_both_ends_of_each_channel() {
+        assert_eq!(rgb888(0xffff), [255, 255, 255]);
+        assert_eq!(rgb888(0), [0, 0, 0]);
+        assert_eq!(rgb888(0x8410), [0x84, 0x82, 0x84]);
+    }
+}

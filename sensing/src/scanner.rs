@@ -1,0 +1,271 @@
+//! Rows in, blobs out: threshold, dilation, runs and labels, without a frame in memory.
+
+use core::fmt;
+
+use crate::{
+    blob::Blob,
+    dilate::Dilation,
+    label::Labeller,
+    mask::{EMPTY_ROW, MaskRow, count, last_word_bits, threshold_row, words_of},
+    status::Status,
+    threshold::ThresholdTable,
+};
+
+pub use crate::{dilate::MAX_DILATIONS, mask::MAX_WIDTH};
+
+/// Most rows of a frame: the moments of [`Blob`] are proven for it.
+pub const MAX_HEIGHT: u16 = 800;
+
+/// What a frame looks like and what to make of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ScanSettings {
+    /// Columns, 1 to [`MAX_WIDTH`].
+    pub width: u16,
+    /// Rows, 1 to [`MAX_HEIGHT`].
+    pub height: u16,
+    /// How often the mask is dilated by 3×3, 0 to [`MAX_DILATIONS`].
+    pub dilations: u8,
+    /// Blobs of fewer pixels, after dilation, are dropped.
+    pub min_area: u32,
+}
+
+/// Why a frame cannot be scanned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ScanError {
+    /// This width is not 1 to [`MAX_WIDTH`].
+    Width(u16),
+    /// This height is not 1 to [`MAX_HEIGHT`].
+    Height(u16),
+    /// This number of dilations is above [`MAX_DILATIONS`].
+    Dilations(u8),
+}
+
+impl fmt::Display for ScanError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ScanError::Width(width) => {
+                write!(
+                    f,
+                    "frame width {width} is out of range: use 1 to {MAX_WIDTH} columns"
+                )
+            }
+            ScanError::Height(height) => {
+                write!(
+                    f,
+                    "frame height {height} is out of range: use 1 to {MAX_HEIGHT} rows"
+                )
+            }
+            ScanError::Dilations(n) => {
+                write!(f, "{n} dilations are too many: use 0 to {MAX_DILATIONS}")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ScanError {}
+
+impl ScanSettings {
+    /// Says whether such a frame can be scanned.
+    ///
+    /// # Errors
+    /// A width, height or number of dilations out of range.
+    pub const fn check(&self) -> Result<(), ScanError> {
+        if self.width == 0 || self.width > MAX_WIDTH {
+            return Err(ScanError::Width(self.width));
+        }
+        if self.height == 0 || self.height > MAX_HEIGHT {
+            return Err(ScanError::Height(self.height));
+        }
+        if self.dilations > MAX_DILATIONS {
+            return Err(ScanError::Dilations(self.dilations));
+        }
+        Ok(())
+    }
+}
+
+/// What one frame gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scan<'a> {
+    /// The blobs of at least the minimum area, ordered by their lowest row, then by where they begin in it.
+    pub blobs: &'a [Blob],
+    /// Pixels that passed the threshold, before dilation.
+    pub set_pixels: u32,
+    /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width, [`Status::BLOB_OVERFLOW`] when
+    /// there were more than `BLOBS` blobs; either means that `blobs` is not the whole truth.
+    pub status: Status,
+}
+
+/// Scans frames row by row and keeps up to `BLOBS` blobs of each.
+///
+/// For each frame: [`begin`](Self::begin), one [`push_row`](Self::push_row) for each row from the top, as rows
+/// arrive, and [`finish`](Self::finish). It holds a few rows of mask and the sums of the blobs that the current row may
+/// still touch.
+#[derive(Clone, Debug)]
+pub struct Scanner<const BLOBS: usize> {
+    settings: ScanSettings,
+    dilation: Dilation,
+    labels: Labeller<BLOBS>,
+    /// Rows taken so far.
+    rows_in: u16,
+    /// Rows that came out of the dilation so far.
+    rows_out: u16,
+    set_pixels: u32,
+    status: Status,
+    /// Between `begin` and `finish`.
+    active: bool,
+}
+
+impl<const BLOBS: usize> Scanner<BLOBS> {
+    /// A scanner that waits for its first frame; suits a `static`.
+    pub const fn new() -> Self {
+        Scanner {
+            settings: ScanSettings {
+                width: 0,
+                height: 0,
+                dilations: 0,
+                min_area: 0,
+            },
+            dilation: Dilation::new(),
+            labels: Labeller::new(),
+            rows_in: 0,
+            rows_out: 0,
+            set_pixels: 0,
+            status: Status::FRAME_INCOMPLETE,
+            active: false,
+        }
+    }
+
+    /// Starts a frame and forgets the one before.
+    ///
+    /// # Errors
+    /// Those of [`ScanSettings::check`]; there is then no frame to push rows to.
+    pub fn begin(&mut self, settings: ScanSettings) -> Result<(), ScanError> {
+        self.active = false;
+        self.status = Status::FRAME_INCOMPLETE;
+        self.rows_in = 0;
+        self.rows_out = 0;
+        self.set_pixels = 0;
+        self.labels.begin(settings.min_area);
+        settings.check()?;
+        self.settings = settings;
+        self.dilation.begin(settings.width, settings.dilations);
+        self.status = Status::OK;
+        self.active = true;
+        Ok(())
+    }
+
+    /// Takes the next row of pixels, as they lie in memory. A row of another width, or one too many, is left out and
+    /// makes the frame incomplete.
+    pub fn push_row(&mut self, table: &ThresholdTable, row: &[u16]) {
+        if !self.expects(row.len() == usize::from(self.settings.width)) {
+            return;
+        }
+        let mut mask = EMPTY_ROW;
+        threshold_row(table, row, &mut mask);
+        self.take(&mask);
+    }
+
+    /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Otherwise as
+    /// [`push_row`](Self::push_row).
+    pub fn push_mask_row(&mut self, words: &[u32]) {
+        if !self.expects(words.len() == words_of(self.settings.width)) {
+            return;
+        }
+        let mut mask = EMPTY_ROW;
+        mask[..words.len()].copy_from_slice(words);
+        mask[words.len() - 1] &= last_word_bits(self.settings.width);
+        self.take(&mask);
+    }
+
+    /// Ends the frame. Without a frame (no successful `begin` since the last `finish`), it repeats the last result.
+    pub fn finish(&mut self) -> Scan<'_> {
+        if self.active {
+            self.active = false;
+            self.flush();
+        }
+        Scan {
+            blobs: self.labels.kept(),
+            set_pixels: self.set_pixels,
+            status: self.status,
+        }
+    }
+
+    /// Whether a row of the right or wrong width is the next one of the frame; notes it when it is not.
+    fn expects(&mut self, right_width: bool) -> bool {
+        let expected = self.active && right_width && self.rows_in < self.settings.height;
+        if !expected {
+            self.status |= Status::FRAME_INCOMPLETE;
+        }
+        expected
+    }
+
+    fn take(&mut self, mask: &MaskRow) {
+        self.rows_in += 1;
+        self.set_pixels += count(mask);
+        self.advance(mask);
+    }
+
+    /// Passes a row through the dilation to the labels.
+    fn advance(&mut self, mask: &MaskRow) {
+        let mut dilated = EMPTY_ROW;
+        if self.dilation.push(mask, &mut dilated) {
+            self.labels.push(&dilated, self.rows_out);
+            self.rows_out += 1;
+        }
+    }
+
+    /// Brings out the rows that the dilation still holds, and the blobs that they end.
+    fn flush(&mut self) {
+        if self.rows_in < self.settings.height {
+            self.status |= Status::FRAME_INCOMPLETE;
+        }
+        for _ in 0..self.dilation.radius() {
+            self.advance(&EMPTY_ROW);
+        }
+        self.labels.finish(self.rows_out);
+        if self.labels.overflowed() {
+            self.status |= Status::BLOB_OVERFLOW;
+        }
+    }
+}
+
+impl<const BLOBS: usize> Default for Scanner<BLOBS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::threshold::{ByteOrder, HsvBox};
+
+    const RED: u16 = 0xf800;
+
+    fn settings(width: u16, height: u16, dilations: u8, min_area: u32) -> ScanSettings {
+        ScanSettings {
+            width,
+            height,
+            dilations,
+            min_area,
+        }
+    }
+
+    #[test]
+    fn one_red_pixel_grows_to_nine() {
+        let table = ThresholdTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
+        let mut scanner = Scanner::<4>::new();
+        scanner.begin(settings(40, 5, 1, 9)).unwrap();
+        for y in 0..5 {
+            let mut row = [0_u16; 40];
+            row[33] = if y == 2 { RED } else { 0 };
+            scanner.push_row(&table, &row);
+        }
+        let scan = scanner.finish();
+        assert_eq!((scan.set_pixels, scan.status), (1, Status::OK));
+        assert_eq!(scan.blobs.len(), 1);
+        let blob = scan.blobs[0];
+        assert_eq!((blob.area, blob.sum_x, blob.sum_y), (9, 33 * 9, 2 * 9));
+        assert_eq!((blob.x0, blob.y0, blob.x1, blob.y1), (32, 1, 34, 3));
+    }
+}
