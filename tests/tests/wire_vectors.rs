@@ -1,0 +1,382 @@
+//! Golden vectors of the wire format: `tests/vectors/wire.json`, made by an implementation that shares nothing with
+//! the Rust one, equals what `hivtac-wire` writes and reads, and what `docs/wire.md` quotes.
+
+use hivtac_wire::decoder::{Decoder, Received, Rejected};
+use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, Message, encode};
+use hivtac_wire::message::*;
+use hivtac_wire::status::Status;
+use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+const VECTORS: &str = include_str!("../vectors/wire.json");
+const DOCUMENT: &str = include_str!("../../docs/wire.md");
+
+fn vectors() -> Value {
+    serde_json::from_str(VECTORS).expect("tests/vectors/wire.json is JSON")
+}
+
+/// The bytes of hexadecimal text, `#` comments skipped.
+fn bytes_of(text: &str) -> Vec<u8> {
+    let codes = text
+        .lines()
+        .flat_map(|line| line.split('#').next().unwrap().split_whitespace());
+    codes
+        .map(|code| u8::from_str_radix(code, 16).unwrap_or_else(|_| panic!("{code:?} is no byte")))
+        .collect()
+}
+
+fn hex(value: &Value) -> Vec<u8> {
+    bytes_of(value.as_str().expect("a string of hexadecimal bytes"))
+}
+
+/// The frames of one section of the vectors by name.
+fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
+    let all = vectors();
+    let section = all[section].as_object().expect("a section");
+    section
+        .iter()
+        .map(|(name, frame)| (name.clone(), hex(frame)))
+        .collect()
+}
+
+const RED: HsvBox = HsvBox {
+    hue_low: 170,
+    hue_high: 10,
+    saturation_low: 100,
+    saturation_high: 255,
+    value_low: 45,
+    value_high: 255,
+};
+
+fn hello(model: Option<ModelIdentity>) -> DeviceMessage {
+    DeviceMessage::Hello(DeviceHello {
+        protocol: PROTOCOL_VERSION,
+        schema: SCHEMA_HASH,
+        device_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
+        board: "weact-h743 + ov7725".try_into().unwrap(),
+        firmware: "hivtac 0.1.0".try_into().unwrap(),
+        model,
+        width: 320,
+        height: 240,
+        threshold: RED,
+    })
+}
+
+fn model() -> ModelIdentity {
+    ModelIdentity {
+        crc: 0xcafe_f00d,
+        name: "11-64-64-3 ov7725".try_into().unwrap(),
+        simulated: true,
+    }
+}
+
+fn sample(status: Status, cartesian_un: Option<[i32; 3]>) -> DeviceMessage {
+    let force = Force {
+        alpha_mdeg: -5000,
+        beta_mdeg: 2500,
+        magnitude_un: 100_000,
+        cartesian_un,
+        direction_sigma_mdeg: 480,
+        magnitude_sigma_un: 900,
+    };
+    DeviceMessage::Sample(Sample {
+        sequence: 41,
+        frame: 42,
+        time_us: 1_400_000,
+        status,
+        force: Some(force),
+    })
+}
+
+fn sample_without_force() -> DeviceMessage {
+    DeviceMessage::Sample(Sample {
+        sequence: 300,
+        frame: 305,
+        time_us: 10_000_000,
+        status: Status::MARKERS_MISSING | Status::FRAME_DROPPED,
+        force: None,
+    })
+}
+
+fn stats() -> DeviceMessage {
+    DeviceMessage::Stats(Stats {
+        frames_exposed: 1000,
+        frames_processed: 990,
+        dropped_busy: 7,
+        dropped_overrun: 2,
+        dropped_size: 1,
+        camera_timeouts: 0,
+        camera_restarts: 0,
+        capture_overruns: 2,
+        usb_dropped: 130,
+        host_frames_rejected: 0,
+        processing_us: 5300,
+        uptime_us: 34_000_000,
+    })
+}
+
+fn log() -> DeviceMessage {
+    DeviceMessage::Log(LogLine {
+        level: LogLevel::Warning,
+        time_us: 2_500_000,
+        text: "camera silent, restarting".try_into().unwrap(),
+    })
+}
+
+fn reply(id: u16, outcome: Outcome) -> DeviceMessage {
+    DeviceMessage::Reply(Reply { id, outcome })
+}
+
+fn device_messages() -> BTreeMap<String, DeviceMessage> {
+    [
+        ("device-hello", hello(Some(model()))),
+        ("device-hello-without-model", hello(None)),
+        (
+            "sample-force",
+            sample(Status::MODEL_SIMULATED, Some([-8707, 4362, -99_525])),
+        ),
+        ("sample-without-cartesian", sample(Status::default(), None)),
+        ("sample-without-force", sample_without_force()),
+        ("stats", stats()),
+        ("log", log()),
+        ("reply-done", reply(7, Outcome::Done)),
+        (
+            "reply-no-good-frames",
+            reply(u16::MAX, Outcome::NoGoodFrames),
+        ),
+    ]
+    .map(|(name, message)| (name.to_owned(), message))
+    .into()
+}
+
+fn host_messages() -> BTreeMap<String, HostMessage> {
+    let command = |id, request| HostMessage::Command(Command { id, request });
+    [
+        ("host-hello", HostMessage::Hello(HelloPrefix::OURS.into())),
+        ("get-info", command(1, Request::GetInfo)),
+        ("start", command(2, Request::Start)),
+        ("stop", command(3, Request::Stop)),
+        ("set-threshold", command(200, Request::SetThreshold(RED))),
+        ("tare", command(7, Request::Tare { frames: 128 })),
+    ]
+    .map(|(name, message)| (name.to_owned(), message))
+    .into()
+}
+
+fn decode<M: Message>(bytes: &[u8]) -> (Vec<Received<M>>, Rejected) {
+    let mut decoder = Decoder::<DEVICE_FRAME_LIMIT>::new();
+    let mut rest = bytes;
+    let messages = std::iter::from_fn(|| decoder.feed(&mut rest)).collect();
+    (messages, decoder.rejected())
+}
+
+/// Every message gives its vector and every vector its message.
+fn check_both_ways<M: Message + Clone + PartialEq + std::fmt::Debug>(
+    messages: BTreeMap<String, M>,
+    frames: BTreeMap<String, Vec<u8>>,
+) {
+    assert!(
+        messages.keys().eq(frames.keys()),
+        "{:?} {:?}",
+        messages.keys(),
+        frames.keys()
+    );
+    for (name, message) in messages {
+        let mut buffer = [0; DEVICE_FRAME_LIMIT];
+        let written = encode(&message, &mut buffer).expect("it fits");
+        assert_eq!(written, frames[&name], "{name}");
+        let read = decode(&frames[&name]);
+        assert_eq!(
+            read,
+            (vec![Received::Message(message)], Rejected::default()),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn device_messages_are_their_vectors() {
+    check_both_ways(device_messages(), frames("device"));
+}
+
+#[test]
+fn host_messages_are_their_vectors() {
+    check_both_ways(host_messages(), frames("host"));
+}
+
+#[test]
+fn every_kind_of_message_has_a_vector() {
+    let devices = device_messages();
+    let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
+    let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
+    assert_eq!(distinct.len(), 5);
+    let hosts = host_messages();
+    let requests: std::collections::HashSet<_> = hosts
+        .values()
+        .filter_map(|message| match message {
+            HostMessage::Command(command) => Some(std::mem::discriminant(&command.request)),
+            HostMessage::Hello(_) => None,
+        })
+        .collect();
+    assert_eq!(requests.len(), 5);
+}
+
+#[test]
+fn a_foreign_hello_is_named() {
+    let expected = HelloPrefix {
+        protocol: 2,
+        schema: 0x1122_3344_5566_7788,
+    };
+    let frame = &frames("foreign")["foreign-hello"];
+    let as_host = decode::<DeviceMessage>(frame);
+    assert_eq!(
+        as_host,
+        (vec![Received::ForeignHello(expected)], Rejected::default())
+    );
+    let as_device = decode::<HostMessage>(frame);
+    assert_eq!(
+        as_device,
+        (vec![Received::ForeignHello(expected)], Rejected::default())
+    );
+}
+
+#[test]
+fn rejected_frames_are_counted_by_cause() {
+    let all = vectors();
+    for (name, entry) in all["rejected"].as_object().unwrap() {
+        let frame = hex(&entry["frame"]);
+        let bytes = frame.len() as u32 - 1;
+        let mut expected = Rejected {
+            bytes,
+            ..Rejected::default()
+        };
+        *match entry["cause"].as_str().unwrap() {
+            "overlong" => &mut expected.overlong,
+            "cobs" => &mut expected.cobs,
+            "crc" => &mut expected.crc,
+            "body" => &mut expected.body,
+            "trailing" => &mut expected.trailing,
+            cause => panic!("{name}: {cause} is no cause"),
+        } = 1;
+        assert_eq!(
+            decode::<DeviceMessage>(&frame),
+            (vec![], expected),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_stream_with_garbage_is_read_and_counted() {
+    let all = vectors();
+    let stream = &all["stream"];
+    let (messages, rejected) = decode::<DeviceMessage>(&hex(&stream["bytes"]));
+    let known = device_messages();
+    let names = stream["messages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|name| name.as_str().unwrap());
+    let expected: Vec<_> = names
+        .map(|name| Received::Message(known[name].clone()))
+        .collect();
+    assert_eq!(messages, expected);
+    let count = |cause: &str| stream["rejected"][cause].as_u64().unwrap() as u32;
+    let expected = Rejected {
+        cobs: count("cobs"),
+        crc: count("crc"),
+        bytes: count("bytes"),
+        ..Rejected::default()
+    };
+    assert_eq!(rejected, expected);
+}
+
+#[test]
+fn vectors_and_document_name_this_version() {
+    let all = vectors();
+    let hash = format!("{SCHEMA_HASH:#018x}");
+    assert_eq!(all["protocol"], PROTOCOL_VERSION);
+    assert_eq!(all["schema"], hash);
+    assert!(DOCUMENT.contains(&format!("Protocol version **{PROTOCOL_VERSION}**")));
+    assert!(DOCUMENT.contains(&format!("**{hash}**")));
+}
+
+#[test]
+fn the_document_states_the_limits_of_the_code() {
+    let device = <DeviceMessage as Message>::MAX_FRAME;
+    let host = <HostMessage as Message>::MAX_FRAME;
+    for row in [
+        format!("| frame from the device | {device} bytes | {DEVICE_FRAME_LIMIT} bytes |"),
+        format!("| frame from the host | {host} bytes | {HOST_FRAME_LIMIT} bytes |"),
+    ] {
+        assert!(DOCUMENT.contains(&row), "{row}");
+    }
+}
+
+/// Blocks of the document that open with "```text KIND NAME": name and bytes.
+fn quoted(kind: &str) -> Vec<(&'static str, Vec<u8>)> {
+    let opening = format!("text {kind} ");
+    let blocks = DOCUMENT.split("```").skip(1).step_by(2);
+    let blocks = blocks.filter_map(|block| block.strip_prefix(&opening));
+    blocks
+        .map(|block| {
+            let (name, text) = block.split_once('\n').expect("a line with the name");
+            (name, bytes_of(text))
+        })
+        .collect()
+}
+
+/// Every frame of the vectors that should decode, or not.
+fn all_frames() -> BTreeMap<String, Vec<u8>> {
+    let all = vectors();
+    let rejected = all["rejected"].as_object().unwrap().clone();
+    let rejected = rejected
+        .iter()
+        .map(|(name, entry)| (name.clone(), hex(&entry["frame"])));
+    let sections = ["device", "host", "foreign"].map(frames);
+    sections.into_iter().flatten().chain(rejected).collect()
+}
+
+#[test]
+fn the_document_quotes_the_vectors() {
+    let quotes = quoted("frame");
+    assert!(
+        quotes.len() >= 11,
+        "only {} frames are quoted",
+        quotes.len()
+    );
+    let frames = all_frames();
+    for (name, bytes) in quotes {
+        assert_eq!(frames.get(name), Some(&bytes), "{name}");
+    }
+}
+
+#[test]
+fn the_documents_field_by_field_bytes_are_the_contents_of_the_frames() {
+    let quotes = quoted("body");
+    assert!(
+        quotes.len() >= 10,
+        "only {} bodies are quoted",
+        quotes.len()
+    );
+    let frames = all_frames();
+    for (name, bytes) in quotes {
+        assert_eq!(remove_cobs(&frames[name]), bytes, "{name}");
+    }
+}
+
+/// The content of a good frame, closing zero included in what is given.
+fn remove_cobs(frame: &[u8]) -> Vec<u8> {
+    let mut content = Vec::new();
+    let mut rest = frame.strip_suffix(&[0]).expect("a closing zero");
+    while let Some((&code, tail)) = rest.split_first() {
+        let (run, next) = tail.split_at(usize::from(code) - 1);
+        content.extend(run);
+        if code != 0xff && !next.is_empty() {
+            content.push(0);
+        }
+        rest = next;
+    }
+    content
+}

@@ -1,0 +1,233 @@
+#!/usr/bin/env python3
+"""Makes wire.json, the golden vectors of docs/wire.md, from that text alone.
+
+An implementation of its own, sharing nothing with the Rust one, so that the two check each other:
+    python3 tests/vectors/wire_vectors.py          rewrite wire.json beside this file
+    python3 tests/vectors/wire_vectors.py --doc    print the annotated bytes that docs/wire.md quotes
+"""
+
+import json
+import pathlib
+import sys
+import zlib
+
+SCHEMA = 0x277B4C2C7A18DDFC
+
+
+def varint(value):
+    out = bytearray()
+    while value >= 0x80:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes(out + bytes([value]))
+
+
+def zigzag(value):
+    return varint(value * 2 if value >= 0 else -value * 2 - 1)
+
+
+def unsigned(note, value):
+    return varint(value), f"{note} {value}"
+
+
+def signed(note, value):
+    return zigzag(value), f"{note} {value}"
+
+
+def raw(note, data):
+    return bytes(data), note
+
+
+def string(note, text):
+    data = text.encode()
+    return varint(len(data)) + data, f'{note} "{text}"'
+
+
+def cobs(content):
+    out = bytearray()
+    block = bytearray()
+    for byte in content:
+        if byte == 0:
+            out += bytes([len(block) + 1]) + block
+            block.clear()
+        else:
+            block.append(byte)
+            if len(block) == 254:
+                out += b"\xff" + block
+                block.clear()
+    return bytes(out + bytes([len(block) + 1]) + block)
+
+
+def body(fields):
+    return b"".join(data for data, _ in fields)
+
+
+def frame(content):
+    return cobs(content + zlib.crc32(content).to_bytes(4, "little")) + b"\0"
+
+
+HOST_HELLO = [raw("Hello", [0]), unsigned("protocol", 1), (varint(SCHEMA), f"schema {SCHEMA:#018x}")]
+COMMAND = [raw("Command", [1])]
+BOX = [170, 10, 100, 255, 45, 255]
+BOX_FIELD = raw("threshold H 170–10, S 100–255, V 45–255", BOX)
+
+HELLO = [
+    raw("Hello", [0]),
+    unsigned("protocol", 1),
+    (varint(SCHEMA), f"schema {SCHEMA:#018x}"),
+    raw("device_id", range(1, 13)),
+    string("board", "weact-h743 + ov7725"),
+    string("firmware", "hivtac 0.1.0"),
+]
+HELLO_END = [unsigned("width", 320), unsigned("height", 240), BOX_FIELD]
+MODEL = [
+    raw("model: Some", [1]),
+    (varint(0xCAFEF00D), "model.crc 0xcafef00d"),
+    string("model.name", "11-64-64-3 ov7725"),
+    raw("model.simulated: true", [1]),
+]
+
+
+def sample(sequence, frame_number, time_us, status, names):
+    note = f"status {status:#x}: {names}" if names else "status 0"
+    return [
+        raw("Sample", [1]),
+        unsigned("sequence", sequence),
+        unsigned("frame", frame_number),
+        unsigned("time_us", time_us),
+        (varint(status), note),
+    ]
+
+
+ANGLES = [
+    raw("force: Some", [1]),
+    signed("alpha_mdeg", -5000),
+    signed("beta_mdeg", 2500),
+    signed("magnitude_un", 100_000),
+]
+CARTESIAN = [
+    raw("cartesian_un: Some", [1]),
+    signed("x", -8707),
+    signed("y", 4362),
+    signed("z", -99_525),
+]
+SIGMAS = [unsigned("direction_sigma_mdeg", 480), unsigned("magnitude_sigma_un", 900)]
+
+STATS = [
+    ("frames_exposed", 1000),
+    ("frames_processed", 990),
+    ("dropped_busy", 7),
+    ("dropped_overrun", 2),
+    ("dropped_size", 1),
+    ("camera_timeouts", 0),
+    ("camera_restarts", 0),
+    ("capture_overruns", 2),
+    ("usb_dropped", 130),
+    ("host_frames_rejected", 0),
+    ("processing_us", 5300),
+    ("uptime_us", 34_000_000),
+]
+
+DEVICE = {
+    "device-hello": HELLO + MODEL + HELLO_END,
+    "device-hello-without-model": HELLO + [raw("model: None", [0])] + HELLO_END,
+    "sample-force": sample(41, 42, 1_400_000, 0x2000, "model_simulated") + ANGLES + CARTESIAN + SIGMAS,
+    "sample-without-cartesian": sample(41, 42, 1_400_000, 0, "") + ANGLES
+    + [raw("cartesian_un: None", [0])] + SIGMAS,
+    "sample-without-force": sample(300, 305, 10_000_000, 0x201, "markers_missing, frame_dropped")
+    + [raw("force: None", [0])],
+    "stats": [raw("Stats", [2])] + [unsigned(name, value) for name, value in STATS],
+    "log": [
+        raw("Log", [3]),
+        raw("level: Warning", [1]),
+        unsigned("time_us", 2_500_000),
+        string("text", "camera silent, restarting"),
+    ],
+    "reply-done": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Done", [0])],
+    "reply-no-good-frames": [raw("Reply", [4]), unsigned("id", 65_535), raw("outcome: NoGoodFrames", [3])],
+}
+
+HOST = {
+    "host-hello": HOST_HELLO,
+    "get-info": COMMAND + [unsigned("id", 1), raw("GetInfo", [0])],
+    "start": COMMAND + [unsigned("id", 2), raw("Start", [1])],
+    "stop": COMMAND + [unsigned("id", 3), raw("Stop", [2])],
+    "set-threshold": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3]), BOX_FIELD],
+    "tare": COMMAND + [unsigned("id", 7), raw("Tare", [4]), unsigned("frames", 128)],
+}
+
+FOREIGN = [
+    raw("Hello", [0]),
+    unsigned("protocol", 2),
+    (varint(0x1122334455667788), "schema 0x1122334455667788"),
+    raw("unknown to version 1", [0xDE, 0xAD]),
+]
+
+
+def bad_crc():
+    """The reply "done" with one bit of its number flipped after the checksum was made: 7 became 6."""
+    content = body(DEVICE["reply-done"])
+    damaged = bytes([content[0], content[1] ^ 1, content[2]])
+    return cobs(damaged + zlib.crc32(content).to_bytes(4, "little")) + b"\0"
+
+
+def rejects():
+    reply = body(DEVICE["reply-done"])
+    return {
+        "bad-crc": ("crc", bad_crc()),
+        "too-short-for-a-crc": ("crc", cobs(b"\4\7\0") + b"\0"),
+        "cobs-past-the-end": ("cobs", bytes.fromhex("09 04 07 00")),
+        "unknown-variant": ("body", frame(b"\5\7\0")),
+        "string-too-long": ("body", frame(b"\3\0\0" + varint(97) + b"x" * 97)),
+        "cut-body": ("body", frame(reply[:-1])),
+        "trailing-byte": ("trailing", frame(reply + b"\0")),
+        "overlong": ("overlong", b"\1" * 257 + b"\0"),
+    }
+
+
+def document():
+    """Everything that wire.json says."""
+    resync = b"\x2a\x55" + b"\0" + frame(body(DEVICE["reply-done"])) + bad_crc() + b"\0\0" \
+        + frame(body(DEVICE["sample-without-force"]))
+    return {
+        "protocol": 1,
+        "schema": f"{SCHEMA:#018x}",
+        "device": {name: frame(body(fields)).hex(" ") for name, fields in DEVICE.items()},
+        "host": {name: frame(body(fields)).hex(" ") for name, fields in HOST.items()},
+        "foreign": {"foreign-hello": frame(body(FOREIGN)).hex(" ")},
+        "rejected": {
+            name: {"cause": cause, "frame": data.hex(" ")} for name, (cause, data) in rejects().items()
+        },
+        "stream": {
+            "bytes": resync.hex(" "),
+            "messages": ["reply-done", "sample-without-force"],
+            "rejected": {"cobs": 1, "crc": 1, "bytes": 2 + len(bad_crc()) - 1},
+        },
+    }
+
+
+def annotate(name, fields, whole=None):
+    """A block for docs/wire.md: the body field by field, then the frame."""
+    content = body(fields)
+    rows = list(fields) + [(zlib.crc32(content).to_bytes(4, "little"), f"CRC-32 {zlib.crc32(content):#010x}")]
+    print(f"```text body {name}")
+    for data, note in rows:
+        print(f"{data.hex(' '):<35} # {note}" if len(data) < 12 else f"{data.hex(' ')} # {note}")
+    print(f"```\n\n```text frame {name}\n{(whole or frame(content)).hex(' ')}\n```\n")
+
+
+def print_documentation():
+    for name in ["host-hello", "start", "set-threshold", "tare"]:
+        annotate(name, HOST[name])
+    for name in ["device-hello", "sample-force", "sample-without-force", "stats", "log", "reply-done"]:
+        annotate(name, DEVICE[name])
+    annotate("foreign-hello", FOREIGN)
+    print(f"```text frame bad-crc\n{bad_crc().hex(' ')}\n```")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--doc"]:
+        print_documentation()
+    else:
+        path = pathlib.Path(__file__).with_name("wire.json")
+        path.write_text(json.dumps(document(), indent=2, ensure_ascii=False) + "\n")
