@@ -184,10 +184,15 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             self.flush();
         }
         Scan {
-            blobs: self.labels.kept(),
+            blobs: self.blobs(),
             set_pixels: self.set_pixels,
             status: self.status,
         }
+    }
+
+    /// The blobs that are complete: after [`finish`](Self::finish) all of the frame, as in [`Scan::blobs`].
+    pub fn blobs(&self) -> &[Blob] {
+        self.labels.kept()
     }
 
     /// Whether a row of the right or wrong width is the next one of the frame; notes it when it is not.
