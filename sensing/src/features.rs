@@ -42,6 +42,16 @@ impl Features {
         numbers[10] = self.rect_area;
         numbers
     }
+
+    /// The other way round; centroids and centre must fit 32 bits.
+    pub(crate) fn from_array(numbers: [i64; FEATURES]) -> Features {
+        let px = |i: usize| Px(numbers[i] as i32);
+        Features {
+            centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
+            rect_center: (px(8), px(9)),
+            rect_area: numbers[10],
+        }
+    }
 }
 
 fn extent(values: [Px; 4]) -> (i64, i64) {

@@ -1,9 +1,31 @@
 //! Forces: direction, size and the Cartesian vector.
 //!
 //! Film frame, right-handed: x right and y down in the image, z = x × y out of the film, away from the camera.
-//! F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's. A press has F_z < 0.
+//!
+//! F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's. A press has F_z < 0. The other way round,
+//! α = atan2(Fx, −Fz), −180° < α ≤ 180°, and β = atan2(Fy, √(Fx² + Fz²)), −90° ≤ β ≤ 90°. Where β = ±90°, and where
+//! F = 0, α is 0; where F = 0, so is β.
+//!
+//! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at most 0.5 µN;
+//! a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
 
-use crate::units::{MicroNewtons, MilliDegrees};
+use crate::{
+    cordic::{ONE_BITS, atan2, sin_cos},
+    model::{CalibratedRange, ContactReading, Model, OutputKind, Uncertainty},
+    status::Status,
+    units::{MicroNewtons, MilliDegrees},
+};
+
+/// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range of ±10°
+/// (Section 4), so that little more than the sign of α is left.
+pub const UNRELIABLE_DIRECTION: MilliDegrees = MilliDegrees(5_000);
+/// A direction of which nothing is known.
+const NO_DIRECTION: MilliDegrees = MilliDegrees(180_000);
+/// How far beyond the calibrated range a force still counts as inside: a training set's largest forces come out
+/// a little larger or smaller than they were. |F|: one part in this many.
+pub const RANGE_MARGIN: i32 = 20;
+/// The same, for angles.
+pub const ANGLE_MARGIN: MilliDegrees = MilliDegrees(1_000);
 
 /// A force with its standard uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -16,8 +38,153 @@ pub struct Force {
     pub magnitude: MicroNewtons,
     /// (Fx, Fy, Fz); `None` where the model's angles are not those of the force (`stick`, `slip`).
     pub cartesian: Option<[MicroNewtons; 3]>,
-    /// Standard uncertainty of the direction (angle between vectors).
+    /// Standard uncertainty of the direction: root mean square of the angle between vectors, at most 180°.
     pub direction_sigma: MilliDegrees,
     /// Standard uncertainty of |F|.
     pub magnitude_sigma: MicroNewtons,
+}
+
+/// Direction and size of a force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Polar {
+    /// α.
+    pub alpha: MilliDegrees,
+    /// β.
+    pub beta: MilliDegrees,
+    /// |F|, 0 to 2,147 N.
+    pub magnitude: MicroNewtons,
+}
+
+impl Polar {
+    /// Of a vector (Fx, Fy, Fz). |F| is limited to 2,147.483647 N.
+    pub fn of_vector(vector: [MicroNewtons; 3]) -> Polar {
+        let [x, y, z] = vector.map(|component| i64::from(component.0));
+        // Each square is at most 2⁶²: three fit 64 bits, unsigned.
+        let squares = [x, y, z].map(|component| component.unsigned_abs().pow(2));
+        let magnitude = rounded_root(squares.iter().sum());
+        Polar {
+            alpha: atan2(x, -z),
+            beta: atan2(y << 30, rounded_root_q30(squares[0] + squares[2])),
+            magnitude: MicroNewtons(i32::try_from(magnitude).unwrap_or(i32::MAX)),
+        }
+    }
+
+    /// The vector (Fx, Fy, Fz).
+    pub fn to_vector(self) -> [MicroNewtons; 3] {
+        let (sin_alpha, cos_alpha) = sin_cos(self.alpha);
+        let (sin_beta, cos_beta) = sin_cos(self.beta);
+        let product = |a: i64, b: i64| (a * b + (1 << (ONE_BITS - 1))) >> ONE_BITS;
+        let unit = [
+            product(sin_alpha, cos_beta),
+            sin_beta,
+            -product(cos_alpha, cos_beta),
+        ];
+        unit.map(|part| {
+            let component = product(part, i64::from(self.magnitude.0));
+            // A sine may exceed one in its last place.
+            MicroNewtons(component.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32)
+        })
+    }
+}
+
+impl Force {
+    /// The force that a model's three outputs mean, and its status bits: [`Status::OUT_OF_RANGE`] and
+    /// [`Status::DIRECTION_UNRELIABLE`]. A negative |F| from a model is one of nothing: it becomes 0.
+    pub fn of_outputs(model: &Model<'_>, outputs: [i32; 3]) -> (Force, Status) {
+        let (polar, vector) = match model.output {
+            OutputKind::ForceVector => {
+                let vector = outputs.map(MicroNewtons);
+                (Polar::of_vector(vector), vector)
+            }
+            OutputKind::AnglesMagnitude => {
+                let polar = of_angles(outputs);
+                (polar, polar.to_vector())
+            }
+        };
+        let (direction_sigma, magnitude_sigma) = propagate(&model.uncertainty, vector);
+        let is_force = model.conditions.contact == ContactReading::Force;
+        let force = Force {
+            alpha: polar.alpha,
+            beta: polar.beta,
+            magnitude: polar.magnitude,
+            cartesian: is_force.then_some(vector),
+            direction_sigma,
+            magnitude_sigma,
+        };
+        (force, force.trust(&model.range))
+    }
+
+    /// How far this force can be trusted. The angles count only where the direction does.
+    fn trust(&self, range: &CalibratedRange) -> Status {
+        let largest = range
+            .magnitude
+            .0
+            .saturating_add(range.magnitude.0 / RANGE_MARGIN);
+        let outside = |angle: MilliDegrees, limit: MilliDegrees| {
+            angle.0.unsigned_abs() > (limit.0 + ANGLE_MARGIN.0).unsigned_abs()
+        };
+        let mut status = Status::OK;
+        if self.direction_sigma > UNRELIABLE_DIRECTION {
+            status |= Status::DIRECTION_UNRELIABLE;
+        } else if outside(self.alpha, range.alpha) || outside(self.beta, range.beta) {
+            status |= Status::OUT_OF_RANGE;
+        }
+        if self.magnitude.0 > largest {
+            status |= Status::OUT_OF_RANGE;
+        }
+        status
+    }
+}
+
+/// α and β as the model gives them, brought to the ranges of their meaning.
+fn of_angles([alpha, beta, magnitude]: [i32; 3]) -> Polar {
+    let turned = i64::from(alpha).rem_euclid(360_000) as i32;
+    Polar {
+        alpha: MilliDegrees(if turned > 180_000 {
+            turned - 360_000
+        } else {
+            turned
+        }),
+        beta: MilliDegrees(beta.clamp(-90_000, 90_000)),
+        magnitude: MicroNewtons(magnitude.max(0)),
+    }
+}
+
+/// Uncertainty of direction and size, to first order.
+///
+/// With σ_l of Fx and Fy, σ_n of Fz, u = F/|F| and c = u_z²: along u, σ² = σ_l²(1 − c) + σ_n²c; the rest of
+/// 2σ_l² + σ_n² lies across u, and turns it by that over |F|.
+fn propagate(uncertainty: &Uncertainty, vector: [MicroNewtons; 3]) -> (MilliDegrees, MicroNewtons) {
+    let square = |value: MicroNewtons| u128::from(value.0.unsigned_abs()).pow(2);
+    let (lateral, normal) = (square(uncertainty.lateral), square(uncertainty.normal));
+    let length: u128 = vector.map(square).iter().sum();
+    if length == 0 {
+        // No direction: the larger of both holds for |F|.
+        return (NO_DIRECTION, uncertainty.lateral.max(uncertainty.normal));
+    }
+    let axial = square(vector[2]);
+    let along = (lateral * (length - axial) + normal * axial) / length;
+    let across = 2 * lateral + normal - along;
+    let magnitude_sigma = MicroNewtons(along.isqrt() as i32);
+    (angle_of(across, length), magnitude_sigma)
+}
+
+/// √(across / length) rad in m°, at most 180°.
+fn angle_of(across: u128, length: u128) -> MilliDegrees {
+    /// (180,000 / π)², m°² in a squared radian.
+    const SQUARED_RADIAN: u128 = 3_282_806_350;
+    let angle = (across * SQUARED_RADIAN / length).isqrt();
+    i32::try_from(angle).map_or(NO_DIRECTION, |angle| MilliDegrees(angle).min(NO_DIRECTION))
+}
+
+/// √n, rounded to nearest.
+fn rounded_root(n: u64) -> u64 {
+    let root = n.isqrt();
+    // n > (root + ½)² ⇔ n > root² + root.
+    root + u64::from(n - root * root > root)
+}
+
+/// √n · 2³⁰, so that small forces keep their angle; n ≤ 2⁶³, the result is below 2⁶².
+fn rounded_root_q30(n: u64) -> i64 {
+    (u128::from(n) << 60).isqrt() as i64
 }

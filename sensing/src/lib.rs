@@ -25,10 +25,14 @@ pub mod geometry;
 pub mod hsv;
 pub mod markers;
 pub mod model;
+pub mod network;
 pub mod pipeline;
 pub mod scanner;
+pub mod settings;
+pub mod tare;
 pub mod threshold;
 
+mod cordic;
 mod dilate;
 mod label;
 mod mask;

@@ -1,6 +1,18 @@
 //! Rows in, measurement out.
 
-use crate::{features::Features, force::Force, markers::Marker, status::Status};
+use crate::{
+    blob::Blob,
+    features::Features,
+    force::Force,
+    geometry::{Geometry, Preset},
+    markers::{Finder, Marker},
+    model::{Model, Rest},
+    network::Network,
+    scanner::Scanner,
+    settings::{Settings, SettingsError},
+    status::Status,
+    threshold::{ByteOrder, HsvBox, ThresholdError, ThresholdTable},
+};
 
 /// What one frame gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -11,6 +23,198 @@ pub struct Measurement {
     pub markers: Option<[Marker; 4]>,
     /// Their features, exactly when there are markers.
     pub features: Option<Features>,
-    /// The force; `None` exactly when `status` has a bit that says "no force".
+    /// The force; `None` exactly when `status` has a bit of [`Status::NO_FORCE`].
     pub force: Option<Force>,
+}
+
+/// A frame has more set pixels than one in this many: no four dots look like that.
+const SATURATED_PART: u32 = 2;
+
+/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame.
+///
+/// It holds all its storage, about 50 KiB, so build it where it shall stay: in a `static` as [`Sensor::new`], which is
+/// `const`, and then [`configure`](Self::configure) it in place; nothing large crosses the stack.
+/// For each frame: [`begin_frame`](Self::begin_frame), [`push_row`](Self::push_row) for each row from the top, as rows
+/// arrive, and [`finish_frame`](Self::finish_frame).
+#[derive(Clone, Debug)]
+pub struct Sensor<'m, const BLOBS: usize = 64> {
+    settings: Settings,
+    model: Option<Model<'m>>,
+    tare: Option<Rest>,
+    table: ThresholdTable,
+    scanner: Scanner<BLOBS>,
+    network: Network,
+}
+
+impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
+    /// A sensor that sees nothing until it is configured: its threshold accepts no colour.
+    pub const fn new() -> Self {
+        Sensor {
+            settings: Settings {
+                geometry: Geometry::preset(Preset::Ov7725, 320, 240),
+                threshold: HsvBox::RED,
+                byte_order: ByteOrder::Swapped,
+                dilations: 1,
+                min_area: 1,
+            },
+            model: None,
+            tare: None,
+            table: ThresholdTable::closed(),
+            scanner: Scanner::new(),
+            network: Network::new(),
+        }
+    }
+
+    /// Sets everything and forgets the tare. Without a model there are markers and features but no force.
+    ///
+    /// # Errors
+    /// A setting out of its range; nothing is then changed.
+    pub fn configure(
+        &mut self,
+        settings: Settings,
+        model: Option<Model<'m>>,
+    ) -> Result<(), SettingsError> {
+        settings.check()?;
+        self.table
+            .set(&settings.threshold, settings.byte_order)
+            .map_err(SettingsError::Threshold)?;
+        self.settings = settings;
+        self.model = model;
+        self.tare = None;
+        Ok(())
+    }
+
+    /// What it is set to.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The model in use.
+    pub fn model(&self) -> Option<&Model<'m>> {
+        self.model.as_ref()
+    }
+
+    /// The threshold in use.
+    pub fn threshold(&self) -> HsvBox {
+        self.settings.threshold
+    }
+
+    /// Sets the threshold, effective from the next row; do it between frames. A model made with another one gives no
+    /// force then ([`Status::MODEL_MISMATCH`]).
+    ///
+    /// # Errors
+    /// A box that means nothing; the threshold is then unchanged.
+    pub fn set_threshold(&mut self, threshold: HsvBox) -> Result<(), ThresholdError> {
+        self.table.set(&threshold, self.settings.byte_order)?;
+        self.settings.threshold = threshold;
+        Ok(())
+    }
+
+    /// Sets the rest position of this unit, or goes back to the model's.
+    pub fn set_tare(&mut self, tare: Option<Rest>) {
+        self.tare = tare;
+    }
+
+    /// The rest position of this unit, when one was taken.
+    pub fn tare(&self) -> Option<&Rest> {
+        self.tare.as_ref()
+    }
+
+    /// Starts a frame and forgets the one before.
+    pub fn begin_frame(&mut self) {
+        // An error cannot happen after `configure`, and makes every frame incomplete before it.
+        let _ = self.scanner.begin(self.settings.scan());
+    }
+
+    /// Takes the next row of pixels, as they lie in memory: one `u16` a pixel, exactly the frame's width.
+    pub fn push_row(&mut self, row: &[u16]) {
+        self.scanner.push_row(&self.table, row);
+    }
+
+    /// Ends the frame.
+    pub fn finish_frame(&mut self) -> Measurement {
+        let mut status = self.standing_status();
+        let markers = match self.find_markers() {
+            Ok(markers) => Some(markers),
+            Err(reason) => {
+                status |= reason;
+                None
+            }
+        };
+        let features = markers.as_ref().map(Features::of_markers);
+        let force = features.and_then(|features| self.measure(&features, &mut status));
+        Measurement {
+            status,
+            markers,
+            features,
+            force,
+        }
+    }
+
+    /// The blobs of the frame that was finished last, at least [`Settings::min_area`] each.
+    pub fn blobs(&self) -> &[Blob] {
+        self.scanner.blobs()
+    }
+
+    /// The bits that every frame has, whatever it shows.
+    fn standing_status(&self) -> Status {
+        let mut status = Status::OK;
+        if self.tare.is_none() {
+            status |= Status::TARE_MISSING;
+        }
+        match &self.model {
+            None => status |= Status::MODEL_MISSING,
+            Some(model) => {
+                if model.is_simulated() {
+                    status |= Status::MODEL_SIMULATED;
+                }
+                if !self.settings.fit(&model.conditions) {
+                    status |= Status::MODEL_MISMATCH;
+                }
+            }
+        }
+        status
+    }
+
+    fn find_markers(&mut self) -> Result<[Marker; 4], Status> {
+        let pixels =
+            u32::from(self.settings.geometry.width) * u32::from(self.settings.geometry.height);
+        let fitting = self
+            .model
+            .filter(|model| self.settings.fit(&model.conditions));
+        let rest = self.tare.or(fitting.map(|model| model.rest));
+        let scan = self.scanner.finish();
+        if scan.status != Status::OK {
+            return Err(scan.status);
+        }
+        if scan.set_pixels == 0 {
+            return Err(Status::IMAGE_DARK);
+        }
+        if scan.set_pixels > pixels / SATURATED_PART {
+            return Err(Status::IMAGE_SATURATED);
+        }
+        Finder::new(&self.settings.geometry, rest.as_ref()).find(scan.blobs)
+    }
+
+    /// The force of a frame's features, unless `status` already forbids one.
+    fn measure(&mut self, features: &Features, status: &mut Status) -> Option<Force> {
+        if status.intersects(Status::NO_FORCE) {
+            return None;
+        }
+        let model = self.model.as_ref()?;
+        let tare = self.tare.map_or(model.rest.features, |tare| tare.features);
+        let output = self.network.run(model, features, &tare);
+        let (force, trust) = Force::of_outputs(model, output.values);
+        *status |= trust;
+        if output.input_saturated {
+            *status |= Status::OUT_OF_RANGE;
+        }
+        Some(force)
+    }
+}
+
+impl<const BLOBS: usize> Default for Sensor<'_, BLOBS> {
+    fn default() -> Self {
+        Sensor::new()
+    }
 }

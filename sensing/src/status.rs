@@ -50,6 +50,19 @@ impl Status {
     /// No bit set.
     pub const OK: Status = Status(0);
 
+    /// The bits that say "no force": a measurement has a force exactly when none of these is set.
+    pub const NO_FORCE: Status = Status(
+        Self::MARKERS_MISSING.0
+            | Self::MARKERS_AMBIGUOUS.0
+            | Self::BLOB_OVERFLOW.0
+            | Self::MARKERS_IMPLAUSIBLE.0
+            | Self::IMAGE_SATURATED.0
+            | Self::IMAGE_DARK.0
+            | Self::FRAME_INCOMPLETE.0
+            | Self::MODEL_MISSING.0
+            | Self::MODEL_MISMATCH.0,
+    );
+
     /// The bits as the wire carries them.
     pub const fn bits(self) -> u32 {
         self.0
@@ -60,9 +73,17 @@ impl Status {
         self.0 & other.0 == other.0
     }
 
+    /// True when any bit of `other` is set here.
+    pub const fn intersects(self, other: Status) -> bool {
+        self.0 & other.0 != 0
+    }
+
     /// The names of the bits that are set.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        Self::NAMES.iter().filter(move |(bit, _)| self.contains(*bit)).map(|(_, name)| *name)
+        Self::NAMES
+            .iter()
+            .filter(move |(bit, _)| self.contains(*bit))
+            .map(|(_, name)| *name)
     }
 }
 

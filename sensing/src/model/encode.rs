@@ -126,6 +126,7 @@ fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
     bytes.extend(geometry.focal.0.to_le_bytes());
     bytes.extend(geometry.marker_diameter.0.to_le_bytes());
     bytes.extend(geometry.marker_radius.0.to_le_bytes());
+    bytes.extend(geometry.film_distance.0.to_le_bytes());
     let hsv = &conditions.threshold;
     bytes.extend([hsv.hue_low, hsv.hue_high]);
     bytes.extend([hsv.saturation_low, hsv.saturation_high]);

@@ -120,6 +120,7 @@ fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
             focal: Px(reader.positive("focal length")?),
             marker_diameter: Micrometres(reader.positive("marker diameter")? as u32),
             marker_radius: Micrometres(reader.positive("marker radius")? as u32),
+            film_distance: Micrometres(reader.positive("film distance")? as u32),
         },
         threshold: threshold(reader)?,
         dilations: reader.u8_in("dilations", 3, "0 to 3")?,
@@ -160,14 +161,23 @@ pub(super) fn padded_name(preset: Preset) -> [u8; NAME_LENGTH] {
 }
 
 fn threshold(reader: &mut Reader<'_>) -> Result<HsvBox, ModelError> {
-    Ok(HsvBox {
-        hue_low: reader.u8_in("lowest hue", 179, "0 to 179")?,
-        hue_high: reader.u8_in("highest hue", 179, "0 to 179")?,
+    let offset = reader.offset;
+    let threshold = HsvBox {
+        hue_low: reader.u8()?,
+        hue_high: reader.u8()?,
         saturation_low: reader.u8()?,
         saturation_high: reader.u8()?,
         value_low: reader.u8()?,
         value_high: reader.u8()?,
-    })
+    };
+    let allowed = "hues of 0 to 179, and no lowest saturation or value above the highest";
+    let wrong = ModelError::Field {
+        name: "threshold",
+        offset,
+        allowed,
+    };
+    threshold.check().map_err(|_| wrong)?;
+    Ok(threshold)
 }
 
 fn origin(reader: &mut Reader<'_>) -> Result<Origin, ModelError> {

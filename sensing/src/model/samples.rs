@@ -109,9 +109,11 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
     c.geometry.focal = Px(1 + (next() >> 2) as i32);
     c.geometry.marker_diameter = Micrometres(1 + (next() >> 2));
     c.geometry.marker_radius = Micrometres(1 + (next() >> 2));
+    c.geometry.film_distance = Micrometres(1 + (next() >> 2));
     c.dilations = (next() % 4) as u8;
     c.threshold.hue_low = (next() % 180) as u8;
-    c.threshold.value_high = next() as u8;
+    c.threshold.value_low = next() as u8;
+    c.threshold.value_high = c.threshold.value_low.saturating_add(next() as u8);
     for (x, y) in &mut spec.rest.features.centroids {
         (*x, *y) = (Px(next() as i32), Px(next() as i32));
     }

@@ -1,0 +1,108 @@
+//! What a sensor must be told before its first frame.
+
+use crate::{
+    geometry::Geometry,
+    model::{Conditions, Model},
+    scanner::{ScanError, ScanSettings},
+    threshold::{ByteOrder, HsvBox, ThresholdError},
+};
+use core::fmt;
+
+/// What a frame looks like and how its markers are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Settings {
+    /// Lens, frame size and markers.
+    pub geometry: Geometry,
+    /// The colours of a marker.
+    pub threshold: HsvBox,
+    /// How the bytes of a pixel lie in a row.
+    pub byte_order: ByteOrder,
+    /// 3×3 dilations of the mask, 0–3.
+    pub dilations: u8,
+    /// Blobs of fewer pixels, after dilation, are dropped.
+    pub min_area: u32,
+}
+
+/// Why a sensor cannot be set so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SettingsError {
+    /// The frame cannot be scanned.
+    Scan(ScanError),
+    /// The threshold means nothing.
+    Threshold(ThresholdError),
+    /// The focal length, or a measure of the markers, is not positive.
+    Geometry,
+}
+
+impl Settings {
+    /// The project's usual settings for a geometry: red markers, one dilation, and no blob smaller than a quarter of
+    /// a marker at rest.
+    pub fn usual(geometry: Geometry, byte_order: ByteOrder) -> Settings {
+        Settings {
+            geometry,
+            threshold: HsvBox::RED,
+            byte_order,
+            dilations: 1,
+            min_area: geometry.rest_area() / 4,
+        }
+    }
+
+    /// The settings that a model was made for.
+    pub fn of_model(model: &Model<'_>, byte_order: ByteOrder) -> Settings {
+        let Conditions {
+            geometry,
+            threshold,
+            dilations,
+            ..
+        } = model.conditions;
+        Settings {
+            threshold,
+            dilations,
+            ..Settings::usual(geometry, byte_order)
+        }
+    }
+
+    /// Says whether a sensor can be set so.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        self.scan().check().map_err(SettingsError::Scan)?;
+        self.threshold.check().map_err(SettingsError::Threshold)?;
+        if self.geometry.is_sound() {
+            Ok(())
+        } else {
+            Err(SettingsError::Geometry)
+        }
+    }
+
+    /// Whether a model was made under these conditions.
+    pub(crate) fn fit(&self, conditions: &Conditions) -> bool {
+        self.geometry == conditions.geometry
+            && self.threshold == conditions.threshold
+            && self.dilations == conditions.dilations
+    }
+
+    pub(crate) fn scan(&self) -> ScanSettings {
+        ScanSettings {
+            width: self.geometry.width,
+            height: self.geometry.height,
+            dilations: self.dilations,
+            min_area: self.min_area,
+        }
+    }
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SettingsError::Scan(error) => error.fmt(f),
+            SettingsError::Threshold(error) => error.fmt(f),
+            SettingsError::Geometry => f.write_str(
+                "the focal length, the marker's diameter and its distance from the axis must be positive",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SettingsError {}
