@@ -47,6 +47,5 @@ pub use error::SceneError;
 pub use film::{Film, HALF_SIDE_MM, StandInFilm};
 pub use frame::{Frame, MarkerTruth, Truth};
 pub use load::Load;
-pub use motion::Motion;
 pub use options::{Mounting, Options, Paint, Patch};
 pub use scene::Scene;

@@ -17,7 +17,7 @@ const SWEEP_DIRECTIONS: [(f64, f64); 5] =
 
 /// What presses the film, as a function of time. Before time 0, and at a time that is no number, nothing does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Motion {
+pub(crate) enum Motion {
     /// Nothing presses.
     Rest,
     /// One load, from time 0 on.
@@ -37,7 +37,7 @@ impl Motion {
     ///
     /// # Errors
     /// When there is none of that name.
-    pub fn named(name: &str, seed: u64) -> Result<Motion, SceneError> {
+    pub(crate) fn named(name: &str, seed: u64) -> Result<Motion, SceneError> {
         match name {
             "rest" => Ok(Motion::Rest),
             "static" => Ok(Motion::Static(load(0.1, 4.0, -3.0))),
@@ -48,7 +48,7 @@ impl Motion {
     }
 
     /// The load at a time in seconds.
-    pub fn load(&self, time_s: f64) -> Load {
+    pub(crate) fn load(&self, time_s: f64) -> Load {
         if !time_s.is_finite() || time_s < 0.0 {
             return Load::REST;
         }

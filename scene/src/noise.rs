@@ -62,3 +62,78 @@ fn normal_quantile(p: f64) -> f64 {
     }
     (low + high) / 2.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PIXELS: usize = 200_000;
+
+    fn samples(noise: &Noise, number: u64) -> Vec<[f64; 3]> {
+        let frame = noise.of_frame(number).take(PIXELS);
+        frame.map(|pixel| pixel.map(f64::from)).collect()
+    }
+
+    /// Mean of the product of two series of deviation 160, as a correlation.
+    fn correlation(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
+        let sum: f64 = a.zip(b).map(|(a, b)| a * b).sum();
+        sum / PIXELS as f64 / (160.0 * 160.0)
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_normal_distribution() {
+        for (p, z) in [(0.5, 0.0), (0.975, 1.959_964), (0.001, -3.090_232)] {
+            assert!((normal_quantile(p) - z).abs() < 2e-6, "{p}");
+        }
+    }
+
+    #[test]
+    fn mean_and_deviation_are_those_asked_for() {
+        let noise = Noise::new(160.0, 1);
+        let (mean, square) = noise.table.iter().fold((0.0, 0.0), |(mean, square), &z| {
+            (
+                mean + f64::from(z) / 4096.0,
+                square + f64::from(z) * f64::from(z) / 4096.0,
+            )
+        });
+        assert_eq!(mean, 0.0);
+        assert!(
+            (square.sqrt() / 160.0 - 1.0).abs() < 1e-3,
+            "{}",
+            square.sqrt()
+        );
+    }
+
+    #[test]
+    fn channels_neighbours_frames_and_seeds_are_independent() {
+        let a = samples(&Noise::new(160.0, 1), 0);
+        let next = samples(&Noise::new(160.0, 1), 1);
+        let other = samples(&Noise::new(160.0, 2), 0);
+        let one = |series: &[[f64; 3]], channel: usize| -> Vec<f64> {
+            series.iter().map(|pixel| pixel[channel]).collect()
+        };
+        let pairs = [
+            ("itself", one(&a, 0), one(&a, 0), 1.0),
+            ("red, green", one(&a, 0), one(&a, 1), 0.0),
+            ("green, blue", one(&a, 1), one(&a, 2), 0.0),
+            ("neighbour", one(&a, 0), one(&a[1..], 0), 0.0),
+            ("row", one(&a, 0), one(&a[320..], 0), 0.0),
+            ("frame", one(&a, 0), one(&next, 0), 0.0),
+            ("seed", one(&a, 0), one(&other, 0), 0.0),
+        ];
+        for (name, x, y, expected) in pairs {
+            let found = correlation(x.into_iter(), y.into_iter());
+            // Four standard errors of the mean of 200,000.
+            assert!(
+                (found - expected).abs() < 0.009 + 0.004 * expected,
+                "{name}: {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn without_deviation_there_is_none() {
+        let noise = Noise::new(0.0, 1);
+        assert!(noise.of_frame(0).take(100).all(|pixel| pixel == [0; 3]));
+    }
+}

@@ -4,10 +4,11 @@ use crate::coverage::Coverage;
 use crate::disc::Outline;
 use crate::frame::rgb565;
 use crate::light::{Light, STEPS};
+use crate::motion::Motion;
 use crate::noise::Noise;
 use crate::{
-    Camera, Disc, Film, Frame, Load, MARKERS, MarkerTruth, Motion, Options, Paint, Preset,
-    SceneError, StandInFilm, Truth,
+    Camera, Disc, Film, Frame, Load, MARKERS, MarkerTruth, Options, Paint, Preset, SceneError,
+    StandInFilm, Truth,
 };
 
 /// A simulated sensor and what presses it. Frames depend on nothing but the scene and the arguments.
@@ -23,8 +24,14 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene by name (`rest`, `static`, `demo`, `sweep`: see [`Motion`]) at a frame size (4:3, 160×120 to
-    /// 800×600), with default options. The seed decides the noise, and where `demo` starts.
+    /// A scene by name, with default options, at a frame size (4:3, 160×120 to 800×600). The seed decides the noise,
+    /// and where `demo` starts.
+    ///
+    /// - `rest`: nothing presses.
+    /// - `static`: 0.1 N at α = 4°, β = −3°.
+    /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F| 0.02–0.2 N, |α| ≤ 8°,
+    ///   |β| ≤ 6°.
+    /// - `sweep`: |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then at α = ±8°, then at β = ±6°.
     ///
     /// # Errors
     /// When there is no scene of that name or the size is another.
