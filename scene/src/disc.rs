@@ -83,7 +83,15 @@ impl Outline {
         })
     }
 
-    /// Area in px² and its centroid in px. The area must not be 0.
+    /// Area in px²; 0 without corners.
+    pub(crate) fn area(&self) -> f64 {
+        if self.corners.is_empty() {
+            return 0.0;
+        }
+        self.area_and_centroid().0
+    }
+
+    /// Area in px² and its centroid in px. There must be corners; without an area the centroid is no number.
     pub(crate) fn area_and_centroid(&self) -> (f64, [f64; 2]) {
         // Moments about a corner, so that no digits are lost far from the origin.
         let [ox, oy] = self.corners[0];

@@ -1,4 +1,7 @@
 //! Colours and the light they are seen in.
+//!
+//! Channels are proportional to the light (no gamma), so that a pixel half covered is half way between two colours.
+//! The film is taken to fill the picture.
 
 use crate::camera::centre;
 use crate::load::radians;

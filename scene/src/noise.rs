@@ -4,10 +4,18 @@
 //! (SplitMix64's output function over a Weyl sequence) gives 12 bits per channel, and each picks a quantile of the
 //! normal distribution from a table: |z| ≤ 3.7, standard deviation within 0.1 % of the one asked for.
 
+use std::sync::LazyLock;
+
 /// Quantiles in the table.
 const QUANTILES: usize = 4096;
 /// SplitMix64's increment, the odd number nearest to 2⁶⁴ / golden ratio.
 const WEYL: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The middle quantiles of as many equal parts of the standard normal distribution; made once, as that takes a while.
+static UNIT: LazyLock<Vec<f64>> = LazyLock::new(|| {
+    let middle = |i: usize| (i as f64 + 0.5) / QUANTILES as f64;
+    (0..QUANTILES).map(|i| normal_quantile(middle(i))).collect()
+});
 
 /// A table of noise, in steps of 1/64 level.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,11 +27,9 @@ pub(crate) struct Noise {
 impl Noise {
     /// Noise of a standard deviation in steps, at most 4096.
     pub(crate) fn new(deviation: f64, seed: u64) -> Noise {
-        let quantile = |i: usize| normal_quantile((i as f64 + 0.5) / QUANTILES as f64);
+        let scaled = |quantile: &f64| (deviation * quantile).round() as i16;
         Noise {
-            table: (0..QUANTILES)
-                .map(|i| (deviation * quantile(i)).round() as i16)
-                .collect(),
+            table: UNIT.iter().map(scaled).collect(),
             seed,
         }
     }

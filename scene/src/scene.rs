@@ -166,13 +166,11 @@ impl Scene {
     fn marker_truth(&self, image: &Outline) -> Option<MarkerTruth> {
         let (area_px2, centroid_px) = image.area_and_centroid();
         let inside = image.clipped(self.camera.width(), self.camera.height());
-        if inside.corners.is_empty() {
-            return None;
-        }
-        Some(MarkerTruth {
+        let visible = inside.area() / area_px2;
+        (visible > 0.0).then_some(MarkerTruth {
             centroid_px,
             area_px2,
-            visible: inside.area_and_centroid().0 / area_px2,
+            visible: visible.min(1.0),
         })
     }
 }

@@ -1,5 +1,7 @@
 //! Where the markers are seen, and how that changes with the load.
 
+use proptest::prelude::*;
+
 use hivtac_scene::{
     Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Load, MARKER_REST_MM, Mounting, Options, Preset,
     Scene, SceneError,
@@ -175,6 +177,29 @@ fn truth_says_what_is_missing_cut_or_gone() {
         under(gone, Load::REST).map(|m| m.is_some()),
         [true, false, false, true]
     );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+    #[test]
+    fn truth_is_sound_for_any_load_and_mounting(
+        force_n in 0.0..1.1, alpha in -89.0..89.0, beta in -89.0..89.0,
+        dx in -200.0..200.0, dy in -200.0..200.0, roll_deg in -45.0..45.0,
+    ) {
+        let mounting = Mounting { shift_px: [dx, dy], roll_deg };
+        let options = Options { mounting, ..Options::default() };
+        let scene = scene(Preset::Ov7725, (160, 120)).with_options(options).unwrap();
+        let Ok(frame) = scene.render_load(&press(force_n, alpha, beta), 0) else {
+            prop_assert!(force_n > 0.8, "{force_n} N is refused");
+            return Ok(());
+        };
+        for marker in frame.truth.markers.into_iter().flatten() {
+            prop_assert!(marker.visible > 0.0 && marker.visible <= 1.0);
+            prop_assert!(marker.area_px2 > 0.0 && marker.area_px2 < 200.0, "{} px²", marker.area_px2);
+            let [x, y] = marker.centroid_px;
+            prop_assert!((-40.0..200.0).contains(&x) && (-40.0..160.0).contains(&y), "{x}, {y}");
+        }
+    }
 }
 
 #[test]
