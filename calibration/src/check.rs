@@ -1,0 +1,166 @@
+//! A quick check of a model file: frames that no training saw, through the whole pipeline, against the truth.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use anyhow::{Result, anyhow};
+use hivtac_sensing::force::Force;
+use hivtac_sensing::model::{ContactReading, Model};
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::threshold::ByteOrder;
+use rayon::prelude::*;
+
+use crate::dataset::{Recipe, measure, reasons};
+use crate::errors::{Errors, WEAK_N};
+use crate::weights::Range;
+
+/// What a check found.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The model: its widths and preset, and what its numbers mean.
+    pub model: String,
+    /// Errors of all frames that gave a force, those that carry a warning included.
+    pub errors: Errors,
+    /// Frames that gave no force, by status.
+    pub rejected: BTreeMap<String, usize>,
+}
+
+/// Renders `samples` frames of random loads inside the model's calibrated range and lets the pipeline measure them.
+///
+/// # Errors
+/// When the bytes are no model, or the model is for conditions that cannot be rendered.
+pub fn check(
+    model: &[u8],
+    samples: usize,
+    seed: u64,
+    progress: impl Fn() + Sync,
+) -> Result<Report> {
+    let model = Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
+    let recipe = recipe(&model, samples, seed);
+    let scene = recipe.scene()?;
+    let eyes = || sensor(&model);
+    let measured = (0..samples).into_par_iter().map_init(eyes, |sensor, row| {
+        let sensor = sensor.as_mut().map_err(|error| anyhow!("{error}"))?;
+        let frame = scene.render_load(&recipe.load(row)?, row as u64)?;
+        let measurement = measure(sensor, &frame);
+        progress();
+        let force = measurement
+            .force
+            .map(vector_n)
+            .ok_or_else(|| reasons(measurement.status));
+        Ok((frame.truth.force.vector_n(), force))
+    });
+    let mut report = Report {
+        model: describe(&model),
+        errors: Errors::default(),
+        rejected: BTreeMap::new(),
+    };
+    for (truth, found) in measured.collect::<Result<Vec<_>>>()? {
+        match found {
+            Ok(found) => report.errors.add(found, truth),
+            Err(status) => *report.rejected.entry(status).or_default() += 1,
+        }
+    }
+    Ok(report)
+}
+
+/// Random loads inside what the model says it can do.
+fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Recipe {
+    let geometry = model.conditions.geometry;
+    let range = Range {
+        force_n: f64::from(model.range.magnitude.0) / 1e6,
+        alpha_deg: f64::from(model.range.alpha.0) / 1e3,
+        beta_deg: f64::from(model.range.beta.0) / 1e3,
+    };
+    let (width, height) = (geometry.width, geometry.height);
+    Recipe {
+        preset: model.conditions.preset,
+        width,
+        height,
+        samples,
+        rest: 0,
+        range,
+        seed,
+    }
+}
+
+fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
+    let mut sensor = Box::new(Sensor::new());
+    let settings = Settings::of_model(model, ByteOrder::Native);
+    sensor
+        .configure(settings, Some(*model))
+        .map_err(|error| anyhow!("{error}"))?;
+    Ok(sensor)
+}
+
+/// The force's vector in N, rebuilt from its angles: this holds for every contact reading.
+fn vector_n(force: Force) -> [f64; 3] {
+    let degrees = |angle: i32| (f64::from(angle) / 1e3).to_radians();
+    let (sin_a, cos_a) = degrees(force.alpha.0).sin_cos();
+    let (sin_b, cos_b) = degrees(force.beta.0).sin_cos();
+    [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| part * f64::from(force.magnitude.0) / 1e6)
+}
+
+fn describe(model: &Model<'_>) -> String {
+    let origin = if model.is_simulated() {
+        "trained on a simulated sensor"
+    } else {
+        "calibrated on a unit"
+    };
+    let contact = match model.conditions.contact {
+        ContactReading::Force => "force",
+        ContactReading::Stick => "stick",
+        ContactReading::Slip => "slip",
+    };
+    format!(
+        "{} (CRC {:08x}), {origin}, contact reading `{contact}`",
+        model.name(),
+        model.crc()
+    )
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            model,
+            errors,
+            rejected,
+        } = self;
+        writeln!(f, "model                 {model}")?;
+        writeln!(
+            f,
+            "frames                simulated: the same stand-in sensor as in training, other loads and noise"
+        )?;
+        writeln!(f, "forces                {}", errors.count())?;
+        writeln!(
+            f,
+            "mean direction error  {:.3}° (angle between vectors)",
+            errors.mean_direction_deg()
+        )?;
+        let (strong, weak) = (errors.strong_count(), WEAK_N * 1e3);
+        writeln!(
+            f,
+            "  |F| ≥ {weak} mN        {:.3}° ({strong} frames)",
+            errors.mean_strong_direction_deg()
+        )?;
+        writeln!(
+            f,
+            "RMSE of |F|           {:.3} mN",
+            errors.magnitude_rmse_n() * 1e3
+        )?;
+        writeln!(
+            f,
+            "RMSE of Fx, Fy        {:.3} mN",
+            errors.lateral_rmse_n() * 1e3
+        )?;
+        write!(
+            f,
+            "frames without force  {}",
+            rejected.values().sum::<usize>()
+        )?;
+        rejected
+            .iter()
+            .try_for_each(|(status, count)| write!(f, "\n  {status}: {count}"))
+    }
+}

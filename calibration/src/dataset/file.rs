@@ -1,0 +1,202 @@
+//! Data sets as files: CSV, one row a frame, under comment lines that say what it is.
+//!
+//! The first line names the format, the second holds [`About`] as JSON; both begin with `#`. Features are written as
+//! exact decimals, so that reading gives the very integers that the pipeline produced.
+
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use csv::StringRecord;
+use hivtac_sensing::features::FEATURES;
+
+use super::{About, Dataset, Observation, PX, Row};
+
+const FORMAT: &str =
+    "# hivtac-dataset 1; forces in N in the film frame, features in px (area in px²), areas in px";
+const COLUMNS: [&str; 19] = [
+    "fx_n",
+    "fy_n",
+    "fz_n",
+    "x0_px",
+    "y0_px",
+    "x1_px",
+    "y1_px",
+    "x2_px",
+    "y2_px",
+    "x3_px",
+    "y3_px",
+    "rect_x_px",
+    "rect_y_px",
+    "rect_area_px2",
+    "area0_px",
+    "area1_px",
+    "area2_px",
+    "area3_px",
+    "status",
+];
+const FEATURES_AT: usize = 3;
+const AREAS_AT: usize = FEATURES_AT + FEATURES;
+const STATUS_AT: usize = AREAS_AT + 4;
+
+impl Dataset {
+    /// Writes the data set.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let write = || -> Result<()> {
+            let mut file = BufWriter::new(File::create(path)?);
+            writeln!(file, "{FORMAT}\n# {}", serde_json::to_string(&self.about)?)?;
+            let mut table = csv::Writer::from_writer(file);
+            table.write_record(COLUMNS)?;
+            for row in &self.rows {
+                table.write_record(fields(row))?;
+            }
+            Ok(table.flush()?)
+        };
+        write().with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// Reads a data set.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is not a data set; names the line.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text =
+            fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        Self::parse(&text).with_context(|| format!("{} is not a usable data set", path.display()))
+    }
+
+    fn parse(text: &str) -> Result<Self> {
+        let mut lines = text.lines();
+        let first = lines.next().unwrap_or_default();
+        ensure!(first == FORMAT, "line 1 is not `{FORMAT}`");
+        let about = lines
+            .next()
+            .and_then(|line| line.strip_prefix("# "))
+            .context("line 2 says nothing about it")?;
+        let about: About = serde_json::from_str(about).context("line 2")?;
+        let mut table = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .from_reader(text.as_bytes());
+        ensure!(
+            table.headers()?.iter().eq(COLUMNS),
+            "the columns are not {}",
+            COLUMNS.join(",")
+        );
+        let rows = table.records().map(|record| {
+            let record = record?;
+            let line = record.position().map_or(0, csv::Position::line);
+            row(&record).with_context(|| format!("line {line}"))
+        });
+        Ok(Self {
+            about,
+            rows: rows.collect::<Result<_>>()?,
+        })
+    }
+}
+
+fn fields(row: &Row) -> Vec<String> {
+    let mut fields: Vec<String> = row.force_n.iter().map(f64::to_string).collect();
+    match &row.seen {
+        Ok(seen) => {
+            fields.extend(seen.features_px().iter().map(f64::to_string));
+            fields.extend(seen.areas_px.iter().map(u32::to_string));
+            fields.push(String::new());
+        }
+        Err(status) => {
+            fields.resize(STATUS_AT, String::new());
+            fields.push(status.clone());
+        }
+    }
+    fields
+}
+
+fn row(record: &StringRecord) -> Result<Row> {
+    let force_n = [number(record, 0)?, number(record, 1)?, number(record, 2)?];
+    let seen = match &record[STATUS_AT] {
+        "" => Ok(observation(record)?),
+        status => Err(status.to_owned()),
+    };
+    Ok(Row { force_n, seen })
+}
+
+fn observation(record: &StringRecord) -> Result<Observation> {
+    let mut seen = Observation {
+        features_q16: [0; FEATURES],
+        areas_px: [0; 4],
+    };
+    for (i, feature) in seen.features_q16.iter_mut().enumerate() {
+        *feature = (number(record, FEATURES_AT + i)? * PX).round() as i64;
+    }
+    for (i, area) in seen.areas_px.iter_mut().enumerate() {
+        let text = &record[AREAS_AT + i];
+        *area = text
+            .parse()
+            .with_context(|| format!("column {}: `{text}`", COLUMNS[AREAS_AT + i]))?;
+    }
+    Ok(seen)
+}
+
+fn number(record: &StringRecord, column: usize) -> Result<f64> {
+    let text = &record[column];
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => bail!(
+            "column {}: `{text}` is not a finite number",
+            COLUMNS[column]
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::example;
+    use super::*;
+
+    fn saved(dataset: &Dataset) -> String {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("data.csv");
+        dataset.save(&path).unwrap();
+        assert_eq!(Dataset::load(&path).unwrap(), *dataset);
+        fs::read_to_string(path).unwrap()
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let text = saved(&example());
+        for words in [
+            "force",
+            "ov7725",
+            "\"seed\":3",
+            "made up",
+            "fx_n",
+            "rect_area_px2",
+            "markers_missing",
+        ] {
+            assert!(text.contains(words), "no `{words}` in:\n{text}");
+        }
+    }
+
+    #[test]
+    fn bad_files_are_refused_with_the_place() {
+        let text = saved(&example());
+        let refused = |bad: String, words: &str| {
+            let error = format!("{:#}", Dataset::parse(&bad).unwrap_err());
+            assert!(error.contains(words), "{error}");
+        };
+        refused(String::new(), "line 1");
+        refused(text.replace("dataset 1", "dataset 9"), "line 1");
+        refused(text.replace("\"seed\":3", "\"sead\":3"), "line 2");
+        refused(text.replace("area3_px", "area4_px"), "columns");
+        refused(
+            text.replace("0,0,0,", "0,zero,0,"),
+            "line 4: column fy_n: `zero`",
+        );
+        refused(text.replace("0,0,0,", "0,inf,0,"), "column fy_n");
+        refused(text.replace(",200,200,", ",200,2.5,"), "column area");
+        refused(text.replace("markers_missing", "a,b"), "line 7");
+    }
+}

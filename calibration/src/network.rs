@@ -1,0 +1,273 @@
+//! A small fully connected network in plain floats: what training produces and what is quantized.
+
+use anyhow::{Result, ensure};
+use serde::{Deserialize, Serialize};
+
+/// Features that enter the network (`sensing::features`).
+pub const INPUTS: usize = 11;
+/// Components of the force that leave it: F_x, F_y, F_z.
+pub const OUTPUTS: usize = 3;
+
+/// One layer: y = W·x + b. Every layer but a network's last is followed by ReLU.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Layer {
+    /// W as \[output\]\[input\], as PyTorch stores it.
+    pub weights: Vec<Vec<f32>>,
+    /// b, one for each output.
+    pub bias: Vec<f32>,
+}
+
+impl Layer {
+    /// Inputs of the layer.
+    pub fn inputs(&self) -> usize {
+        self.weights.first().map_or(0, Vec::len)
+    }
+
+    /// Outputs of the layer.
+    pub fn outputs(&self) -> usize {
+        self.weights.len()
+    }
+
+    fn apply(&self, x: &[f64]) -> Vec<f64> {
+        let dot =
+            |row: &Vec<f32>| -> f64 { row.iter().zip(x).map(|(&w, &x)| f64::from(w) * x).sum() };
+        self.weights
+            .iter()
+            .zip(&self.bias)
+            .map(|(row, &b)| dot(row) + f64::from(b))
+            .collect()
+    }
+}
+
+/// Mean and standard deviation, component by component.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Standardization {
+    /// Means.
+    pub mean: Vec<f64>,
+    /// Standard deviations, all > 0.
+    pub sigma: Vec<f64>,
+}
+
+impl Standardization {
+    /// Means and population standard deviations of `rows`. A component that does not vary gets σ = 1, so that
+    /// it standardizes to zero instead of dividing by zero.
+    ///
+    /// # Errors
+    /// When `rows` is empty.
+    pub fn of<const N: usize>(rows: &[[f64; N]]) -> Result<Self> {
+        ensure!(
+            !rows.is_empty(),
+            "nothing to standardize: the data set has no usable row"
+        );
+        let count = rows.len() as f64;
+        let mean: Vec<f64> = (0..N)
+            .map(|i| rows.iter().map(|r| r[i]).sum::<f64>() / count)
+            .collect();
+        let variance = |i: usize| {
+            rows.iter()
+                .map(|r| (r[i] - mean[i]) * (r[i] - mean[i]))
+                .sum::<f64>()
+                / count
+        };
+        let sigma = (0..N).map(|i| Self::usable(variance(i).sqrt())).collect();
+        Ok(Self { mean, sigma })
+    }
+
+    fn usable(sigma: f64) -> f64 {
+        if sigma > 1e-9 { sigma } else { 1.0 }
+    }
+
+    /// (x − mean) / σ.
+    pub fn forward(&self, x: &[f64]) -> Vec<f64> {
+        x.iter()
+            .zip(&self.mean)
+            .zip(&self.sigma)
+            .map(|((x, m), s)| (x - m) / s)
+            .collect()
+    }
+
+    /// x·σ + mean.
+    pub fn backward(&self, x: &[f64]) -> Vec<f64> {
+        x.iter()
+            .zip(&self.mean)
+            .zip(&self.sigma)
+            .map(|((x, m), s)| x * s + m)
+            .collect()
+    }
+}
+
+/// A network with its input and output scaling: features in pixels to a force in newtons.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Network {
+    /// Features in px (the rectangle's area in px²).
+    pub input: Standardization,
+    /// Force components in N.
+    pub output: Standardization,
+    /// For each hidden layer, the largest activation that its seven bits can carry (see `quantize`).
+    pub activation_max: Vec<f64>,
+    /// The layers, in order.
+    pub layers: Vec<Layer>,
+}
+
+impl Network {
+    /// Checks that the parts fit each other and that every number is finite.
+    ///
+    /// # Errors
+    /// Says which part does not fit.
+    pub fn validate(&self) -> Result<()> {
+        ensure!(!self.layers.is_empty(), "the network has no layers");
+        let scaling = |s: &Standardization, n: usize| s.mean.len() == n && s.sigma.len() == n;
+        ensure!(
+            scaling(&self.input, INPUTS),
+            "the input scaling needs {INPUTS} means and deviations"
+        );
+        ensure!(
+            scaling(&self.output, OUTPUTS),
+            "the output scaling needs {OUTPUTS} means and deviations"
+        );
+        self.validate_layers()?;
+        let deviations = self
+            .input
+            .sigma
+            .iter()
+            .chain(&self.output.sigma)
+            .chain(&self.activation_max);
+        ensure!(
+            deviations.clone().all(|&s| s.is_finite() && s > 0.0),
+            "deviations and maxima must be above zero"
+        );
+        let means = self.input.mean.iter().chain(&self.output.mean);
+        ensure!(
+            means.clone().all(|m| m.is_finite()),
+            "a mean is not a finite number"
+        );
+        Ok(())
+    }
+
+    fn validate_layers(&self) -> Result<()> {
+        let hidden = self.layers.len() - 1;
+        ensure!(
+            self.activation_max.len() == hidden,
+            "{hidden} hidden layers need {hidden} activation maxima"
+        );
+        let mut inputs = INPUTS;
+        for (i, layer) in self.layers.iter().enumerate() {
+            let shape_ok =
+                layer.outputs() > 0 && layer.weights.iter().all(|row| row.len() == inputs);
+            ensure!(shape_ok, "layer {i} is not a matrix with {inputs} columns");
+            ensure!(
+                layer.bias.len() == layer.outputs(),
+                "layer {i} needs {} biases",
+                layer.outputs()
+            );
+            let mut numbers = layer.weights.iter().flatten().chain(&layer.bias);
+            ensure!(
+                numbers.all(|w| w.is_finite()),
+                "layer {i} holds a number that is not finite"
+            );
+            inputs = layer.outputs();
+        }
+        ensure!(
+            inputs == OUTPUTS,
+            "the last layer has {inputs} outputs instead of {OUTPUTS}"
+        );
+        Ok(())
+    }
+
+    /// The float reference: features (px, px²) to a force (N).
+    pub fn predict(&self, features: &[f64; INPUTS]) -> [f64; OUTPUTS] {
+        let (last, hidden) = self
+            .layers
+            .split_last()
+            .expect("validated: at least one layer");
+        let mut x = self.input.forward(features);
+        for layer in hidden {
+            x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
+        }
+        let y = self.output.backward(&last.apply(&x));
+        [y[0], y[1], y[2]]
+    }
+
+    /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so that a layer
+    /// that never fires can still be scaled.
+    pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
+        let mut maxima = vec![1e-6; self.layers.len() - 1];
+        for row in rows {
+            let mut x = self.input.forward(row);
+            for (layer, max) in self.layers.iter().zip(&mut maxima) {
+                x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
+                *max = x.iter().copied().fold(*max, f64::max);
+            }
+        }
+        maxima
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_component_standardizes_to_zero() {
+        let scaling = Standardization::of(&[[1.0, 5.0], [3.0, 5.0]]).unwrap();
+        assert_eq!(scaling.mean, [2.0, 5.0]);
+        assert_eq!(scaling.sigma, [1.0, 1.0]);
+        assert_eq!(scaling.forward(&[3.0, 5.0]), [1.0, 0.0]);
+        assert_eq!(scaling.backward(&[1.0, 0.0]), [3.0, 5.0]);
+    }
+
+    #[test]
+    fn nothing_cannot_be_standardized() {
+        assert!(Standardization::of::<2>(&[]).is_err());
+    }
+
+    fn tiny() -> Network {
+        let ones = |n: usize| Standardization {
+            mean: vec![0.0; n],
+            sigma: vec![1.0; n],
+        };
+        let hidden = Layer {
+            weights: vec![vec![1.0; INPUTS], vec![-1.0; INPUTS]],
+            bias: vec![0.5, 0.0],
+        };
+        let last = Layer {
+            weights: vec![vec![1.0, 2.0]; OUTPUTS],
+            bias: vec![0.0, 1.0, -1.0],
+        };
+        Network {
+            input: ones(INPUTS),
+            output: ones(OUTPUTS),
+            activation_max: vec![1.0],
+            layers: vec![hidden, last],
+        }
+    }
+
+    #[test]
+    fn the_forward_pass_is_layers_and_relu() {
+        let network = tiny();
+        network.validate().unwrap();
+        assert_eq!(network.predict(&[1.0; INPUTS]), [11.5, 12.5, 10.5]);
+        assert_eq!(network.predict(&[-1.0; INPUTS]), [22.0, 23.0, 21.0]);
+        assert_eq!(
+            network.activation_maxima(&[[1.0; INPUTS], [-2.0; INPUTS]]),
+            [22.0]
+        );
+    }
+
+    #[test]
+    fn parts_that_do_not_fit_are_refused() {
+        let refused = |change: fn(&mut Network), words: &str| {
+            let mut network = tiny();
+            change(&mut network);
+            let error = network.validate().unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        };
+        refused(|n| n.layers.clear(), "no layers");
+        refused(|n| n.layers[0].weights[1].truncate(3), "layer 0");
+        refused(|n| n.layers[1].bias.truncate(2), "biases");
+        refused(|n| n.layers[1].weights.truncate(2), "layer 1");
+        refused(|n| n.layers[0].weights[0][0] = f32::NAN, "not finite");
+        refused(|n| n.input.sigma[4] = 0.0, "above zero");
+        refused(|n| n.activation_max.clear(), "maxima");
+    }
+}

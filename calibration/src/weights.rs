@@ -1,0 +1,183 @@
+//! The weights file: a trained network in floats, with all that the exporter needs to make a model file of it.
+
+use std::{fs, path::Path};
+
+use anyhow::{Context, Result, ensure};
+use hivtac_sensing::features::{FEATURES, Features};
+use hivtac_sensing::units::Px;
+use serde::{Deserialize, Serialize};
+
+use crate::conditions::Conditions;
+use crate::network::Network;
+
+/// What the file calls itself.
+const FORMAT: &str = "hivtac-weights 1";
+
+/// A weights file. JSON; its floats are written so that reading gives the same bits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Weights {
+    /// Name and version of the format.
+    pub format: String,
+    /// What the network was trained for.
+    pub conditions: Conditions,
+    /// The untouched film.
+    pub rest: Rest,
+    /// The forces it was trained for.
+    pub range: Range,
+    /// How well the quantized network knows forces that it was not trained on.
+    pub uncertainty: Uncertainty,
+    /// How it came to be, for the reader.
+    pub training: Training,
+    /// The network.
+    pub network: Network,
+}
+
+/// The rest position.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rest {
+    /// The eleven features in 1/65,536 px (the rectangle's area in 1/65,536 px²).
+    pub features_q16: [i64; FEATURES],
+    /// Areas of markers 0–3 in the mask, px.
+    pub areas_px: [u32; 4],
+}
+
+/// The calibrated range: 0 to `force_n`, angles to ± their limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// Largest |F|, N.
+    pub force_n: f64,
+    /// Largest |α|, degrees.
+    pub alpha_deg: f64,
+    /// Largest |β|, degrees.
+    pub beta_deg: f64,
+}
+
+impl Default for Range {
+    /// The paper's range (Section 6).
+    fn default() -> Self {
+        Self {
+            force_n: 0.2,
+            alpha_deg: 10.0,
+            beta_deg: 8.0,
+        }
+    }
+}
+
+/// Standard uncertainties: root mean square errors on rows that were held out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Uncertainty {
+    /// Of F_x and of F_y, N.
+    pub lateral_n: f64,
+    /// Of F_z, N.
+    pub normal_n: f64,
+}
+
+/// How a network was trained.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Training {
+    /// What the data shows, as its file says.
+    pub scene: String,
+    /// Seed of the data.
+    pub data_seed: u64,
+    /// Rows trained on.
+    pub rows: usize,
+    /// Seed of first weights, shuffling and the choice of held-out rows.
+    pub seed: u64,
+    /// Passes over the data in floats.
+    pub epochs: usize,
+    /// Passes with the chip's rounding.
+    pub rounded_epochs: usize,
+}
+
+impl Weights {
+    /// The name that a file of this version carries.
+    pub fn format() -> String {
+        FORMAT.into()
+    }
+
+    /// Reads and checks a weights file.
+    ///
+    /// # Errors
+    /// When it cannot be read, is not a weights file of this version, or its parts do not fit each other.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text =
+            fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        Self::parse(&text)
+            .with_context(|| format!("{} is not a usable weights file", path.display()))
+    }
+
+    /// Reads and checks the text of a weights file.
+    ///
+    /// # Errors
+    /// When it is not a weights file of this version, or its parts do not fit each other.
+    pub fn parse(text: &str) -> Result<Self> {
+        let weights: Self = serde_json::from_str(text)?;
+        ensure!(
+            weights.format == FORMAT,
+            "its format is `{}`, this program reads `{FORMAT}`",
+            weights.format
+        );
+        weights.network.validate()?;
+        weights.check_numbers()?;
+        Ok(weights)
+    }
+
+    fn check_numbers(&self) -> Result<()> {
+        let Range {
+            force_n,
+            alpha_deg,
+            beta_deg,
+        } = self.range;
+        ensure!(
+            force_n > 0.0 && force_n <= 1000.0,
+            "range.force_n is {force_n}: use above 0, to 1000"
+        );
+        for (name, angle) in [("alpha_deg", alpha_deg), ("beta_deg", beta_deg)] {
+            ensure!(
+                (0.0..=90.0).contains(&angle),
+                "range.{name} is {angle}: use 0 to 90"
+            );
+        }
+        let Uncertainty {
+            lateral_n,
+            normal_n,
+        } = self.uncertainty;
+        for (name, sigma) in [("lateral_n", lateral_n), ("normal_n", normal_n)] {
+            ensure!(
+                (0.0..=1000.0).contains(&sigma),
+                "uncertainty.{name} is {sigma}: use 0 to 1000"
+            );
+        }
+        features_from_q16(&self.rest.features_q16).context("rest.features_q16")?;
+        Ok(())
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string(self)? + "\n";
+        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    }
+}
+
+/// The eleven numbers in the paper's order, each with 16 fractional bits, as features.
+///
+/// # Errors
+/// When a coordinate does not fit 32 bits.
+pub fn features_from_q16(q16: &[i64; FEATURES]) -> Result<Features> {
+    let px = |i: usize| -> Result<Px> {
+        let value = i32::try_from(q16[i]);
+        Ok(Px(value.with_context(|| {
+            format!("feature {i} is {} and does not fit 32 bits", q16[i])
+        })?))
+    };
+    let pair = |i: usize| -> Result<(Px, Px)> { Ok((px(2 * i)?, px(2 * i + 1)?)) };
+    Ok(Features {
+        centroids: [pair(0)?, pair(1)?, pair(2)?, pair(3)?],
+        rect_center: pair(4)?,
+        rect_area: q16[10],
+    })
+}
