@@ -1,3 +1,108 @@
-//! placeholder
+//! The HiVTac sensor's program for the STM32H743.
+//!
+//! ```text
+//! vsync ─┐
+//! camera ┴→ capture → frame buffers → pipeline → outbox → usb → host
+//!                                        ↑                 │
+//!                                     orders ← commands ←──┘
+//! ```
+//!
+//! Who interrupts whom: [`priorities`]. What lies where: `memory.x`, [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
+
+mod board;
+mod caches;
+mod camera;
+mod capture;
+mod capture_task;
+mod commands;
+mod convert;
+mod faults;
+mod frame;
+mod frame_dma;
+mod health;
+mod info;
+mod log;
+mod model;
+mod outbox;
+mod pipeline_task;
+mod priorities;
+mod seeded_bugs;
+mod session;
+mod stats;
+mod tare;
+mod usb;
+mod vsync;
+
+use board::Board;
+use cortex_m_rt::entry;
+use defmt_rtt as _;
+use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
+use embassy_stm32::interrupt;
+use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::model::Model;
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::threshold::ByteOrder;
+use static_cell::{ConstStaticCell, StaticCell};
+
+static CAPTURE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static USB_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
+static SENSOR: ConstStaticCell<Sensor<'static>> = ConstStaticCell::new(Sensor::new());
+
+#[entry]
+fn main() -> ! {
+    let mut core = cortex_m::Peripherals::take().expect("first and only use");
+    caches::enable(&mut core);
+    let board = Board::start();
+    faults::report_reset();
+    priorities::set();
+    frame::provide_buffers();
+    vsync::start();
+    let model = model::embedded();
+    let sensor = SENSOR.take();
+    configure(sensor, model);
+
+    let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
+    usb.spawn(token(usb::run(board.usb, model)));
+    usb.spawn(token(health::run(board.led)));
+    let capture = CAPTURE_EXECUTOR.start(priorities::CAPTURE_EXECUTOR);
+    capture.spawn(token(capture_task::run(board.camera, board.capture)));
+    THREAD_EXECUTOR
+        .init(Executor::new())
+        .run(|spawner: Spawner| {
+            spawner.spawn(token(pipeline_task::run(sensor)));
+            spawner.spawn(token(faults::feed_watchdog(board.watchdog)));
+        })
+}
+
+/// Sets the pipeline to what the camera delivers and the model was made for.
+fn configure(sensor: &mut Sensor<'static>, model: Option<Model<'static>>) {
+    let geometry = Geometry::preset(Preset::Ov7725, camera::WIDTH, camera::HEIGHT);
+    let settings = Settings::usual(geometry, ByteOrder::Swapped);
+    if sensor.configure(settings, model).is_err() {
+        defmt::panic!("the built-in settings are out of range");
+    }
+}
+
+/// Each task is started once, at boot; a second start would be a bug of this file.
+fn token<S, E>(result: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
+    match result {
+        Ok(token) => token,
+        Err(_) => defmt::panic!("a task was started twice"),
+    }
+}
+
+#[interrupt]
+unsafe fn UART4() {
+    // SAFETY: this is the executor's interrupt, and nobody else calls it.
+    unsafe { CAPTURE_EXECUTOR.on_interrupt() }
+}
+
+#[interrupt]
+unsafe fn UART5() {
+    // SAFETY: as above.
+    unsafe { USB_EXECUTOR.on_interrupt() }
+}

@@ -1,0 +1,4 @@
+//! The board in use: all of its pins and clocks. A second board is one more file with the same names.
+
+mod weact;
+pub use weact::*;

@@ -1,0 +1,84 @@
+//! Caches and the memory protection unit.
+//!
+//! Both caches are on: code and model lie in flash, which is slow without them. What the DMA writes and the core
+//! reads lies in AXI SRAM, which one MPU region makes normal, non-cacheable memory. So no cache line can ever
+//! hold a stale pixel and no code has to remember to invalidate one. DTCM is never cached.
+
+use cortex_m::Peripherals;
+use cortex_m::peripheral::MPU;
+
+/// `MPU_RASR` of a region: attributes in the bits that the architecture gives them (ARMv7-M, B3.5.9).
+struct Region {
+    base: u32,
+    /// log2 of the size in bytes.
+    size_log2: u32,
+    /// Eighths of the region that do not belong to it.
+    disabled_eighths: u32,
+    access: u32,
+    /// TEX, S, C, B.
+    memory_type: u32,
+}
+
+const NO_ACCESS: u32 = 0b000 << 24;
+const FULL_ACCESS: u32 = 0b011 << 24;
+const STRONGLY_ORDERED: u32 = 0;
+/// TEX = 1, C = 0, B = 0; shareable, as two bus masters use it.
+const NORMAL_NON_CACHEABLE: u32 = 1 << 19 | 1 << 18;
+const NEVER_EXECUTE: u32 = 1 << 28;
+
+/// External memory (0x6000_0000 to 0xDFFF_FFFF) is not fitted, but the core may read there speculatively and then
+/// waits for ever (ST AN4838, section 4): no access at all.
+const EXTERNAL_MEMORY: Region = Region {
+    base: 0,
+    size_log2: 32,
+    disabled_eighths: 0b1000_0111,
+    access: NO_ACCESS,
+    memory_type: STRONGLY_ORDERED,
+};
+
+/// AXI SRAM: the DMA buffers.
+const DMA_BUFFERS: Region = Region {
+    base: 0x2400_0000,
+    size_log2: 19,
+    disabled_eighths: 0,
+    access: FULL_ACCESS,
+    memory_type: NORMAL_NON_CACHEABLE,
+};
+
+/// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA buffer.
+pub fn enable(core: &mut Peripherals) {
+    set_regions(&mut core.MPU);
+    core.SCB.enable_icache();
+    core.SCB.enable_dcache(&mut core.CPUID);
+}
+
+fn set_regions(mpu: &mut MPU) {
+    const ENABLE: u32 = 1;
+    /// Everywhere else the architecture's default memory map holds.
+    const PRIVILEGED_DEFAULT: u32 = 1 << 2;
+    cortex_m::asm::dmb();
+    // SAFETY: the program has not yet used either region, and everything it does use keeps its default attributes.
+    unsafe {
+        mpu.ctrl.write(0);
+        for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS]) {
+            mpu.rnr.write(number);
+            mpu.rbar.write(region.base);
+            mpu.rasr.write(region.attributes());
+        }
+        mpu.ctrl.write(ENABLE | PRIVILEGED_DEFAULT);
+    }
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+impl Region {
+    fn attributes(&self) -> u32 {
+        const ENABLE: u32 = 1;
+        NEVER_EXECUTE
+            | self.access
+            | self.memory_type
+            | self.disabled_eighths << 8
+            | (self.size_log2 - 1) << 1
+            | ENABLE
+    }
+}

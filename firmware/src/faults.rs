@@ -1,0 +1,54 @@
+//! When all else fails: say so if possible, and start again.
+//!
+//! | what | ends in |
+//! |---|---|
+//! | panic | a line on the debug probe, then a hard fault (`panic-probe`) |
+//! | hard fault: stack overflow, wild pointer, panic | reset at once, touching neither stack nor memory |
+//! | interrupt without a handler | reset |
+//! | thread mode stands still for 2 s, or the core is locked up | reset by the watchdog |
+
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::exception;
+use embassy_stm32::pac::RCC;
+use embassy_stm32::peripherals::IWDG1;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_time::{Duration, Timer};
+use panic_probe as _;
+
+/// A quarter of the watchdog's time.
+const FEED_PERIOD: Duration = Duration::from_millis(500);
+
+/// Logs why the microcontroller was reset, and clears the reasons.
+pub fn report_reset() {
+    let reasons = RCC.rsr().read();
+    defmt::info!(
+        "reset: power {=bool}, pin {=bool}, software or fault {=bool}, watchdog {=bool}",
+        reasons.porrstf(),
+        reasons.pinrstf(),
+        reasons.sftrstf(),
+        reasons.iwdg1rstf()
+    );
+    RCC.rsr().modify(|w| w.set_rmvf(true));
+}
+
+/// Starts the watchdog and feeds it from thread mode: it bites when something above never lets thread mode run.
+#[embassy_executor::task]
+pub async fn feed_watchdog(mut watchdog: IndependentWatchdog<'static, IWDG1>) {
+    watchdog.unleash();
+    loop {
+        watchdog.pet();
+        Timer::after(FEED_PERIOD).await;
+    }
+}
+
+#[exception(trampoline = false)]
+unsafe fn HardFault() -> ! {
+    // After a stack overflow nothing may be pushed.
+    SCB::sys_reset()
+}
+
+#[exception]
+unsafe fn DefaultHandler(number: i16) -> ! {
+    defmt::error!("interrupt {=i16} has no handler", number);
+    SCB::sys_reset()
+}

@@ -1,0 +1,88 @@
+//! The LED: how the sensor is doing, at a glance.
+//!
+//! | pattern | meaning |
+//! |---|---|
+//! | breathes, 4 s | frames give forces |
+//! | blinks once a second | frames arrive but give no force: markers, light or model |
+//! | blinks five times a second | no camera |
+
+use core::sync::atomic::{AtomicU8, Ordering};
+use embassy_stm32::gpio::Output;
+use embassy_time::{Duration, Instant, Timer};
+use micromath::F32Ext;
+
+/// How the sensor is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Condition {
+    /// The camera does not answer or sends nothing.
+    NoCamera = 0,
+    /// Frames arrive but give no force.
+    NoForce = 1,
+    /// Frames give forces.
+    Good = 2,
+}
+
+static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
+
+/// One period of the LED's dimming: fast enough not to flicker.
+const PERIOD: Duration = Duration::from_millis(10);
+const BREATH: Duration = Duration::from_secs(4);
+const SLOW_BLINK: Duration = Duration::from_secs(1);
+const FAST_BLINK: Duration = Duration::from_millis(200);
+
+/// Tells how the sensor is doing from now on.
+pub fn set(condition: Condition) {
+    CONDITION.store(condition as u8, Ordering::Relaxed);
+}
+
+/// Drives the LED for ever.
+#[embassy_executor::task]
+pub async fn run(mut led: Output<'static>) {
+    loop {
+        let lit = lit_time(Instant::now());
+        if lit > Duration::MIN {
+            led.set_high();
+            Timer::after(lit).await;
+        }
+        if lit < PERIOD {
+            led.set_low();
+            Timer::after(PERIOD - lit).await;
+        }
+    }
+}
+
+/// How long the LED is on in the dimming period that begins at `now`.
+fn lit_time(now: Instant) -> Duration {
+    let good = Condition::Good as u8;
+    let no_force = Condition::NoForce as u8;
+    match CONDITION.load(Ordering::Relaxed) {
+        condition if condition == good => {
+            let brightness = brightness(phase(now, BREATH));
+            Duration::from_micros((brightness * PERIOD.as_micros() as f32) as u64)
+        }
+        condition if condition == no_force => blink(now, SLOW_BLINK),
+        _ => blink(now, FAST_BLINK),
+    }
+}
+
+fn blink(now: Instant, period: Duration) -> Duration {
+    if phase(now, period) < 0.5 {
+        PERIOD
+    } else {
+        Duration::MIN
+    }
+}
+
+/// Where `now` lies in its period, 0 to 1.
+fn phase(now: Instant, period: Duration) -> f32 {
+    (now.as_micros() % period.as_micros()) as f32 / period.as_micros() as f32
+}
+
+/// Brightness, 0 to 1, at a phase of the breath: ((1 − cos 2πp) / 2)², squared as the eye is more sensitive to
+/// little light. `micromath`'s cosine is off by at most 0.0011, which makes at most 0.0007 here (both over 4,001
+/// phases): less than a tenth of the smallest step an eye sees.
+fn brightness(phase: f32) -> f32 {
+    let half = (1.0 - (phase * core::f32::consts::TAU).cos()) / 2.0;
+    half * half
+}

@@ -1,0 +1,43 @@
+//! What waits to be sent to the host. Bounded: nobody who measures ever waits for the host.
+
+use crate::{session, stats};
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use hivtac_wire::message::{DeviceMessage, Sample};
+
+/// Hellos, replies, stats and log lines.
+static ANSWERS: Channel<CriticalSectionRawMutex, DeviceMessage, 8> = Channel::new();
+/// Samples: 0.2 s of them. Older ones are worth more than a gap, but not more than a fresh measurement's latency.
+static SAMPLES: Channel<CriticalSectionRawMutex, Sample, 8> = Channel::new();
+
+/// Queues an answer that the host waits for; waits for room. Only for tasks that serve the host.
+pub async fn answer(message: DeviceMessage) {
+    ANSWERS.send(message).await;
+}
+
+/// Queues a message when a host listens and there is room; says whether it did.
+pub fn offer(message: DeviceMessage) -> bool {
+    session::is_open() && ANSWERS.try_send(message).is_ok()
+}
+
+/// Queues a sample, or drops and counts it.
+pub fn offer_sample(sample: Sample) {
+    if SAMPLES.try_send(sample).is_err() {
+        stats::USB_DROPPED.count();
+    }
+}
+
+/// The next message to send; answers go before samples.
+pub async fn next() -> DeviceMessage {
+    match select(ANSWERS.receive(), SAMPLES.receive()).await {
+        Either::First(answer) => answer,
+        Either::Second(sample) => DeviceMessage::Sample(sample),
+    }
+}
+
+/// Throws away what is left of an earlier conversation.
+pub fn clear() {
+    ANSWERS.clear();
+    SAMPLES.clear();
+}

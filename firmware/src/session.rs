@@ -1,0 +1,32 @@
+//! Whether a host listens, and what it wants: a conversation as `docs/wire.md` defines it.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+static OPEN: AtomicBool = AtomicBool::new(false);
+static STREAMING: AtomicBool = AtomicBool::new(false);
+
+/// A hello began a new conversation; `understood` when host and device speak the same version.
+pub fn begin(understood: bool) {
+    STREAMING.store(false, Ordering::Relaxed);
+    OPEN.store(understood, Ordering::Relaxed);
+}
+
+/// The host is gone.
+pub fn end() {
+    begin(false);
+}
+
+/// True between the host's hello and its end.
+pub fn is_open() -> bool {
+    OPEN.load(Ordering::Relaxed)
+}
+
+/// Starts or stops the flow of samples and stats.
+pub fn stream(on: bool) {
+    STREAMING.store(on, Ordering::Relaxed);
+}
+
+/// True while samples and stats flow.
+pub fn is_streaming() -> bool {
+    STREAMING.load(Ordering::Relaxed)
+}

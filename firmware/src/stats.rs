@@ -1,0 +1,69 @@
+//! Counters since boot, from every task and handler.
+
+use crate::vsync;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_time::Instant;
+use hivtac_wire::message::Stats;
+
+/// A counter that stops at its largest value.
+pub struct Counter(AtomicU32);
+
+impl Counter {
+    const fn new() -> Self {
+        Self(AtomicU32::new(0))
+    }
+
+    /// One more.
+    pub fn count(&self) {
+        self.add(1);
+    }
+
+    /// `n` more.
+    pub fn add(&self, n: u32) {
+        let saturating = |value: u32| Some(value.saturating_add(n));
+        // Never fails: the closure always gives a value.
+        let _ = self
+            .0
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, saturating);
+    }
+
+    /// Replaces the value.
+    pub fn set(&self, value: u32) {
+        self.0.store(value, Ordering::Relaxed);
+    }
+
+    fn get(&self) -> u32 {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+macro_rules! counters {
+    ($($name:ident => $field:ident;)*) => {
+        $(
+            #[doc = concat!("[`Stats::", stringify!($field), "`].")]
+            pub static $name: Counter = Counter::new();
+        )*
+
+        /// All counters. Each is exact; they are read one after the other.
+        pub fn snapshot() -> Stats {
+            Stats {
+                frames_exposed: vsync::newest().number,
+                uptime_us: Instant::now().as_micros(),
+                $($field: $name.get(),)*
+            }
+        }
+    };
+}
+
+counters! {
+    FRAMES_PROCESSED => frames_processed;
+    DROPPED_BUSY => dropped_busy;
+    DROPPED_OVERRUN => dropped_overrun;
+    DROPPED_SIZE => dropped_size;
+    CAMERA_TIMEOUTS => camera_timeouts;
+    CAMERA_RESTARTS => camera_restarts;
+    CAPTURE_OVERRUNS => capture_overruns;
+    USB_DROPPED => usb_dropped;
+    HOST_FRAMES_REJECTED => host_frames_rejected;
+    PROCESSING_US => processing_us;
+}

@@ -1,0 +1,47 @@
+//! A tare under way: which command it answers, what it has, and when it gives up.
+
+use crate::camera::FRAME_TIME;
+use embassy_time::{Duration, Instant};
+use hivtac_sensing::model::Rest;
+use hivtac_sensing::pipeline::Measurement;
+use hivtac_sensing::tare::TareBuilder;
+
+/// Every second frame may be bad, and a camera may need some time to come back.
+const FRAME_TIMES_EACH: u32 = 2;
+const EXTRA: Duration = Duration::from_secs(2);
+
+/// Sums up good frames.
+pub struct Taring {
+    id: u16,
+    builder: TareBuilder,
+    deadline: Instant,
+}
+
+impl Taring {
+    /// For command `id`, over `frames` good frames; `None` when that number is out of its range.
+    pub fn begin(id: u16, frames: u16) -> Option<Self> {
+        let patience = FRAME_TIME * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
+        Some(Self {
+            id,
+            builder: TareBuilder::new(frames)?,
+            deadline: Instant::now() + patience,
+        })
+    }
+
+    /// The command's number.
+    pub fn id(&self) -> u16 {
+        self.id
+    }
+
+    /// When there were not enough good frames.
+    pub fn deadline(&self) -> Instant {
+        self.deadline
+    }
+
+    /// Takes a frame if it shows the markers; gives the rest position once there were enough.
+    pub fn add(&mut self, measurement: &Measurement) -> Option<Rest> {
+        let markers = measurement.markers.as_ref()?;
+        let features = measurement.features.as_ref()?;
+        self.builder.add(markers, features)
+    }
+}

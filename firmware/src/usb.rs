@@ -1,0 +1,165 @@
+//! USB CDC-ACM: a serial port that never makes anyone else wait.
+//!
+//! # Design
+//! One task on an executor of its own, above processing and below capture. Four parts run side by side: the USB
+//! stack, the receiver, the sender, and a watch on DTR. Samples reach the sender through bounded queues (`outbox`).
+//!
+//! # Note
+//! The sender waits at most [`WRITE_TIMEOUT`] for a packet. When the host does not read, messages are dropped whole
+//! or cut; after a cut the next frame begins with a zero byte, so that the host is in step again at once.
+//!
+//! # Limitations
+//! Without VBUS sensing an unplugged cable looks like a host that sleeps: the conversation ends when the next
+//! host resets the bus, or closes the port.
+
+use crate::board::UsbPort;
+use crate::{commands, outbox, session, stats};
+use embassy_futures::join::join5;
+use embassy_stm32::usb::{self, Driver};
+use embassy_stm32::{bind_interrupts, peripherals};
+use embassy_time::{Duration, Ticker, with_timeout};
+use embassy_usb::class::cdc_acm::{CdcAcmClass, ControlChanged, Receiver, Sender, State};
+use embassy_usb::{Builder, Config};
+use hivtac_sensing::model::Model;
+use hivtac_wire::decoder::Decoder;
+use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
+use hivtac_wire::message::DeviceMessage;
+use hivtac_wire::usb::{MANUFACTURER, PRODUCT, PRODUCT_ID, VENDOR_ID};
+
+/// Bytes of a full-speed bulk packet.
+const PACKET: usize = 64;
+/// A host that reads fetches a packet within a millisecond or two.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+/// Stats while streaming.
+const STATS_PERIOD: Duration = Duration::from_secs(1);
+/// What the board, its LED and the camera draw at most, mA.
+const CURRENT: u16 = 300;
+
+bind_interrupts!(struct Irqs {
+    OTG_FS => usb::InterruptHandler<peripherals::USB_OTG_FS>;
+});
+
+type Port<'d> = Driver<'d, peripherals::USB_OTG_FS>;
+
+/// Runs for ever at the USB executor's priority. `model` is for the device's hello.
+#[embassy_executor::task]
+pub async fn run(port: UsbPort, model: Option<Model<'static>>) {
+    let mut out_packets = [0; 4 * PACKET];
+    let mut config_descriptor = [0; 128];
+    let mut bos_descriptor = [0; 16];
+    let mut control_packet = [0; PACKET];
+    let mut state = State::new();
+    let mut otg = usb::Config::default();
+    otg.vbus_detection = false;
+    let driver = Driver::new_fs(
+        port.core,
+        Irqs,
+        port.plus,
+        port.minus,
+        &mut out_packets,
+        otg,
+    );
+    let mut builder = Builder::new(
+        driver,
+        identity(),
+        &mut config_descriptor,
+        &mut bos_descriptor,
+        &mut [],
+        &mut control_packet,
+    );
+    let class = CdcAcmClass::new(&mut builder, &mut state, PACKET as u16);
+    let (sender, receiver, control) = class.split_with_control();
+    let mut device = builder.build();
+    join5(
+        device.run(),
+        receive(receiver, model.as_ref()),
+        send(sender),
+        watch_dtr(control),
+        send_stats(),
+    )
+    .await;
+}
+
+fn identity() -> Config<'static> {
+    let mut config = Config::new(VENDOR_ID, PRODUCT_ID);
+    config.manufacturer = Some(MANUFACTURER);
+    config.product = Some(PRODUCT);
+    config.serial_number = Some(embassy_stm32::uid::uid_hex());
+    config.max_power = CURRENT;
+    config
+}
+
+async fn receive<'d>(mut receiver: Receiver<'d, Port<'d>>, model: Option<&Model<'_>>) {
+    let mut decoder = Decoder::<HOST_FRAME_LIMIT>::new();
+    let mut packet = [0; PACKET];
+    loop {
+        receiver.wait_connection().await;
+        while let Ok(length) = receiver.read_packet(&mut packet).await {
+            let mut bytes = packet.get(..length).unwrap_or(&packet);
+            while let Some(message) = decoder.feed(&mut bytes) {
+                commands::handle(message, model).await;
+            }
+            stats::HOST_FRAMES_REJECTED.set(decoder.rejected().frames());
+        }
+        decoder.reset();
+        session::end();
+    }
+}
+
+async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
+    // A zero byte before the first frame, and before one that follows a cut frame.
+    let mut buffer = [0; 1 + MAX_DEVICE_FRAME];
+    let mut cut = true;
+    loop {
+        let message = outbox::next().await;
+        let Some(frame) = buffer.get_mut(1..) else {
+            return;
+        };
+        let Ok(frame) = encode(&message, frame) else {
+            defmt::error!("a message is longer than the longest frame");
+            continue;
+        };
+        let length = 1 + frame.len();
+        let bytes = buffer.get(usize::from(!cut)..length).unwrap_or(&[]);
+        cut = !send_bytes(&mut sender, bytes).await;
+        if cut && matches!(message, DeviceMessage::Sample(_)) {
+            stats::USB_DROPPED.count();
+        }
+    }
+}
+
+/// Sends one frame; false when it was cut or not begun.
+async fn send_bytes<'d>(sender: &mut Sender<'d, Port<'d>>, bytes: &[u8]) -> bool {
+    // A transfer ends with a short packet, which is empty when the bytes fill the last one.
+    let end = bytes.len().is_multiple_of(PACKET).then_some(&[][..]);
+    for packet in bytes.chunks(PACKET).chain(end) {
+        match with_timeout(WRITE_TIMEOUT, sender.write_packet(packet)).await {
+            Ok(Ok(())) => {}
+            _ => return false,
+        }
+    }
+    true
+}
+
+/// A host that closes the port drops DTR.
+async fn watch_dtr(control: ControlChanged<'_>) {
+    let mut was_ready = false;
+    loop {
+        control.control_changed().await;
+        let ready = control.dtr();
+        if was_ready && !ready {
+            session::end();
+        }
+        was_ready = ready;
+    }
+}
+
+async fn send_stats() {
+    let mut ticker = Ticker::every(STATS_PERIOD);
+    loop {
+        ticker.next().await;
+        if session::is_streaming() {
+            outbox::offer(DeviceMessage::Stats(stats::snapshot()));
+        }
+    }
+}

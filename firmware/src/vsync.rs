@@ -1,0 +1,66 @@
+//! Counts and time-stamps the camera's VSYNC edges.
+//!
+//! The counted edge is the one that ends the vertical blanking: DCMI begins a frame at the same edge. It says that
+//! a frame is finished at the *other* edge, when blanking begins. So at that moment the newest counted edge is the
+//! one that began the finished frame, and stays so for the whole blanking, however late the handler runs within it.
+
+use crate::camera;
+use core::cell::Cell;
+use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_stm32::pac::{self, EXTI, SYSCFG};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
+use embassy_time::Instant;
+
+/// The VSYNC pin is PB7 on every board with this camera connector.
+const LINE: usize = 7;
+const PORT_B: u8 = 1;
+
+/// One VSYNC edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Edge {
+    /// 1 for the first edge after the camera's register reset at boot.
+    pub number: u32,
+    /// Device time, µs since boot.
+    pub time_us: u64,
+}
+
+static NEWEST: CriticalSectionMutex<Cell<Edge>> = CriticalSectionMutex::new(Cell::new(Edge {
+    number: 0,
+    time_us: 0,
+}));
+
+/// Begins to listen. The pin itself is set up with the camera interface's pins: EXTI sees it whatever its function.
+pub fn start() {
+    SYSCFG
+        .exticr(LINE / 4)
+        .modify(|w| w.set_exti(LINE % 4, PORT_B));
+    let blanking_is_high = camera::VSYNC_BLANKING_IS_HIGH;
+    critical_section::with(|_| {
+        EXTI.ftsr(0).modify(|w| w.set_line(LINE, blanking_is_high));
+        EXTI.rtsr(0).modify(|w| w.set_line(LINE, !blanking_is_high));
+        pac::EXTI.imr(0).modify(|w| w.set_line(LINE, true));
+    });
+    interrupt::EXTI9_5.unpend();
+    // SAFETY: the handler below shares only `NEWEST`, behind a mutex.
+    unsafe { interrupt::EXTI9_5.enable() };
+}
+
+/// The newest edge; number 0 when there was none yet.
+pub fn newest() -> Edge {
+    NEWEST.lock(Cell::get)
+}
+
+/// Begins to count from zero: the next edge gets number 1.
+pub fn restart_count() {
+    NEWEST.lock(|newest| newest.set(Edge::default()));
+}
+
+#[embassy_stm32::interrupt]
+fn EXTI9_5() {
+    let time_us = Instant::now().as_micros();
+    EXTI.pr(0).write(|w| w.set_line(LINE, true));
+    NEWEST.lock(|newest| {
+        let number = newest.get().number.saturating_add(1);
+        newest.set(Edge { number, time_us });
+    });
+}
