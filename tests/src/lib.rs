@@ -1,1 +1,21 @@
-//! tests
+//! What the tests that cross rooms share.
+//!
+//! [`golden`] runs recorded cases through the sensing and prints what came out; the same code runs on the host and, in
+//! `tests/qemu`, on an emulated Cortex-M7. Everything else needs a host (feature `host`, on by default).
+#![no_std]
+
+#[cfg(feature = "host")]
+extern crate std;
+
+pub mod golden;
+
+#[cfg(feature = "host")]
+pub mod artifact;
+#[cfg(feature = "host")]
+pub mod models;
+#[cfg(feature = "host")]
+pub mod pictures;
+#[cfg(feature = "host")]
+pub mod qemu;
+#[cfg(feature = "host")]
+pub mod script;

@@ -1,0 +1,19 @@
+//! The programs that the tests run. `cargo xtask test` builds them and names them in environment variables.
+
+use std::{env, path::PathBuf};
+
+/// The file or folder that an environment variable names.
+///
+/// # Panics
+/// When it names none: the test cannot run, and must not pass.
+pub fn named_by(variable: &str) -> PathBuf {
+    let path = env::var_os(variable).map(PathBuf::from);
+    let path = path
+        .unwrap_or_else(|| panic!("{variable} is not set: run the tests by `cargo xtask test`"));
+    assert!(
+        path.exists(),
+        "{variable} names {}, which does not exist",
+        path.display()
+    );
+    path
+}

@@ -1,0 +1,206 @@
+//! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
+
+use hivtac_scene::{Load, Options, Preset, Scene};
+use hivtac_sensing::model::OutputKind;
+use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_tests::models::{self, Weights};
+use hivtac_tests::pictures::{self, Random};
+use hivtac_tests::qemu;
+use hivtac_tests::script::{Script, features};
+
+/// Runs a script on both and compares what they print, byte for byte. Gives the text for further checks.
+fn same_on_both(script: &Script) -> String {
+    let host = qemu::run_on_host(script).unwrap();
+    let emulated = qemu::run(script).unwrap();
+    if let Some(difference) = qemu::first_difference(&host, &emulated) {
+        panic!("host (left) and Cortex-M7 (right) differ at {difference}");
+    }
+    assert!(!host.is_empty(), "the script printed nothing");
+    host
+}
+
+fn red(script: &mut Script, order: ByteOrder) {
+    script.threshold(&HsvBox::RED, order);
+}
+
+fn loads() -> Vec<Load> {
+    let mut loads = vec![Load::REST];
+    for newtons in [0.01, 0.05, 0.1, 0.2] {
+        for (alpha, beta) in [(0.0, 0.0), (8.0, -6.0), (-8.0, 6.0)] {
+            loads.push(Load::from_angles(newtons, alpha, beta).unwrap());
+        }
+    }
+    loads
+}
+
+#[test]
+fn frames_of_the_scene_give_the_same_forces() {
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
+    let frames: Vec<_> = (0..)
+        .zip(loads())
+        .map(|(number, load)| scene.render_load(&load, number).unwrap().pixels)
+        .collect();
+    let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
+    let mut script = Script::new();
+    for output in [OutputKind::ForceVector, OutputKind::AnglesMagnitude] {
+        script.model(&models::file(&[11, 64, 64, 3], Weights::Random, output, 3));
+        for order in [ByteOrder::Native, ByteOrder::Swapped] {
+            red(&mut script, order);
+            script.sense(320, &frames);
+        }
+    }
+    let text = same_on_both(&script);
+    let forces = text
+        .lines()
+        .filter(|line| line.contains("force: Some"))
+        .count();
+    assert_eq!(forces, 4 * frames.len(), "every frame has a force:\n{text}");
+}
+
+#[test]
+fn frames_without_a_force_give_the_same_reasons() {
+    let missing = Options {
+        missing: [false, true, false, false],
+        ..Options::default()
+    };
+    let dark = Options {
+        gain: 0.2,
+        ..Options::default()
+    };
+    let mut frames = vec![
+        pictures::plain(320, 240, pictures::RED),
+        pictures::plain(320, 240, pictures::BLACK),
+        pictures::checkerboard(320, 240),
+        pictures::discs_on_borders(320, 240, 6),
+        pictures::noise(320, 240, 5),
+    ];
+    for options in [missing, dark] {
+        let scene = Scene::preset("static", Preset::Ov7725, 320, 240, 11).unwrap();
+        frames.push(scene.with_options(options).unwrap().frame(1, 1.0).pixels);
+    }
+    let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
+    let mut script = Script::new();
+    red(&mut script, ByteOrder::Swapped);
+    script.sense(320, &frames);
+    script.model(&models::file(
+        &[11, 64, 64, 3],
+        Weights::Random,
+        OutputKind::ForceVector,
+        3,
+    ));
+    script.sense(320, &frames);
+    let text = same_on_both(&script);
+    assert!(
+        !text.contains("force: Some"),
+        "no such frame has a force:\n{text}"
+    );
+}
+
+#[test]
+fn blobs_of_extreme_pictures_are_the_same() {
+    let mut script = Script::new();
+    red(&mut script, ByteOrder::Native);
+    for (width, height) in [
+        (320, 240),
+        (800, 600),
+        (1, 1),
+        (31, 7),
+        (33, 2),
+        (800, 1),
+        (1, 800),
+    ] {
+        let pictures = [
+            pictures::plain(width, height, pictures::RED),
+            pictures::plain(width, height, pictures::BLACK),
+            pictures::checkerboard(width, height),
+            pictures::stripes(width, height),
+            pictures::comb(width, height),
+            pictures::discs_on_borders(width, height, 6),
+            pictures::noise(width, height, 1),
+            pictures::salted(pictures::plain(width, height, 0), 5, 2),
+        ];
+        for (pixels, dilations) in pictures.iter().zip([0, 1, 0, 0, 0, 1, 0, 3]) {
+            script.scan(width, pixels, dilations, 1);
+        }
+    }
+    let text = same_on_both(&script);
+    // All red, 800 × 600, one dilation or none: Σx² is the largest of all moments.
+    let sum_xx: u64 = 600 * (0..800_u64).map(|x| x * x).sum::<u64>();
+    assert!(text.contains(&format!("sum_xx: {sum_xx}")), "{text}");
+}
+
+#[test]
+fn every_pixel_value_passes_the_same_thresholds() {
+    let values: Vec<u16> = (0..=u16::MAX).collect();
+    let narrow = HsvBox {
+        hue_low: 50,
+        hue_high: 70,
+        ..HsvBox::RED
+    };
+    let mut script = Script::new();
+    for hsv_box in [HsvBox::RED, narrow] {
+        for order in [ByteOrder::Native, ByteOrder::Swapped] {
+            script.threshold(&hsv_box, order);
+            for half in values.chunks(256 * 128) {
+                script.scan(256, half, 0, 1);
+            }
+        }
+    }
+    same_on_both(&script);
+}
+
+#[test]
+fn networks_give_the_same_outputs() {
+    let mut script = Script::new();
+    let mut random = Random::new(17);
+    let kinds = [OutputKind::ForceVector, OutputKind::AnglesMagnitude];
+    for widths in [
+        &[11, 3][..],
+        &[11, 64, 64, 3],
+        &[11, 512, 512, 512, 3],
+        &[11, 1, 37, 3],
+    ] {
+        for weights in [Weights::Random, Weights::Extreme] {
+            script.model(&models::file(widths, weights, kinds[widths.len() % 2], 23));
+            for _ in 0..8 {
+                script.network(&moved(&mut random, 1 << 18), &models::rest());
+            }
+            script.network(&moved(&mut random, i64::from(i32::MAX)), &models::rest());
+            script.network(&models::rest(), &moved(&mut random, i64::from(i32::MAX)));
+        }
+    }
+    let text = same_on_both(&script);
+    assert!(
+        text.contains("input_saturated: true"),
+        "no input met its limit:\n{text}"
+    );
+    assert!(
+        text.contains("input_saturated: false"),
+        "every input met its limit:\n{text}"
+    );
+}
+
+#[test]
+fn force_conversions_are_the_same() {
+    let mut script = Script::new();
+    let mut random = Random::new(29);
+    let ends = [i32::MIN, -90_000, -1, 0, 1, 90_000, i32::MAX];
+    for a in ends {
+        for b in ends {
+            for c in ends {
+                script.force([a, b, c]);
+            }
+        }
+    }
+    for _ in 0..2_000 {
+        script.force([0; 3].map(|_| random.between(-250_000, 250_000) as i32));
+    }
+    same_on_both(&script);
+}
+
+/// Features that differ from the rest position by up to `distance`, in 1/65,536 px.
+fn moved(random: &mut Random, distance: i64) -> hivtac_sensing::features::Features {
+    let rest = models::rest().to_array();
+    let limit = |number: i64| number.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    features(rest.map(|number| limit(number + random.between(-distance, distance))))
+}
