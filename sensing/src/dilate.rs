@@ -119,3 +119,60 @@ fn spread_word(left: u32, word: u32, right: u32, radius: u8) -> u32 {
         bits | (rightwards << shift >> 32) as u32 | (leftwards >> shift) as u32
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+
+    const WIDTH: u16 = 75;
+    const HEIGHT: usize = 40;
+
+    /// A mask and the same after one, two and three dilations by OpenCV (`tests/opencv/reference.py`).
+    const OPENCV: &[u8; 4 * HEIGHT * 12] = include_bytes!("../tests/opencv/dilated.bits");
+
+    fn opencv(dilations: u8) -> Vec<MaskRow> {
+        let mask = OPENCV.chunks_exact(HEIGHT * 12).nth(usize::from(dilations));
+        let row = |bytes: &[u8]| {
+            let mut row = EMPTY_ROW;
+            for (word, bytes) in row.iter_mut().zip(bytes.as_chunks().0) {
+                *word = u32::from_le_bytes(*bytes);
+            }
+            row
+        };
+        mask.unwrap().chunks_exact(12).map(row).collect()
+    }
+
+    fn dilated(rows: &[MaskRow], dilations: u8) -> Vec<MaskRow> {
+        let mut dilation = Dilation::new();
+        dilation.begin(WIDTH, dilations);
+        let below = std::iter::repeat_n(&EMPTY_ROW, usize::from(dilations));
+        let rows = rows.iter().chain(below).filter_map(|row| {
+            let mut out = EMPTY_ROW;
+            dilation.push(row, &mut out).then_some(out)
+        });
+        rows.collect()
+    }
+
+    #[test]
+    fn masks_equal_opencv() {
+        for dilations in 0..=MAX_DILATIONS {
+            assert_eq!(
+                dilated(&opencv(0), dilations),
+                opencv(dilations),
+                "{dilations}"
+            );
+        }
+    }
+
+    #[test]
+    fn frames_lower_than_the_square_come_out_whole() {
+        for dilations in 0..=MAX_DILATIONS {
+            for height in 0..4 {
+                let rows = dilated(&opencv(0)[..height], dilations);
+                assert_eq!(rows.len(), height);
+            }
+        }
+    }
+}

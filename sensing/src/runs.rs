@@ -37,3 +37,51 @@ pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
         visit(Run { x0, x1: column - 1 });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{vec, vec::Vec};
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn runs(words: &[u32]) -> Vec<(u16, u16)> {
+        let mut found = Vec::new();
+        for_each_run(words, |run| found.push((run.x0, run.x1)));
+        found
+    }
+
+    fn bit_by_bit(words: &[u32]) -> Vec<(u16, u16)> {
+        let set = |x: u16| words[usize::from(x / 32)] >> (x % 32) & 1 == 1;
+        let mut found: Vec<(u16, u16)> = Vec::new();
+        for x in (0..32 * words.len() as u16).filter(|x| set(*x)) {
+            match found.last_mut() {
+                Some((_, x1)) if *x1 + 1 == x => *x1 = x,
+                _ => found.push((x, x)),
+            }
+        }
+        found
+    }
+
+    /// Words with few edges and with many.
+    fn word() -> impl Strategy<Value = u32> {
+        let spans = (0..32_u32, 0..32_u32).prop_map(|(a, b)| u32::MAX << a & u32::MAX >> b);
+        prop_oneof![Just(0), Just(u32::MAX), spans, any::<u32>()]
+    }
+
+    proptest! {
+        #[test]
+        fn runs_are_those_found_bit_by_bit(words in prop::collection::vec(word(), 0..6)) {
+            prop_assert_eq!(runs(&words), bit_by_bit(&words));
+        }
+    }
+
+    #[test]
+    fn runs_cross_words_and_reach_both_borders() {
+        assert_eq!(runs(&[u32::MAX; 25]), vec![(0, 799)]);
+        assert_eq!(runs(&[1, 1 << 31, 1]), vec![(0, 0), (63, 64)]);
+        assert_eq!(runs(&[0xaaaa_aaaa; 25]).len(), 400);
+        assert!(runs(&[0; 25]).is_empty());
+    }
+}

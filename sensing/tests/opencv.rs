@@ -54,7 +54,12 @@ fn assert_equals_opencv(table: &ThresholdTable, reference: &Reference, order: By
             ByteOrder::Swapped => pixel.rotate_left(8),
         };
         let expected = reference.accepted[usize::from(pixel / 8)] >> (pixel % 8) & 1 == 1;
-        assert_eq!(table.accepts(raw), expected, "{:?}, pixel {pixel:#06x}", reference.hsv_box);
+        assert_eq!(
+            table.accepts(raw),
+            expected,
+            "{:?}, pixel {pixel:#06x}",
+            reference.hsv_box
+        );
     }
 }
 
