@@ -31,8 +31,8 @@ pub struct Blob {
     pub y1: u16,
 }
 
-/// Second moments of a blob about its centroid, times its area: whole numbers, in px⁴ of an area in px².
-/// The variance along x is `xx / area²`.
+/// Second moments of a blob about its centroid, multiplied by its area so that they are whole numbers.
+/// The variance along x, in px², is `xx / area²`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CentralMoments {
     /// area · Σ(x − x̄)² = area · Σx² − (Σx)².
