@@ -9,7 +9,7 @@
 
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use embassy_stm32::pac::RCC;
+use embassy_stm32::pac::{DBGMCU, RCC};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Timer};
@@ -34,6 +34,8 @@ pub fn report_reset() {
 /// Starts the watchdog and feeds it from thread mode: it bites when something above never lets thread mode run.
 #[embassy_executor::task]
 pub async fn feed_watchdog(mut watchdog: IndependentWatchdog<'static, IWDG1>) {
+    // A debugger may hold the core for as long as it likes.
+    DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
     watchdog.unleash();
     loop {
         watchdog.pet();

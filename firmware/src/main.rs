@@ -56,9 +56,9 @@ static SENSOR: ConstStaticCell<Sensor<'static>> = ConstStaticCell::new(Sensor::n
 fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
     caches::enable(&mut core);
+    priorities::set();
     let board = Board::start();
     faults::report_reset();
-    priorities::set();
     frame::provide_buffers();
     vsync::start();
     let model = model::embedded();
@@ -78,10 +78,17 @@ fn main() -> ! {
         })
 }
 
-/// Sets the pipeline to what the camera delivers and the model was made for.
+/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers.
 fn configure(sensor: &mut Sensor<'static>, model: Option<Model<'static>>) {
+    let order = ByteOrder::Swapped;
     let geometry = Geometry::preset(Preset::Ov7725, camera::WIDTH, camera::HEIGHT);
-    let settings = Settings::usual(geometry, ByteOrder::Swapped);
+    let settings = match &model {
+        Some(model) => Settings {
+            geometry,
+            ..Settings::of_model(model, order)
+        },
+        None => Settings::usual(geometry, order),
+    };
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
     }

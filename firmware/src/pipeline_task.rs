@@ -62,6 +62,7 @@ struct PipelineTask {
 impl PipelineTask {
     /// Does the next thing there is to do.
     async fn step(&mut self) {
+        self.taring.take_if(|taring| !taring.is_wanted());
         let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
         match select3(ORDERS.receive(), CAPTURED.receive(), Timer::at(deadline)).await {
             Either3::First(order) => self.obey(order),

@@ -17,7 +17,7 @@ pub const CAPTURE_EXECUTOR: interrupt::Interrupt = interrupt::UART4;
 /// Interrupt whose vector runs the USB executor. The UART itself is not used.
 pub const USB_EXECUTOR: interrupt::Interrupt = interrupt::UART5;
 
-/// Sets every priority. Call once, before the interrupts are enabled by their owners.
+/// Sets every priority. Call once, before any of these interrupts is enabled.
 pub fn set() {
     interrupt::EXTI9_5.set_priority(Priority::P0);
     interrupt::DCMI.set_priority(Priority::P1);

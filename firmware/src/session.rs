@@ -1,14 +1,16 @@
 //! Whether a host listens, and what it wants: a conversation as `docs/wire.md` defines it.
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 static OPEN: AtomicBool = AtomicBool::new(false);
 static STREAMING: AtomicBool = AtomicBool::new(false);
+static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 /// A hello began a new conversation; `understood` when host and device speak the same version.
 pub fn begin(understood: bool) {
     STREAMING.store(false, Ordering::Relaxed);
     OPEN.store(understood, Ordering::Relaxed);
+    NUMBER.fetch_add(1, Ordering::Relaxed);
 }
 
 /// The host is gone.
@@ -19,6 +21,11 @@ pub fn end() {
 /// True between the host's hello and its end.
 pub fn is_open() -> bool {
     OPEN.load(Ordering::Relaxed)
+}
+
+/// Another one for each conversation, so that no reply of an earlier one reaches the next.
+pub fn number() -> u32 {
+    NUMBER.load(Ordering::Relaxed)
 }
 
 /// Starts or stops the flow of samples and stats.

@@ -1,6 +1,7 @@
 //! A tare under way: which command it answers, what it has, and when it gives up.
 
 use crate::camera::FRAME_TIME;
+use crate::session;
 use embassy_time::{Duration, Instant};
 use hivtac_sensing::model::Rest;
 use hivtac_sensing::pipeline::Measurement;
@@ -13,6 +14,7 @@ const EXTRA: Duration = Duration::from_secs(2);
 /// Sums up good frames.
 pub struct Taring {
     id: u16,
+    conversation: u32,
     builder: TareBuilder,
     deadline: Instant,
 }
@@ -23,6 +25,7 @@ impl Taring {
         let patience = FRAME_TIME * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
         Some(Self {
             id,
+            conversation: session::number(),
             builder: TareBuilder::new(frames)?,
             deadline: Instant::now() + patience,
         })
@@ -31,6 +34,11 @@ impl Taring {
     /// The command's number.
     pub fn id(&self) -> u16 {
         self.id
+    }
+
+    /// False once the host that asked has gone.
+    pub fn is_wanted(&self) -> bool {
+        self.conversation == session::number()
     }
 
     /// When there were not enough good frames.

@@ -142,6 +142,7 @@ fn synchronize_hsi48() {
 fn start_camera_clock(mco: Peri<'static, peripherals::MCO1>, pin: Peri<'static, peripherals::PA8>) {
     let mut config = McoConfig::default();
     config.prescaler = McoPrescaler::DIV2;
+    config.speed = Speed::Medium;
     Mco::new(mco, pin, Mco1Source::HSE, config);
 }
 
@@ -149,7 +150,8 @@ fn start_camera_clock(mco: Peri<'static, peripherals::MCO1>, pin: Peri<'static, 
 fn connect_camera(pins: [Peri<'static, AnyPin>; 11]) {
     for pin in pins {
         let mut pin = Flex::new(pin);
-        pin.set_as_af_unchecked(DCMI_FUNCTION, AfType::input(Pull::None));
+        // Pulled down: with no camera fitted, an open VSYNC pin must not make interrupts.
+        pin.set_as_af_unchecked(DCMI_FUNCTION, AfType::input(Pull::Down));
         // Dropping it would disconnect the pin.
         core::mem::forget(pin);
     }

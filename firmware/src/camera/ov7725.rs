@@ -28,6 +28,8 @@ pub const HREF_BLANKING_IS_HIGH: bool = false;
 const ADDRESS: u8 = 0x21;
 /// The register file is busy for 1 ms after a reset and 10 ms after power-down; doubled.
 const SETTLE: Duration = Duration::from_millis(20);
+/// A new format holds from the next frame on; the frame after power-up takes 32 ms. The frames of this time are not used.
+const FORMAT_CHANGE: Duration = Duration::from_millis(100);
 /// Between two register writes: lets tasks of lower priority run.
 const PAUSE: Duration = Duration::from_micros(100);
 
@@ -88,13 +90,14 @@ impl Camera {
         self.write(COM7, COM7_RESET)
     }
 
-    /// Writes the register table. The camera delivers frames from its next VSYNC on.
+    /// Writes the register table; returns when the camera sends frames in the new format.
     pub async fn configure(&mut self) -> Result<(), Error> {
         Timer::after(SETTLE).await;
         for (register, value) in TABLE {
             self.write(*register, *value)?;
             Timer::after(PAUSE).await;
         }
+        Timer::after(FORMAT_CHANGE).await;
         Ok(())
     }
 
