@@ -3,7 +3,7 @@
 //! n dilations by 3×3 are one by a square of 2n + 1: first along the row, then over the last 2n + 1 rows. As with
 //! OpenCV's default border, what lies outside the frame counts as unset.
 
-use crate::mask::{EMPTY_ROW, MAX_WORDS, MaskRow, last_word_bits, words_of};
+use crate::mask::{EMPTY_ROW, MaskRow, last_word_bits};
 
 /// Most dilations.
 pub const MAX_DILATIONS: u8 = 3;
@@ -14,6 +14,8 @@ const RING: usize = 2 * MAX_DILATIONS as usize + 1;
 #[derive(Clone, Debug)]
 pub struct Dilation {
     ring: [MaskRow; RING],
+    /// The row that goes out.
+    out: MaskRow,
     /// Which rows of the ring have a set bit.
     occupied: [bool; RING],
     /// n.
@@ -30,6 +32,7 @@ impl Dilation {
     pub const fn new() -> Dilation {
         Dilation {
             ring: [EMPTY_ROW; RING],
+            out: EMPTY_ROW,
             occupied: [false; RING],
             radius: 0,
             width: 1,
@@ -53,17 +56,15 @@ impl Dilation {
         self.radius
     }
 
-    /// Takes the next row and gives the row that lies [`radius`](Self::radius) rows above it, dilated, into `out`;
-    /// false while there is none yet. Words of `out` beyond the row's width stay as they are.
-    pub fn push(&mut self, row: &MaskRow, out: &mut MaskRow) -> bool {
-        let words = words_of(self.width).min(MAX_WORDS);
-        self.store(&row[..words]);
+    /// Takes the next row, ⌈width / 32⌉ words, and gives the row that lies [`radius`](Self::radius) rows above it, dilated;
+    /// `None` while there is none yet.
+    pub fn push(&mut self, row: &[u32]) -> Option<&[u32]> {
+        self.store(row);
         if self.delay > 0 {
             self.delay -= 1;
-            return false;
+            return None;
         }
-        self.combine(&mut out[..words]);
-        true
+        Some(self.combine(row.len()))
     }
 
     /// Dilates a row along itself into the ring.
@@ -80,15 +81,18 @@ impl Dilation {
         self.next = (self.next + 1) % self.height();
     }
 
-    /// The ring's occupied rows, one over the other.
-    fn combine(&self, out: &mut [u32]) {
+    /// The ring's occupied rows of so many words, one over the other.
+    fn combine(&mut self, words: usize) -> &[u32] {
+        let height = self.height();
+        let out = &mut self.out[..words];
         out.fill(0);
-        let rows = self.ring.iter().zip(self.occupied).take(self.height());
+        let rows = self.ring.iter().zip(self.occupied).take(height);
         for (row, _) in rows.filter(|(_, occupied)| *occupied) {
             for (to, from) in out.iter_mut().zip(row) {
                 *to |= from;
             }
         }
+        out
     }
 
     fn height(&self) -> usize {
@@ -132,26 +136,19 @@ mod tests {
     /// A mask and the same after one, two and three dilations by OpenCV (`tests/opencv/reference.py`).
     const OPENCV: &[u8; 4 * HEIGHT * 12] = include_bytes!("../tests/opencv/dilated.bits");
 
-    fn opencv(dilations: u8) -> Vec<MaskRow> {
+    fn opencv(dilations: u8) -> Vec<[u32; 3]> {
         let mask = OPENCV.chunks_exact(HEIGHT * 12).nth(usize::from(dilations));
-        let row = |bytes: &[u8]| {
-            let mut row = EMPTY_ROW;
-            for (word, bytes) in row.iter_mut().zip(bytes.as_chunks().0) {
-                *word = u32::from_le_bytes(*bytes);
-            }
-            row
-        };
+        let word = |bytes: &[u8]| u32::from_le_bytes(bytes.try_into().unwrap());
+        let row = |bytes: &[u8]| [0, 4, 8].map(|i| word(&bytes[i..i + 4]));
         mask.unwrap().chunks_exact(12).map(row).collect()
     }
 
-    fn dilated(rows: &[MaskRow], dilations: u8) -> Vec<MaskRow> {
+    fn dilated(rows: &[[u32; 3]], dilations: u8) -> Vec<[u32; 3]> {
         let mut dilation = Dilation::new();
         dilation.begin(WIDTH, dilations);
-        let below = std::iter::repeat_n(&EMPTY_ROW, usize::from(dilations));
-        let rows = rows.iter().chain(below).filter_map(|row| {
-            let mut out = EMPTY_ROW;
-            dilation.push(row, &mut out).then_some(out)
-        });
+        let below = std::iter::repeat_n(&[0; 3], usize::from(dilations));
+        let rows = rows.iter().chain(below);
+        let rows = rows.filter_map(|row| dilation.push(row).map(|out| out.try_into().unwrap()));
         rows.collect()
     }
 

@@ -193,15 +193,15 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Frees the labels of the row before that were joined to others, and those that row `y` did not touch.
     fn finish_untouched(&mut self, y: u16) {
         for &LabelledRun { label, .. } in &self.before {
-            let Slot { parent, blob } = self.slots[usize::from(label)];
-            let root = parent == label;
-            if parent == FREE || root && blob.y1 == y {
+            let slot = &mut self.slots[usize::from(label)];
+            let root = slot.parent == label;
+            if slot.parent == FREE || root && slot.blob.y1 == y {
                 continue;
             }
-            if root && blob.area >= self.min_area {
-                self.overflowed |= self.kept.push(blob).is_err();
+            if root && slot.blob.area >= self.min_area {
+                self.overflowed |= self.kept.push(slot.blob).is_err();
             }
-            self.slots[usize::from(label)].parent = FREE;
+            slot.parent = FREE;
             self.overflowed |= self.free.push(label).is_err();
         }
     }

@@ -6,7 +6,7 @@ use crate::{
     blob::Blob,
     dilate::Dilation,
     label::Labeller,
-    mask::{EMPTY_ROW, MaskRow, count, last_word_bits, threshold_row, words_of},
+    mask::{EMPTY_ROW, count, last_word_bits, threshold_row, words_of},
     status::Status,
     threshold::ThresholdTable,
 };
@@ -162,7 +162,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
         let mut mask = EMPTY_ROW;
         threshold_row(table, row, &mut mask);
-        self.take(&mask);
+        self.take(&mask[..words_of(self.settings.width)]);
     }
 
     /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Otherwise as
@@ -172,9 +172,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             return;
         }
         let mut mask = EMPTY_ROW;
-        mask[..words.len()].copy_from_slice(words);
-        mask[words.len() - 1] &= last_word_bits(self.settings.width);
-        self.take(&mask);
+        let mask = &mut mask[..words.len()];
+        mask.copy_from_slice(words);
+        if let Some(last) = mask.last_mut() {
+            *last &= last_word_bits(self.settings.width);
+        }
+        self.take(mask);
     }
 
     /// Ends the frame. Without a frame (no successful `begin` since the last `finish`), it repeats the last result.
@@ -204,17 +207,16 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         expected
     }
 
-    fn take(&mut self, mask: &MaskRow) {
+    fn take(&mut self, mask: &[u32]) {
         self.rows_in += 1;
         self.set_pixels += count(mask);
         self.advance(mask);
     }
 
     /// Passes a row through the dilation to the labels.
-    fn advance(&mut self, mask: &MaskRow) {
-        let mut dilated = EMPTY_ROW;
-        if self.dilation.push(mask, &mut dilated) {
-            self.labels.push(&dilated, self.rows_out);
+    fn advance(&mut self, mask: &[u32]) {
+        if let Some(dilated) = self.dilation.push(mask) {
+            self.labels.push(dilated, self.rows_out);
             self.rows_out += 1;
         }
     }
@@ -224,8 +226,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if self.rows_in < self.settings.height {
             self.status |= Status::FRAME_INCOMPLETE;
         }
+        let below = &EMPTY_ROW[..words_of(self.settings.width)];
         for _ in 0..self.dilation.radius() {
-            self.advance(&EMPTY_ROW);
+            self.advance(below);
         }
         self.labels.finish(self.rows_out);
         if self.labels.overflowed() {
