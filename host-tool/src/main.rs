@@ -1,2 +1,168 @@
-//! placeholder
-fn main() {}
+//! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
+
+mod command;
+mod decimal;
+mod failure;
+mod force_json;
+mod hsv;
+mod info;
+mod lines;
+mod link;
+mod monitor;
+mod output;
+mod port;
+mod stop;
+mod tally;
+mod truth;
+
+use clap::{Args, Parser, Subcommand};
+use failure::{Failure, Kind};
+use hivtac_wire::message::HsvBox;
+use lines::Format;
+use port::Address;
+use std::process::ExitCode;
+use std::time::Duration;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done; also when the reader of the output went away (broken pipe)
+  1    a file, a picture or the output cannot be used
+  2    wrong usage
+  3    no device: none found, the port cannot be opened, or nobody answers
+  4    the device speaks another version of the protocol
+  5    the connection was lost
+  6    the device refused a command or did not answer it
+  130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
+
+/// Shows the forces of a HiVTac sensor.
+#[derive(Parser)]
+#[command(version, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Show forces as they come, and a summary at the end
+    Monitor(MonitorArguments),
+    /// Show what the device is and how it fares
+    Info {
+        #[command(flatten)]
+        device: Device,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
+    /// Take the present position of the film as its rest position
+    Tare {
+        #[command(flatten)]
+        device: Device,
+        /// Good frames to average
+        #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=256))]
+        frames: u16,
+    },
+    /// Set the colour threshold until the device restarts
+    Threshold {
+        #[command(flatten)]
+        device: Device,
+        /// Inclusive bounds in OpenCV's 8-bit HSV: hue 0–179 (h0 > h1 wraps), saturation and value 0–255
+        #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
+        hsv: HsvBox,
+    },
+}
+
+#[derive(Args)]
+struct Device {
+    /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
+    #[arg(long, value_name = "PORT")]
+    port: Option<String>,
+    /// Longest wait for the device's hello and replies, s
+    #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+    timeout: Duration,
+}
+
+impl Device {
+    fn address(&self) -> Address {
+        self.port.as_deref().map_or(Address::Find, Address::parse)
+    }
+}
+
+#[derive(Args)]
+struct MonitorArguments {
+    #[command(flatten)]
+    device: Device,
+    /// End after N frames
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    frames: Option<u64>,
+    /// End after S seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Option<Duration>,
+    /// One JSON object a line
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Comma-separated values
+    #[arg(long)]
+    csv: bool,
+    /// Go on after a lost connection, trying twice a second
+    #[arg(long)]
+    reconnect: bool,
+    /// Compare with the log of a simulated sensor: JSON lines with "frame" and the true force
+    #[arg(long, value_name = "FILE")]
+    truth: Option<String>,
+}
+
+impl MonitorArguments {
+    fn options(self) -> monitor::Options {
+        let format = match (self.json, self.csv) {
+            (true, _) => Format::Json,
+            (_, true) => Format::Csv,
+            _ => Format::Human,
+        };
+        monitor::Options {
+            address: self.device.address(),
+            patience: self.device.timeout,
+            frames: self.frames,
+            duration: self.seconds,
+            format,
+            reconnect: self.reconnect,
+            truth: self.truth,
+        }
+    }
+}
+
+/// A positive number of seconds, up to a year.
+fn seconds(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 31_536_000.0 => {
+            Ok(Duration::from_secs_f64(seconds))
+        }
+        _ => Err("a positive number of seconds is needed".to_owned()),
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    stop::install()?;
+    match command {
+        Command::Monitor(arguments) => monitor::run(&arguments.options()),
+        Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
+        Command::Tare { device, frames } => {
+            command::tare(&device.address(), device.timeout, frames)
+        }
+        Command::Threshold { device, hsv } => {
+            command::threshold(&device.address(), device.timeout, hsv)
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Arguments::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if failure.kind != Kind::Interrupted {
+                output::note(&format!("hivtac: {failure}"));
+            }
+            ExitCode::from(failure.kind.exit_code())
+        }
+    }
+}

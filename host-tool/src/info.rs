@@ -1,0 +1,151 @@
+//! `hivtac info`: what the device is and how it fares.
+
+use crate::failure::Failure;
+use crate::lines::to_json;
+use crate::link::{Link, log_text};
+use crate::output::{note, print};
+use crate::port::Address;
+use hivtac_wire::message::{DeviceHello, DeviceMessage, HsvBox, Request, Stats};
+use serde::Serialize;
+use std::time::Duration;
+
+/// Prints the device's hello and counters, as lines or as one JSON object.
+pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
+    let (mut link, hello) = Link::connect(address, patience)?;
+    let (hello, stats) = ask(&mut link, patience, hello)?;
+    let info = Info::new(&link.name, &hello, stats);
+    print(&if json {
+        to_json(&info)
+    } else {
+        info.lines().join("\n")
+    })?;
+    Ok(())
+}
+
+fn ask(
+    link: &mut Link,
+    patience: Duration,
+    mut hello: DeviceHello,
+) -> Result<(DeviceHello, Option<Stats>), Failure> {
+    let mut stats = None;
+    link.request(Request::GetInfo, patience, |message| match message {
+        DeviceMessage::Hello(newer) => hello = newer,
+        DeviceMessage::Stats(newer) => stats = Some(newer),
+        DeviceMessage::Log(line) => note(&log_text(&line)),
+        DeviceMessage::Sample(_) | DeviceMessage::Reply(_) => (),
+    })?;
+    Ok((hello, stats))
+}
+
+#[derive(Serialize)]
+struct Info<'a> {
+    port: &'a str,
+    protocol: u16,
+    schema: String,
+    device_id: String,
+    board: &'a str,
+    firmware: &'a str,
+    model: Option<Model<'a>>,
+    width: u16,
+    height: u16,
+    threshold: HsvBox,
+    stats: Option<Stats>,
+}
+
+#[derive(Serialize)]
+struct Model<'a> {
+    crc: String,
+    name: &'a str,
+    simulated: bool,
+}
+
+impl<'a> Info<'a> {
+    fn new(port: &'a str, hello: &'a DeviceHello, stats: Option<Stats>) -> Info<'a> {
+        Info {
+            port,
+            protocol: hello.protocol,
+            schema: format!("{:#018x}", hello.schema),
+            device_id: hello
+                .device_id
+                .iter()
+                .map(|byte| format!("{byte:02x}"))
+                .collect(),
+            board: &hello.board,
+            firmware: &hello.firmware,
+            model: hello.model.as_ref().map(|model| Model {
+                crc: format!("{:08x}", model.crc),
+                name: &model.name,
+                simulated: model.simulated,
+            }),
+            width: hello.width,
+            height: hello.height,
+            threshold: hello.threshold,
+            stats,
+        }
+    }
+
+    fn lines(&self) -> Vec<String> {
+        let threshold = &self.threshold;
+        let mut lines = vec![
+            format!("port       {}", self.port),
+            format!("device     {}", self.device_id),
+            format!("board      {}", self.board),
+            format!("firmware   {}", self.firmware),
+            format!("protocol   {}, schema {}", self.protocol, self.schema),
+            format!("model      {}", self.model_text()),
+            format!("frame      {} × {} px", self.width, self.height),
+            format!(
+                "threshold  H {}–{}, S {}–{}, V {}–{}",
+                threshold.hue_low,
+                threshold.hue_high,
+                threshold.saturation_low,
+                threshold.saturation_high,
+                threshold.value_low,
+                threshold.value_high
+            ),
+        ];
+        lines.extend(self.stats.iter().flat_map(stats_lines));
+        lines
+    }
+
+    fn model_text(&self) -> String {
+        match &self.model {
+            Some(model) => {
+                let origin = if model.simulated {
+                    "simulated sensor"
+                } else {
+                    "this unit"
+                };
+                format!("{}, CRC {}, trained on: {origin}", model.name, model.crc)
+            }
+            None => "none".to_owned(),
+        }
+    }
+}
+
+/// The counters since boot.
+fn stats_lines(stats: &Stats) -> [String; 4] {
+    [
+        format!(
+            "frames     {} exposed, {} processed; dropped: busy {}, overrun {}, size {}",
+            stats.frames_exposed,
+            stats.frames_processed,
+            stats.dropped_busy,
+            stats.dropped_overrun,
+            stats.dropped_size
+        ),
+        format!(
+            "camera     {} timeouts, {} restarts, {} overruns",
+            stats.camera_timeouts, stats.camera_restarts, stats.capture_overruns
+        ),
+        format!(
+            "USB        {} samples dropped, {} frames from the host rejected",
+            stats.usb_dropped, stats.host_frames_rejected
+        ),
+        format!(
+            "time       up {:.3} s; last frame took {} µs",
+            stats.uptime_us as f64 / 1e6,
+            stats.processing_us
+        ),
+    ]
+}

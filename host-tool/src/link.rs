@@ -1,0 +1,254 @@
+//! A conversation with the device (`docs/wire.md`): hello, commands, messages.
+
+use crate::failure::{Failure, Kind};
+use crate::port::{Address, Port};
+use crate::stop;
+use hivtac_wire::decoder::{Decoder, Received, Rejected};
+use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
+use hivtac_wire::message::{
+    Command, DeviceHello, DeviceMessage, HostMessage, LogLevel, LogLine, Outcome, Request,
+};
+use hivtac_wire::version::HelloPrefix;
+use std::io::{self, ErrorKind};
+use std::time::{Duration, Instant};
+
+/// Time between two hellos that were not answered.
+const HELLO_EVERY: Duration = Duration::from_millis(250);
+/// Longest time the device may take no byte of a command.
+const WRITE_PATIENCE: Duration = Duration::from_secs(2);
+
+/// An open conversation.
+pub struct Link {
+    port: Box<dyn Port>,
+    /// The port's name, for messages.
+    pub name: String,
+    decoder: Decoder<DEVICE_FRAME_LIMIT>,
+    /// Bytes that were read; those before `decoded` are done with.
+    inbox: Vec<u8>,
+    decoded: usize,
+    last_id: u16,
+}
+
+impl Link {
+    /// Opens the port and exchanges hellos.
+    ///
+    /// # Errors
+    /// [`Kind::NoDevice`] when the port cannot be opened or nobody says hello within `patience`;
+    /// [`Kind::Version`] when the device speaks another version.
+    pub fn connect(address: &Address, patience: Duration) -> Result<(Link, DeviceHello), Failure> {
+        let (port, name) = address.open()?;
+        let decoder = Decoder::new();
+        let mut link = Link {
+            port,
+            name,
+            decoder,
+            inbox: Vec::new(),
+            decoded: 0,
+            last_id: 0,
+        };
+        let hello = link.exchange_hellos(patience)?;
+        Ok((link, hello))
+    }
+
+    fn exchange_hellos(&mut self, patience: Duration) -> Result<DeviceHello, Failure> {
+        let end = Instant::now() + patience;
+        while Instant::now() < end {
+            self.say_hello()?;
+            let next = end.min(Instant::now() + HELLO_EVERY);
+            while let Some(message) = self.receive(next)? {
+                // Anything else is left over from an earlier conversation.
+                if let DeviceMessage::Hello(hello) = message {
+                    // The decoder stands between two frames here; what it rejected so far does not count.
+                    self.decoder = Decoder::new();
+                    return Ok(hello);
+                }
+            }
+        }
+        Err(self.no_hello(patience))
+    }
+
+    fn no_hello(&self, patience: Duration) -> Failure {
+        let name = &self.name;
+        let seconds = patience.as_secs_f32();
+        let bytes = match self.decoder.rejected().bytes {
+            0 => "nothing came".to_owned(),
+            bytes => format!("{bytes} bytes came that are no message"),
+        };
+        Failure::new(
+            Kind::NoDevice,
+            format!(
+                "no hello from {name} within {seconds} s ({bytes}); is it a HiVTac sensor, \
+                 and running? (choose another port with --port, or wait longer with --timeout)"
+            ),
+        )
+    }
+
+    /// A zero first: it ends whatever half frame is in the line.
+    fn say_hello(&mut self) -> Result<(), Failure> {
+        self.write(&[0])?;
+        self.send(&HostMessage::Hello(HelloPrefix::OURS.into()))
+    }
+
+    fn send(&mut self, message: &HostMessage) -> Result<(), Failure> {
+        let mut buffer = [0; MAX_HOST_FRAME];
+        match encode(message, &mut buffer) {
+            Ok(frame) => self.write(frame),
+            Err(error) => unreachable!("{error:?}: MAX_HOST_FRAME holds every message"),
+        }
+    }
+
+    fn write(&mut self, mut bytes: &[u8]) -> Result<(), Failure> {
+        let mut end = Instant::now() + WRITE_PATIENCE;
+        while !bytes.is_empty() {
+            stop::check()?;
+            match self.port.write(bytes) {
+                Ok(0) => return Err(self.lost("the port is closed")),
+                Ok(written) => {
+                    bytes = &bytes[written..];
+                    end = Instant::now() + WRITE_PATIENCE;
+                }
+                Err(error) if is_patience(&error) && Instant::now() < end => (),
+                Err(error) => return Err(self.lost(&error.to_string())),
+            }
+        }
+        Ok(())
+    }
+
+    /// The next message; `None` from `end` on, even when there are more.
+    ///
+    /// # Errors
+    /// [`Kind::Lost`], [`Kind::Version`] or [`Kind::Interrupted`].
+    pub fn receive(&mut self, end: Instant) -> Result<Option<DeviceMessage>, Failure> {
+        while Instant::now() < end {
+            stop::check()?;
+            match self.decode() {
+                Some(Received::Message(message)) => return Ok(Some(message)),
+                Some(Received::ForeignHello(hello)) => return Err(self.foreign(hello)),
+                None => self.read()?,
+            }
+        }
+        Ok(None)
+    }
+
+    fn decode(&mut self) -> Option<Received<DeviceMessage>> {
+        let mut rest = &self.inbox[self.decoded..];
+        let received = self.decoder.feed(&mut rest);
+        self.decoded = self.inbox.len() - rest.len();
+        received
+    }
+
+    fn read(&mut self) -> Result<(), Failure> {
+        self.inbox.resize(4096, 0);
+        self.decoded = 0;
+        let result = self.port.read(&mut self.inbox);
+        self.inbox.truncate(*result.as_ref().unwrap_or(&0));
+        match result {
+            Ok(0) => Err(self.lost("the other end closed it")),
+            Ok(_) => Ok(()),
+            Err(error) if is_patience(&error) => Ok(()),
+            Err(error) => Err(self.lost(&error.to_string())),
+        }
+    }
+
+    fn lost(&self, why: &str) -> Failure {
+        let name = &self.name;
+        let message = format!(
+            "connection to {name} lost: {why}; cable pulled or device reset? \
+             (`hivtac monitor --reconnect` goes on when it is back)"
+        );
+        Failure::new(Kind::Lost, message)
+    }
+
+    fn foreign(&self, device: HelloPrefix) -> Failure {
+        let host = HelloPrefix::OURS;
+        let message = format!(
+            "the device at {} speaks protocol {} (schema {:#018x}), this tool protocol {} (schema {:#018x}); \
+             use the hivtac and the firmware of one release",
+            self.name, device.protocol, device.schema, host.protocol, host.schema
+        );
+        Failure::new(Kind::Version, message)
+    }
+
+    /// Sends a command without waiting for its reply; returns its id.
+    pub fn command(&mut self, request: Request) -> Result<u16, Failure> {
+        self.last_id = self.last_id.wrapping_add(1);
+        let id = self.last_id;
+        self.send(&HostMessage::Command(Command { id, request }))?;
+        Ok(id)
+    }
+
+    /// Sends a command and waits for its reply; other messages that come first go to `other`.
+    ///
+    /// # Errors
+    /// [`Kind::Refused`] when the answer is not `Done` or there is none within `patience`; those of [`Link::receive`].
+    pub fn request(
+        &mut self,
+        request: Request,
+        patience: Duration,
+        mut other: impl FnMut(DeviceMessage),
+    ) -> Result<(), Failure> {
+        let what = name_of(&request);
+        let id = self.command(request)?;
+        let end = Instant::now() + patience;
+        while let Some(message) = self.receive(end)? {
+            match message {
+                DeviceMessage::Reply(reply) if reply.id == id => return judge(what, reply.outcome),
+                message => other(message),
+            }
+        }
+        let seconds = patience.as_secs_f32();
+        Err(refused(format!(
+            "the device did not answer \"{what}\" within {seconds} s"
+        )))
+    }
+
+    /// What the decoder threw away since the device's hello.
+    pub fn rejected(&self) -> Rejected {
+        self.decoder.rejected()
+    }
+}
+
+/// True when nothing happened yet, rather than something bad.
+fn is_patience(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+    )
+}
+
+fn name_of(request: &Request) -> &'static str {
+    match request {
+        Request::GetInfo => "get info",
+        Request::Start => "start",
+        Request::Stop => "stop",
+        Request::SetThreshold(_) => "set threshold",
+        Request::Tare { .. } => "tare",
+    }
+}
+
+fn refused(message: String) -> Failure {
+    Failure::new(Kind::Refused, message)
+}
+
+fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
+    let why = match outcome {
+        Outcome::Done => return Ok(()),
+        Outcome::InvalidArgument => "an argument is outside its range",
+        Outcome::Busy => "it is busy with the same thing; try again later",
+        Outcome::NoGoodFrames => {
+            "not enough good frames came in time; does the camera see all four markers? (hivtac monitor)"
+        }
+    };
+    Err(refused(format!("the device refused \"{what}\": {why}")))
+}
+
+/// A device's log line for standard error.
+pub fn log_text(line: &LogLine) -> String {
+    let level = match line.level {
+        LogLevel::Error => "error",
+        LogLevel::Warning => "warning",
+        LogLevel::Info => "info",
+    };
+    let seconds = line.time_us as f64 / 1e6;
+    format!("device, {seconds:.3} s, {level}: {}", line.text)
+}

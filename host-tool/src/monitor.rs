@@ -1,0 +1,263 @@
+//! `hivtac monitor`: the forces as they come, and a summary at the end.
+
+use crate::failure::{Failure, Kind};
+use crate::lines::{Format, Row};
+use crate::link::{Link, log_text};
+use crate::output::{Reader, note, print};
+use crate::port::Address;
+use crate::stop;
+use crate::tally::Tally;
+use crate::truth::TruthFile;
+use hivtac_wire::message::{DeviceMessage, Request, Sample};
+use std::time::{Duration, Instant};
+
+/// Time between two attempts to connect again.
+const RETRY_EVERY: Duration = Duration::from_millis(500);
+/// Silence after which a person is told.
+const SILENCE: Duration = Duration::from_secs(5);
+/// Longest wait for the last counters at the end.
+const FAREWELL: Duration = Duration::from_secs(1);
+
+/// What to do.
+pub struct Options {
+    /// Where the device is.
+    pub address: Address,
+    /// Longest wait for the device's answers.
+    pub patience: Duration,
+    /// End after so many frames.
+    pub frames: Option<u64>,
+    /// End so long after the first start.
+    pub duration: Option<Duration>,
+    /// How samples are printed.
+    pub format: Format,
+    /// Survive a lost connection.
+    pub reconnect: bool,
+    /// The simulation's log to compare with.
+    pub truth: Option<String>,
+}
+
+/// Shows samples until the frames or the time are over, the reader is gone, or something fails; then the summary: on
+/// standard output for a person, on standard error beside JSON and CSV.
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let mut monitor = Monitor::new(options)?;
+    let result = monitor.watch();
+    if monitor.started.is_some() {
+        monitor.print_summary();
+    }
+    result.map(|_| ())
+}
+
+/// Why the samples ended without a failure.
+enum End {
+    /// As many frames or as long as wanted.
+    Enough,
+    /// Nobody reads the output any more.
+    ReaderGone,
+}
+
+struct Monitor<'o> {
+    options: &'o Options,
+    truth: Option<TruthFile>,
+    tally: Tally,
+    /// When the device first began to stream.
+    started: Option<Instant>,
+    reader: Reader,
+    /// Connected again, and no sample yet.
+    just_back: bool,
+}
+
+impl<'o> Monitor<'o> {
+    fn new(options: &'o Options) -> Result<Self, Failure> {
+        let truth = options.truth.as_deref().map(TruthFile::open).transpose()?;
+        Ok(Monitor {
+            options,
+            truth,
+            tally: Tally::default(),
+            started: None,
+            reader: Reader::There,
+            just_back: false,
+        })
+    }
+
+    /// Follows the device through as many connections as it takes.
+    fn watch(&mut self) -> Result<End, Failure> {
+        let (mut link, _) = Link::connect(&self.options.address, self.options.patience)?;
+        loop {
+            let result = self.converse(&mut link);
+            self.tally.rejected(link.rejected());
+            match result {
+                Err(failure) if failure.kind == Kind::Lost && self.options.reconnect => {
+                    drop(link);
+                    note(&format!("hivtac: {failure}"));
+                    match self.find_again()? {
+                        Some(again) => link = again,
+                        None => return Ok(End::Enough),
+                    }
+                }
+                result => return result,
+            }
+        }
+    }
+
+    /// Connects again, however long it takes; `None` when the time is over.
+    fn find_again(&mut self) -> Result<Option<Link>, Failure> {
+        let lost = Instant::now();
+        while !self.time_is_over() {
+            stop::check()?;
+            std::thread::sleep(RETRY_EVERY);
+            match Link::connect(&self.options.address, self.options.patience) {
+                Ok((link, _)) => {
+                    let seconds = lost.elapsed().as_secs_f32();
+                    note(&format!(
+                        "hivtac: connected again to {} after {seconds:.1} s",
+                        link.name
+                    ));
+                    self.tally.reconnections += 1;
+                    self.just_back = true;
+                    return Ok(Some(link));
+                }
+                Err(failure) if matches!(failure.kind, Kind::NoDevice | Kind::Lost) => (),
+                Err(failure) => return Err(failure),
+            }
+        }
+        Ok(None)
+    }
+
+    /// One connection from the first command to its end.
+    fn converse(&mut self, link: &mut Link) -> Result<End, Failure> {
+        self.request(link, Request::GetInfo, self.options.patience)?;
+        self.started.get_or_insert_with(Instant::now);
+        self.print_header()?;
+        let started = self.request(link, Request::Start, self.options.patience)?;
+        let end = match started {
+            Some(end) => end,
+            None => self.stream(link)?,
+        };
+        self.say_goodbye(link);
+        Ok(end)
+    }
+
+    fn print_header(&mut self) -> Result<(), Failure> {
+        let header = self.options.format.header(self.truth.is_some());
+        if let (Some(header), 0) = (header, self.tally.reconnections) {
+            self.reader = print(&header)?;
+        }
+        Ok(())
+    }
+
+    /// Sends a command; samples that come before its reply are shown like any other.
+    fn request(
+        &mut self,
+        link: &mut Link,
+        request: Request,
+        patience: Duration,
+    ) -> Result<Option<End>, Failure> {
+        let mut early = Vec::new();
+        link.request(request, patience, |message| early.push(message))?;
+        for message in early {
+            if let Some(end) = self.take(message)? {
+                return Ok(Some(end));
+            }
+        }
+        Ok(None)
+    }
+
+    fn stream(&mut self, link: &mut Link) -> Result<End, Failure> {
+        let mut heard = Instant::now();
+        while !self.time_is_over() {
+            let silence_ends = heard + SILENCE;
+            match link.receive(self.end().map_or(silence_ends, |end| end.min(silence_ends)))? {
+                Some(message) => {
+                    let is_sample = matches!(message, DeviceMessage::Sample(_));
+                    if let Some(end) = self.take(message)? {
+                        return Ok(end);
+                    }
+                    // After `take`, which may have waited for whoever reads the output.
+                    if is_sample {
+                        heard = Instant::now();
+                    }
+                }
+                None if heard.elapsed() >= SILENCE => {
+                    let seconds = SILENCE.as_secs();
+                    note(&format!(
+                        "hivtac: no sample for {seconds} s; does the camera run? (still waiting)"
+                    ));
+                    heard = Instant::now();
+                }
+                None => (),
+            }
+        }
+        Ok(End::Enough)
+    }
+
+    /// Deals with one message; returns why to end, if so.
+    fn take(&mut self, message: DeviceMessage) -> Result<Option<End>, Failure> {
+        match message {
+            DeviceMessage::Sample(sample) => return self.show(&sample),
+            DeviceMessage::Stats(stats) => self.tally.stats(&stats),
+            DeviceMessage::Log(line) => note(&log_text(&line)),
+            // Late answers to a repeated hello, and to commands that were given up.
+            DeviceMessage::Hello(_) | DeviceMessage::Reply(_) => (),
+        }
+        Ok(None)
+    }
+
+    fn show(&mut self, sample: &Sample) -> Result<Option<End>, Failure> {
+        let (samples, frames) = self.tally.sample(sample);
+        if std::mem::take(&mut self.just_back) {
+            note(&format!(
+                "hivtac: {samples} samples missed, {frames} more frames not processed meanwhile"
+            ));
+        }
+        let truth = match &mut self.truth {
+            Some(file) => Some(file.take(sample.frame)?),
+            None => None,
+        };
+        if let (Some(force), Some(Some(truth))) = (&sample.force, &truth) {
+            self.tally.compare(force, truth);
+        }
+        self.reader = print(&self.options.format.row(&Row { sample, truth }))?;
+        if self.reader == Reader::Gone {
+            return Ok(Some(End::ReaderGone));
+        }
+        self.tally.shown += 1;
+        let enough = self
+            .options
+            .frames
+            .is_some_and(|frames| self.tally.shown >= frames);
+        Ok(enough.then_some(End::Enough))
+    }
+
+    /// When the time is over, if ever.
+    fn end(&self) -> Option<Instant> {
+        Some(self.started? + self.options.duration?)
+    }
+
+    fn time_is_over(&self) -> bool {
+        self.end().is_some_and(|end| Instant::now() >= end)
+    }
+
+    /// Stops the device and fetches its last counters; it is no failure when that does not work any more.
+    fn say_goodbye(&mut self, link: &mut Link) {
+        let ignore_samples = |stats: &mut Tally, message| {
+            if let DeviceMessage::Stats(last) = message {
+                stats.stats(&last);
+            }
+        };
+        for request in [Request::Stop, Request::GetInfo] {
+            let tally = &mut self.tally;
+            let result = link.request(request, FAREWELL, |message| ignore_samples(tally, message));
+            if result.is_err() {
+                return;
+            }
+        }
+    }
+
+    fn print_summary(&self) {
+        let summary = self.tally.summary(self.truth.is_some());
+        let for_a_person = self.options.format == Format::Human && self.reader == Reader::There;
+        if !for_a_person || print(&format!("\n{}", summary.trim_end())).is_err() {
+            note(summary.trim_end());
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Where the device is: a serial port found by its USB id or named, or a TCP address.
+
+use crate::failure::{Failure, Kind};
+use hivtac_wire::usb::{PRODUCT_ID, VENDOR_ID};
+use serialport::{ErrorKind, SerialPortInfo, SerialPortType};
+use std::io::{self, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+
+/// Longest wait of one read or write.
+const PATIENCE: Duration = Duration::from_millis(50);
+/// Longest wait for a TCP connection.
+const TCP_PATIENCE: Duration = Duration::from_secs(2);
+
+/// A byte stream whose reads and writes give up after [`PATIENCE`] with an error of kind `TimedOut` or `WouldBlock`.
+pub trait Port: Read + Write {}
+impl<T: Read + Write> Port for T {}
+
+/// Which port to use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    /// The one serial port with the sensor's USB id.
+    Find,
+    /// A serial port or pseudo-terminal.
+    Tty(String),
+    /// `host:port`.
+    Tcp(String),
+}
+
+impl Address {
+    /// From the text of `--port`: `tcp:HOST:PORT`, or the name of a serial port.
+    pub fn parse(text: &str) -> Address {
+        match text.strip_prefix("tcp:") {
+            Some(address) => Address::Tcp(address.to_owned()),
+            None => Address::Tty(text.to_owned()),
+        }
+    }
+
+    /// Opens the port; returns it with its name.
+    ///
+    /// # Errors
+    /// [`Kind::NoDevice`] when there is none or it cannot be opened.
+    pub fn open(&self) -> Result<(Box<dyn Port>, String), Failure> {
+        match self {
+            Address::Find => open_tty(&find(&ports()?)?),
+            Address::Tty(name) => open_tty(name),
+            Address::Tcp(address) => open_tcp(address),
+        }
+    }
+}
+
+fn failure(message: String) -> Failure {
+    Failure::new(Kind::NoDevice, message)
+}
+
+/// All serial ports of this machine.
+fn ports() -> Result<Vec<SerialPortInfo>, Failure> {
+    // `serialport` panics where Linux has no such directory, as in some containers.
+    if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").exists() {
+        return Ok(Vec::new());
+    }
+    let ports = serialport::available_ports().map_err(|error| {
+        failure(format!(
+            "cannot list the serial ports: {error}; name one with --port"
+        ))
+    })?;
+    // macOS shows each port twice; opening the `tty` one would wait for a carrier.
+    Ok(ports
+        .into_iter()
+        .filter(|port| !port.port_name.starts_with("/dev/tty."))
+        .collect())
+}
+
+/// The name of the one port that has the sensor's USB id.
+fn find(ports: &[SerialPortInfo]) -> Result<String, Failure> {
+    let sensors: Vec<_> = ports.iter().filter(|port| is_sensor(port)).collect();
+    match sensors[..] {
+        [sensor] => Ok(sensor.port_name.clone()),
+        [] => Err(failure(format!(
+            "no sensor found: no serial port has USB id {VENDOR_ID:04x}:{PRODUCT_ID:04x}; {}; \
+             plug it in, or name its port with --port",
+            seen(ports.iter())
+        ))),
+        _ => Err(failure(format!(
+            "more than one sensor found; {}; choose one with --port",
+            seen(sensors.into_iter())
+        ))),
+    }
+}
+
+fn is_sensor(port: &SerialPortInfo) -> bool {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) => (usb.vid, usb.pid) == (VENDOR_ID, PRODUCT_ID),
+        _ => false,
+    }
+}
+
+/// "ports seen: …" for a message.
+fn seen<'a>(ports: impl Iterator<Item = &'a SerialPortInfo>) -> String {
+    let names: Vec<_> = ports.map(describe).collect();
+    match names[..] {
+        [] => "there are no serial ports here".to_owned(),
+        _ => format!("ports seen: {}", names.join(", ")),
+    }
+}
+
+fn describe(port: &SerialPortInfo) -> String {
+    match &port.port_type {
+        SerialPortType::UsbPort(usb) => {
+            let serial = usb.serial_number.as_deref().unwrap_or("no serial number");
+            format!(
+                "{} (USB {:04x}:{:04x}, {serial})",
+                port.port_name, usb.vid, usb.pid
+            )
+        }
+        _ => port.port_name.clone(),
+    }
+}
+
+fn open_tty(name: &str) -> Result<(Box<dyn Port>, String), Failure> {
+    // The baud rate means nothing to the device; some drivers want one. DTR tells it that a host is there.
+    let port = serialport::new(name, 115_200)
+        .timeout(PATIENCE)
+        .dtr_on_open(true)
+        .open();
+    match port {
+        Ok(port) => Ok((Box::new(port), name.to_owned())),
+        Err(error) => Err(failure(format!("cannot open {name}: {}", advice(&error)))),
+    }
+}
+
+/// What is wrong with a port and what to do.
+fn advice(error: &serialport::Error) -> String {
+    match error.kind {
+        ErrorKind::Io(io::ErrorKind::NotFound) => {
+            let ports = ports().unwrap_or_default();
+            format!(
+                "there is no such port; {}; is the sensor plugged in?",
+                seen(ports.iter())
+            )
+        }
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
+            "permission denied; on Linux join the port's group: \
+             sudo usermod -aG dialout $USER, then log in again"
+                .to_owned()
+        }
+        ErrorKind::NoDevice => format!("{error}; close the other program that uses it"),
+        _ => format!("{error}; is it a serial port?"),
+    }
+}
+
+fn open_tcp(address: &str) -> Result<(Box<dyn Port>, String), Failure> {
+    let name = format!("tcp:{address}");
+    match connect(address) {
+        Ok(stream) => Ok((Box::new(stream), name)),
+        Err(error) => Err(failure(format!(
+            "cannot connect to {name}: {error}; is something listening there? (form: tcp:HOST:PORT)"
+        ))),
+    }
+}
+
+fn connect(address: &str) -> io::Result<TcpStream> {
+    let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+    for target in address.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&target, TCP_PATIENCE) {
+            Ok(stream) => {
+                stream.set_read_timeout(Some(PATIENCE))?;
+                stream.set_write_timeout(Some(PATIENCE))?;
+                stream.set_nodelay(true)?;
+                return Ok(stream);
+            }
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serialport::UsbPortInfo;
+
+    fn usb(name: &str, vid: u16, pid: u16, serial: &str) -> SerialPortInfo {
+        SerialPortInfo {
+            port_name: name.to_owned(),
+            port_type: SerialPortType::UsbPort(UsbPortInfo {
+                vid,
+                pid,
+                serial_number: Some(serial.to_owned()),
+                manufacturer: None,
+                product: None,
+            }),
+        }
+    }
+
+    fn plain(name: &str) -> SerialPortInfo {
+        SerialPortInfo {
+            port_name: name.to_owned(),
+            port_type: SerialPortType::Unknown,
+        }
+    }
+
+    #[test]
+    fn addresses_are_told_apart() {
+        assert_eq!(
+            Address::parse("tcp:localhost:7"),
+            Address::Tcp("localhost:7".into())
+        );
+        assert_eq!(
+            Address::parse("/dev/ttyACM0"),
+            Address::Tty("/dev/ttyACM0".into())
+        );
+        assert_eq!(Address::parse("COM3"), Address::Tty("COM3".into()));
+    }
+
+    #[test]
+    fn the_sensor_is_found_among_others() {
+        let ports = [
+            plain("ttyS0"),
+            usb("ttyACM0", 1, 2, "a"),
+            usb("ttyACM1", 0x1209, 1, "b"),
+        ];
+        assert_eq!(find(&ports).unwrap(), "ttyACM1");
+    }
+
+    #[test]
+    fn without_a_sensor_the_ports_are_listed() {
+        let ports = [plain("ttyS0"), usb("ttyACM0", 1, 2, "a")];
+        assert_eq!(
+            find(&ports).unwrap_err().to_string(),
+            "no sensor found: no serial port has USB id 1209:0001; ports seen: ttyS0, \
+             ttyACM0 (USB 0001:0002, a); plug it in, or name its port with --port"
+        );
+        assert!(
+            find(&[])
+                .unwrap_err()
+                .to_string()
+                .contains("there are no serial ports here")
+        );
+    }
+
+    #[test]
+    fn two_sensors_are_listed() {
+        let ports = [
+            usb("A", 0x1209, 1, "a"),
+            plain("S"),
+            usb("B", 0x1209, 1, "b"),
+        ];
+        assert_eq!(
+            find(&ports).unwrap_err().to_string(),
+            "more than one sensor found; ports seen: A (USB 1209:0001, a), B (USB 1209:0001, b); \
+             choose one with --port"
+        );
+    }
+}

@@ -1,0 +1,349 @@
+//! What a monitor saw in all: frames shown, received and lost by cause, and the error against the truth.
+
+use crate::truth::Truth;
+use hivtac_wire::decoder::Rejected;
+use hivtac_wire::message::{Force, Sample, Stats};
+use hivtac_wire::status::Status;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// |F| from which a direction means something, N.
+const DIRECTION_FLOOR_N: f64 = 0.05;
+
+/// Everything the summary says.
+#[derive(Default)]
+pub struct Tally {
+    /// Samples printed.
+    pub shown: u64,
+    received: u64,
+    gaps: Gaps,
+    rejected: Rejected,
+    device: DeviceCounts,
+    without_force: u64,
+    /// Of those without a force, how many had each "no force" bit, by its place in [`Status::NAMES`].
+    reasons: BTreeMap<usize, u64>,
+    errors: Errors,
+    /// Connections after the first.
+    pub reconnections: u64,
+}
+
+impl Tally {
+    /// Counts a sample; returns how many samples and frames before it are missing.
+    pub fn sample(&mut self, sample: &Sample) -> (u32, u32) {
+        self.received += 1;
+        if sample.force.is_none() {
+            self.without_force += 1;
+            let names = Status::NAMES.iter().enumerate();
+            for (place, _) in names.filter(|(_, (bit, _))| {
+                Status::NO_FORCE.contains(*bit) && sample.status.contains(*bit)
+            }) {
+                *self.reasons.entry(place).or_default() += 1;
+            }
+        }
+        self.gaps.count(sample.sequence, sample.frame)
+    }
+
+    /// Compares a sample that has a truth with it.
+    pub fn compare(&mut self, force: &Force, truth: &Truth) {
+        self.errors.count(force, truth);
+    }
+
+    /// Takes in the device's counters.
+    pub fn stats(&mut self, stats: &Stats) {
+        self.device.count(stats);
+    }
+
+    /// Takes in what the decoder of a connection threw away, once, when it ends.
+    pub fn rejected(&mut self, of_connection: Rejected) {
+        let sum = &mut self.rejected;
+        sum.overlong += of_connection.overlong;
+        sum.cobs += of_connection.cobs;
+        sum.crc += of_connection.crc;
+        sum.body += of_connection.body;
+        sum.trailing += of_connection.trailing;
+        sum.bytes += of_connection.bytes;
+    }
+
+    /// The summary for a person; with `truth`, the errors too.
+    pub fn summary(&self, truth: bool) -> String {
+        let mut lines = vec![
+            self.frames_line(),
+            self.loss_line(),
+            self.device.to_string(),
+        ];
+        if self.without_force > 0 {
+            lines.push(self.without_force_line());
+        }
+        if self.reconnections > 0 {
+            lines.push(format!("connected again {} times", self.reconnections));
+        }
+        if truth {
+            lines.extend(self.errors.lines());
+        }
+        lines.join("\n") + "\n"
+    }
+
+    fn frames_line(&self) -> String {
+        let lost = self.gaps.samples + self.gaps.frames;
+        format!(
+            "{} frames shown, {} received, {lost} lost",
+            self.shown, self.received
+        )
+    }
+
+    fn loss_line(&self) -> String {
+        let Rejected {
+            overlong,
+            cobs,
+            crc,
+            body,
+            trailing,
+            bytes,
+        } = self.rejected;
+        let mut line = format!(
+            "lost: {} samples on the way (gaps in the sequence), {} frames not processed (gaps in the frame number); \
+             rejected here: {} messages, {bytes} bytes",
+            self.gaps.samples,
+            self.gaps.frames,
+            self.rejected.frames()
+        );
+        if self.rejected.frames() > 0 {
+            line += &format!(
+                " (overlong {overlong}, cobs {cobs}, crc {crc}, body {body}, trailing {trailing})"
+            );
+        }
+        if self.gaps.restarts > 0 {
+            line += &format!("; the device started anew {} times", self.gaps.restarts);
+        }
+        line
+    }
+
+    fn without_force_line(&self) -> String {
+        let reasons: Vec<_> = self
+            .reasons
+            .iter()
+            .map(|(place, count)| format!("{} {count}", Status::NAMES[*place].1))
+            .collect();
+        format!(
+            "without a force: {} ({})",
+            self.without_force,
+            reasons.join(", ")
+        )
+    }
+}
+
+/// Gaps in the two counters of a sample.
+#[derive(Default)]
+struct Gaps {
+    last: Option<(u32, u32)>,
+    samples: u64,
+    frames: u64,
+    restarts: u64,
+}
+
+impl Gaps {
+    /// Missing samples, and missing frames beyond those, between this sample and the one before.
+    fn count(&mut self, sequence: u32, frame: u32) -> (u32, u32) {
+        let Some((last_sequence, last_frame)) = self.last.replace((sequence, frame)) else {
+            return (0, 0);
+        };
+        let samples = sequence.wrapping_sub(last_sequence).wrapping_sub(1);
+        let frames = frame.wrapping_sub(last_frame).wrapping_sub(1);
+        // Counters that step back are those of a device that started anew.
+        if samples > u32::MAX / 2 || frames > u32::MAX / 2 {
+            self.restarts += 1;
+            return (0, 0);
+        }
+        let unprocessed = frames.saturating_sub(samples);
+        self.samples += u64::from(samples);
+        self.frames += u64::from(unprocessed);
+        (samples, unprocessed)
+    }
+}
+
+/// How the device's counters grew while it was watched.
+#[derive(Default)]
+struct DeviceCounts {
+    last: Option<Stats>,
+    grown: [u64; 10],
+}
+
+impl DeviceCounts {
+    fn count(&mut self, stats: &Stats) {
+        let last = match self.last.replace(*stats) {
+            None => *stats,
+            Some(last) if stats.uptime_us < last.uptime_us => Stats::default(),
+            Some(last) => last,
+        };
+        let pairs = counters(stats).into_iter().zip(counters(&last));
+        for (sum, (now, before)) in self.grown.iter_mut().zip(pairs) {
+            *sum += u64::from(now.saturating_sub(before));
+        }
+    }
+}
+
+fn counters(stats: &Stats) -> [u32; 10] {
+    [
+        stats.frames_exposed,
+        stats.frames_processed,
+        stats.dropped_busy,
+        stats.dropped_overrun,
+        stats.dropped_size,
+        stats.usb_dropped,
+        stats.camera_timeouts,
+        stats.camera_restarts,
+        stats.capture_overruns,
+        stats.host_frames_rejected,
+    ]
+}
+
+impl fmt::Display for DeviceCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(last) = self.last else {
+            return f.write_str("device: no counters received");
+        };
+        let [
+            exposed,
+            processed,
+            busy,
+            overrun,
+            size,
+            usb,
+            timeouts,
+            restarts,
+            overruns,
+            rejected,
+        ] = self.grown;
+        write!(
+            f,
+            "device: {exposed} frames exposed, {processed} processed; dropped: busy {busy}, overrun {overrun}, \
+             size {size}, USB {usb}; camera timeouts {timeouts}, restarts {restarts}, overruns {overruns}; \
+             commands rejected {rejected}; last frame took {} µs",
+            last.processing_us
+        )
+    }
+}
+
+/// A mean in the making.
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: u64,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1;
+    }
+
+    fn value(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
+    }
+}
+
+/// Errors against the truth.
+#[derive(Default)]
+struct Errors {
+    direction_deg: Mean,
+    direction_deg_from_floor: Mean,
+    magnitude_squared: Mean,
+}
+
+impl Errors {
+    fn count(&mut self, force: &Force, truth: &Truth) {
+        let magnitude_error = f64::from(force.magnitude_un) / 1e6 - truth.magnitude_n;
+        self.magnitude_squared
+            .add(magnitude_error * magnitude_error);
+        let Some(vector) = force.cartesian_un else {
+            return;
+        };
+        let Some(angle) = angle_deg(vector.map(f64::from), [truth.x_n, truth.y_n, truth.z_n])
+        else {
+            return;
+        };
+        self.direction_deg.add(angle);
+        if truth.magnitude_n >= DIRECTION_FLOOR_N {
+            self.direction_deg_from_floor.add(angle);
+        }
+    }
+
+    fn lines(&self) -> [String; 2] {
+        let direction = |mean: &Mean, what: &str| match mean.value() {
+            Some(value) => format!("{value:.3}° over {} frames {what}", mean.count),
+            None => format!("none over 0 frames {what}"),
+        };
+        let rmse = match self.magnitude_squared.value() {
+            Some(square) => format!("{:.3} mN", square.sqrt() * 1e3),
+            None => "none".to_owned(),
+        };
+        [
+            format!(
+                "mean direction error: {}, {}",
+                direction(&self.direction_deg, "with a force"),
+                direction(&self.direction_deg_from_floor, "with true |F| ≥ 50 mN")
+            ),
+            format!(
+                "RMSE of |F|: {rmse} over {} frames",
+                self.magnitude_squared.count
+            ),
+        ]
+    }
+}
+
+/// Angle between two vectors, degrees, well conditioned everywhere; `None` when one of them has no direction.
+fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    let cross = [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ];
+    let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+    (dot != 0.0 || sine != 0.0).then(|| sine.atan2(dot).to_degrees())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_told_apart() {
+        let mut gaps = Gaps::default();
+        assert_eq!(
+            gaps.count(u32::MAX - 1, 10),
+            (0, 0),
+            "the first has no gap before it"
+        );
+        assert_eq!(gaps.count(u32::MAX, 11), (0, 0));
+        assert_eq!(gaps.count(0, 12), (0, 0), "wraps");
+        assert_eq!(gaps.count(3, 15), (2, 0), "two samples lost on the way");
+        assert_eq!(gaps.count(4, 18), (0, 2), "two frames not processed");
+        assert_eq!(gaps.count(6, 22), (1, 2), "both");
+        assert_eq!(gaps.count(0, 1), (0, 0), "started anew");
+        assert_eq!((gaps.samples, gaps.frames, gaps.restarts), (3, 4, 1));
+    }
+
+    #[test]
+    fn device_counters_are_what_they_grew() {
+        let stats = |exposed, uptime_us| Stats {
+            frames_exposed: exposed,
+            uptime_us,
+            ..Stats::default()
+        };
+        let mut device = DeviceCounts::default();
+        for (exposed, uptime) in [(100, 10), (130, 20), (5, 3), (9, 4)] {
+            device.count(&stats(exposed, uptime));
+        }
+        assert_eq!(device.grown[0], 39, "30 before the restart and 9 after it");
+    }
+
+    #[test]
+    fn angles_between_vectors() {
+        let angle = |a, b| angle_deg(a, b).unwrap();
+        assert!((angle([0.0, 0.0, -2.0], [0.0, 3.0, 0.0]) - 90.0).abs() < 1e-12);
+        assert!((angle([1.0, 0.0, 0.0], [1.0, 1e-9, 0.0]) - 1e-9_f64.to_degrees()).abs() < 1e-20);
+        assert!((angle([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]) - 180.0).abs() < 1e-12);
+        assert_eq!(angle_deg([0.0; 3], [1.0, 0.0, 0.0]), None);
+    }
+}

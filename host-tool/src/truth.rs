@@ -1,0 +1,176 @@
+//! The true force of each frame, from the log of a simulated sensor, joined by frame number.
+
+use crate::failure::{Failure, Kind};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::time::{Duration, Instant};
+
+/// Longest wait for the line of a frame that was received already.
+const PATIENCE: Duration = Duration::from_millis(300);
+/// Time between two looks at a file that grows.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+
+/// One line of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Truth {
+    /// Frame number, as in the samples.
+    #[serde(skip_serializing)]
+    frame: u32,
+    /// α, degrees.
+    pub alpha_deg: f64,
+    /// β, degrees.
+    pub beta_deg: f64,
+    /// |F|, N.
+    pub magnitude_n: f64,
+    /// Fx, N.
+    pub x_n: f64,
+    /// Fy, N.
+    pub y_n: f64,
+    /// Fz, N.
+    pub z_n: f64,
+}
+
+/// A log of JSON lines that may still grow while it is read.
+pub struct TruthFile {
+    path: String,
+    file: File,
+    /// What was read of a line that has no end yet.
+    partial: Vec<u8>,
+    lines: usize,
+    frames: HashMap<u32, Truth>,
+}
+
+impl TruthFile {
+    /// Opens the log.
+    pub fn open(path: &str) -> Result<TruthFile, Failure> {
+        let file = File::open(path).map_err(|error| {
+            let hint = match error.kind() {
+                ErrorKind::NotFound => "; start what writes it first",
+                _ => "",
+            };
+            Failure::new(
+                Kind::Input,
+                format!("cannot open the truth file {path}: {error}{hint}"),
+            )
+        })?;
+        let path = path.to_owned();
+        Ok(TruthFile {
+            path,
+            file,
+            partial: Vec::new(),
+            lines: 0,
+            frames: HashMap::new(),
+        })
+    }
+
+    /// The truth of a frame and forgets it; waits a little for its line to be written. `None` when it does not come.
+    pub fn take(&mut self, frame: u32) -> Result<Option<Truth>, Failure> {
+        let end = Instant::now() + PATIENCE;
+        loop {
+            self.read_on()?;
+            let truth = self.frames.remove(&frame);
+            if truth.is_some() || Instant::now() >= end {
+                return Ok(truth);
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+    }
+
+    fn read_on(&mut self) -> Result<(), Failure> {
+        self.file
+            .read_to_end(&mut self.partial)
+            .map_err(|error| self.failure(&format!("cannot be read: {error}")))?;
+        let Some(end) = self.partial.iter().rposition(|byte| *byte == b'\n') else {
+            return Ok(());
+        };
+        let rest = self.partial.split_off(end + 1);
+        let whole = std::mem::replace(&mut self.partial, rest);
+        whole[..end]
+            .split(|byte| *byte == b'\n')
+            .try_for_each(|line| self.keep(line))
+    }
+
+    fn keep(&mut self, line: &[u8]) -> Result<(), Failure> {
+        self.lines += 1;
+        let truth: Truth = serde_json::from_slice(line)
+            .map_err(|error| self.failure(&format!("line {}: {error}", self.lines)))?;
+        self.frames.insert(truth.frame, truth);
+        Ok(())
+    }
+
+    fn failure(&self, what: &str) -> Failure {
+        Failure::new(Kind::Input, format!("truth file {}: {what}", self.path))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn line(frame: u32, alpha: f64) -> String {
+        format!(
+            r#"{{"frame":{frame},"time_us":5,"alpha_deg":{alpha},"beta_deg":0.5,"magnitude_n":0.1,"x_n":0.0,"y_n":0.0,"z_n":-0.1}}"#
+        )
+    }
+
+    #[test]
+    fn frames_are_joined_by_number_while_the_file_grows() {
+        let mut log = tempfile::NamedTempFile::new().unwrap();
+        write!(
+            log,
+            "{}\n{}\n{}",
+            line(3, 1.0),
+            line(5, 2.0),
+            &line(6, 3.0)[..20]
+        )
+        .unwrap();
+        let mut truth = TruthFile::open(log.path().to_str().unwrap()).unwrap();
+        assert_eq!(truth.take(5).unwrap().unwrap().alpha_deg, 2.0);
+        assert_eq!(truth.take(4).unwrap(), None);
+        assert_eq!(truth.take(6).unwrap(), None, "half a line is no truth");
+        writeln!(log, "{}", &line(6, 3.0)[20..]).unwrap();
+        assert_eq!(truth.take(6).unwrap().unwrap().alpha_deg, 3.0);
+        assert_eq!(truth.take(3).unwrap().unwrap().alpha_deg, 1.0);
+    }
+
+    #[test]
+    fn it_waits_for_a_line_that_comes_late() {
+        let log = tempfile::NamedTempFile::new().unwrap();
+        let path = log.path().to_str().unwrap().to_owned();
+        let mut writer = log.reopen().unwrap();
+        let thread = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(60));
+            writeln!(writer, "{}", line(1, 4.0)).unwrap();
+        });
+        assert_eq!(
+            TruthFile::open(&path)
+                .unwrap()
+                .take(1)
+                .unwrap()
+                .unwrap()
+                .alpha_deg,
+            4.0
+        );
+        thread.join().unwrap();
+    }
+
+    #[test]
+    fn a_bad_line_is_named() {
+        let mut log = tempfile::NamedTempFile::new().unwrap();
+        writeln!(log, "{}\nnonsense", line(1, 0.0)).unwrap();
+        let path = log.path().to_str().unwrap();
+        let error = TruthFile::open(path)
+            .unwrap()
+            .take(1)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with(&format!("truth file {path}: line 2: ")),
+            "{error}"
+        );
+        assert!(TruthFile::open("/nowhere").is_err());
+    }
+}

@@ -1,0 +1,244 @@
+//! Finding, greeting, asking and commanding a device.
+
+use crate::fake::*;
+use crate::run::*;
+use hivtac_wire::frame::encode;
+use hivtac_wire::message::*;
+use hivtac_wire::version::SCHEMA_HASH;
+
+#[test]
+fn info_for_a_person() {
+    let script: Script = Box::new(|device| {
+        device.stats = Stats {
+            frames_exposed: 1000,
+            frames_processed: 990,
+            dropped_busy: 7,
+            usb_dropped: 3,
+            processing_us: 5300,
+            uptime_us: 34_000_000,
+            ..Stats::default()
+        };
+        device.serve();
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["info", "--port", &device.port]);
+    assert_eq!(
+        run.stdout,
+        format!(
+            "port       {}\n\
+             device     000102030405060708090aff\n\
+             board      fake board\n\
+             firmware   fake 1.0\n\
+             protocol   1, schema {SCHEMA_HASH:#018x}\n\
+             model      11-64-64-3 ov7725, CRC 0000cafe, trained on: simulated sensor\n\
+             frame      320 × 240 px\n\
+             threshold  H 170–10, S 100–255, V 45–255\n\
+             frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0\n\
+             camera     0 timeouts, 0 restarts, 0 overruns\n\
+             USB        3 samples dropped, 0 frames from the host rejected\n\
+             time       up 34.000 s; last frame took 5300 µs\n",
+            device.port
+        )
+    );
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn info_as_json() {
+    let device = FakeDevice::on_pty(Box::new(|device| device.serve()));
+    let run = run(&["info", "--json", "--port", &device.port]);
+    let info: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(info["port"], device.port);
+    assert_eq!(info["schema"], format!("{SCHEMA_HASH:#018x}"));
+    assert_eq!(info["device_id"], "000102030405060708090aff");
+    assert_eq!(info["model"]["simulated"], true);
+    assert_eq!(info["threshold"]["hue_low"], 170);
+    assert_eq!(info["stats"]["frames_exposed"], 0);
+    assert_eq!(run.stdout.lines().count(), 1);
+}
+
+#[test]
+fn another_version_is_named() {
+    let script: Script = Box::new(|device| {
+        let hello = DeviceHello {
+            protocol: 2,
+            schema: 0x1122_3344_5566_7788,
+            ..hello()
+        };
+        let mut buffer = [0; 256];
+        let frame = encode(&DeviceMessage::Hello(hello), &mut buffer).unwrap();
+        device.next();
+        device.raw(frame);
+        device.serve();
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["monitor", "--port", &device.port]);
+    assert_eq!(
+        run.stderr,
+        format!(
+            "hivtac: the device at {} speaks protocol 2 (schema 0x1122334455667788), \
+             this tool protocol 1 (schema {SCHEMA_HASH:#018x}); \
+             use the hivtac and the firmware of one release\n",
+            device.port
+        )
+    );
+    assert_eq!((run.code, run.stdout.as_str()), (Some(4), ""));
+}
+
+#[test]
+fn a_silent_device_is_no_device() {
+    let device = FakeDevice::on_pty(Box::new(|device| while device.next().is_some() {}));
+    let run = run(&["info", "--port", &device.port, "--timeout", "0.6"]);
+    assert_eq!(
+        run.stderr,
+        format!(
+            "hivtac: no hello from {} within 0.6 s (nothing came); is it a HiVTac sensor, and running? \
+             (choose another port with --port, or wait longer with --timeout)\n",
+            device.port
+        )
+    );
+    assert_eq!(run.code, Some(3));
+}
+
+#[test]
+fn a_device_of_another_kind_is_no_device() {
+    let device = FakeDevice::on_tcp([Box::new(|device| {
+        device.raw(b"$GPGGA,some,other,thing\0");
+        while device.next().is_some() {}
+    })]);
+    let run = run(&["info", "--port", &device.port, "--timeout", "0.6"]);
+    assert!(
+        run.stderr
+            .contains("within 0.6 s (23 bytes came that are no message)"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(run.code, Some(3));
+}
+
+/// The device starts late and misses the first hellos.
+#[test]
+fn the_hello_is_repeated() {
+    let device = FakeDevice::on_tcp([Box::new(|device| {
+        device.next();
+        device.next();
+        device.serve();
+    })]);
+    assert_eq!(run(&["info", "--port", &device.port]).code, Some(0));
+}
+
+#[test]
+fn ports_that_cannot_be_opened_are_named() {
+    let missing = run(&["info", "--port", "/dev/ttyNOWHERE"]);
+    assert_eq!(missing.code, Some(3));
+    let start = "hivtac: cannot open /dev/ttyNOWHERE: there is no such port; ";
+    assert!(missing.stderr.starts_with(start), "{}", missing.stderr);
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let no_port = run(&["info", "--port", file.path().to_str().unwrap()]);
+    assert_eq!(no_port.code, Some(3));
+    assert!(
+        no_port.stderr.contains("; is it a serial port?"),
+        "{}",
+        no_port.stderr
+    );
+    let nobody = run(&["info", "--port", "tcp:127.0.0.1:1"]);
+    assert_eq!(nobody.code, Some(3));
+    assert!(
+        nobody
+            .stderr
+            .contains("cannot connect to tcp:127.0.0.1:1: "),
+        "{}",
+        nobody.stderr
+    );
+}
+
+#[test]
+fn a_tare_is_taken_refused_or_not_answered() {
+    let device = |tare| {
+        let script: Script = Box::new(move |device| {
+            device.tare = tare;
+            device.serve();
+        });
+        FakeDevice::on_tcp([script])
+    };
+    let good = device(Some(Outcome::Done));
+    let done = run(&["tare", "--frames", "64", "--port", &good.port]);
+    assert_eq!(
+        (done.code, done.stdout.as_str()),
+        (Some(0), "tare taken over 64 frames\n")
+    );
+    assert_eq!(
+        good.commands.iter().collect::<Vec<_>>(),
+        [Request::Tare { frames: 64 }]
+    );
+    let blind = run(&["tare", "--port", &device(Some(Outcome::NoGoodFrames)).port]);
+    assert_eq!(blind.code, Some(6));
+    assert_eq!(
+        blind.stderr,
+        "hivtac: the device refused \"tare\": not enough good frames came in time; \
+         does the camera see all four markers? (hivtac monitor)\n"
+    );
+    let mute = run(&["tare", "--frames", "1", "--port", &device(None).port]);
+    assert_eq!(mute.code, Some(6));
+    assert_eq!(
+        mute.stderr,
+        "hivtac: the device did not answer \"tare\" within 10.5 s\n"
+    );
+}
+
+#[test]
+fn a_threshold_is_set_as_given() {
+    let device = FakeDevice::on_pty(Box::new(|device| device.serve()));
+    let run = run(&[
+        "threshold",
+        "--hsv",
+        "160,8,90,250,40,240",
+        "--port",
+        &device.port,
+    ]);
+    assert_eq!(
+        (run.code, run.stdout.as_str()),
+        (Some(0), "threshold set\n")
+    );
+    let expected = HsvBox {
+        hue_low: 160,
+        hue_high: 8,
+        saturation_low: 90,
+        saturation_high: 250,
+        value_low: 40,
+        value_high: 240,
+    };
+    assert_eq!(
+        device.commands.iter().next(),
+        Some(Request::SetThreshold(expected))
+    );
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    for arguments in [
+        &["tare", "--frames", "257"][..],
+        &["tare", "--frames", "0"],
+        &["threshold", "--hsv", "200,8,90,250,40,240"],
+        &["monitor", "--json", "--csv"],
+        &["monitor", "--frames", "0"],
+        &["monitor", "--seconds", "-1"],
+        &["monitor", "--timeout", "nan"],
+        &["nonsense"],
+    ] {
+        assert_eq!(run(arguments).code, Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn the_help_lists_the_exit_codes() {
+    let help = run(&["--help"]);
+    assert_eq!(help.code, Some(0));
+    for code in ["0  ", "1  ", "2  ", "3  ", "4  ", "5  ", "6  ", "130"] {
+        assert!(
+            help.stdout.contains(&format!("\n  {code}")),
+            "{code}: {}",
+            help.stdout
+        );
+    }
+}

@@ -1,0 +1,221 @@
+//! A device that follows a script, on TCP or on a pseudo-terminal.
+
+use hivtac_wire::decoder::{Decoder, Received};
+use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
+use hivtac_wire::message::*;
+use hivtac_wire::status::Status;
+use hivtac_wire::version::SCHEMA_HASH;
+use rustix::fs::{Mode, OFlags};
+use rustix::pty::OpenptFlags;
+use std::fs::File;
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::sync::mpsc;
+
+pub trait Stream: Read + Write + Send {}
+impl<T: Read + Write + Send> Stream for T {}
+
+/// The device's end of one connection.
+pub struct Conversation {
+    stream: Box<dyn Stream>,
+    decoder: Decoder<HOST_FRAME_LIMIT>,
+    pub stats: Stats,
+    /// Commands that were received, for the test to look at.
+    pub commands: mpsc::Sender<Request>,
+    /// What a tare is answered with; `None`: nothing.
+    pub tare: Option<Outcome>,
+    /// True when the host takes nothing any more.
+    pub host_is_gone: bool,
+}
+
+/// What a device does on one connection.
+pub type Script = Box<dyn FnOnce(&mut Conversation) + Send>;
+
+impl Conversation {
+    /// The next message of the host; `None` when it is gone.
+    pub fn next(&mut self) -> Option<HostMessage> {
+        loop {
+            let mut byte = [0];
+            match self.stream.read(&mut byte) {
+                Ok(0) => return None,
+                Ok(_) => match self.decoder.push(byte[0]) {
+                    Some(Received::Message(message)) => return Some(message),
+                    Some(Received::ForeignHello(hello)) => panic!("{hello:?}"),
+                    None => (),
+                },
+                Err(_) => return None,
+            }
+        }
+    }
+
+    /// Sends bytes; a host that is gone does not matter.
+    pub fn raw(&mut self, bytes: &[u8]) {
+        self.host_is_gone |= self.stream.write_all(bytes).is_err();
+    }
+
+    pub fn send(&mut self, message: DeviceMessage) {
+        let mut buffer = [0; MAX_DEVICE_FRAME];
+        self.raw(encode(&message, &mut buffer).unwrap());
+    }
+
+    pub fn reply(&mut self, id: u16, outcome: Outcome) {
+        self.send(DeviceMessage::Reply(Reply { id, outcome }));
+    }
+
+    /// Answers like a good device until the host says start; true then, false when it is gone.
+    pub fn until_start(&mut self) -> bool {
+        while let Some(message) = self.next() {
+            if self.answer(message) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Answers like a good device until the host is gone; samples are not sent.
+    pub fn serve(&mut self) {
+        while let Some(message) = self.next() {
+            self.answer(message);
+        }
+    }
+
+    /// Answers one message; true for start.
+    fn answer(&mut self, message: HostMessage) -> bool {
+        let HostMessage::Command(Command { id, request }) = message else {
+            self.send(DeviceMessage::Hello(hello()));
+            return false;
+        };
+        let _ = self.commands.send(request.clone());
+        match &request {
+            Request::GetInfo => {
+                self.send(DeviceMessage::Hello(hello()));
+                self.send(DeviceMessage::Stats(self.stats));
+            }
+            Request::Tare { .. } => {
+                if let Some(outcome) = self.tare {
+                    self.reply(id, outcome);
+                }
+                return false;
+            }
+            _ => (),
+        }
+        self.reply(id, Outcome::Done);
+        request == Request::Start
+    }
+}
+
+pub fn hello() -> DeviceHello {
+    DeviceHello {
+        protocol: PROTOCOL_VERSION,
+        schema: SCHEMA_HASH,
+        device_id: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 255],
+        board: "fake board".try_into().unwrap(),
+        firmware: "fake 1.0".try_into().unwrap(),
+        model: Some(ModelIdentity {
+            crc: 0xcafe,
+            name: "11-64-64-3 ov7725".try_into().unwrap(),
+            simulated: true,
+        }),
+        width: 320,
+        height: 240,
+        threshold: HsvBox {
+            hue_low: 170,
+            hue_high: 10,
+            saturation_low: 100,
+            saturation_high: 255,
+            value_low: 45,
+            value_high: 255,
+        },
+    }
+}
+
+pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
+    DeviceMessage::Sample(Sample {
+        sequence,
+        frame,
+        time_us: u64::from(frame) * 33_333,
+        status: Status::MODEL_SIMULATED,
+        force: Some(Force {
+            alpha_mdeg: -5000,
+            beta_mdeg: 2500,
+            magnitude_un: 100_000,
+            cartesian_un: Some([-8707, 4362, -99_525]),
+            direction_sigma_mdeg: 480,
+            magnitude_sigma_un: 900,
+        }),
+    })
+}
+
+/// A device that plays one script for each connection, then is gone.
+pub struct FakeDevice {
+    /// For `--port`.
+    pub port: String,
+    pub commands: mpsc::Receiver<Request>,
+}
+
+fn conversation(stream: Box<dyn Stream>, commands: &mpsc::Sender<Request>) -> Conversation {
+    Conversation {
+        stream,
+        decoder: Decoder::new(),
+        stats: Stats::default(),
+        commands: commands.clone(),
+        tare: Some(Outcome::Done),
+        host_is_gone: false,
+    }
+}
+
+impl FakeDevice {
+    pub fn on_tcp<const N: usize>(scripts: [Script; N]) -> FakeDevice {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp:{}", listener.local_addr().unwrap());
+        let (sender, commands) = mpsc::channel();
+        std::thread::spawn(move || {
+            for script in scripts {
+                let (stream, _) = listener.accept().unwrap();
+                script(&mut conversation(Box::new(stream), &sender));
+            }
+        });
+        FakeDevice { port, commands }
+    }
+
+    /// On a pseudo-terminal; it vanishes when the script is over, as a pulled cable's port does.
+    pub fn on_pty(script: Script) -> FakeDevice {
+        let (device, host_side, port) = pseudo_terminal().unwrap();
+        let (sender, commands) = mpsc::channel();
+        std::thread::spawn(move || {
+            // Held open, so that the device's end works before the tool comes.
+            let _host_side = host_side;
+            script(&mut conversation(Box::new(device), &sender));
+        });
+        FakeDevice { port, commands }
+    }
+}
+
+/// A new pseudo-terminal: the device's end, the host's end, and the name by which the host opens it. Neither is
+/// inherited by the tool: a terminal that the tool itself holds would never vanish.
+fn pseudo_terminal() -> rustix::io::Result<(File, File, String)> {
+    let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+    let device = rustix::pty::openpt(flags)?;
+    rustix::pty::grantpt(&device)?;
+    rustix::pty::unlockpt(&device)?;
+    let name = rustix::pty::ptsname(&device, Vec::new())?;
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let host_side = rustix::fs::open(&name, flags, Mode::empty())?;
+    Ok((
+        device.into(),
+        host_side.into(),
+        name.into_string().expect("a path in ASCII"),
+    ))
+}
+
+/// A device that streams these messages after start, then answers until the host is gone.
+pub fn streaming(messages: Vec<DeviceMessage>) -> Script {
+    Box::new(move |device| {
+        if device.until_start() {
+            messages
+                .into_iter()
+                .for_each(|message| device.send(message));
+            device.serve();
+        }
+    })
+}

@@ -1,0 +1,7 @@
+//! The tool against scripted devices: what it prints, and how it ends.
+#![cfg(unix)]
+
+mod commands;
+mod fake;
+mod monitor;
+mod run;

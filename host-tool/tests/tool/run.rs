@@ -1,0 +1,73 @@
+//! The tool run as a user runs it.
+
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// Longest time any run of the tool may take.
+const RUN_PATIENCE: Duration = Duration::from_secs(30);
+
+/// A run of the tool.
+pub struct Run(Child);
+
+/// Starts `hivtac ARGUMENTS`.
+pub fn start(arguments: &[&str]) -> Run {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hivtac"));
+    command
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    Run(command.spawn().unwrap())
+}
+
+/// Runs `hivtac ARGUMENTS` to its end.
+pub fn run(arguments: &[&str]) -> Finished {
+    start(arguments).finish()
+}
+
+impl Run {
+    pub fn child(&mut self) -> &mut Child {
+        &mut self.0
+    }
+
+    /// Waits for the end.
+    pub fn finish(self) -> Finished {
+        let pid = self.0.id();
+        let (sender, receiver) = mpsc::channel();
+        std::thread::spawn(move || sender.send(self.0.wait_with_output().unwrap()));
+        match receiver.recv_timeout(RUN_PATIENCE) {
+            Ok(output) => Finished::new(output),
+            Err(_) => {
+                signal(pid, "KILL");
+                panic!("the tool did not end within {RUN_PATIENCE:?}");
+            }
+        }
+    }
+}
+
+/// Sends a signal to a process.
+pub fn signal(pid: u32, name: &str) {
+    let status = Command::new("kill")
+        .args(["-s", name, &pid.to_string()])
+        .status();
+    assert!(status.unwrap().success());
+}
+
+/// What a run left.
+#[derive(Debug)]
+pub struct Finished {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Finished {
+    fn new(output: Output) -> Finished {
+        Finished {
+            code: output.status.code(),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+}
