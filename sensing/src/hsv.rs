@@ -52,8 +52,8 @@ impl Hsv {
     }
 }
 
-/// Hue in units of 1/180 turn: the position within the sixth that the largest channel opens. OpenCV asks for red
-/// first, then green, which decides ties.
+/// Hue in units of 1/180 turn: the position within the third around the largest channel. Where two are largest, both
+/// thirds give the same hue.
 fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
     let [r, g, b] = [i32::from(red), i32::from(green), i32::from(blue)];
     let sixths = match value {
@@ -62,7 +62,7 @@ fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
         _ => r - g + 4 * chroma,
     };
     let hue = rounded(sixths * reciprocal(30, chroma));
-    // −30…150 before the turn is added, hence 0…179: −0.5 and above rounds to 0, not to −1.
+    // Between −30 and 150 before a turn is added, and never so little below 0 that it becomes 180.
     (if hue < 0 { hue + 180 } else { hue }) as u8
 }
 

@@ -141,6 +141,8 @@ fn a_full_house_is_no_overflow() {
         scan(&mut scanner, &mask, 0, 1).status,
         Status::BLOB_OVERFLOW
     );
+    // The next frame starts afresh.
+    assert_eq!(scan(&mut scanner, &mask, 0, 2).status, Status::OK);
 }
 
 #[test]
