@@ -20,30 +20,24 @@ pub async fn run(camera: Camera, capture: Capture) {
     let mut task = CaptureTask {
         camera,
         capture,
+        numbering: false,
         last: Edge::default(),
         silences: 0,
         after_overrun: false,
         after_restart: false,
     };
-    task.start_camera(At::Boot).await;
+    task.start_camera().await;
     loop {
         let frame = FREE.receive().await;
         task.step(frame).await;
     }
 }
 
-/// When the camera is set up.
-#[derive(Clone, Copy, PartialEq)]
-enum At {
-    /// VSYNC edges count from the register reset.
-    Boot,
-    /// VSYNC edges go on counting.
-    Restart,
-}
-
 struct CaptureTask {
     camera: Camera,
     capture: Capture,
+    /// VSYNC edges count since the first register reset.
+    numbering: bool,
     /// Edge of the newest frame that was captured or counted as lost.
     last: Edge,
     /// In a row.
@@ -109,31 +103,31 @@ impl CaptureTask {
         stats::CAMERA_TIMEOUTS.count();
         self.silences += 1;
         if self.silences >= SILENCES {
+            health::set(Condition::NoCamera);
             self.silences = 0;
             self.after_restart = true;
             log::say(
                 LogLevel::Warning,
                 format_args!("camera silent, restarting it"),
             );
-            self.start_camera(At::Restart).await;
+            self.start_camera().await;
+            stats::CAMERA_RESTARTS.count();
         }
     }
 
     /// Sets the camera up; tries until it answers.
-    async fn start_camera(&mut self, at: At) {
-        while let Err(error) = self.try_camera(at).await {
+    async fn start_camera(&mut self) {
+        while let Err(error) = self.try_camera().await {
             health::set(Condition::NoCamera);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             Timer::after(RETRY).await;
         }
     }
 
-    async fn try_camera(&mut self, at: At) -> Result<(), camera::Error> {
-        if at == At::Restart {
-            stats::CAMERA_RESTARTS.count();
-        }
+    async fn try_camera(&mut self) -> Result<(), camera::Error> {
         self.camera.reset().await?;
-        if at == At::Boot {
+        if !self.numbering {
+            self.numbering = true;
             vsync::restart_count();
         }
         self.camera.configure().await

@@ -18,7 +18,7 @@ const PORT_B: u8 = 1;
 /// One VSYNC edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Edge {
-    /// 1 for the first edge after the camera's register reset at boot.
+    /// 1 for the first edge after the camera's first register reset.
     pub number: u32,
     /// Device time, µs since boot.
     pub time_us: u64,
