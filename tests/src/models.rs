@@ -25,6 +25,9 @@ pub enum Weights {
     Extreme,
 }
 
+/// Pixels of a marker at rest, dilated, as the rendered sensor shows it.
+const REST_AREA: u32 = 245;
+
 /// The rest position of the sensor with the default preset, in whole pixels.
 pub fn rest() -> Features {
     let px = |number: i64| number << 16;
@@ -47,7 +50,7 @@ pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> 
         conditions: conditions(),
         rest: Rest {
             features: rest(),
-            areas: [conditions().geometry.rest_area(); 4],
+            areas: [REST_AREA; 4],
         },
         input: input_scaling(),
         layers: layers.collect(),

@@ -1,2 +1,59 @@
-//! placeholder
-fn main() {}
+//! `cargo xtask …`: set-up, demo, tests, benchmarks and sizes of this project.
+
+mod artifacts;
+mod bench;
+mod demo;
+mod packages;
+mod process;
+mod report;
+mod rig;
+mod size;
+mod stages;
+mod test;
+mod toolchain;
+mod workspace;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+use toolchain::{Choice, Toolchain};
+
+/// Set-up, demo, tests, benchmarks and sizes. Each command installs what it needs.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+    /// Where the compiler for the microcontroller may come from.
+    #[arg(
+        long,
+        value_enum,
+        default_value = "auto",
+        global = true,
+        hide_short_help = true
+    )]
+    toolchain: Choice,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Run the firmware on the emulated board with a simulated tip, and show the forces.
+    Demo(demo::Demo),
+    /// Run every test, and print a table of how they went.
+    Test(test::Test),
+    /// Count the instructions per frame and per inference, in QEMU.
+    Bench(bench::Bench),
+    /// Show what the firmware takes of each memory.
+    Size(size::Size),
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let toolchain = || Toolchain::prepare(arguments.toolchain);
+    match arguments.task {
+        Task::Demo(demo) => demo.run(&toolchain()?),
+        Task::Test(test) => test.run(&toolchain()?),
+        Task::Bench(bench) => bench.run(&toolchain()?),
+        Task::Size(size) => size.run(&toolchain()?),
+    }
+}

@@ -1,0 +1,123 @@
+//! What the demo and the tests run: each is built by cargo, which also says where it lies.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result};
+
+use crate::toolchain::{Toolchain, cargo};
+use crate::{process, workspace};
+
+/// Features of the firmware that each seed one bug which the rig must notice.
+pub const SEEDED_BUGS: [&str; 5] = [
+    "bug-dmamux-request",
+    "bug-polarity",
+    "bug-camera-register",
+    "bug-half-buffer",
+    "bug-no-hsi48",
+];
+
+/// The firmware, as it is flashed.
+pub fn firmware(toolchain: &Toolchain) -> Result<PathBuf> {
+    build(&mut firmware_command(toolchain), "hivtac-firmware")
+}
+
+/// The firmware with one seeded bug.
+pub fn firmware_with_bug(toolchain: &Toolchain, bug: &str) -> Result<PathBuf> {
+    let mut command = firmware_command(toolchain);
+    build(command.args(["--features", bug]), "hivtac-firmware")
+}
+
+fn firmware_command(toolchain: &Toolchain) -> Command {
+    let mut command = toolchain.build(workspace::root());
+    command.args(["--package", "hivtac-firmware", "--release"]);
+    command
+}
+
+/// The host tool `hivtac`.
+pub fn host_tool() -> Result<PathBuf> {
+    let mut command = cargo("build", workspace::root());
+    build(command.args(["--package", "hivtac", "--release"]), "hivtac")
+}
+
+/// The rig.
+pub fn rig() -> Result<PathBuf> {
+    let mut command = cargo("build", &workspace::folder("rig"));
+    build(
+        command.args(["--release", "--bin", "hivtac-rig"]),
+        "hivtac-rig",
+    )
+}
+
+/// The sensing as a Cortex-M7 program for QEMU.
+pub fn qemu_image(toolchain: &Toolchain) -> Result<PathBuf> {
+    let mut command = toolchain.build(&workspace::folder("tests/qemu"));
+    build(command.arg("--release"), "hivtac-qemu-image")
+}
+
+/// The plugin for QEMU that counts instructions, for a version of QEMU's plugin interface.
+pub fn instruction_counter(version: u32) -> Result<PathBuf> {
+    let mut command = cargo("build", &workspace::folder("xtask/instruction-counter"));
+    command.arg("--release");
+    if version >= 2 {
+        command.args(["--features", "plugin-api-2"]);
+    }
+    build(&mut command, "instruction_counter")
+}
+
+/// Runs `cargo build` and gives the file it made for the target of this name.
+fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
+    command.arg("--message-format=json-render-diagnostics");
+    let mut file = None;
+    process::for_each_line(command, |line| {
+        if let Some(found) = artifact(line, target) {
+            file = Some(found);
+        }
+    })?;
+    file.with_context(|| format!("`{}` made no {target}", process::display(command)))
+}
+
+/// The file in one of cargo's messages, when it is the artifact of `target`.
+fn artifact(line: &str, target: &str) -> Option<PathBuf> {
+    let message: serde_json::Value = serde_json::from_str(line).ok()?;
+    let is_artifact = message["reason"] == "compiler-artifact";
+    if !is_artifact || message["target"]["name"] != target {
+        return None;
+    }
+    let file = message["executable"]
+        .as_str()
+        .or_else(|| message["filenames"].get(0)?.as_str())?;
+    Some(PathBuf::from(file))
+}
+
+/// Copies a file, and says which one when that fails.
+pub fn copy(from: &Path, to: &Path) -> Result<()> {
+    std::fs::copy(from, to)
+        .with_context(|| format!("copying {} to {}", from.display(), to.display()))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_executable_is_found_in_the_messages_of_cargo() {
+        let line = r#"{"reason":"compiler-artifact","target":{"name":"hivtac"},"filenames":["/t/hivtac"],"executable":"/t/hivtac"}"#;
+        assert_eq!(artifact(line, "hivtac"), Some(PathBuf::from("/t/hivtac")));
+        assert_eq!(artifact(line, "another"), None);
+    }
+
+    #[test]
+    fn a_library_is_found_by_its_file() {
+        let line = r#"{"reason":"compiler-artifact","target":{"name":"lib"},"filenames":["/t/lib.so"],"executable":null}"#;
+        assert_eq!(artifact(line, "lib"), Some(PathBuf::from("/t/lib.so")));
+    }
+
+    #[test]
+    fn other_lines_are_passed_over() {
+        for line in ["", "not json", r#"{"reason":"build-finished"}"#] {
+            assert_eq!(artifact(line, "hivtac"), None);
+        }
+    }
+}

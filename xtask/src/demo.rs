@@ -1,0 +1,110 @@
+//! `cargo xtask demo`: the firmware on the emulated board, a simulated tip that presses it, and the forces.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::rig::Rig;
+use crate::toolchain::Toolchain;
+use crate::{artifacts, process, workspace};
+
+/// Options of `cargo xtask demo`.
+#[derive(Args)]
+pub struct Demo {
+    /// End after this many frames.
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..))]
+    frames: u64,
+}
+
+/// What the demo runs, and where it writes.
+struct Stage {
+    firmware: PathBuf,
+    rig: PathBuf,
+    tool: PathBuf,
+    truth: PathBuf,
+    log: PathBuf,
+}
+
+impl Demo {
+    /// Builds what is needed, runs the rig, and shows what the host tool says.
+    ///
+    /// # Errors
+    /// When something cannot be built or fails; names the rig's log when it was running.
+    pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
+        let start = Instant::now();
+        let stage = Stage::build(toolchain)?;
+        let built = start.elapsed();
+        let outcome = self.show(&stage);
+        if outcome.is_err() {
+            stage.show_log();
+        }
+        outcome.with_context(|| format!("the rig's log is {}", stage.log.display()))?;
+        let shown = start.elapsed() - built;
+        let (built, shown) = (built.as_secs_f64(), shown.as_secs_f64());
+        eprintln!("\nbuilt in {built:.1} s, shown in {shown:.1} s");
+        eprintln!("truth: {}", stage.truth.display());
+        eprintln!("log:   {}", stage.log.display());
+        Ok(())
+    }
+
+    fn show(&self, stage: &Stage) -> Result<()> {
+        let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
+        process::run(&mut self.monitor(stage, rig.port()))?;
+        rig.finish()
+    }
+
+    fn monitor(&self, stage: &Stage, port: &str) -> Command {
+        let mut command = Command::new(&stage.tool);
+        command
+            .args([
+                "monitor",
+                "--port",
+                port,
+                "--frames",
+                &self.frames.to_string(),
+            ])
+            // The emulated board boots slower than a real one.
+            .args(["--timeout", "120", "--truth"])
+            .arg(&stage.truth);
+        command
+    }
+}
+
+impl Stage {
+    fn build(toolchain: &Toolchain) -> Result<Stage> {
+        let folder = workspace::work_folder("demo")?;
+        Ok(Stage {
+            firmware: artifacts::firmware(toolchain)?,
+            rig: artifacts::rig()?,
+            tool: artifacts::host_tool()?,
+            truth: folder.join("truth.jsonl"),
+            log: folder.join("rig.log"),
+        })
+    }
+
+    fn rig_command(&self) -> Command {
+        let mut command = Command::new(&self.rig);
+        command
+            .args(["--scene", "demo", "--pty", "--exit-on-hangup", "--truth"])
+            .arg(&self.truth)
+            .arg(&self.firmware);
+        command
+    }
+
+    fn show_log(&self) {
+        eprintln!("\nThe last lines of the rig's log:");
+        for line in last_lines(&self.log, 20) {
+            eprintln!("  {line}");
+        }
+    }
+}
+
+fn last_lines(file: &Path, count: usize) -> Vec<String> {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let lines: Vec<_> = text.lines().map(str::to_owned).collect();
+    lines[lines.len().saturating_sub(count)..].to_vec()
+}

@@ -1,0 +1,62 @@
+//! Debian packages: installed when missing and allowed, named plainly when not.
+
+use std::process::Command;
+
+use anyhow::{Result, bail};
+
+use crate::process;
+
+/// Installs Debian packages as root or through sudo. Called only when something is missing, so that a machine that has
+/// everything needs no network.
+///
+/// # Errors
+/// Says which packages are missing and why they could not be installed.
+pub fn install(packages: &[&str], why: &str) -> Result<()> {
+    let names = packages.join(" ");
+    eprintln!("{why}: installing the Debian packages {names}");
+    let Some(prefix) = root_prefix() else {
+        bail!("{why}; as root, install the packages: {names}");
+    };
+    if process::find_program("apt-get").is_none() {
+        bail!("{why}; this system has no apt-get: install what your system calls {names}");
+    }
+    if try_install(prefix, packages).is_ok() {
+        return Ok(());
+    }
+    // The list of packages may be missing or out of date, as in a fresh container.
+    process::run(&mut apt_get(prefix, &["update"]))
+        .and_then(|()| try_install(prefix, packages))
+        .map_err(|error| error.context(format!("{why}, and installing {names} failed")))
+}
+
+fn try_install(prefix: &[&str], packages: &[&str]) -> Result<()> {
+    let arguments = [&["install", "--yes", "--no-install-recommends"], packages].concat();
+    process::run(&mut apt_get(prefix, &arguments))
+}
+
+fn apt_get(prefix: &[&str], arguments: &[&str]) -> Command {
+    let words = [prefix, &["apt-get"], arguments].concat();
+    let mut command = Command::new(words[0]);
+    command
+        .args(&words[1..])
+        .env("DEBIAN_FRONTEND", "noninteractive");
+    command
+}
+
+/// What to put before a command that needs root; `None` when there is no way without a password.
+fn root_prefix() -> Option<&'static [&'static str]> {
+    let user = process::output(Command::new("id").arg("-u")).ok()?;
+    if user.trim() == "0" {
+        return Some(&[]);
+    }
+    process::succeeds(Command::new("sudo").args(["--non-interactive", "true"]))
+        .then_some(&["sudo", "--non-interactive"])
+}
+
+/// QEMU's Cortex-M7 machine, for the tests and the benchmark.
+pub fn ensure_qemu() -> Result<()> {
+    if process::find_program("qemu-system-arm").is_none() {
+        install(&["qemu-system-arm"], "the Cortex-M7 emulator is missing")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,228 @@
+//! `cargo xtask test`: every check and every test of the project.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, Result};
+use clap::Args;
+
+use crate::report::{Report, Tally, run_tests};
+use crate::toolchain::{self, Toolchain, cargo};
+use crate::{artifacts, bench, packages, process, workspace};
+
+/// The workspaces: folder, and whether it has more than one package.
+const WORKSPACES: [(&str, bool); 4] = [
+    ("", true),
+    ("rig", false),
+    ("tests/qemu", false),
+    ("xtask/instruction-counter", false),
+];
+
+/// What runs on this computer without any image.
+const HOST: [&str; 5] = [
+    "--workspace",
+    "--exclude",
+    "hivtac-firmware",
+    "--exclude",
+    "hivtac-tests",
+];
+
+/// Options of `cargo xtask test`.
+#[derive(Args)]
+pub struct Test {
+    /// Run only the steps whose names contain one of these words, and the builds that they need.
+    steps: Vec<String>,
+}
+
+/// The programs that the tests of the rig and those across rooms run.
+struct Programs {
+    firmware: PathBuf,
+    /// One ELF per seeded bug, named by its feature.
+    bugs: PathBuf,
+}
+
+impl Test {
+    /// Runs every step, past those that fail, and prints the table.
+    ///
+    /// # Errors
+    /// When a step failed.
+    pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
+        let mut report = Report::default();
+        self.checks(&mut report, toolchain);
+        self.host_tests(&mut report);
+        if self.wants_one_of(&["tests: rig", "tests: across rooms"]) {
+            let programs = report.step("build: firmware", |_| Programs::build(toolchain));
+            self.rig_tests(&mut report, programs.as_ref());
+            self.cross_room_tests(&mut report, toolchain, programs.as_ref());
+        }
+        if self.wants("benchmark") {
+            report.step("benchmark", |_| bench::Bench::default().run(toolchain));
+        }
+        report.finish()
+    }
+
+    fn wants(&self, step: &str) -> bool {
+        self.steps.is_empty() || self.steps.iter().any(|word| step.contains(word))
+    }
+
+    fn wants_one_of(&self, steps: &[&str]) -> bool {
+        steps.iter().any(|step| self.wants(step))
+    }
+
+    fn checks(&self, report: &mut Report, toolchain: &Toolchain) {
+        if !self.wants_one_of(&["format", "lints: host", "lints: microcontroller"]) {
+            return;
+        }
+        if report
+            .step("components", |_| {
+                toolchain::ensure_components(workspace::root())
+            })
+            .is_none()
+        {
+            return;
+        }
+        if self.wants("format") {
+            report.step("format", |_| check_format());
+        }
+        if self.wants("lints: host") {
+            report.step("lints: host", |_| host_lints());
+        }
+        if self.wants("lints: microcontroller") {
+            report.step("lints: microcontroller", |_| target_lints(toolchain));
+        }
+    }
+
+    fn host_tests(&self, report: &mut Report) {
+        if self.wants("tests: host") {
+            report.step("tests: host", |tally| {
+                let mut command = cargo("test", workspace::root());
+                run_tests(command.args(HOST).arg("--no-fail-fast"), tally)
+            });
+        }
+    }
+
+    fn rig_tests(&self, report: &mut Report, programs: Option<&Programs>) {
+        if self.wants("tests: rig") {
+            report.step("tests: rig", |tally| {
+                let programs = programs.context("not run: the firmware could not be built")?;
+                // In release, as the demo runs it: the emulator is built once.
+                let mut command = cargo("test", &workspace::folder("rig"));
+                programs.name_to(command.args(["--release", "--no-fail-fast"]));
+                run_tests(&mut command, tally)
+            });
+        }
+    }
+
+    fn cross_room_tests(
+        &self,
+        report: &mut Report,
+        toolchain: &Toolchain,
+        programs: Option<&Programs>,
+    ) {
+        if self.wants("tests: across rooms") {
+            report.step("tests: across rooms", |tally| {
+                let programs = programs.context("not run: the firmware could not be built")?;
+                cross_room_tests(toolchain, programs, tally)
+            });
+        }
+    }
+}
+
+impl Programs {
+    fn build(toolchain: &Toolchain) -> Result<Programs> {
+        let bugs = workspace::work_folder("bugs")?;
+        for bug in artifacts::SEEDED_BUGS {
+            let elf = artifacts::firmware_with_bug(toolchain, bug)?;
+            artifacts::copy(&elf, &bugs.join(format!("{bug}.elf")))?;
+        }
+        // Last, so that what cargo leaves behind is the firmware without a bug.
+        Ok(Programs {
+            firmware: artifacts::firmware(toolchain)?,
+            bugs,
+        })
+    }
+
+    /// Tells a test runner where they lie.
+    fn name_to(&self, command: &mut Command) {
+        command
+            .env("HIVTAC_ELF", &self.firmware)
+            .env("HIVTAC_BUG_ELFS", &self.bugs);
+    }
+}
+
+fn check_format() -> Result<()> {
+    for (folder, many) in WORKSPACES {
+        let mut command = cargo("fmt", &workspace::folder(folder));
+        command.args(if many {
+            &["--all", "--check"][..]
+        } else {
+            &["--check"]
+        });
+        process::run(&mut command)?;
+    }
+    Ok(())
+}
+
+fn host_lints() -> Result<()> {
+    let mut root = cargo("clippy", workspace::root());
+    root.args([
+        "--workspace",
+        "--exclude",
+        "hivtac-firmware",
+        "--all-targets",
+    ]);
+    let mut rig = cargo("clippy", &workspace::folder("rig"));
+    rig.args(["--release", "--all-targets"]);
+    let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
+    counter.arg("--release");
+    for command in [&mut root, &mut rig, &mut counter] {
+        process::run(command.args(["--", "-D", "warnings"]))?;
+    }
+    Ok(())
+}
+
+fn target_lints(toolchain: &Toolchain) -> Result<()> {
+    let mut firmware = toolchain.clippy(workspace::root())?;
+    firmware.args(["--package", "hivtac-firmware"]);
+    let mut image = toolchain.clippy(&workspace::folder("tests/qemu"))?;
+    for command in [&mut firmware, &mut image] {
+        process::run(command.args(["--release", "--", "-D", "warnings"]))?;
+    }
+    Ok(())
+}
+
+fn cross_room_tests(toolchain: &Toolchain, programs: &Programs, tally: &mut Tally) -> Result<()> {
+    packages::ensure_qemu()?;
+    let mut command = cargo("test", workspace::root());
+    command.args(["--package", "hivtac-tests", "--no-fail-fast"]);
+    programs.name_to(&mut command);
+    command
+        .env("HIVTAC_TOOL", artifacts::host_tool()?)
+        .env("HIVTAC_RIG", artifacts::rig()?)
+        .env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image(toolchain)?);
+    run_tests(&mut command, tally)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn test(steps: &[&str]) -> Test {
+        Test {
+            steps: steps.iter().map(|&step| step.to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn without_words_every_step_is_wanted() {
+        assert!(test(&[]).wants("format"));
+    }
+
+    #[test]
+    fn words_choose_steps() {
+        let test = test(&["rig", "format"]);
+        assert!(test.wants("tests: rig") && test.wants("format"));
+        assert!(!test.wants("benchmark"));
+        assert!(test.wants_one_of(&["tests: rig", "tests: across rooms"]));
+    }
+}
