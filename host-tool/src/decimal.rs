@@ -25,6 +25,13 @@ impl<const DECIMALS: u32> Decimal<DECIMALS> {
     }
 }
 
+impl Millionths {
+    /// The same in thousandths: N become mN.
+    pub fn in_thousandths(self) -> Thousandths {
+        Decimal(self.0)
+    }
+}
+
 impl<const DECIMALS: u32> fmt::Display for Decimal<DECIMALS> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let unit = 10_u64.pow(DECIMALS);

@@ -1,5 +1,6 @@
 //! Thresholds on the command line.
 
+use hivtac_sensing::threshold;
 use hivtac_wire::message::HsvBox;
 
 /// From `h0,h1,s0,s1,v0,v1` in OpenCV's 8-bit HSV (hue 0–179, h0 > h1 wraps through 0).
@@ -29,6 +30,18 @@ pub fn parse(text: &str) -> Result<HsvBox, String> {
     ordered("saturation", box_.saturation_low, box_.saturation_high)?;
     ordered("value", box_.value_low, box_.value_high)?;
     Ok(box_)
+}
+
+/// The same for the sensing code.
+pub fn for_sensing(threshold: HsvBox) -> threshold::HsvBox {
+    threshold::HsvBox {
+        hue_low: threshold.hue_low,
+        hue_high: threshold.hue_high,
+        saturation_low: threshold.saturation_low,
+        saturation_high: threshold.saturation_high,
+        value_low: threshold.value_low,
+        value_high: threshold.value_high,
+    }
 }
 
 fn number(text: &str, highest: u8) -> Result<u8, String> {

@@ -3,6 +3,7 @@
 mod command;
 mod decimal;
 mod failure;
+mod finding;
 mod force_json;
 mod hsv;
 mod info;
@@ -10,13 +11,16 @@ mod lines;
 mod link;
 mod monitor;
 mod output;
+mod picture;
 mod port;
+mod sense;
 mod stop;
 mod tally;
 mod truth;
 
 use clap::{Args, Parser, Subcommand};
 use failure::{Failure, Kind};
+use hivtac_sensing::geometry::Preset;
 use hivtac_wire::message::HsvBox;
 use lines::Format;
 use port::Address;
@@ -70,6 +74,12 @@ enum Command {
         #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
         hsv: HsvBox,
     },
+    /// Look for markers and force in pictures, with the sensor's own code
+    ///
+    /// PNG, JPEG or PPM, up to 800 × 800 px. Eight bits a channel are rounded to RGB565, which is what the sensor's
+    /// camera delivers. There is a force only when size, preset and threshold are those of the model; the status says so
+    /// otherwise, and blobs, markers and features are there all the same.
+    Sense(SenseArguments),
 }
 
 #[derive(Args)]
@@ -112,6 +122,52 @@ struct MonitorArguments {
     truth: Option<String>,
 }
 
+#[derive(Args)]
+struct SenseArguments {
+    /// Pictures
+    #[arg(required = true, value_name = "IMAGE")]
+    images: Vec<String>,
+    /// Lens and pixels; the model's when not given. Other sizes than the preset's scale its focal length
+    #[arg(long, value_name = "paper|ov7725", value_parser = preset)]
+    preset: Option<Preset>,
+    /// Colours of a marker, as in `hivtac threshold --hsv`; the model's when not given
+    #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
+    threshold: Option<HsvBox>,
+    /// Smallest blob, px; a quarter of a marker at rest when not given
+    #[arg(long, value_name = "PX")]
+    min_area: Option<u32>,
+    /// Model file; the firmware's own when not given
+    #[arg(long, value_name = "FILE")]
+    model: Option<String>,
+    /// Picture of the untouched film, to measure displacements from
+    #[arg(long, value_name = "IMAGE")]
+    tare: Option<String>,
+    /// One JSON object a line
+    #[arg(long)]
+    json: bool,
+}
+
+impl SenseArguments {
+    fn options(self) -> sense::Options {
+        sense::Options {
+            images: self.images,
+            preset: self.preset,
+            threshold: self.threshold.map(hsv::for_sensing),
+            min_area: self.min_area,
+            model: self.model,
+            tare: self.tare,
+            json: self.json,
+        }
+    }
+}
+
+fn preset(name: &str) -> Result<Preset, String> {
+    Preset::from_name(name).ok_or_else(|| {
+        let names = Preset::ALL.map(Preset::name).join(" or ");
+        format!("no preset has this name; use {names}")
+    })
+}
+
 impl MonitorArguments {
     fn options(self) -> monitor::Options {
         let format = match (self.json, self.csv) {
@@ -144,6 +200,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 fn run(command: Command) -> Result<(), Failure> {
     stop::install()?;
     match command {
+        Command::Sense(arguments) => sense::run(&arguments.options()),
         Command::Monitor(arguments) => monitor::run(&arguments.options()),
         Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
         Command::Tare { device, frames } => {

@@ -5,3 +5,4 @@ mod commands;
 mod fake;
 mod monitor;
 mod run;
+mod sense;

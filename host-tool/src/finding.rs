@@ -1,0 +1,207 @@
+//! What was found in a picture, for people and as JSON.
+
+use crate::decimal::Millionths;
+use crate::force_json::ForceJson;
+use crate::lines::to_json;
+use hivtac_sensing::blob::Blob;
+use hivtac_sensing::pipeline::Measurement;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::status::Status;
+use serde::Serialize;
+
+/// Everything found in one picture. Positions in pixels, exact: 16 binary digits after the point.
+#[derive(Serialize)]
+pub struct Finding<'a> {
+    image: &'a str,
+    width: u16,
+    height: u16,
+    blobs: Vec<BlobJson>,
+    markers: Option<Vec<MarkerJson>>,
+    features: Option<Vec<f64>>,
+    force: Option<ForceJson>,
+    status: Vec<&'static str>,
+    #[serde(skip)]
+    focal_px: f64,
+    #[serde(skip)]
+    overflow: bool,
+}
+
+#[derive(Serialize)]
+struct BlobJson {
+    area: u32,
+    cx: f64,
+    cy: f64,
+    x0: u16,
+    y0: u16,
+    x1: u16,
+    y1: u16,
+}
+
+#[derive(Serialize)]
+struct MarkerJson {
+    id: usize,
+    x: f64,
+    y: f64,
+    area: u32,
+}
+
+impl From<&Blob> for BlobJson {
+    fn from(blob: &Blob) -> BlobJson {
+        let (x, y) = blob.centroid();
+        let Blob {
+            area,
+            x0,
+            y0,
+            x1,
+            y1,
+            ..
+        } = *blob;
+        BlobJson {
+            area,
+            cx: x.to_f64(),
+            cy: y.to_f64(),
+            x0,
+            y0,
+            x1,
+            y1,
+        }
+    }
+}
+
+impl<'a> Finding<'a> {
+    /// Of the picture `image`.
+    pub fn new(
+        image: &'a str,
+        settings: &Settings,
+        blobs: &[Blob],
+        measurement: Measurement,
+    ) -> Finding<'a> {
+        let markers = measurement.markers.map(|markers| {
+            let markers = markers.iter().enumerate();
+            markers
+                .map(|(id, marker)| MarkerJson {
+                    id,
+                    x: marker.x.to_f64(),
+                    y: marker.y.to_f64(),
+                    area: marker.area,
+                })
+                .collect()
+        });
+        // 2¹⁶ steps a pixel; an area has at most 20 bits more, far below the 53 of an f64.
+        let exact = |number: i64| number as f64 / 65_536.0;
+        let features = measurement
+            .features
+            .map(|features| features.to_array().map(exact).to_vec());
+        Finding {
+            image,
+            width: settings.geometry.width,
+            height: settings.geometry.height,
+            blobs: blobs.iter().map(BlobJson::from).collect(),
+            markers,
+            features,
+            force: measurement.force.as_ref().map(ForceJson::from),
+            status: measurement.status.names().collect(),
+            focal_px: settings.geometry.focal.to_f64(),
+            overflow: measurement.status.contains(Status::BLOB_OVERFLOW),
+        }
+    }
+
+    /// One JSON object without a line end.
+    pub fn json(&self) -> String {
+        to_json(self)
+    }
+
+    /// Lines for a person, without the last line end.
+    pub fn text(&self) -> String {
+        let Finding {
+            image,
+            width,
+            height,
+            focal_px,
+            ..
+        } = self;
+        let mut lines = vec![format!(
+            "{image}: {width} × {height} px, taken with a focal length of {focal_px:.2} px"
+        )];
+        lines.extend(self.blob_lines());
+        lines.extend(self.marker_lines());
+        lines.extend(self.feature_line());
+        lines.extend(self.force_line());
+        let status = if self.status.is_empty() {
+            "ok".to_owned()
+        } else {
+            self.status.join(" ")
+        };
+        lines.push(format!("  status    {status}"));
+        lines.join("\n")
+    }
+
+    fn blob_lines(&self) -> Vec<String> {
+        let more = if self.overflow {
+            ", and more than can be kept"
+        } else {
+            ""
+        };
+        let mut lines = vec![format!("  blobs     {}{more}", self.blobs.len())];
+        if !self.blobs.is_empty() {
+            lines.push(format!("{:>10}{:>22}  box", "area", "centroid"));
+        }
+        lines.extend(self.blobs.iter().map(|blob| {
+            let BlobJson {
+                area,
+                cx,
+                cy,
+                x0,
+                y0,
+                x1,
+                y1,
+            } = blob;
+            format!(
+                "{area:>10}{:>22}  x {x0}–{x1}, y {y0}–{y1}",
+                format!("({cx:.3}, {cy:.3})")
+            )
+        }));
+        lines
+    }
+
+    fn marker_lines(&self) -> Vec<String> {
+        let Some(markers) = &self.markers else {
+            return vec!["  markers   none".to_owned()];
+        };
+        const CORNERS: [&str; 4] = ["upper left", "upper right", "lower right", "lower left"];
+        let lines = markers.iter().zip(CORNERS).map(|(marker, corner)| {
+            let MarkerJson { id, x, y, area } = marker;
+            format!("  marker {id}  {corner:<12} ({x:.3}, {y:.3}), area {area}")
+        });
+        lines.collect()
+    }
+
+    fn feature_line(&self) -> Option<String> {
+        let numbers: Vec<_> = self
+            .features
+            .as_ref()?
+            .iter()
+            .map(|number| format!("{number:.3}"))
+            .collect();
+        Some(format!("  features  {}", numbers.join(" ")))
+    }
+
+    fn force_line(&self) -> Option<String> {
+        let force = self.force.as_ref()?;
+        let vector = match (force.x_n, force.y_n, force.z_n) {
+            (Some(x), Some(y), Some(z)) => {
+                let [x, y, z] = [x, y, z].map(Millionths::in_thousandths);
+                format!(", F ({x}, {y}, {z}) mN")
+            }
+            _ => String::new(),
+        };
+        Some(format!(
+            "  force     α {}°, β {}°, |F| {} mN{vector}; ± {}°, ± {} mN",
+            force.alpha_deg,
+            force.beta_deg,
+            force.magnitude_n.in_thousandths(),
+            force.direction_sigma_deg,
+            force.magnitude_sigma_n.in_thousandths()
+        ))
+    }
+}

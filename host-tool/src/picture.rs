@@ -1,0 +1,98 @@
+//! Pictures as a camera would deliver them: rows of RGB565.
+
+use crate::failure::{Failure, Kind};
+use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
+use image::{ImageReader, RgbImage};
+use std::fs::File;
+use std::io::{self, BufReader};
+
+/// A picture in RGB565, red in the high bits.
+pub struct Picture {
+    /// Columns, 1 to [`MAX_WIDTH`].
+    pub width: u16,
+    /// Rows, 1 to [`MAX_HEIGHT`].
+    pub height: u16,
+    pixels: Vec<u16>,
+}
+
+impl Picture {
+    /// Reads a PNG, JPEG or PPM file, told apart by content; 8 bits a channel are rounded to the nearest of RGB565.
+    ///
+    /// # Errors
+    /// When the file cannot be read, is no such picture, or is larger than a frame can be.
+    pub fn load(path: &str) -> Result<Picture, Failure> {
+        let image = decode(path)
+            .map_err(|error| failure(format!("cannot read the picture {path}: {error}")))?;
+        let (width, height) = size(path, &image)?;
+        let pixels = image.pixels().map(|pixel| rgb565(pixel.0)).collect();
+        Ok(Picture {
+            width,
+            height,
+            pixels,
+        })
+    }
+
+    /// Its rows from the top.
+    pub fn rows(&self) -> impl Iterator<Item = &[u16]> {
+        self.pixels.chunks_exact(self.width.into())
+    }
+}
+
+fn failure(message: String) -> Failure {
+    Failure::new(Kind::Input, message)
+}
+
+fn decode(path: &str) -> Result<RgbImage, Box<dyn std::error::Error>> {
+    let reader = ImageReader::new(BufReader::new(File::open(path)?)).with_guessed_format()?;
+    if reader.format().is_none() {
+        let message = "it is no PNG, JPEG or PPM file";
+        return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
+    }
+    Ok(reader.decode()?.into_rgb8())
+}
+
+fn size(path: &str, image: &RgbImage) -> Result<(u16, u16), Failure> {
+    let (width, height) = image.dimensions();
+    if width == 0 || height == 0 {
+        return Err(failure(format!("the picture {path} is empty")));
+    }
+    match (u16::try_from(width), u16::try_from(height)) {
+        (Ok(columns @ ..=MAX_WIDTH), Ok(rows @ ..=MAX_HEIGHT)) => Ok((columns, rows)),
+        _ => Err(failure(format!(
+            "the picture {path} has {width} × {height} px, more than the {MAX_WIDTH} × {MAX_HEIGHT} px of the largest \
+             frame; scale it down, for example to 640 px wide"
+        ))),
+    }
+}
+
+fn rgb565([red, green, blue]: [u8; 3]) -> u16 {
+    let round = |level: u8, highest: u16| (u16::from(level) * highest + 127) / 255;
+    round(red, 31) << 11 | round(green, 63) << 5 | round(blue, 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame saved with the bits of each channel repeated comes back as it was.
+    #[test]
+    fn every_rgb565_value_survives_the_way_through_a_picture() {
+        for pixel in 0..=u16::MAX {
+            let (red, green, blue) = (pixel >> 11, pixel >> 5 & 63, pixel & 31);
+            let replicated = [
+                red << 3 | red >> 2,
+                green << 2 | green >> 4,
+                blue << 3 | blue >> 2,
+            ];
+            assert_eq!(rgb565(replicated.map(|level| level as u8)), pixel);
+        }
+    }
+
+    #[test]
+    fn levels_are_rounded_to_the_nearest() {
+        for level in 0..=255_u8 {
+            let code = rgb565([level, 0, 0]) >> 11;
+            assert_eq!(f64::from(code), (f64::from(level) * 31.0 / 255.0).round());
+        }
+    }
+}

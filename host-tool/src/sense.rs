@@ -1,0 +1,170 @@
+//! `hivtac sense`: the sensor's own code on pictures, with everything it finds on the way.
+
+use crate::failure::{Failure, Kind};
+use crate::finding::Finding;
+use crate::output::{Reader, note, print};
+use crate::picture::Picture;
+use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::model::{Model, Rest};
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+
+/// The model that the firmware has, too.
+static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
+
+/// What to do.
+pub struct Options {
+    /// Files to look at.
+    pub images: Vec<String>,
+    /// Lens and pixels; the model's when not given.
+    pub preset: Option<Preset>,
+    /// Colours of a marker; the model's when not given.
+    pub threshold: Option<HsvBox>,
+    /// Smallest blob, px; a quarter of a marker when not given.
+    pub min_area: Option<u32>,
+    /// Another model file.
+    pub model: Option<String>,
+    /// A picture of the untouched film.
+    pub tare: Option<String>,
+    /// One JSON object a line.
+    pub json: bool,
+}
+
+/// Prints what it finds in each picture. A picture that cannot be used is named, and the others are still looked at.
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let file = options.model.as_deref().map(read_model).transpose()?;
+    let name = options.model.as_deref().unwrap_or("the built-in model");
+    let model = Model::parse(file.as_deref().unwrap_or(MODEL))
+        .map_err(|error| failure(format!("{name} is no usable model: {error}")))?;
+    let bench = Bench { options, model };
+    let tare = options
+        .tare
+        .as_deref()
+        .map(|path| bench.tare(path))
+        .transpose()?;
+    let mut bad = 0;
+    for path in &options.images {
+        match bench.look(path, tare.as_ref()) {
+            Ok(text) => {
+                if print(&text)? == Reader::Gone {
+                    return Ok(());
+                }
+            }
+            Err(failure) => {
+                note(&format!("hivtac: {failure}"));
+                bad += 1;
+            }
+        }
+    }
+    match bad {
+        0 => Ok(()),
+        _ => Err(failure(format!(
+            "{bad} of {} pictures could not be used",
+            options.images.len()
+        ))),
+    }
+}
+
+fn failure(message: String) -> Failure {
+    Failure::new(Kind::Input, message)
+}
+
+fn read_model(path: &str) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| failure(format!("cannot read the model {path}: {error}")))
+}
+
+/// A rest position and the size of the picture it comes from.
+struct Tare {
+    rest: Rest,
+    size: (u16, u16),
+}
+
+/// What all pictures have in common.
+struct Bench<'a> {
+    options: &'a Options,
+    model: Model<'a>,
+}
+
+impl<'a> Bench<'a> {
+    /// What is in one picture, as text or as JSON.
+    fn look(&self, path: &str, tare: Option<&Tare>) -> Result<String, Failure> {
+        let picture = Picture::load(path)?;
+        let mut sensor = self.sensor(path, &picture)?;
+        if let Some(tare) = tare {
+            if tare.size != (picture.width, picture.height) {
+                let (width, height) = tare.size;
+                return Err(failure(format!(
+                    "the picture {path} has {} × {} px, but the tare's has {width} × {height} px; use pictures of one size",
+                    picture.width, picture.height
+                )));
+            }
+            sensor.set_tare(Some(tare.rest));
+        }
+        let measurement = measure(&mut sensor, &picture);
+        let finding = Finding::new(path, sensor.settings(), sensor.blobs(), measurement);
+        Ok(if self.options.json {
+            finding.json()
+        } else {
+            finding.text()
+        })
+    }
+
+    /// The rest position in a picture.
+    fn tare(&self, path: &str) -> Result<Tare, Failure> {
+        let picture = Picture::load(path)?;
+        let mut sensor = self.sensor(path, &picture)?;
+        let measurement = measure(&mut sensor, &picture);
+        let found = measurement.markers.zip(measurement.features);
+        let rest =
+            found.and_then(|(markers, features)| TareBuilder::new(1)?.add(&markers, &features));
+        let status: Vec<_> = measurement.status.names().collect();
+        match rest {
+            Some(rest) => Ok(Tare {
+                rest,
+                size: (picture.width, picture.height),
+            }),
+            None => Err(failure(format!(
+                "the tare picture {path} does not show the four markers ({}); look at it with `hivtac sense {path}`",
+                status.join(" ")
+            ))),
+        }
+    }
+
+    /// A sensor for pictures like this one.
+    fn sensor(&self, path: &str, picture: &Picture) -> Result<Box<Sensor<'a>>, Failure> {
+        let mut sensor: Box<Sensor> = Box::default();
+        sensor
+            .configure(self.settings(picture), Some(self.model))
+            .map_err(|error| failure(format!("the picture {path} cannot be looked at: {error}")))?;
+        Ok(sensor)
+    }
+
+    /// The model's conditions as far as nothing else is said; a picture of another size is taken as one by the same
+    /// preset, its focal length scaled with it.
+    fn settings(&self, picture: &Picture) -> Settings {
+        let mut settings = Settings::of_model(&self.model, ByteOrder::Native);
+        let conditions = &self.model.conditions;
+        let size = (conditions.geometry.width, conditions.geometry.height);
+        if self.options.preset.is_some() || size != (picture.width, picture.height) {
+            let preset = self.options.preset.unwrap_or(conditions.preset);
+            let geometry = Geometry::preset(preset, picture.width, picture.height);
+            let usual = Settings::usual(geometry, ByteOrder::Native);
+            settings = Settings {
+                threshold: settings.threshold,
+                dilations: settings.dilations,
+                ..usual
+            };
+        }
+        settings.threshold = self.options.threshold.unwrap_or(settings.threshold);
+        settings.min_area = self.options.min_area.unwrap_or(settings.min_area);
+        settings
+    }
+}
+
+fn measure(sensor: &mut Sensor, picture: &Picture) -> hivtac_sensing::pipeline::Measurement {
+    sensor.begin_frame();
+    picture.rows().for_each(|row| sensor.push_row(row));
+    sensor.finish_frame()
+}

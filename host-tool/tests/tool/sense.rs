@@ -1,0 +1,328 @@
+//! `hivtac sense` on pictures that are drawn here.
+
+use crate::run::*;
+use hivtac_sensing::model::Model;
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::threshold::ByteOrder;
+use image::{Rgb, RgbImage};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
+
+const BACKGROUND: Rgb<u8> = Rgb([66, 81, 90]);
+const RED: Rgb<u8> = Rgb([206, 28, 33]);
+
+/// A red disc: centre and radius, px.
+type Disc = (f64, f64, f64);
+
+fn picture(width: u32, height: u32, discs: &[Disc]) -> RgbImage {
+    RgbImage::from_fn(width, height, |x, y| {
+        let inside =
+            |&(cx, cy, radius): &Disc| (f64::from(x) - cx).hypot(f64::from(y) - cy) <= radius;
+        if discs.iter().any(inside) {
+            RED
+        } else {
+            BACKGROUND
+        }
+    })
+}
+
+/// Discs where the built-in model's markers rest, as large as they are there.
+fn at_rest() -> Vec<Disc> {
+    let rest = Model::parse(MODEL).unwrap().rest;
+    let areas = rest
+        .areas
+        .map(|area| (f64::from(area) / std::f64::consts::PI).sqrt() - 1.0);
+    let markers = rest.features.centroids.into_iter().zip(areas);
+    markers
+        .map(|((x, y), radius)| (x.to_f64(), y.to_f64(), radius))
+        .collect()
+}
+
+/// The rest position drawn larger and shifted, as a slanted press makes it.
+fn pressed() -> Vec<Disc> {
+    let push = |(x, y, radius): Disc| {
+        (
+            159.5 + (x - 159.5) * 1.05 + 1.0,
+            119.5 + (y - 119.5) * 1.05,
+            radius + 0.3,
+        )
+    };
+    at_rest().into_iter().map(push).collect()
+}
+
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Folder {
+        Folder(TempDir::new().unwrap())
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    fn save(&self, name: &str, picture: &RgbImage) -> String {
+        picture.save(self.path(name)).unwrap();
+        self.path(name)
+    }
+}
+
+fn json_of(run: &Finished) -> Value {
+    assert_eq!(run.code, Some(0), "{run:?}");
+    assert_eq!(run.stdout.lines().count(), 1, "{run:?}");
+    serde_json::from_str(&run.stdout).unwrap()
+}
+
+#[test]
+fn every_blob_is_measured() {
+    let folder = Folder::new();
+    let mut image = picture(320, 240, &[]);
+    for (x, y) in (20..30).flat_map(|x| (40..52).map(move |y| (x, y))) {
+        image.put_pixel(x, y, RED);
+    }
+    let path = folder.save("square.png", &image);
+    let found = json_of(&run(&["sense", "--json", &path]));
+    let expected = json!({
+        "image": path, "width": 320, "height": 240,
+        "blobs": [{"area": 168, "cx": 24.5, "cy": 45.5, "x0": 19, "y0": 39, "x1": 30, "y1": 52}],
+        "markers": null, "features": null, "force": null,
+        "status": ["markers_missing", "tare_missing", "model_simulated"],
+    });
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn small_blobs_are_shown_on_request() {
+    let folder = Folder::new();
+    let mut image = picture(320, 240, &[]);
+    image.put_pixel(7, 9, RED);
+    let path = folder.save("dot.png", &image);
+    let blobs = |arguments: &[&str]| {
+        let arguments = [&["sense", "--json", &path], arguments].concat();
+        json_of(&run(&arguments))["blobs"].as_array().unwrap().len()
+    };
+    assert_eq!((blobs(&[]), blobs(&["--min-area", "1"])), (0, 1));
+}
+
+/// The numbers are those of the sensing code on the same pixels, to the last digit.
+#[test]
+fn the_force_is_that_of_the_sensing_code() {
+    let folder = Folder::new();
+    let image = picture(320, 240, &pressed());
+    let found = json_of(&run(&[
+        "sense",
+        "--json",
+        &folder.save("pressed.png", &image),
+    ]));
+    let model = Model::parse(MODEL).unwrap();
+    let mut sensor: Box<Sensor> = Box::default();
+    sensor
+        .configure(Settings::of_model(&model, ByteOrder::Native), Some(model))
+        .unwrap();
+    sensor.begin_frame();
+    for row in image.rows() {
+        // Of the picture's two colours these are the nearest codes of RGB565.
+        let codes = row.map(|pixel| {
+            if *pixel == RED {
+                25 << 11 | 7 << 5 | 4
+            } else {
+                8 << 11 | 20 << 5 | 11
+            }
+        });
+        sensor.push_row(&codes.collect::<Vec<u16>>());
+    }
+    let measurement = sensor.finish_frame();
+    let force = measurement.force.unwrap_or_else(|| panic!("{found}"));
+    let micro = |number: i32| f64::from(number) / 1e6;
+    let milli = |number: i32| f64::from(number) / 1e3;
+    let [x, y, z] = force.cartesian.unwrap().map(|component| component.0);
+    assert_eq!(
+        found["force"],
+        json!({
+            "alpha_deg": milli(force.alpha.0), "beta_deg": milli(force.beta.0),
+            "magnitude_n": micro(force.magnitude.0),
+            "x_n": micro(x), "y_n": micro(y), "z_n": micro(z),
+            "direction_sigma_deg": milli(force.direction_sigma.0),
+            "magnitude_sigma_n": micro(force.magnitude_sigma.0),
+        })
+    );
+    let features: Vec<Value> = measurement
+        .features
+        .unwrap()
+        .to_array()
+        .iter()
+        .map(|n| json!(*n as f64 / 65_536.0))
+        .collect();
+    assert_eq!(found["features"], Value::from(features));
+    assert_eq!(found["markers"][2]["id"], 2);
+    assert_eq!(
+        found["status"],
+        json!(measurement.status.names().collect::<Vec<_>>())
+    );
+}
+
+#[test]
+fn png_and_ppm_give_the_same_and_jpeg_is_read() {
+    let folder = Folder::new();
+    let image = picture(320, 240, &at_rest());
+    let mut found = ["a.png", "a.ppm"]
+        .map(|name| json_of(&run(&["sense", "--json", &folder.save(name, &image)])));
+    for object in &mut found {
+        object["image"].take();
+    }
+    assert_eq!(found[0], found[1]);
+    let jpeg = json_of(&run(&["sense", "--json", &folder.save("a.jpg", &image)]));
+    assert_eq!(jpeg["blobs"].as_array().unwrap().len(), 4);
+}
+
+#[test]
+fn a_tare_takes_its_status_bit_away() {
+    let folder = Folder::new();
+    let rest = folder.save("rest.png", &picture(320, 240, &at_rest()));
+    let press = folder.save("press.png", &picture(320, 240, &pressed()));
+    let found = json_of(&run(&["sense", "--json", "--tare", &rest, &press]));
+    let status = found["status"].as_array().unwrap();
+    assert!(!status.contains(&json!("tare_missing")), "{found}");
+    assert!(found["force"].is_object(), "{found}");
+    let empty = folder.save("empty.png", &picture(320, 240, &[]));
+    let failed = run(&["sense", "--tare", &empty, &press]);
+    assert_eq!(failed.code, Some(1));
+    assert!(
+        failed
+            .stderr
+            .contains("does not show the four markers (image_dark "),
+        "{}",
+        failed.stderr
+    );
+    let large = folder.save("large.png", &picture(640, 480, &[]));
+    let failed = run(&["sense", "--tare", &rest, &large]);
+    assert!(
+        failed
+            .stderr
+            .contains("has 640 × 480 px, but the tare's has 320 × 240 px"),
+        "{}",
+        failed.stderr
+    );
+}
+
+/// Whatever the model was not made for gives no force, and says so.
+#[test]
+fn other_conditions_give_no_force() {
+    let folder = Folder::new();
+    let image = picture(320, 240, &pressed());
+    let path = folder.save("press.png", &image);
+    let doubled: Vec<_> = pressed()
+        .iter()
+        .map(|(x, y, r)| (2.0 * x + 0.5, 2.0 * y + 0.5, 2.0 * r))
+        .collect();
+    let large = folder.save("large.png", &picture(640, 480, &doubled));
+    for arguments in [
+        &["sense", "--json", &path, "--preset", "paper"][..],
+        &[
+            "sense",
+            "--json",
+            &path,
+            "--threshold",
+            "170,10,101,255,45,255",
+        ],
+        &["sense", "--json", &large],
+    ] {
+        let found = json_of(&run(arguments));
+        assert_eq!(found["blobs"].as_array().unwrap().len(), 4, "{found}");
+        assert_eq!(found["force"], Value::Null, "{found}");
+        let status = found["status"].as_array().unwrap();
+        assert!(status.contains(&json!("model_mismatch")), "{found}");
+    }
+}
+
+#[test]
+fn a_person_sees_every_stage() {
+    let folder = Folder::new();
+    let path = folder.save("press.png", &picture(320, 240, &pressed()));
+    let found = run(&["sense", &path]);
+    let lines: Vec<_> = found.stdout.lines().collect();
+    assert_eq!(
+        lines[0],
+        format!("{path}: 320 × 240 px, taken with a focal length of 175.00 px")
+    );
+    assert_eq!(lines[1], "  blobs     4");
+    assert_eq!(lines[2], "      area              centroid  box");
+    assert!(
+        lines[7].starts_with("  marker 0  upper left   ("),
+        "{}",
+        lines[7]
+    );
+    assert!(lines[11].starts_with("  features  "), "{}", lines[11]);
+    assert!(lines[12].starts_with("  force     α "), "{}", lines[12]);
+    assert!(lines[13].starts_with("  status    "), "{}", lines[13]);
+    assert!(
+        lines[13].ends_with("tare_missing model_simulated"),
+        "{}",
+        lines[13]
+    );
+    assert_eq!(lines.len(), 14);
+}
+
+#[test]
+fn bad_pictures_are_named_and_the_others_looked_at() {
+    let folder = Folder::new();
+    let good = folder.save("good.png", &picture(320, 240, &[]));
+    let big = folder.save("big.png", &picture(801, 2, &[]));
+    let text = folder.path("text.png");
+    std::fs::write(&text, "no picture").unwrap();
+    let cut = folder.path("cut.png");
+    std::fs::write(&cut, &std::fs::read(&good).unwrap()[..60]).unwrap();
+    let found = run(&["sense", "--json", "/nowhere.png", &big, &text, &cut, &good]);
+    assert_eq!(found.code, Some(1));
+    assert_eq!(found.stdout.lines().count(), 1);
+    let lines: Vec<_> = found.stderr.lines().collect();
+    assert!(
+        lines[0].starts_with("hivtac: cannot read the picture /nowhere.png: "),
+        "{}",
+        lines[0]
+    );
+    assert_eq!(
+        lines[1],
+        format!(
+            "hivtac: the picture {big} has 801 × 2 px, more than the 800 × 800 px of the largest frame; \
+             scale it down, for example to 640 px wide"
+        )
+    );
+    assert_eq!(
+        lines[2],
+        format!("hivtac: cannot read the picture {text}: it is no PNG, JPEG or PPM file")
+    );
+    assert!(
+        lines[3].starts_with(&format!("hivtac: cannot read the picture {cut}: ")),
+        "{}",
+        lines[3]
+    );
+    assert_eq!(lines[4], "hivtac: 4 of 5 pictures could not be used");
+}
+
+#[test]
+fn a_bad_model_file_is_named() {
+    let folder = Folder::new();
+    let image = folder.save("a.png", &picture(320, 240, &[]));
+    let model = folder.path("model.hvtm");
+    let mut bytes = MODEL.to_vec();
+    *bytes.last_mut().unwrap() ^= 1;
+    std::fs::write(&model, bytes).unwrap();
+    let bad = run(&["sense", "--model", &model, &image]);
+    assert_eq!(bad.code, Some(1));
+    let start = format!("hivtac: {model} is no usable model: ");
+    assert!(bad.stderr.starts_with(&start), "{}", bad.stderr);
+    std::fs::write(&model, MODEL).unwrap();
+    assert_eq!(run(&["sense", "--model", &model, &image]).code, Some(0));
+    let missing = run(&["sense", "--model", "/nowhere.hvtm", &image]);
+    assert!(
+        missing
+            .stderr
+            .starts_with("hivtac: cannot read the model /nowhere.hvtm: "),
+        "{}",
+        missing.stderr
+    );
+}
