@@ -2,7 +2,7 @@
 
 use crate::{
     cordic::{ONE_BITS, atan2, sin_cos},
-    units::{Micrometres, Px},
+    units::{Micrometres, MilliDegrees, Px},
 };
 
 /// Lens, frame and marker geometry (`docs/architecture.md`, presets).
@@ -56,8 +56,10 @@ const DIAGONAL_TO_FOCAL_Q32: u64 = 1_640_556_661;
 /// 2.1 mm / (640 · 6 µm) in Q16: an OV7725 frame's width to its focal length, both in pixels. Exact.
 const OV7725_WIDTH_TO_FOCAL_Q16: i32 = 35_840;
 
-/// π/180,000 in Q30: a thousandth of a degree in radians, to 2 · 10⁻⁵ of itself.
-const RADIANS_Q30: i64 = 18_740;
+/// A metre: nothing here is larger.
+const LARGEST_MEASURE: Micrometres = Micrometres(1_000_000);
+/// A radian in m°, to 4 · 10⁻⁶ of itself.
+const RADIAN: i64 = 57_296;
 /// π/4 in Q30.
 const QUARTER_PI_Q30: i64 = 843_314_857;
 
@@ -84,35 +86,57 @@ impl Geometry {
         (half_span(self.width), half_span(self.height))
     }
 
-    /// Area of a marker's image at rest, px, rounded down; without any dilation.
-    ///
-    /// A disc of diameter d at distance R from the axis and at angle θ from it shows an ellipse, f·d·θ/R across the
-    /// radius and f·d·sin θ·cos θ/R along it.
-    pub fn rest_area(&self) -> u32 {
-        let (radius, distance) = (
+    /// Whether all measures are positive and none is beyond a metre, and the markers do not cover each other.
+    pub const fn is_sound(&self) -> bool {
+        let diameter = self.marker_diameter.0;
+        let radius = self.marker_radius.0;
+        self.focal.0 > 0
+            && 0 < diameter
+            && diameter <= radius
+            && radius <= LARGEST_MEASURE.0
+            && 0 < self.film_distance.0
+            && self.film_distance.0 <= LARGEST_MEASURE.0
+    }
+
+    /// Area of a marker's image at rest, px, rounded down, when the mask adds `edge` to its diameters.
+    pub fn rest_area(&self, edge: Px) -> u32 {
+        let across = self.across(self.rest_distance());
+        let along = self.along_flat(self.rest_distance());
+        let grow = |diameter: Px| i128::from(diameter.0) + i128::from(edge.0);
+        let area_q62 = grow(across) * grow(along) * i128::from(QUARTER_PI_Q30);
+        u32::try_from(area_q62 >> (2 * Px::FRACTION_BITS + ONE_BITS)).unwrap_or(0)
+    }
+
+    /// Distance of a marker's image from the axis at rest: f·θ.
+    pub fn rest_distance(&self) -> Px {
+        let theta = atan2(
             i64::from(self.marker_radius.0),
             i64::from(self.film_distance.0),
         );
-        let theta = atan2(radius, distance);
-        let (sin, cos) = sin_cos(theta);
-        let scale = (i64::from(self.focal.0) * i64::from(self.marker_diameter.0) / radius.max(1))
-            .clamp(0, 1 << 40);
-        let factors = [i64::from(theta.0) * RADIANS_Q30, sin, cos, QUARTER_PI_Q30];
-        let area_q32 = factors
-            .iter()
-            .fold(i128::from(scale) * i128::from(scale), |area, factor| {
-                (area * i128::from(*factor)) >> ONE_BITS
-            });
-        u32::try_from(area_q32 >> 32).unwrap_or(u32::MAX)
+        saturated(i64::from(self.focal.0) * i64::from(theta.0) / RADIAN)
     }
 
-    /// Whether all measures are positive.
-    pub const fn is_sound(&self) -> bool {
-        self.focal.0 > 0
-            && self.marker_diameter.0 > 0
-            && self.marker_radius.0 > 0
-            && self.film_distance.0 > 0
+    /// Diameter, across the radius, of the image of a marker at `distance` from the axis: distance·d/R. A lens that is
+    /// symmetric about its axis shows a circle about the axis as a circle, so this holds for any lens and any
+    /// height or tilt of the film.
+    pub fn across(&self, distance: Px) -> Px {
+        let radius = i64::from(self.marker_radius.0).max(1);
+        saturated(i64::from(distance.0) * i64::from(self.marker_diameter.0) / radius)
     }
+
+    /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with θ = distance/f.
+    pub fn along_flat(&self, distance: Px) -> Px {
+        let theta = i64::from(distance.0) * RADIAN / i64::from(self.focal.0.max(1));
+        let theta = theta.clamp(1, 90_000);
+        let (sin, cos) = sin_cos(MilliDegrees(theta as i32));
+        let factor_q30 = ((sin * cos) >> ONE_BITS) * RADIAN / theta;
+        saturated((i64::from(self.across(distance).0) * factor_q30) >> ONE_BITS)
+    }
+}
+
+/// As a length, at most ± 32,768 px.
+fn saturated(length_q16: i64) -> Px {
+    Px(length_q16.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32)
 }
 
 /// 2.1 mm over a pitch that makes the diagonal 150°: the pitch cancels out.
@@ -151,19 +175,60 @@ mod tests {
     fn a_marker_at_rest_has_the_area_of_its_ellipse() {
         let geometry = Geometry::preset(Preset::Ov7725, 320, 240);
         let theta = (5.257f64 / 10.0).atan();
-        let scale = 175.0 / 5.257;
-        let area = std::f64::consts::FRAC_PI_4 * scale * scale * theta * theta.sin() * theta.cos();
-        assert_eq!(geometry.rest_area(), area as u32);
-        let extreme = Geometry {
-            focal: Px(i32::MAX),
-            marker_radius: Micrometres(1),
-            ..geometry
-        };
-        let _ = Geometry {
-            marker_diameter: Micrometres(u32::MAX),
-            ..extreme
+        assert!((geometry.rest_distance().to_f64() - 175.0 * theta).abs() < 2e-3);
+        let across = 175.0 * theta / 5.257;
+        let along = across * theta.sin() * theta.cos() / theta;
+        assert!((geometry.across(geometry.rest_distance()).to_f64() - across).abs() < 1e-3);
+        assert!((geometry.along_flat(geometry.rest_distance()).to_f64() - along).abs() < 1e-3);
+        for edge in [0.0, 2.8] {
+            let area = std::f64::consts::FRAC_PI_4 * (across + edge) * (along + edge);
+            let found = geometry.rest_area(Px((edge * 65_536.0) as i32));
+            assert!((f64::from(found) - area).abs() < 1.0, "{found} for {area}");
         }
-        .rest_area();
+    }
+
+    #[test]
+    fn extreme_geometries_are_refused_or_give_a_number() {
+        let good = Geometry::preset(Preset::Paper, 800, 600);
+        assert!(good.is_sound());
+        for wrong in [
+            Geometry {
+                focal: Px(0),
+                ..good
+            },
+            Geometry {
+                marker_diameter: Micrometres(0),
+                ..good
+            },
+            Geometry {
+                marker_diameter: Micrometres(5_258),
+                ..good
+            },
+            Geometry {
+                marker_radius: Micrometres(u32::MAX),
+                ..good
+            },
+            Geometry {
+                film_distance: Micrometres(0),
+                ..good
+            },
+            Geometry {
+                film_distance: Micrometres(1_000_001),
+                ..good
+            },
+        ] {
+            assert!(!wrong.is_sound(), "{wrong:?}");
+            let _ = wrong.rest_area(Px(i32::MAX));
+        }
+        let largest = Geometry {
+            focal: Px(i32::MAX),
+            marker_diameter: Micrometres(1_000_000),
+            marker_radius: Micrometres(1_000_000),
+            film_distance: Micrometres(1),
+            ..good
+        };
+        assert!(largest.is_sound());
+        assert!(largest.rest_area(Px(0)) > 0);
     }
 
     #[test]

@@ -36,4 +36,6 @@ mod cordic;
 mod dilate;
 mod label;
 mod mask;
+#[cfg(test)]
+mod picture;
 mod runs;

@@ -5,7 +5,7 @@ use crate::{
     features::Features,
     force::Force,
     geometry::{Geometry, Preset},
-    markers::{Finder, Marker},
+    markers::{Finder, Found, Marker, judge},
     model::{Model, Rest},
     network::Network,
     scanner::Scanner,
@@ -110,9 +110,10 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
         Ok(())
     }
 
-    /// Sets the rest position of this unit, or goes back to the model's.
+    /// Sets the rest position of this unit, or goes back to the model's. One that is not [sound](Rest::is_sound) is
+    /// as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {
-        self.tare = tare;
+        self.tare = tare.filter(Rest::is_sound);
     }
 
     /// The rest position of this unit, when one was taken.
@@ -134,14 +135,12 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
         let mut status = self.standing_status();
-        let markers = match self.find_markers() {
-            Ok(markers) => Some(markers),
-            Err(reason) => {
-                status |= reason;
-                None
-            }
-        };
+        let found = self.find_markers().map_err(|reason| status |= reason).ok();
+        let markers = found.map(|found| found.markers);
         let features = markers.as_ref().map(Features::of_markers);
+        if let (Some(found), Some(rest)) = (&found, self.rest()) {
+            status |= judge(&self.settings.geometry, &rest, found);
+        }
         let force = features.and_then(|features| self.measure(&features, &mut status));
         Measurement {
             status,
@@ -176,13 +175,18 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
         status
     }
 
-    fn find_markers(&mut self) -> Result<[Marker; 4], Status> {
-        let pixels =
-            u32::from(self.settings.geometry.width) * u32::from(self.settings.geometry.height);
+    /// The rest position to compare with: this unit's, or else the model's, if that was made for such frames.
+    fn rest(&self) -> Option<Rest> {
         let fitting = self
             .model
+            .as_ref()
             .filter(|model| self.settings.fit(&model.conditions));
-        let rest = self.tare.or(fitting.map(|model| model.rest));
+        self.tare.or(fitting.map(|model| model.rest))
+    }
+
+    fn find_markers(&mut self) -> Result<Found, Status> {
+        let geometry = &self.settings.geometry;
+        let pixels = u32::from(geometry.width) * u32::from(geometry.height);
         let scan = self.scanner.finish();
         if scan.status != Status::OK {
             return Err(scan.status);
@@ -193,7 +197,7 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
         if scan.set_pixels > pixels / SATURATED_PART {
             return Err(Status::IMAGE_SATURATED);
         }
-        Finder::new(&self.settings.geometry, rest.as_ref()).find(scan.blobs)
+        Finder::new(geometry, self.settings.dilations).find(scan.blobs)
     }
 
     /// The force of a frame's features, unless `status` already forbids one.

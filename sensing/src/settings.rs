@@ -5,6 +5,7 @@ use crate::{
     model::{Conditions, Model},
     scanner::{ScanError, ScanSettings},
     threshold::{ByteOrder, HsvBox, ThresholdError},
+    units::Px,
 };
 use core::fmt;
 
@@ -30,7 +31,7 @@ pub enum SettingsError {
     Scan(ScanError),
     /// The threshold means nothing.
     Threshold(ThresholdError),
-    /// The focal length, or a measure of the markers, is not positive.
+    /// [`Geometry::is_sound`] says no.
     Geometry,
 }
 
@@ -43,7 +44,7 @@ impl Settings {
             threshold: HsvBox::RED,
             byte_order,
             dilations: 1,
-            min_area: geometry.rest_area() / 4,
+            min_area: geometry.rest_area(Px(0)) / 4,
         }
     }
 
@@ -99,7 +100,8 @@ impl fmt::Display for SettingsError {
             SettingsError::Scan(error) => error.fmt(f),
             SettingsError::Threshold(error) => error.fmt(f),
             SettingsError::Geometry => f.write_str(
-                "the focal length, the marker's diameter and its distance from the axis must be positive",
+                "the focal length and all measures of markers and film must be positive and at most a metre, \
+                 and a marker no wider than its distance from the axis",
             ),
         }
     }

@@ -114,14 +114,7 @@ fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
 fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
     Ok(Conditions {
         preset: preset(reader)?,
-        geometry: Geometry {
-            width: reader.u16_in("width", 1, LARGEST_SIDE, "1 to 800")?,
-            height: reader.u16_in("height", 1, LARGEST_SIDE, "1 to 800")?,
-            focal: Px(reader.positive("focal length")?),
-            marker_diameter: Micrometres(reader.positive("marker diameter")? as u32),
-            marker_radius: Micrometres(reader.positive("marker radius")? as u32),
-            film_distance: Micrometres(reader.positive("film distance")? as u32),
-        },
+        geometry: geometry(reader)?,
         threshold: threshold(reader)?,
         dilations: reader.u8_in("dilations", 3, "0 to 3")?,
         pixel_format: reader.choice("pixel format", &[PixelFormat::Rgb565], "0")?,
@@ -137,6 +130,30 @@ fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
         )?,
         origin: origin(reader)?,
     })
+}
+
+fn geometry(reader: &mut Reader<'_>) -> Result<Geometry, ModelError> {
+    let offset = reader.offset;
+    let geometry = Geometry {
+        width: reader.u16_in("width", 1, LARGEST_SIDE, "1 to 800")?,
+        height: reader.u16_in("height", 1, LARGEST_SIDE, "1 to 800")?,
+        focal: Px(reader.positive("focal length")?),
+        marker_diameter: Micrometres(reader.u32()?),
+        marker_radius: Micrometres(reader.u32()?),
+        film_distance: Micrometres(reader.u32()?),
+    };
+    let allowed =
+        "of measures of 1 to 1000000 µm, and a marker no wider than its distance from the axis";
+    let wrong = ModelError::Field {
+        name: "geometry",
+        offset,
+        allowed,
+    };
+    if geometry.is_sound() {
+        Ok(geometry)
+    } else {
+        Err(wrong)
+    }
 }
 
 fn preset(reader: &mut Reader<'_>) -> Result<Preset, ModelError> {
@@ -197,12 +214,24 @@ fn origin(reader: &mut Reader<'_>) -> Result<Origin, ModelError> {
 }
 
 fn rest(reader: &mut Reader<'_>) -> Result<Rest, ModelError> {
+    let offset = reader.offset;
     let features = features(reader)?;
     let mut areas = [0; 4];
     for area in &mut areas {
-        *area = reader.positive("rest area")? as u32;
+        *area = reader.u32()?;
     }
-    Ok(Rest { features, areas })
+    let rest = Rest { features, areas };
+    let allowed = "centroids of 0 to 800 px and areas of 1 to 640000 px";
+    let wrong = ModelError::Field {
+        name: "rest position",
+        offset,
+        allowed,
+    };
+    if rest.is_sound() {
+        Ok(rest)
+    } else {
+        Err(wrong)
+    }
 }
 
 fn features(reader: &mut Reader<'_>) -> Result<Features, ModelError> {

@@ -22,7 +22,7 @@ use crate::{
     features::{FEATURES, Features},
     geometry::{Geometry, Preset},
     threshold::HsvBox,
-    units::{MicroNewtons, MilliDegrees},
+    units::{MicroNewtons, MilliDegrees, Px},
 };
 use core::fmt::Write;
 
@@ -30,6 +30,8 @@ use core::fmt::Write;
 pub const MAX_WIDTH: usize = 512;
 /// The most layers a model may have.
 pub const MAX_LAYERS: usize = 8;
+/// The longest side of a picture, px.
+const LARGEST_SIDE: i32 = 800;
 /// What the last layer gives: three numbers.
 pub const OUTPUTS: usize = 3;
 
@@ -155,6 +157,19 @@ pub struct Uncertainty {
     pub lateral: MicroNewtons,
     /// Of the normal component, Fz.
     pub normal: MicroNewtons,
+}
+
+impl Rest {
+    /// Whether it can be a rest position: inside the largest picture, with markers of at least a pixel.
+    pub fn is_sound(&self) -> bool {
+        let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
+        let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;
+        self.features
+            .centroids
+            .iter()
+            .all(|c| inside(c.0) && inside(c.1))
+            && self.areas.iter().all(|area| (1..=largest).contains(area))
+    }
 }
 
 impl<'a> Model<'a> {

@@ -9,7 +9,7 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
     let features = Features {
         centroids: [
             (Px(1), Px(2)),
-            (Px(3), Px(-4)),
+            (Px(3), Px(4)),
             (Px(5), Px(6)),
             (Px(7), Px(8)),
         ],
@@ -107,18 +107,18 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
     c.geometry.width = 1 + (next() % 800) as u16;
     c.geometry.height = 1 + (next() % 800) as u16;
     c.geometry.focal = Px(1 + (next() >> 2) as i32);
-    c.geometry.marker_diameter = Micrometres(1 + (next() >> 2));
-    c.geometry.marker_radius = Micrometres(1 + (next() >> 2));
-    c.geometry.film_distance = Micrometres(1 + (next() >> 2));
+    c.geometry.marker_diameter = Micrometres(1 + next() % 1000);
+    c.geometry.marker_radius = Micrometres(1000 + next() % 999_001);
+    c.geometry.film_distance = Micrometres(1 + next() % 1_000_000);
     c.dilations = (next() % 4) as u8;
     c.threshold.hue_low = (next() % 180) as u8;
     c.threshold.value_low = next() as u8;
     c.threshold.value_high = c.threshold.value_low.saturating_add(next() as u8);
     for (x, y) in &mut spec.rest.features.centroids {
-        (*x, *y) = (Px(next() as i32), Px(next() as i32));
+        (*x, *y) = (Px((next() >> 7) as i32), Px((next() >> 7) as i32));
     }
     spec.input.mean.rect_area = i64::from(next());
-    spec.rest.areas = [0; 4].map(|_: u32| 1 + (next() >> 2));
+    spec.rest.areas = [0; 4].map(|_: u32| 1 + next() % 640_000);
     spec.input.multipliers = [0; 11].map(|_: u32| 1 + (next() >> 9));
     spec.input.shifts = [0; 11].map(|_: u8| 1 + (next() % 62) as u8);
     spec.output = [OutputKind::ForceVector, OutputKind::AnglesMagnitude][next() as usize % 2];

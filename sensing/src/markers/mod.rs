@@ -1,0 +1,186 @@
+//! Four markers out of the blobs: correct or rejected, never silently wrong.
+//!
+//! The rules rest on optics and on the pattern's geometry, not on how the film gives:
+//!
+//! 1. *Candidates* (`shape`): blobs off the border, of a plausible area, filled like an ellipse.
+//! 2. *Pattern* (`pattern`): four candidates, one in each quadrant around their own centre, that make a near-square.
+//! 3. *Size*: a lens that is symmetric about its axis shows a circle about the axis as a circle, so it magnifies
+//!    *across* the radius by image radius over film radius, whatever the film's height and tilt. A marker at distance
+//!    r from the pattern's centre is therefore r·d/R wide across it, plus what dilation and soft edges add.
+//! 4. *Trust* (`trust`): with a rest position, much tighter limits relative to it decide whether there may be a
+//!    force.
+//!
+//! Exactly one set of four must pass 1 to 3; two are ambiguous, however different. What cannot be seen: a red disc
+//! of a marker's size that hides a marker and sits within a third of a marker's width of it.
+
+mod pattern;
+mod shape;
+#[cfg(test)]
+mod tests;
+mod trust;
+
+pub(crate) use trust::judge;
+
+use crate::{blob::Blob, geometry::Geometry, status::Status, units::Px};
+use heapless::Vec;
+use pattern::Pattern;
+use shape::{Shape, nominal_edge};
+
+/// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3 lower left
+/// as the image shows them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Marker {
+    /// Centroid, column.
+    pub x: Px,
+    /// Centroid, row.
+    pub y: Px,
+    /// Pixels in the mask, after dilation.
+    pub area: u32,
+}
+
+/// Four markers, how their images look, and the pattern they make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Found {
+    /// Markers 0–3.
+    pub markers: [Marker; 4],
+    /// Their images.
+    pub shapes: [Shape; 4],
+    /// Their pattern.
+    pub pattern: Pattern,
+}
+
+/// More candidates than this are not sorted out: 8 make 70 sets of four.
+const MAX_CANDIDATES: usize = 8;
+/// A candidate has at least one part in this many of a marker's area at rest: markers only come nearer.
+const SMALLEST_PART: u32 = 3;
+/// A candidate has at most this many times a marker's area at rest: at twice the rest's distance from the axis it
+/// has less than four times, before dilation adds its share.
+const LARGEST_MULTIPLE: u32 = 8;
+/// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any size and tilt, a
+/// half disc 0.95, two touching discs 0.88, a crescent less.
+const LEAST_FILL: i64 = 60_950;
+/// How far a marker may be from the optical law in width, of 256 (±25 %): threshold, light and blur are unknown
+/// before there is a rest position.
+const SIZE_TOLERANCE: i64 = 64;
+/// Narrowest marker, along the radius over across it, of 256 (0.2): foreshortened by distance and steepest film.
+const LEAST_ASPECT: i64 = 51;
+/// Widest, of 256 (1.15): round, and the noise of a small picture.
+const LARGEST_ASPECT: i64 = 294;
+
+/// Finds the markers among the blobs of a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Finder<'g> {
+    geometry: &'g Geometry,
+    edge: Px,
+    areas: (u32, u32),
+}
+
+impl<'g> Finder<'g> {
+    /// For frames of this geometry whose mask is dilated so many times.
+    pub fn new(geometry: &'g Geometry, dilations: u8) -> Finder<'g> {
+        let edge = nominal_edge(dilations);
+        let smallest = geometry.rest_area(Px(0)) / SMALLEST_PART;
+        let largest = geometry.rest_area(edge).saturating_mul(LARGEST_MULTIPLE);
+        let areas = (smallest.max(1), largest);
+        Finder {
+            geometry,
+            edge,
+            areas,
+        }
+    }
+
+    /// The four markers among `blobs`.
+    ///
+    /// # Errors
+    /// [`Status::MARKERS_MISSING`] with fewer than four candidates; [`Status::MARKERS_IMPLAUSIBLE`] when four of them
+    /// make the pattern but their sizes do not fit it; else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does,
+    /// or there are too many candidates.
+    pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
+        let candidates = self.candidates(blobs)?;
+        let mut found = None;
+        let mut reason = Status::MARKERS_AMBIGUOUS;
+        for set in sets_of_four(candidates.len()) {
+            match self.examine(set.map(|index| candidates[index])) {
+                Ok(_) if found.is_some() => return Err(Status::MARKERS_AMBIGUOUS),
+                Ok(set) => found = Some(set),
+                Err(why) if why == Status::MARKERS_IMPLAUSIBLE => reason = why,
+                Err(_) => {}
+            }
+        }
+        found.ok_or(reason)
+    }
+
+    fn candidates(&self, blobs: &[Blob]) -> Result<Vec<Shape, MAX_CANDIDATES>, Status> {
+        let mut candidates = Vec::new();
+        for shape in blobs
+            .iter()
+            .filter(|blob| self.may_be_marker(blob))
+            .map(Shape::of_blob)
+        {
+            if shape.fill < LEAST_FILL {
+                continue;
+            }
+            candidates
+                .push(shape)
+                .map_err(|_| Status::MARKERS_AMBIGUOUS)?;
+        }
+        if candidates.len() < 4 {
+            return Err(Status::MARKERS_MISSING);
+        }
+        Ok(candidates)
+    }
+
+    /// Plausible area, and no pixel on the border: what touches it is cut.
+    fn may_be_marker(&self, blob: &Blob) -> bool {
+        (self.areas.0..=self.areas.1).contains(&blob.area)
+            && blob.x0 > 0
+            && blob.y0 > 0
+            && blob.x1 + 1 < self.geometry.width
+            && blob.y1 + 1 < self.geometry.height
+    }
+
+    /// Whether four shapes are the markers.
+    fn examine(&self, shapes: [Shape; 4]) -> Result<Found, Status> {
+        let shapes = pattern::identify(shapes).ok_or(Status::MARKERS_AMBIGUOUS)?;
+        let pattern = Pattern::of_centroids(shapes.map(|shape| (shape.x, shape.y)));
+        if !pattern.is_plausible(self.geometry) {
+            return Err(Status::MARKERS_AMBIGUOUS);
+        }
+        if !shapes
+            .iter()
+            .all(|shape| self.is_plausible(shape, &pattern))
+        {
+            return Err(Status::MARKERS_IMPLAUSIBLE);
+        }
+        let markers = shapes.map(|shape| Marker {
+            x: shape.x,
+            y: shape.y,
+            area: shape.area,
+        });
+        Ok(Found {
+            markers,
+            shapes,
+            pattern,
+        })
+    }
+
+    /// Whether a marker's size fits its distance from the pattern's centre.
+    fn is_plausible(&self, shape: &Shape, pattern: &Pattern) -> bool {
+        let Some(seen) = shape.seen_from(pattern.center) else {
+            return false;
+        };
+        let expected = i64::from(self.geometry.across(seen.distance).0);
+        let excess = (seen.across - i64::from(self.edge.0) - expected).abs();
+        excess * 256 <= expected * SIZE_TOLERANCE
+            && (LEAST_ASPECT..=LARGEST_ASPECT).contains(&(seen.along * 256 / seen.across.max(1)))
+    }
+}
+
+/// Every way to take four of `count` things, in order.
+fn sets_of_four(count: usize) -> impl Iterator<Item = [usize; 4]> {
+    (0..count).flat_map(move |a| {
+        (a + 1..count).flat_map(move |b| {
+            (b + 1..count).flat_map(move |c| (c + 1..count).map(move |d| [a, b, c, d]))
+        })
+    })
+}

@@ -1,0 +1,120 @@
+//! The pattern of four points: where its centre is, how large, turned and distorted it is.
+//!
+//! Four points have eight coordinates: centre (2), size and turn (2), *strain* (2: stretched along x against y, or
+//! sheared) and *taper* (2: one side longer than the opposite one). For a square film, a force at its middle changes
+//! strain only to second order, wherever it points: a straight press changes the size, a sideways one shifts and
+//! tapers. One marker displaced by δ changes strain by δ/4r whatever the direction, r being the markers' distance
+//! from the centre. That makes strain the test for a thing that stands in for a marker.
+
+use super::shape::Shape;
+use crate::{
+    cordic::atan2,
+    geometry::Geometry,
+    units::{MilliDegrees, Px},
+};
+
+/// What four points in the order of the identities make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pattern {
+    /// Their mean.
+    pub center: (Px, Px),
+    /// Half the side of the square that fits best, px in Q16.16.
+    pub half_side: i64,
+    /// How far that square is turned, x towards y.
+    pub turn: MilliDegrees,
+    /// Stretch and shear, in parts of the square's size, of 65,536.
+    pub strain: [i64; 2],
+    /// Taper along x and y, in parts of the square's half side, of 65,536.
+    pub taper: [i64; 2],
+}
+
+/// Limits of a pattern before there is a rest position: lens, mounting and punched film are as they come.
+/// Turned by at most 20°.
+const LARGEST_TURN: MilliDegrees = MilliDegrees(20_000);
+/// Strain of at most 0.05, of 65,536.
+const LARGEST_STRAIN: i64 = 3_277;
+/// Taper of at most 0.15, of 65,536.
+const LARGEST_TAPER: i64 = 9_830;
+/// Centre at most 0.8 of the half side at rest away from the picture's middle; of 256.
+const LARGEST_SHIFT: i64 = 205;
+/// 0.75 to 2.2 times as large as at rest, of 256: a film pulled outwards, and one that nearly touches the lens.
+const SCALE: (i64, i64) = (192, 563);
+
+/// √½ of 256: a square's half side over its half diagonal.
+const SQRT_HALF: i64 = 181;
+
+/// (Sign of x, sign of y) of markers 0–3 around their centre.
+const SIGNS: [(i64, i64); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
+
+/// Puts four shapes in the order of the identities: by the quadrant around their own centre. `None` unless there is
+/// one in each.
+pub fn identify(shapes: [Shape; 4]) -> Option<[Shape; 4]> {
+    let sum = |value: fn(&Shape) -> Px| shapes.iter().map(|s| i64::from(value(s).0)).sum::<i64>();
+    let (sum_x, sum_y) = (sum(|s| s.x), sum(|s| s.y));
+    let mut ordered = [None; 4];
+    for shape in shapes {
+        let right = 4 * i64::from(shape.x.0) > sum_x;
+        let lower = 4 * i64::from(shape.y.0) > sum_y;
+        let identity = match (right, lower) {
+            (false, false) => 0,
+            (true, false) => 1,
+            (true, true) => 2,
+            (false, true) => 3,
+        };
+        ordered[identity] = Some(shape);
+    }
+    let [a, b, c, d] = ordered;
+    Some([a?, b?, c?, d?])
+}
+
+impl Pattern {
+    /// Of four points in the order of the identities.
+    pub fn of_centroids(centroids: [(Px, Px); 4]) -> Pattern {
+        // Four times the coefficient of a sign pattern in x and in y.
+        let project = |weight: fn((i64, i64)) -> i64| {
+            let terms = centroids.iter().zip(SIGNS);
+            terms.fold((0, 0), |(x, y), (point, signs)| {
+                let weight = weight(signs);
+                (
+                    x + weight * i64::from(point.0.0),
+                    y + weight * i64::from(point.1.0),
+                )
+            })
+        };
+        let (sum_x, sum_y) = project(|_| 1);
+        let (xx, yx) = project(|(x, _)| x);
+        let (xy, yy) = project(|(_, y)| y);
+        let (taper_x, taper_y) = project(|(x, y)| x * y);
+        // Eight half sides.
+        let size = ((xx + yy).pow(2) + (yx - xy).pow(2)).isqrt().max(1);
+        Pattern {
+            center: (Px((sum_x >> 2) as i32), Px((sum_y >> 2) as i32)),
+            half_side: size / 8,
+            turn: atan2(yx - xy, xx + yy),
+            strain: [xx - yy, xy + yx].map(|part| (part << 16) / size),
+            taper: [taper_x, taper_y].map(|part| (part << 17) / size),
+        }
+    }
+
+    /// Whether it can be the markers of such a sensor in any state, from geometry alone.
+    pub fn is_plausible(&self, geometry: &Geometry) -> bool {
+        let rest = i64::from(geometry.rest_distance().0) * SQRT_HALF / 256;
+        let shift = i64::from(distance(self.center, geometry.center()).0);
+        self.turn.0.abs() <= LARGEST_TURN.0
+            && length(self.strain) <= LARGEST_STRAIN
+            && length(self.taper) <= LARGEST_TAPER
+            && shift * 256 <= rest * LARGEST_SHIFT
+            && (rest * SCALE.0..=rest * SCALE.1).contains(&(self.half_side * 256))
+    }
+}
+
+/// Distance of two points, both in a picture.
+pub fn distance(a: (Px, Px), b: (Px, Px)) -> Px {
+    let (dx, dy) = (a.0 - b.0, a.1 - b.1);
+    Px(length([i64::from(dx.0), i64::from(dy.0)]) as i32)
+}
+
+/// Length of a vector whose parts are below 2³¹.
+pub fn length([x, y]: [i64; 2]) -> i64 {
+    (x * x + y * y).isqrt()
+}

@@ -1,0 +1,109 @@
+//! How the image of one marker looks: its moments as an ellipse's, and what the optics says of them.
+
+use super::pattern::distance;
+use crate::{blob::Blob, units::Px};
+
+/// A blob's centroid and second moments. Lengths and variances have 16 fractional bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Centroid, column.
+    pub x: Px,
+    /// Centroid, row.
+    pub y: Px,
+    /// Pixels.
+    pub area: u32,
+    /// Area over that of the ellipse with the same moments, of 65,536. 1 for an ellipse, less for anything else.
+    pub fill: i64,
+    /// Distance of the centroid from the middle of the bounding box, the larger of x and y, px in Q16.16: 0 for an
+    /// ellipse, more for one that is cut.
+    pub lopsided: i64,
+    variance: [i64; 3],
+}
+
+/// A shape as its pattern's centre sees it. Diameters in px, Q16.16.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seen {
+    /// Distance from the centre.
+    pub distance: Px,
+    /// Diameter across the radius.
+    pub across: i64,
+    /// Diameter along the radius.
+    pub along: i64,
+    /// Covariance of both directions over the variance across, of 65,536: 0 where the ellipse lies across or along.
+    pub skew: i64,
+}
+
+/// A pixel is a square, not a point: 1/12 px² in Q16.
+const PIXEL_VARIANCE: i64 = 5_461;
+/// 4π in Q16.
+const FOUR_PI: i128 = 823_550;
+/// What soft edges add to a diameter (0.8 px: a pixel half covered by red passes), and a dilation (2 px).
+const SOFT_EDGE: i32 = 52_429;
+const DILATION_EDGE: i32 = 131_072;
+
+/// What the mask adds to a marker's diameter before more is known, px.
+pub fn nominal_edge(dilations: u8) -> Px {
+    Px(SOFT_EDGE + i32::from(dilations) * DILATION_EDGE)
+}
+
+impl Shape {
+    /// Of a blob of at least one pixel.
+    pub fn of_blob(blob: &Blob) -> Shape {
+        let (x, y) = blob.centroid();
+        let moments = blob.central_moments();
+        let area = i64::from(blob.area.max(1));
+        // A whole number of px² first: the fraction lost is below 1/area.
+        let variance = |moment: i64| ((moment / area) << 16) / area;
+        let variance = [
+            variance(moments.xx) + PIXEL_VARIANCE,
+            variance(moments.xy),
+            variance(moments.yy) + PIXEL_VARIANCE,
+        ];
+        let lopsided = |low: u16, high: u16, mean: Px| {
+            let middle = i64::from(u32::from(low) + u32::from(high)) << 15;
+            (middle - i64::from(mean.0)).abs()
+        };
+        Shape {
+            x,
+            y,
+            area: blob.area,
+            fill: fill(area, variance),
+            lopsided: lopsided(blob.x0, blob.x1, x).max(lopsided(blob.y0, blob.y1, y)),
+            variance,
+        }
+    }
+
+    /// Seen from a centre; `None` from its own.
+    pub fn seen_from(&self, center: (Px, Px)) -> Option<Seen> {
+        let [dx, dy] =
+            [(self.x, center.0), (self.y, center.1)].map(|(a, b)| a.0 as i64 - b.0 as i64);
+        // Sixteenths of a pixel give the direction well enough, and a product below 2⁶³.
+        let (ux, uy) = (dx >> 12, dy >> 12);
+        let norm = ux * ux + uy * uy;
+        let [xx, xy, yy] = self.variance;
+        if norm == 0 {
+            return None;
+        }
+        let along = (ux * ux * xx + 2 * ux * uy * xy + uy * uy * yy) / norm;
+        let across = (uy * uy * xx - 2 * ux * uy * xy + ux * ux * yy) / norm;
+        let covariance = (ux * uy * (yy - xx) + (ux * ux - uy * uy) * xy) / norm;
+        Some(Seen {
+            distance: distance((self.x, self.y), center),
+            across: diameter(across),
+            along: diameter(along),
+            skew: (covariance << 16) / across.max(1),
+        })
+    }
+}
+
+/// An ellipse's diameter is four standard deviations.
+fn diameter(variance: i64) -> i64 {
+    4 * (variance.max(0) << 16).isqrt()
+}
+
+/// An ellipse's area is 4π√det of its covariance.
+fn fill(area: i64, [xx, xy, yy]: [i64; 3]) -> i64 {
+    let determinant = i128::from(xx) * i128::from(yy) - i128::from(xy) * i128::from(xy);
+    let ellipse_q32 = FOUR_PI * determinant.max(1).isqrt();
+    ((i128::from(area) << 48) / ellipse_q32) as i64
+}
