@@ -1,2 +1,186 @@
-//! placeholder
-fn main() {}
+//! `hivtac-rig`: runs a firmware ELF on the emulated sensor.
+
+use std::io::Write;
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use anyhow::Context;
+use clap::Parser;
+use hivtac_rig::faults::{Fault, Faults};
+use hivtac_rig::frame_source::{FrameSource, SceneSource, TestPicture};
+use hivtac_rig::link::{Endpoint, Link, Pty, Tcp};
+use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
+use hivtac_rig::script::Script;
+use hivtac_rig::truth::TruthLog;
+
+/// Runs the firmware on an emulated STM32H743 with a simulated camera and a USB host.
+///
+/// Prints `ready tcp=ADDRESS pty=PATH` once the serial port is there. Ends at a limit, on SIGTERM or Ctrl-C, or, with
+/// --exit-on-hangup, when the client leaves. Exit code 0 when the run ended so, 1 when it could not be done or the
+/// firmware broke a rule of the chip, 2 for wrong arguments.
+#[derive(Parser, Debug)]
+#[command(name = "hivtac-rig", version)]
+struct Arguments {
+    /// The firmware, as it is flashed.
+    elf: PathBuf,
+    /// What presses the film: rest, static, demo, sweep; or test-picture.
+    #[arg(long, default_value = "demo")]
+    scene: String,
+    /// Decides the noise, and where the demo starts.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Geometry of the simulated sensor: ov7725 or paper.
+    #[arg(long, default_value = "ov7725")]
+    preset: String,
+    /// Offer the serial port at this TCP port of 127.0.0.1; 0 takes a free one.
+    #[arg(long, value_name = "PORT")]
+    tcp: Option<u16>,
+    /// Offer the serial port as a pseudo-terminal.
+    #[arg(long)]
+    pty: bool,
+    /// Make a symbolic link to the pseudo-terminal.
+    #[arg(long, value_name = "PATH", requires = "pty")]
+    pty_link: Option<PathBuf>,
+    /// Start without a client, and go on without one.
+    #[arg(long)]
+    no_wait: bool,
+    /// End when the client leaves.
+    #[arg(long)]
+    exit_on_hangup: bool,
+    /// Write one JSON object per exposure: frame, exposure, time_us, time_s, and the true force and markers.
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// End after so many captured frames.
+    #[arg(long, value_name = "N")]
+    frames: Option<u64>,
+    /// End after so much virtual time, ms.
+    #[arg(long, value_name = "N")]
+    virtual_ms: Option<u64>,
+    /// A scripted host instead of a client: the same bytes every time. Lines of `MS ACTION`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["tcp", "pty"])]
+    script: Option<PathBuf>,
+    /// Write what the device sent to the scripted host.
+    #[arg(long, value_name = "FILE", requires = "script")]
+    out: Option<PathBuf>,
+    /// Something that goes wrong, KIND[@MS[-MS]] in virtual time: camera-absent, camera-wrong-id, camera-silent,
+    /// dcmi-overrun, host-not-reading, cable-pulled. May be repeated.
+    #[arg(long, value_name = "KIND[@MS[-MS]]")]
+    fault: Vec<Fault>,
+    /// Instructions per second of virtual time that the core is assumed to execute.
+    #[arg(long, value_name = "N", default_value_t = INSTRUCTIONS_PER_SECOND)]
+    instructions_per_second: u64,
+    /// Write the run's counters as JSON.
+    #[arg(long, value_name = "FILE")]
+    stats_json: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match work(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hivtac-rig: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn work(arguments: Arguments) -> anyhow::Result<()> {
+    let interrupt = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, interrupt.clone())?;
+    }
+    let options = options(&arguments, interrupt)?;
+    let outcome = run(options)?;
+    finish(&arguments, &outcome)
+}
+
+fn options(arguments: &Arguments, interrupt: Arc<AtomicBool>) -> anyhow::Result<Options> {
+    let truth = arguments
+        .truth
+        .as_deref()
+        .map(TruthLog::create)
+        .transpose()?
+        .unwrap_or_default();
+    let rate = arguments.instructions_per_second;
+    Ok(Options {
+        elf: arguments.elf.clone(),
+        source: source(arguments)?,
+        truth,
+        faults: Faults::new(arguments.fault.clone()),
+        program: program(arguments)?,
+        limits: Limits {
+            frames: arguments.frames,
+            virtual_ns: arguments.virtual_ms.map(|ms| ms.saturating_mul(1_000_000)),
+        },
+        instructions_per_second: NonZeroU64::new(rate)
+            .context("--instructions-per-second must not be 0")?,
+        interrupt,
+    })
+}
+
+fn source(arguments: &Arguments) -> anyhow::Result<Box<dyn FrameSource>> {
+    if arguments.scene == "test-picture" {
+        return Ok(Box::new(TestPicture));
+    }
+    Ok(Box::new(SceneSource::new(
+        &arguments.scene,
+        &arguments.preset,
+        arguments.seed,
+    )?))
+}
+
+fn program(arguments: &Arguments) -> anyhow::Result<Program> {
+    if let Some(path) = &arguments.script {
+        if arguments.frames.is_none() && arguments.virtual_ms.is_none() {
+            anyhow::bail!("--script needs an end: give --frames or --virtual-ms");
+        }
+        return Ok(Program::Script(Script::load(path)?));
+    }
+    let link = open_link(arguments)?;
+    Ok(Program::Client {
+        link,
+        wait: !arguments.no_wait,
+        exit_on_hangup: arguments.exit_on_hangup,
+    })
+}
+
+/// Opens the endpoints and says where they are. Without any wish it is a TCP port.
+fn open_link(arguments: &Arguments) -> anyhow::Result<Link> {
+    let mut endpoints: Vec<Box<dyn Endpoint>> = Vec::new();
+    let mut ready = String::from("ready");
+    if arguments.tcp.is_some() || !arguments.pty {
+        let tcp = Tcp::listen(arguments.tcp.unwrap_or(0))?;
+        ready += &format!(" tcp=127.0.0.1:{}", tcp.port()?);
+        endpoints.push(Box::new(tcp));
+    }
+    if arguments.pty {
+        let pty = Pty::open(arguments.pty_link.as_deref())?;
+        ready += &format!(" pty={}", pty.path().display());
+        endpoints.push(Box::new(pty));
+    }
+    let mut stdout = std::io::stdout();
+    writeln!(stdout, "{ready}")
+        .and_then(|()| stdout.flush())
+        .context("standard output")?;
+    Ok(Link::new(endpoints))
+}
+
+fn finish(arguments: &Arguments, outcome: &Outcome) -> anyhow::Result<()> {
+    eprintln!("hivtac-rig: {}", outcome.report.line());
+    let write = |path: &PathBuf, bytes: &[u8]| {
+        std::fs::write(path, bytes).with_context(|| path.display().to_string())
+    };
+    if let Some(path) = &arguments.out {
+        write(path, &outcome.bytes)?;
+    }
+    if let Some(path) = &arguments.stats_json {
+        write(path, format!("{:#}\n", outcome.report.json()).as_bytes())?;
+    }
+    match &outcome.report.truth_failure {
+        Some(why) => anyhow::bail!("the truth log ended early: {why}"),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,283 @@
+//! The OV7725: registers on SCCB, a clock from the microcontroller, and pixels that its registers describe.
+//!
+//! The sensor runs by itself. It never waits for the firmware, and what it sends follows from its registers, power-up
+//! values included. Geometry, format and clock are taken over at the start of a frame; a register reset, a change of
+//! the input clock and power-up start the frame timing afresh, and the first VSYNC edge comes one frame later.
+//!
+//! Not simulated: exposure, gain and colour registers (the scene decides the picture), the zoom registers (the window
+//! is scaled to the output size by taking the nearest pixel), automatic frame rate.
+
+pub mod encode;
+pub mod output;
+pub mod registers;
+mod sccb;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::faults::{Faults, Kind};
+use crate::frame_source::{FrameSource, Picture};
+use crate::truth::{Exposed, TruthLog};
+use output::Output;
+use registers::Registers;
+pub use sccb::Sccb;
+
+/// What the board gives the sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Supply {
+    /// The camera's power switch is on.
+    pub powered: bool,
+    /// XCLK, Hz; 0 without a clock.
+    pub clock_hz: u64,
+    /// SCL and SDA reach the I2C peripheral.
+    pub sccb: bool,
+}
+
+/// The sensor.
+#[derive(Debug)]
+pub struct Camera {
+    registers: Registers,
+    supply: Supply,
+    source: Box<dyn FrameSource>,
+    truth: TruthLog,
+    faults: Faults,
+    frame: u64,
+    exposure: u64,
+    restarted: bool,
+    count_begins: bool,
+    counting: bool,
+    faulty_output: Option<String>,
+    sccb_writes: u64,
+}
+
+/// The sensor as its pins' owners share it.
+#[derive(Clone, Debug)]
+pub struct SharedCamera(Arc<Mutex<Camera>>);
+
+impl SharedCamera {
+    /// Shares a sensor.
+    pub fn new(camera: Camera) -> Self {
+        Self(Arc::new(Mutex::new(camera)))
+    }
+
+    /// The sensor. One thread runs the whole rig, so nobody waits here.
+    pub fn lock(&self) -> MutexGuard<'_, Camera> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Camera {
+    /// A sensor without power, looking at `source`.
+    pub fn new(source: Box<dyn FrameSource>, truth: TruthLog, faults: Faults) -> Self {
+        Self {
+            registers: Registers::default(),
+            supply: Supply::default(),
+            source,
+            truth,
+            faults,
+            frame: 0,
+            exposure: 0,
+            restarted: false,
+            count_begins: false,
+            counting: false,
+            faulty_output: None,
+            sccb_writes: 0,
+        }
+    }
+
+    /// Takes over what the board gives the sensor. Without power it forgets its registers.
+    pub fn supply(&mut self, supply: Supply) {
+        if supply == self.supply {
+            return;
+        }
+        if !supply.powered {
+            self.registers = Registers::default();
+        }
+        let before = std::mem::replace(&mut self.supply, supply);
+        self.restarted |= (before.powered, before.clock_hz) != (supply.powered, supply.clock_hz);
+    }
+
+    /// The frame timing starts afresh now.
+    pub fn restart(&mut self) {
+        self.restarted = false;
+        if std::mem::take(&mut self.count_begins) {
+            (self.frame, self.counting) = (0, true);
+        }
+    }
+
+    /// The microcontroller was reset: frames count from the next register reset on.
+    pub fn host_reset(&mut self) {
+        self.counting = false;
+    }
+
+    /// Whether the frame timing has to start afresh.
+    pub fn restarts(&self) -> bool {
+        self.restarted
+    }
+
+    /// Whether a fault keeps the sensor from sending anything.
+    pub fn silenced(&self, now_ns: u64) -> bool {
+        self.faults.on(Kind::CameraAbsent, now_ns) || self.faults.on(Kind::CameraSilent, now_ns)
+    }
+
+    /// What the sensor sends from `now_ns` on; `None` while it sends nothing.
+    pub fn output(&self, now_ns: u64) -> Option<Output> {
+        if self.silenced(now_ns) || !self.supply.powered {
+            return None;
+        }
+        Output::new(&self.registers, self.supply.clock_hz)
+    }
+
+    /// The next instant at which a fault starts or stops the sensor.
+    pub fn next_fault(&self, now_ns: u64) -> Option<u64> {
+        let change = |kind| self.faults.next_change(kind, now_ns);
+        [change(Kind::CameraAbsent), change(Kind::CameraSilent)]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// The edge of VSYNC that ends its pulse, which numbers the frame that follows.
+    pub fn count_edge(&mut self, now_ns: u64) -> Exposed {
+        self.frame += u64::from(self.counting);
+        self.exposure += 1;
+        Exposed {
+            frame: self.frame,
+            exposure: self.exposure,
+            at_ns: now_ns,
+        }
+    }
+
+    /// Logs what is true of an exposure.
+    pub fn log_truth(&mut self, exposed: Exposed) {
+        if self.truth.wanted() {
+            let truth = self.source.truth(exposed.time_s());
+            self.truth.exposed(exposed, truth);
+        }
+    }
+
+    /// The picture of an exposure.
+    pub fn picture(&self, exposed: Exposed) -> Picture {
+        self.source.picture(exposed.exposure, exposed.time_s())
+    }
+
+    /// VSYNC edges since the run began.
+    pub fn exposures(&self) -> u64 {
+        self.exposure
+    }
+
+    /// Registers written over SCCB since the run began.
+    pub fn sccb_writes(&self) -> u64 {
+        self.sccb_writes
+    }
+
+    /// Why the sensor sent no rows, the last time it did not.
+    pub fn faulty_output(&self) -> Option<&str> {
+        self.faulty_output.as_deref()
+    }
+
+    /// Why the truth log ended early.
+    pub fn truth_failure(&self) -> Option<&str> {
+        self.truth.failure()
+    }
+
+    /// Says once why no rows come.
+    pub fn complain(&mut self, output: &Output) {
+        if let Some(fault) = &output.fault
+            && self.faulty_output.as_ref() != Some(fault)
+        {
+            eprintln!("hivtac-rig: the camera sends no rows: {fault}");
+            self.faulty_output = Some(fault.clone());
+        }
+    }
+
+    fn answers(&self, now_ns: u64) -> bool {
+        self.supply.powered
+            && self.supply.clock_hz != 0
+            && self.supply.sccb
+            && !self.faults.on(Kind::CameraAbsent, now_ns)
+    }
+
+    fn read_register(&self, address: u8, now_ns: u64) -> u8 {
+        if address == registers::PID && self.faults.on(Kind::CameraWrongId, now_ns) {
+            return 0x76;
+        }
+        self.registers.get(address)
+    }
+
+    fn write_register(&mut self, address: u8, value: u8) {
+        self.sccb_writes += 1;
+        if self.registers.write(address, value) {
+            self.restarted = true;
+            self.count_begins |= !self.counting;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame_source::TestPicture;
+
+    const SUPPLY: Supply = Supply {
+        powered: true,
+        clock_hz: 24_000_000,
+        sccb: true,
+    };
+
+    fn camera(faults: &[&str]) -> Camera {
+        let faults = Faults::new(faults.iter().map(|fault| fault.parse().unwrap()).collect());
+        Camera::new(Box::new(TestPicture), TruthLog::default(), faults)
+    }
+
+    #[test]
+    fn frames_count_from_the_first_register_reset_after_the_microcontrollers() {
+        let mut camera = camera(&[]);
+        camera.supply(SUPPLY);
+        assert_eq!(camera.count_edge(1).frame, 0);
+        camera.write_register(registers::COM7, 0x80);
+        assert!(camera.restarts());
+        camera.restart();
+        assert!(!camera.restarts());
+        assert_eq!(camera.count_edge(2).frame, 1);
+        camera.write_register(registers::COM7, 0x80);
+        camera.restart();
+        let exposed = camera.count_edge(3);
+        assert_eq!((exposed.frame, exposed.exposure), (2, 3));
+        camera.host_reset();
+        camera.write_register(registers::COM7, 0x80);
+        camera.restart();
+        assert_eq!(camera.count_edge(4).frame, 1);
+    }
+
+    #[test]
+    fn without_power_there_is_no_output_and_no_memory() {
+        let mut camera = camera(&[]);
+        assert_eq!(camera.output(0), None);
+        camera.supply(SUPPLY);
+        camera.write_register(registers::COM7, 0x46);
+        camera.supply(Supply {
+            powered: false,
+            ..SUPPLY
+        });
+        assert!(camera.output(0).is_none() && !camera.answers(0));
+        camera.supply(SUPPLY);
+        assert_eq!(camera.read_register(registers::COM7, 0), 0);
+    }
+
+    #[test]
+    fn faults_silence_and_disguise_the_sensor() {
+        let mut camera = camera(&[
+            "camera-silent@1-2",
+            "camera-absent@3-4",
+            "camera-wrong-id@5",
+        ]);
+        camera.supply(SUPPLY);
+        let at = |ms: u64| ms * 1_000_000;
+        assert!(camera.output(at(0)).is_some() && camera.answers(at(0)));
+        assert!(camera.output(at(1)).is_none() && camera.answers(at(1)));
+        assert!(camera.output(at(3)).is_none() && !camera.answers(at(3)));
+        assert_eq!(camera.next_fault(at(1)), Some(at(2)));
+        let ids = [0, 5].map(|ms| camera.read_register(registers::PID, at(ms)));
+        assert_eq!(ids, [0x77, 0x76]);
+    }
+}

@@ -1,0 +1,160 @@
+//! The microcontroller: the emulator's STM32H743 with the camera interface and the USB core it lacks.
+//!
+//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for five slots itself: DCMI, and the three
+//! blocks of OTG2; everything else goes to the part's own models.
+
+use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::mcu::Mcu;
+use rigless::soc::stm32h743::Stm32h743;
+use rigless::soc::{Bus, Error};
+use rigless::time::VirtualNanos;
+
+use crate::board::{self, Wiring};
+use crate::camera::{Sccb, SharedCamera};
+use crate::dcmi::Dcmi;
+use crate::dormant::Dormant;
+use crate::faults::Faults;
+use crate::otg::{Blocks, SharedCore};
+use crate::rules::Rules;
+use crate::usb_host::SharedHost;
+
+/// The board's supply, mV.
+const SUPPLY_MV: u32 = 3300;
+
+/// The slots that matter here.
+#[derive(Clone, Copy, Debug)]
+struct Slots {
+    dcmi: usize,
+    vsync_port: usize,
+}
+
+/// The part with what the rig adds to it.
+#[derive(Debug)]
+pub struct Chip {
+    /// The emulator's part.
+    pub part: Stm32h743,
+    /// The camera interface.
+    pub dcmi: Dcmi,
+    camera: SharedCamera,
+    otg: Blocks,
+    core: SharedCore,
+    host: SharedHost,
+    dormant: Dormant,
+    slots: Slots,
+    vsync: Level,
+    wiring: Wiring,
+}
+
+impl Chip {
+    /// A part out of reset, with the camera on its pins and the host on its cable.
+    ///
+    /// # Errors
+    /// When the emulator's part is not laid out as expected.
+    pub fn new(
+        camera: SharedCamera,
+        host: SharedHost,
+        faults: Faults,
+        rules: Rules,
+    ) -> Result<Self, Error> {
+        let mut part = Stm32h743::new()?;
+        part.rcc.attach_crystals(board::CRYSTAL_HZ, 0);
+        part.set_supply(SUPPLY_MV);
+        part.set_analog_supply(SUPPLY_MV);
+        part.i2c[0].attach(Sccb::new(camera.clone()));
+        let core = SharedCore::default();
+        let mut otg = Blocks::fit(&mut part, &core, &host)?;
+        otg.wake_host(part.bus_mut(), VirtualNanos(0));
+        let slots = Slots {
+            dcmi: part.bus().slot("DCMI")?,
+            vsync_port: part.bus().slot("GPIOB")?,
+        };
+        Ok(Self {
+            dormant: Dormant::new(part.bus()),
+            dcmi: Dcmi::new(camera.clone(), faults, rules),
+            part,
+            camera,
+            otg,
+            core,
+            host,
+            slots,
+            vsync: Level::Low,
+            wiring: Wiring::default(),
+        })
+    }
+
+    /// Words that the firmware wrote into full USB FIFOs.
+    pub fn lost_usb_words(&self) -> u64 {
+        self.core.lock().lost_words
+    }
+
+    /// Looks at the pins and clocks again, and passes on what changed.
+    pub fn rewire(&mut self, at: VirtualNanos) {
+        let wiring = Wiring::of(&self.part);
+        if wiring != self.wiring {
+            self.wiring = wiring;
+            self.dcmi.wire(wiring.pins, wiring.hclk_hz);
+            self.core.lock().wired = wiring.usb;
+            self.camera.lock().supply(wiring.supply);
+        }
+        if self.camera.lock().restarts() {
+            let (registers, mut context) = self.part.bus_mut().drive(at, self.slots.dcmi);
+            self.dcmi.start_over(registers, &mut context);
+        }
+    }
+
+    /// Puts the VSYNC line's level on its pin.
+    fn drive_vsync(&mut self, at: VirtualNanos) {
+        if self.dcmi.vsync() != self.vsync {
+            self.vsync = self.dcmi.vsync();
+            let level = Some(self.vsync);
+            self.part
+                .drive_port(at, board::VSYNC_PORT, |port, registers, context| {
+                    port.drive(board::vsync_pin(), level, registers, context);
+                });
+        }
+    }
+}
+
+impl Mcu for Chip {
+    fn bus(&self) -> &Bus {
+        self.part.bus()
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        self.part.bus_mut()
+    }
+
+    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        self.part.reset(at, cause);
+        self.core.lock().reset();
+        self.camera.lock().host_reset();
+        self.otg = Blocks::fit(&mut self.part, &self.core, &self.host)
+            .expect("a part that was fitted once");
+        self.otg.wake_host(self.part.bus_mut(), at);
+        self.dormant = Dormant::new(self.part.bus());
+        self.dcmi.part_reset();
+        let (_, mut context) = self.part.bus_mut().drive(at, self.slots.dcmi);
+        self.dcmi.reschedule(&mut context);
+        self.wiring = Wiring::default();
+        self.rewire(at);
+    }
+
+    /// Nothing outside is waiting for a look: the camera and the host live on events.
+    fn poll(&mut self, _now: VirtualNanos) {}
+
+    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        if slot == self.slots.dcmi {
+            return (self.part.bus_mut(), Some(&mut self.dcmi));
+        }
+        if slot == self.slots.vsync_port {
+            self.drive_vsync(self.dcmi.vsync_at());
+        }
+        if self.dormant.sleeps(slot, self.part.bus()) {
+            return (self.part.bus_mut(), None);
+        }
+        match self.otg.model(slot) {
+            Some(model) => (self.part.bus_mut(), Some(model)),
+            None => self.part.split(slot),
+        }
+    }
+}

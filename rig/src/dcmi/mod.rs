@@ -1,0 +1,528 @@
+//! The camera interface: what the sensor's signals do to it, in virtual time, and what the firmware sees of that.
+//!
+//! The sensor's clock drives everything. Bytes arrive in groups of sixteen, one FIFO's worth, at the instant at which
+//! the last of them is on the lines; the FIFO holds four words, and a fifth overruns. Pixels leave only through
+//! DCMI_DR, by a DMA request through DMAMUX1 or by the processor.
+
+mod receiver;
+mod signals;
+
+use rigless::device::{Device, DeviceContext, Level, RegisterFile};
+use rigless::soc::Width;
+use rigless::soc::stm32h743::generated::dcmi::Register;
+use rigless::time::{EventId, VirtualNanos};
+
+use crate::camera::SharedCamera;
+use crate::camera::output::{Output, VSYNC_LINES};
+use crate::faults::{Faults, Kind};
+use crate::rules::Rules;
+use receiver::{Overrun, Receiver, Settings, control};
+use signals::{Frame, Run, sampled_while_changing};
+
+/// Bytes per event: one FIFO's worth.
+const GROUP: u32 = 4 * receiver::FIFO_WORDS as u32;
+/// GPIOB_IDR. A write has no effect on the chip; the rig uses it to make the port look at its pins.
+const VSYNC_PORT_INPUT: u64 = 0x5802_0410;
+
+/// RIS, IER, MIS and ICR bits.
+mod flag {
+    pub const FRAME: u32 = 1 << 0;
+    pub const OVERRUN: u32 = 1 << 1;
+    pub const VSYNC: u32 = 1 << 3;
+    pub const LINE: u32 = 1 << 4;
+}
+
+/// Which pins carry the camera's signals to the interface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pins {
+    /// Data lines.
+    pub data: u8,
+    /// PIXCLK.
+    pub clock: bool,
+    /// HSYNC.
+    pub hsync: bool,
+    /// VSYNC.
+    pub vsync: bool,
+}
+
+/// Counters for the report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames that ended with data.
+    pub frames: u64,
+    /// Frames that ended without.
+    pub empty_frames: u64,
+    /// Words put into the FIFO.
+    pub words: u64,
+    /// Overruns.
+    pub overruns: u64,
+}
+
+/// What the sensor does next.
+#[derive(Clone, Copy, Debug)]
+enum Step {
+    /// VSYNC goes to its active level: a frame begins.
+    VsyncBegins,
+    /// VSYNC goes back.
+    VsyncEnds,
+    /// Bytes of a run, from this one on.
+    Bytes(Run, u32),
+    /// A silent sensor may speak again.
+    Retry,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Next {
+    step: Step,
+    at: VirtualNanos,
+    event: EventId,
+}
+
+/// Where frame starts are counted from, so that they do not drift.
+#[derive(Clone, Copy, Debug, Default)]
+struct Epoch {
+    at_ns: u64,
+    clock_hz: u64,
+    clocks: u64,
+}
+
+/// The interface with the sensor's signals.
+#[derive(Debug)]
+pub struct Dcmi {
+    camera: SharedCamera,
+    faults: Faults,
+    rules: Rules,
+    pins: Pins,
+    hclk_hz: u64,
+    frame: Option<Frame>,
+    epoch: Epoch,
+    next: Option<Next>,
+    receiver: Receiver,
+    settings: Settings,
+    raised: u32,
+    enabled: u32,
+    interrupt: Level,
+    requested: bool,
+    vsync: Level,
+    vsync_at: VirtualNanos,
+    last_byte: u8,
+    counters: Counters,
+}
+
+impl Dcmi {
+    /// An interface wired to a sensor.
+    pub fn new(camera: SharedCamera, faults: Faults, rules: Rules) -> Self {
+        Self {
+            camera,
+            faults,
+            rules,
+            pins: Pins::default(),
+            hclk_hz: 0,
+            frame: None,
+            epoch: Epoch::default(),
+            next: None,
+            receiver: Receiver::default(),
+            settings: Settings::default(),
+            raised: 0,
+            enabled: 0,
+            interrupt: Level::Low,
+            requested: false,
+            vsync: Level::Low,
+            vsync_at: VirtualNanos(0),
+            last_byte: 0,
+            counters: Counters::default(),
+        }
+    }
+
+    /// Counters so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// The level of the VSYNC line.
+    pub fn vsync(&self) -> Level {
+        self.vsync
+    }
+
+    /// When it took this level.
+    pub fn vsync_at(&self) -> VirtualNanos {
+        self.vsync_at
+    }
+
+    /// Takes over how the pins are configured, and the bus clock in Hz.
+    pub fn wire(&mut self, pins: Pins, hclk_hz: u64) {
+        (self.pins, self.hclk_hz) = (pins, hclk_hz);
+    }
+
+    /// Starts the sensor's frame timing afresh: after power-up, a new clock, a register reset.
+    pub fn start_over(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let now = context.now().0;
+        self.next = None;
+        self.epoch = Epoch::default();
+        if self
+            .frame
+            .take()
+            .is_some_and(|frame| frame.exposed.is_none())
+        {
+            // VSYNC was at its active level. That it falls back is an edge like any other.
+            self.camera.lock().count_edge(now);
+        }
+        self.set_vsync(Level::Low, registers, context);
+        self.camera.lock().restart();
+        let (output, fault) = {
+            let camera = self.camera.lock();
+            (camera.output(now), camera.next_fault(now))
+        };
+        match (output, fault) {
+            (Some(output), _) => self.plan(
+                Step::VsyncBegins,
+                now + output.clocks_ns(output.frame_clocks()),
+                context,
+            ),
+            (None, Some(at)) => self.plan(Step::Retry, at, context),
+            (None, None) => {}
+        }
+    }
+
+    /// The events of this slot were dropped by a reset; the sensor does not care.
+    pub fn reschedule(&mut self, context: &mut DeviceContext<'_>) {
+        if let Some(next) = &mut self.next {
+            next.event = context.schedule(next.at);
+        }
+    }
+
+    /// The part was reset: the registers are back, the sensor goes on.
+    pub fn part_reset(&mut self) {
+        self.receiver.reset();
+        self.settings = Settings::default();
+        (self.raised, self.enabled) = (0, 0);
+        (self.interrupt, self.requested) = (Level::Low, false);
+        self.pins = Pins::default();
+    }
+
+    fn plan(&mut self, step: Step, at_ns: u64, context: &mut DeviceContext<'_>) {
+        let at = VirtualNanos(at_ns);
+        self.next = Some(Next {
+            step,
+            at,
+            event: context.schedule(at),
+        });
+    }
+
+    /// Plans what follows from the beginning of a line on.
+    fn plan_from(&mut self, line: u32, context: &mut DeviceContext<'_>) {
+        let Some(frame) = &self.frame else { return };
+        let end = if line < VSYNC_LINES {
+            VSYNC_LINES
+        } else {
+            frame.output.lines
+        };
+        let run = if self.listens() {
+            frame.run_from(line, end, self.inverted(&frame.output))
+        } else {
+            None
+        };
+        match run {
+            Some(run) => self.plan_group(run, 0, context),
+            None if line < VSYNC_LINES => {
+                let at = frame.instant(VSYNC_LINES, 0);
+                self.plan(Step::VsyncEnds, at, context);
+            }
+            None => {
+                let clocks = self.epoch.clocks + frame.output.frame_clocks();
+                let at = self.epoch.at_ns + frame.output.clocks_ns(clocks);
+                self.epoch.clocks = clocks;
+                self.plan(Step::VsyncBegins, at, context);
+            }
+        }
+    }
+
+    fn plan_group(&mut self, run: Run, from: u32, context: &mut DeviceContext<'_>) {
+        let Some(frame) = &self.frame else { return };
+        let at = frame.instant(run.line, run.start + (from + GROUP).min(run.bytes));
+        self.plan(Step::Bytes(run, from), at, context);
+    }
+
+    /// Whether data lines matter at all now.
+    fn listens(&self) -> bool {
+        let wanted = self.receiver.capturing() || self.enabled & flag::LINE != 0;
+        wanted && self.settings.has(control::ENABLE) && self.pins.clock && self.pins.hsync
+    }
+
+    /// Whether HREF's idle level is taken for data.
+    fn inverted(&self, output: &Output) -> bool {
+        output.href_active_high == self.settings.has(control::HSYNC_BLANKS_HIGH)
+    }
+
+    fn begin_frame(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let now = context.now().0;
+        let Some(output) = self.camera.lock().output(now) else {
+            return self.start_over(registers, context);
+        };
+        self.camera.lock().complain(&output);
+        if output.pixel_clock_hz != self.epoch.clock_hz {
+            self.epoch = Epoch {
+                at_ns: now,
+                clock_hz: output.pixel_clock_hz,
+                clocks: 0,
+            };
+        }
+        let level = Level::from(output.vsync_active_high);
+        self.frame = Some(Frame::new(now, output));
+        self.set_vsync(level, registers, context);
+        self.plan_from(0, context);
+    }
+
+    fn end_vsync(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let exposed = self.camera.lock().count_edge(context.now().0);
+        let Some(frame) = &mut self.frame else { return };
+        frame.exposed = Some(exposed);
+        let level = Level::from(!frame.output.vsync_active_high);
+        self.set_vsync(level, registers, context);
+        self.camera.lock().log_truth(exposed);
+        self.plan_from(VSYNC_LINES, context);
+    }
+
+    /// VSYNC changes: on the port's pin, and in the interface.
+    fn set_vsync(
+        &mut self,
+        level: Level,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        if self.vsync == level {
+            return;
+        }
+        (self.vsync, self.vsync_at) = (level, context.now());
+        context.write_to(VSYNC_PORT_INPUT, Width::W32, 0, 0);
+        if !self.pins.vsync || !self.settings.has(control::ENABLE) {
+            return;
+        }
+        let blanks = (level == Level::High) == self.settings.has(control::VSYNC_BLANKS_HIGH);
+        if blanks {
+            self.raised |= flag::VSYNC;
+            if self.receiver.capturing() {
+                self.end_frame(registers);
+            }
+        } else if self.settings.has(control::CAPTURE) {
+            self.check_clock();
+            self.receiver.begin_frame(&self.settings);
+        }
+        self.drive(context);
+    }
+
+    /// RM0433: the bus clock must be at least 2.5 times PIXCLK.
+    fn check_clock(&self) {
+        let Some(frame) = &self.frame else { return };
+        let pixel_clock = frame.output.pixel_clock_hz;
+        if self.hclk_hz * 2 < pixel_clock * 5 {
+            let hclk = self.hclk_hz;
+            self.rules.broken(|| format!("DCMI: HCLK is {hclk} Hz, less than 2.5 times PIXCLK, {pixel_clock} Hz (RM0433, DCMI clocks)"));
+        }
+    }
+
+    fn end_frame(&mut self, registers: &mut RegisterFile) {
+        let words = self.receiver.end_frame();
+        self.raised |= flag::FRAME;
+        if words == 0 {
+            self.counters.empty_frames += 1;
+        } else {
+            self.counters.frames += 1;
+        }
+        if self.settings.has(control::SNAPSHOT) {
+            self.settings.control &= !control::CAPTURE;
+            registers.set(Register::Cr, self.settings.control.into());
+        }
+    }
+
+    fn bytes(
+        &mut self,
+        run: Run,
+        from: u32,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let to = (from + GROUP).min(run.bytes);
+        let waiting = self.receiver.waiting();
+        let ends = to == run.bytes && run.ends_line;
+        if self.receive(&run, from, to, ends, registers).is_err() {
+            self.raised |= flag::OVERRUN;
+            self.counters.overruns += 1;
+        } else {
+            self.counters.words += (self.receiver.waiting() - waiting) as u64;
+        }
+        if ends {
+            self.raised |= flag::LINE;
+        }
+        self.drive(context);
+        if to < run.bytes && self.listens() {
+            self.plan_group(run, to, context);
+        } else {
+            self.plan_from(run.line + 1, context);
+        }
+    }
+
+    fn receive(
+        &mut self,
+        run: &Run,
+        from: u32,
+        to: u32,
+        ends: bool,
+        registers: &mut RegisterFile,
+    ) -> Result<(), Overrun> {
+        let Some(frame) = &mut self.frame else {
+            return Ok(());
+        };
+        let at_stable_edge = frame.output.stable_at_rising == self.settings.has(control::RISING);
+        let base = u64::from(run.line) << 32;
+        let bytes = frame.bytes(run, from, to, |exposed| self.camera.lock().picture(exposed));
+        for (i, byte) in (from..to).zip(bytes) {
+            let sampled = if at_stable_edge {
+                byte
+            } else {
+                sampled_while_changing(self.last_byte, byte, base + u64::from(i))
+            };
+            self.last_byte = byte;
+            self.receiver
+                .byte(sampled & self.pins.data, &self.settings)?;
+        }
+        if ends && self.receiver.end_line(&self.settings)? {
+            self.end_frame(registers);
+        }
+        Ok(())
+    }
+
+    /// Drives the interrupt and the DMA request as the state wants them.
+    fn drive(&mut self, context: &mut DeviceContext<'_>) {
+        let interrupt = Level::from(self.raised & self.enabled != 0);
+        if interrupt != self.interrupt {
+            self.interrupt = interrupt;
+            context.interrupt(0, interrupt);
+        }
+        let stalled = self.faults.on(Kind::DcmiOverrun, context.now().0);
+        let wanted = self.receiver.waiting() > 0 && !stalled;
+        if wanted != self.requested {
+            self.requested = wanted;
+            context.request(0, Level::from(wanted));
+        }
+    }
+
+    fn write_control(&mut self, value: u32) {
+        self.settings.control = value;
+        if !self.settings.has(control::ENABLE) {
+            self.receiver.reset();
+            return;
+        }
+        let unsupported = [
+            (control::JPEG, "JPEG mode (CR bit 3)"),
+            (control::EMBEDDED, "embedded synchronization (CR bit 4)"),
+            (control::WIDTH, "more than 8 data bits (CR bits 11:10)"),
+        ];
+        for (bits, name) in unsupported {
+            if value & bits != 0 {
+                self.rules.broken(|| {
+                    format!("DCMI: {name} is not simulated, and the camera has 8 data lines")
+                });
+            }
+        }
+    }
+
+    fn status(&self, now_ns: u64) -> u32 {
+        let (in_vsync, in_row) = match &self.frame {
+            Some(frame) => (frame.in_vsync(now_ns), frame.in_row(now_ns)),
+            None => (false, false),
+        };
+        let level = |active: bool, active_high: bool| active == active_high;
+        let (vsync_high, hsync_high) = match &self.frame {
+            Some(frame) => (
+                level(in_vsync, frame.output.vsync_active_high),
+                level(in_row, frame.output.href_active_high),
+            ),
+            None => (false, false),
+        };
+        u32::from(hsync_high == self.settings.has(control::HSYNC_BLANKS_HIGH))
+            | u32::from(vsync_high == self.settings.has(control::VSYNC_BLANKS_HIGH)) << 1
+            | u32::from(self.receiver.waiting() > 0) << 2
+    }
+}
+
+impl Device for Dcmi {
+    type Register = Register;
+
+    fn read(
+        &mut self,
+        register: Register,
+        _registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) -> Option<u64> {
+        let value = match register {
+            Register::Dr => {
+                let word = self.receiver.take();
+                self.drive(context);
+                word
+            }
+            Register::Sr => self.status(context.now().0),
+            Register::Ris => self.raised,
+            Register::Mis => self.raised & self.enabled,
+            _ => return None,
+        };
+        Some(value.into())
+    }
+
+    fn write(
+        &mut self,
+        register: Register,
+        _value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let landed = registers.get(register) as u32;
+        match register {
+            Register::Cr => self.write_control(landed),
+            Register::Ier => self.enabled = landed,
+            Register::Icr => self.raised &= !landed,
+            Register::Cwstrt => self.settings.crop_start = landed,
+            Register::Cwsize => self.settings.crop_size = landed,
+            _ => {}
+        }
+        self.drive(context);
+    }
+
+    fn on_event(
+        &mut self,
+        event: EventId,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let Some(next) = self.next.take_if(|next| next.event == event) else {
+            return;
+        };
+        let now = context.now().0;
+        let silenced = {
+            let camera = self.camera.lock();
+            camera.restarts() || camera.silenced(now)
+        };
+        match next.step {
+            _ if silenced => self.start_over(registers, context),
+            Step::Retry => self.start_over(registers, context),
+            Step::VsyncBegins => self.begin_frame(registers, context),
+            Step::VsyncEnds => self.end_vsync(registers, context),
+            Step::Bytes(run, from) => self.bytes(run, from, registers, context),
+        }
+    }
+
+    fn reset(&mut self) {
+        self.part_reset();
+    }
+
+    fn reset_line(&mut self, _registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let requested = self.requested;
+        let pins = self.pins;
+        self.part_reset();
+        self.pins = pins;
+        if requested {
+            context.request(0, Level::Low);
+        }
+        self.reschedule(context);
+    }
+}

@@ -1,0 +1,187 @@
+//! Faults on request: what goes wrong, and when.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// What can go wrong. All of it happens outside the microcontroller, except the DMA stall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// No camera on the connector: no acknowledge, no signals.
+    CameraAbsent,
+    /// The camera answers with another product id.
+    CameraWrongId,
+    /// The camera's clock tree stops: no VSYNC, no pixels; its registers still answer.
+    CameraSilent,
+    /// The DMA gets no access to the bus, so that the camera interface overruns.
+    DcmiOverrun,
+    /// The host has the port open but does not ask for data.
+    HostNotReading,
+    /// The USB data lines are disconnected; the device stays powered.
+    CablePulled,
+}
+
+const NAMES: [(&str, Kind); 6] = [
+    ("camera-absent", Kind::CameraAbsent),
+    ("camera-wrong-id", Kind::CameraWrongId),
+    ("camera-silent", Kind::CameraSilent),
+    ("dcmi-overrun", Kind::DcmiOverrun),
+    ("host-not-reading", Kind::HostNotReading),
+    ("cable-pulled", Kind::CablePulled),
+];
+
+/// Longest time, ms: a thousand days.
+const LONGEST_MS: u64 = 86_400_000_000;
+
+/// One fault with the virtual time it lasts, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// What goes wrong.
+    pub kind: Kind,
+    /// From this instant on.
+    pub from_ns: u64,
+    /// Until this instant; `u64::MAX` for the rest of the run.
+    pub until_ns: u64,
+}
+
+impl FromStr for Fault {
+    type Err = String;
+
+    /// `KIND`, `KIND@MS` or `KIND@MS-MS`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, time) = text
+            .split_once('@')
+            .map_or((text, None), |(name, time)| (name, Some(time)));
+        let kind = NAMES
+            .iter()
+            .find(|(known, _)| *known == name)
+            .map(|(_, kind)| *kind);
+        let kind = kind.ok_or_else(|| format!("no fault is called `{name}`: use {}", names()))?;
+        let (from, until) = match time.map(|time| time.split_once('-').unwrap_or((time, ""))) {
+            None => (0, u64::MAX),
+            Some((from, "")) => (milliseconds(from)?, default_end(kind, milliseconds(from)?)),
+            Some((from, until)) => (milliseconds(from)?, milliseconds(until)?),
+        };
+        if from >= until {
+            return Err(format!(
+                "`{text}` ends before it begins: write KIND@FROM-UNTIL in milliseconds"
+            ));
+        }
+        Ok(Self {
+            kind,
+            from_ns: from,
+            until_ns: until,
+        })
+    }
+}
+
+fn names() -> String {
+    NAMES.map(|(name, _)| name).join(", ")
+}
+
+fn milliseconds(text: &str) -> Result<u64, String> {
+    match text.parse::<u64>() {
+        Ok(ms) if ms <= LONGEST_MS => Ok(ms * 1_000_000),
+        _ => Err(format!(
+            "`{text}` is no time in whole milliseconds up to {LONGEST_MS}"
+        )),
+    }
+}
+
+/// A DMA stall lasts a millisecond unless told otherwise; everything else lasts for the rest of the run.
+fn default_end(kind: Kind, from_ns: u64) -> u64 {
+    if kind == Kind::DcmiOverrun {
+        from_ns + 1_000_000
+    } else {
+        u64::MAX
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = NAMES
+            .iter()
+            .find(|(_, kind)| *kind == self.kind)
+            .map_or("?", |(name, _)| *name);
+        write!(f, "{name}@{}", self.from_ns / 1_000_000)?;
+        if self.until_ns == u64::MAX {
+            Ok(())
+        } else {
+            write!(f, "-{}", self.until_ns / 1_000_000)
+        }
+    }
+}
+
+/// Every fault of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Faults(Vec<Fault>);
+
+impl Faults {
+    /// The given faults.
+    pub fn new(faults: Vec<Fault>) -> Self {
+        Self(faults)
+    }
+
+    /// Whether a fault of this kind is on at an instant.
+    pub fn on(&self, kind: Kind, now_ns: u64) -> bool {
+        self.of(kind)
+            .any(|fault| (fault.from_ns..fault.until_ns).contains(&now_ns))
+    }
+
+    /// The next instant after `now_ns` at which a fault of this kind begins or ends.
+    pub fn next_change(&self, kind: Kind, now_ns: u64) -> Option<u64> {
+        let instants = self
+            .of(kind)
+            .flat_map(|fault| [fault.from_ns, fault.until_ns]);
+        instants.filter(|&at| at > now_ns && at != u64::MAX).min()
+    }
+
+    fn of(&self, kind: Kind) -> impl Iterator<Item = &Fault> {
+        self.0.iter().filter(move |fault| fault.kind == kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fault_is_written_as_kind_and_time() {
+        let fault: Fault = "camera-silent@100-250".parse().unwrap();
+        assert_eq!(
+            (fault.kind, fault.from_ns, fault.until_ns),
+            (Kind::CameraSilent, 100_000_000, 250_000_000)
+        );
+        assert_eq!(fault.to_string(), "camera-silent@100-250");
+        let fault: Fault = "dcmi-overrun@7".parse().unwrap();
+        assert_eq!(fault.until_ns - fault.from_ns, 1_000_000);
+        assert_eq!("camera-absent".parse::<Fault>().unwrap().until_ns, u64::MAX);
+    }
+
+    #[test]
+    fn a_fault_that_makes_no_sense_is_explained() {
+        for (text, word) in [
+            ("fire", "fire"),
+            ("camera-silent@x", "x"),
+            ("cable-pulled@9-3", "ends"),
+            ("cable-pulled@-1", "time"),
+        ] {
+            let error = text.parse::<Fault>().unwrap_err();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_fault_is_on_from_its_start_to_just_before_its_end() {
+        let faults = Faults::new(vec!["cable-pulled@1-2".parse().unwrap()]);
+        let on =
+            [999_999, 1_000_000, 1_999_999, 2_000_000].map(|at| faults.on(Kind::CablePulled, at));
+        assert_eq!(on, [false, true, true, false]);
+        assert_eq!(faults.next_change(Kind::CablePulled, 0), Some(1_000_000));
+        assert_eq!(
+            faults.next_change(Kind::CablePulled, 1_000_000),
+            Some(2_000_000)
+        );
+        assert_eq!(faults.next_change(Kind::CablePulled, 2_000_000), None);
+        assert!(!faults.on(Kind::CameraSilent, 1_500_000));
+    }
+}

@@ -1,0 +1,101 @@
+//! Where the camera's pictures come from: a scene, or a test picture.
+
+use anyhow::Context;
+use hivtac_scene::{Preset, Scene};
+use serde_json::{Value, json};
+
+/// A picture of the whole pixel array, RGB565 in native order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Row by row.
+    pub pixels: Vec<u16>,
+}
+
+/// What stands before the camera.
+pub trait FrameSource: Send + std::fmt::Debug {
+    /// The picture of one exposure; `exposure` counts from 1 since the run began, `time_s` is the run's virtual time.
+    fn picture(&self, exposure: u64, time_s: f64) -> Picture;
+
+    /// What is true then, for the truth log.
+    fn truth(&self, time_s: f64) -> Value;
+}
+
+/// A moving white square over a gradient, every pixel known.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TestPicture;
+
+impl FrameSource for TestPicture {
+    fn picture(&self, exposure: u64, _time_s: f64) -> Picture {
+        let square = [40 + exposure * 3 % 240, 40 + exposure * 2 % 160];
+        let pixel = |x: u64, y: u64| {
+            let inside = x.abs_diff(square[0]) < 12 && y.abs_diff(square[1]) < 12;
+            if inside {
+                0xFFFF
+            } else {
+                ((x >> 4) << 11 | ((x + y) >> 5) << 5 | y >> 4) as u16
+            }
+        };
+        let pixels = (0..240)
+            .flat_map(|y| (0..320).map(move |x| pixel(x, y)))
+            .collect();
+        Picture {
+            width: 320,
+            height: 240,
+            pixels,
+        }
+    }
+
+    fn truth(&self, _time_s: f64) -> Value {
+        json!({})
+    }
+}
+
+/// A simulated sensor.
+#[derive(Debug)]
+pub struct SceneSource(Scene);
+
+impl SceneSource {
+    /// A scene by name under a geometry preset, at 320 × 240.
+    ///
+    /// # Errors
+    /// When there is no such scene or preset.
+    pub fn new(name: &str, preset: &str, seed: u64) -> anyhow::Result<Self> {
+        let preset: Preset = preset.parse().context("--preset")?;
+        Ok(Self(
+            Scene::preset(name, preset, 320, 240, seed).context("--scene")?,
+        ))
+    }
+}
+
+impl FrameSource for SceneSource {
+    fn picture(&self, exposure: u64, time_s: f64) -> Picture {
+        let frame = self.0.frame(exposure, time_s);
+        Picture {
+            width: frame.width,
+            height: frame.height,
+            pixels: frame.pixels,
+        }
+    }
+
+    fn truth(&self, time_s: f64) -> Value {
+        let truth = self.0.truth(time_s);
+        let force = truth.force.vector_n();
+        let markers: Vec<Value> = (truth.markers.iter())
+            .map(|marker| match marker {
+                Some(marker) => json!({"x": marker.centroid_px[0], "y": marker.centroid_px[1], "area": marker.area_px2}),
+                None => Value::Null,
+            })
+            .collect();
+        json!({
+            "alpha_deg": truth.force.alpha_deg(),
+            "beta_deg": truth.force.beta_deg(),
+            "magnitude_n": truth.force.magnitude_n(),
+            "x_n": force[0], "y_n": force[1], "z_n": force[2],
+            "markers": markers,
+        })
+    }
+}

@@ -1,0 +1,241 @@
+//! One endpoint's registers: DIEPCTLn, DIEPINTn, DIEPTSIZn and the transmit FIFO, or DOEPCTLn, DOEPINTn, DOEPTSIZn.
+
+use std::collections::VecDeque;
+
+/// Control register bits.
+mod bit {
+    pub const ACTIVE: u32 = 1 << 15;
+    pub const NAK_STATUS: u32 = 1 << 17;
+    pub const STALL: u32 = 1 << 21;
+    pub const CLEAR_NAK: u32 = 1 << 26;
+    pub const SET_NAK: u32 = 1 << 27;
+    pub const TOGGLE_COMMANDS: u32 = 3 << 28;
+    pub const DISABLE: u32 = 1 << 30;
+    pub const ENABLE: u32 = 1 << 31;
+}
+
+/// Interrupt register bits.
+mod event {
+    pub const TRANSFER_DONE: u32 = 1 << 0;
+    pub const DISABLED: u32 = 1 << 1;
+    pub const SETUP_DONE: u32 = 1 << 3;
+    pub const NAK_EFFECTIVE: u32 = 1 << 6;
+}
+
+/// Control bits after a write: commands act and do not stay.
+fn controlled(old: u32, written: u32) -> u32 {
+    let commands = bit::CLEAR_NAK | bit::SET_NAK | bit::TOGGLE_COMMANDS | bit::DISABLE;
+    let mut now = written & !(commands | bit::NAK_STATUS) | old & (bit::NAK_STATUS | bit::ENABLE);
+    if written & bit::CLEAR_NAK != 0 {
+        now &= !bit::NAK_STATUS;
+    }
+    if written & bit::SET_NAK != 0 {
+        now |= bit::NAK_STATUS;
+    }
+    if written & bit::DISABLE != 0 {
+        now &= !bit::ENABLE;
+    }
+    now
+}
+
+/// An IN endpoint: device to host.
+#[derive(Clone, Debug, Default)]
+pub struct In {
+    control: u32,
+    /// DIEPINT without the FIFO-empty bit.
+    pub interrupts: u32,
+    /// DIEPTSIZ.
+    pub size: u32,
+    fifo: VecDeque<u32>,
+}
+
+impl In {
+    /// DIEPCTL as read; endpoint 0 is always active.
+    pub fn control(&self, number: usize) -> u32 {
+        self.control | if number == 0 { bit::ACTIVE } else { 0 }
+    }
+
+    /// A write of DIEPCTL.
+    pub fn write_control(&mut self, value: u32) {
+        if value & bit::DISABLE != 0 && self.control & bit::ENABLE != 0 {
+            self.interrupts |= event::DISABLED;
+        }
+        self.control = controlled(self.control, value);
+        if value & bit::SET_NAK != 0 {
+            self.interrupts |= event::NAK_EFFECTIVE;
+        }
+    }
+
+    /// One word into the FIFO; false when it is full.
+    pub fn push(&mut self, word: u32, depth: u32) -> bool {
+        let room = self.room(depth) > 0;
+        if room {
+            self.fifo.push_back(word);
+        }
+        room
+    }
+
+    /// Free words of a FIFO of this depth.
+    pub fn room(&self, depth: u32) -> u32 {
+        depth.saturating_sub(self.fifo.len() as u32)
+    }
+
+    /// Whether the FIFO is empty.
+    pub fn fifo_empty(&self) -> bool {
+        self.fifo.is_empty()
+    }
+
+    /// Empties the FIFO.
+    pub fn flush(&mut self) {
+        self.fifo.clear();
+    }
+
+    /// Bus reset: no transfer, and no longer active.
+    pub fn stop(&mut self) {
+        self.control &= !(bit::ENABLE | bit::STALL | bit::ACTIVE);
+        self.size = 0;
+        self.fifo.clear();
+    }
+
+    /// A SETUP packet ends a stall and sets NAK.
+    pub fn setup_received(&mut self) {
+        self.control = (self.control | bit::NAK_STATUS) & !bit::STALL;
+    }
+
+    /// Whether it answers STALL.
+    pub fn stalled(&self) -> bool {
+        self.control & bit::STALL != 0
+    }
+
+    /// The packet that is ready, if one is wholly in the FIFO.
+    pub fn packet(&mut self, number: usize) -> Option<Vec<u8>> {
+        let ready = self.control(number) & (bit::ENABLE | bit::NAK_STATUS | bit::ACTIVE)
+            == bit::ENABLE | bit::ACTIVE;
+        let length = (self.size & if number == 0 { 0x7F } else { 0x7_FFFF }) as usize;
+        if !ready || self.fifo.len() < length.div_ceil(4) {
+            return None;
+        }
+        let words = self.fifo.drain(..length.div_ceil(4));
+        let mut packet: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
+        packet.truncate(length);
+        self.control &= !bit::ENABLE;
+        self.size = 0;
+        self.interrupts |= event::TRANSFER_DONE;
+        Some(packet)
+    }
+}
+
+/// An OUT endpoint: host to device.
+#[derive(Clone, Debug, Default)]
+pub struct Out {
+    control: u32,
+    /// DOEPINT.
+    pub interrupts: u32,
+    /// DOEPTSIZ.
+    pub size: u32,
+    was_enabled: bool,
+}
+
+impl Out {
+    /// DOEPCTL as read; endpoint 0 is always active.
+    pub fn control(&self, number: usize) -> u32 {
+        self.control | if number == 0 { bit::ACTIVE } else { 0 }
+    }
+
+    /// A write of DOEPCTL.
+    pub fn write_control(&mut self, value: u32) {
+        if value & bit::DISABLE != 0 && self.control & bit::ENABLE != 0 {
+            self.interrupts |= event::DISABLED;
+        }
+        self.control = controlled(self.control, value);
+        self.was_enabled =
+            self.control & bit::ACTIVE != 0 && (self.was_enabled || value & bit::ENABLE != 0);
+    }
+
+    /// A SETUP packet ends a stall and sets NAK.
+    pub fn setup_received(&mut self) {
+        self.control = (self.control | bit::NAK_STATUS) & !bit::STALL;
+    }
+
+    /// Whether it answers STALL.
+    pub fn stalled(&self) -> bool {
+        self.control & bit::STALL != 0
+    }
+
+    /// Bus reset: takes nothing, and no longer active.
+    pub fn stop(&mut self) {
+        self.control = (self.control | bit::NAK_STATUS) & !(bit::ENABLE | bit::STALL | bit::ACTIVE);
+        self.was_enabled = false;
+    }
+
+    /// Whether it takes a packet.
+    pub fn armed(&self, number: usize) -> bool {
+        let open = self.control & bit::NAK_STATUS == 0;
+        let packets = self.size >> 19 & 0x3FF;
+        open && (number == 0 || self.was_enabled && packets > 0)
+    }
+
+    /// It took a packet: NAK until the firmware is ready for the next one.
+    pub fn packet_received(&mut self, length: usize) {
+        self.control |= bit::NAK_STATUS;
+        let (packets, bytes) = (self.size >> 19 & 0x3FF, self.size & 0x7_FFFF);
+        let rest = bytes.saturating_sub(length as u32);
+        self.size = self.size & !(0x3FF << 19 | 0x7_FFFF) | packets.saturating_sub(1) << 19 | rest;
+    }
+
+    /// The firmware has read the entry that ends a transfer.
+    pub fn transfer_done(&mut self) {
+        self.interrupts |= event::TRANSFER_DONE;
+    }
+
+    /// The firmware has read the entry that ends a SETUP stage.
+    pub fn setup_done(&mut self) {
+        self.interrupts |= event::SETUP_DONE;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packet_leaves_when_it_is_whole_and_the_endpoint_enabled() {
+        let mut endpoint = In::default();
+        endpoint.write_control(bit::ACTIVE | bit::SET_NAK);
+        endpoint.size = 1 << 19 | 5;
+        endpoint.write_control(bit::ACTIVE | bit::ENABLE | bit::CLEAR_NAK);
+        assert!(endpoint.push(0x4433_2211, 16));
+        assert_eq!(endpoint.packet(1), None);
+        assert!(endpoint.push(0x55, 16));
+        assert_eq!(endpoint.packet(1), Some(vec![0x11, 0x22, 0x33, 0x44, 0x55]));
+        assert_eq!(endpoint.packet(1), None);
+        assert_eq!((endpoint.control(1) & bit::ENABLE, endpoint.size), (0, 0));
+        assert_eq!(endpoint.interrupts & event::TRANSFER_DONE, 1);
+    }
+
+    #[test]
+    fn a_fifo_has_its_depth() {
+        let mut endpoint = In::default();
+        assert!((0..16).all(|word| endpoint.push(word, 16)));
+        assert!(!endpoint.push(16, 16));
+        assert_eq!(endpoint.room(16), 0);
+    }
+
+    #[test]
+    fn an_out_endpoint_takes_one_packet_per_arming() {
+        let mut endpoint = Out::default();
+        endpoint.size = 1 << 19 | 64;
+        endpoint.write_control(bit::ACTIVE | bit::CLEAR_NAK);
+        assert!(!endpoint.armed(2), "never enabled");
+        endpoint.write_control(bit::ACTIVE | bit::CLEAR_NAK | bit::ENABLE);
+        assert!(endpoint.armed(2));
+        endpoint.packet_received(10);
+        assert!(!endpoint.armed(2));
+        endpoint.size = 1 << 19 | 64;
+        endpoint.write_control(bit::ACTIVE | bit::CLEAR_NAK);
+        assert!(endpoint.armed(2));
+        endpoint.write_control(0);
+        endpoint.write_control(bit::ACTIVE | bit::CLEAR_NAK);
+        assert!(!endpoint.armed(2), "inactive in between");
+    }
+}

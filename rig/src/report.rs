@@ -1,0 +1,141 @@
+//! What a run did, for people and as JSON.
+
+use std::time::Duration;
+
+use rigless::machine::Board;
+use rigless::session::Session;
+use serde_json::{Value, json};
+
+use crate::camera::SharedCamera;
+use crate::chip::Chip;
+use crate::dcmi;
+use crate::usb_host::{self, Port, SharedHost};
+
+/// Counters of a run.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Virtual time, ns.
+    pub virtual_ns: u64,
+    /// Wall time.
+    pub wall: Duration,
+    /// Resets of the microcontroller.
+    pub resets: usize,
+    /// VSYNC pulses of the sensor.
+    pub exposures: u64,
+    /// Registers written over SCCB.
+    pub sccb_writes: u64,
+    /// Why the sensor sent no rows.
+    pub camera_fault: Option<String>,
+    /// Why the truth log ended early.
+    pub truth_failure: Option<String>,
+    /// The camera interface.
+    pub dcmi: dcmi::Counters,
+    /// The USB port at the end.
+    pub port: Port,
+    /// The USB host.
+    pub usb: usb_host::Counters,
+    /// What happened on the USB port.
+    pub usb_log: Vec<String>,
+    /// Words that the firmware wrote into full USB FIFOs.
+    pub lost_usb_words: u64,
+    /// Accesses to addresses where the part has nothing, or that a clock gate refused.
+    pub refused: Vec<String>,
+    /// What the emulator's models said about settings that the manual forbids.
+    pub warnings: Vec<String>,
+}
+
+impl Report {
+    /// Gathers the counters.
+    pub(crate) fn new<D: Board>(
+        session: &Session<D>,
+        chip: &Chip,
+        camera: &SharedCamera,
+        host: &SharedHost,
+        wall: Duration,
+        virtual_ns: u64,
+    ) -> Self {
+        let (camera, host) = (camera.lock(), host.lock());
+        let unmapped = session
+            .unmapped()
+            .into_iter()
+            .map(|unmapped| unmapped.to_string());
+        let refused = session
+            .refused()
+            .iter()
+            .map(|(address, fault)| format!("{address:#010x}: {fault}"));
+        Self {
+            virtual_ns,
+            wall,
+            resets: session.resets().len(),
+            exposures: camera.exposures(),
+            sccb_writes: camera.sccb_writes(),
+            camera_fault: camera.faulty_output().map(str::to_owned),
+            truth_failure: camera.truth_failure().map(str::to_owned),
+            dcmi: chip.dcmi.counters(),
+            port: host.port(),
+            usb: host.counters(),
+            usb_log: host.log().to_vec(),
+            lost_usb_words: chip.lost_usb_words(),
+            refused: unmapped.chain(refused).collect(),
+            warnings: session
+                .told()
+                .map(|told| format!("{} {}: {}", told.instance, told.register, told.reason))
+                .collect(),
+        }
+    }
+
+    /// Wall time per captured frame, s; `None` without frames.
+    pub fn wall_per_frame_s(&self) -> Option<f64> {
+        (self.dcmi.frames > 0).then(|| self.wall.as_secs_f64() / self.dcmi.frames as f64)
+    }
+
+    /// As JSON.
+    pub fn json(&self) -> Value {
+        json!({
+            "virtual_s": self.virtual_ns as f64 / 1e9,
+            "wall_s": self.wall.as_secs_f64(),
+            "wall_per_frame_s": self.wall_per_frame_s(),
+            "resets": self.resets,
+            "camera": {
+                "exposures": self.exposures,
+                "sccb_writes": self.sccb_writes,
+                "fault": self.camera_fault,
+            },
+            "dcmi": {
+                "frames": self.dcmi.frames,
+                "empty_frames": self.dcmi.empty_frames,
+                "words": self.dcmi.words,
+                "overruns": self.dcmi.overruns,
+            },
+            "usb": {
+                "port": format!("{:?}", self.port),
+                "enumerations": self.usb.enumerations,
+                "failed_transfers": self.usb.failed_transfers,
+                "bytes_in": self.usb.bytes_in,
+                "packets_in": self.usb.packets_in,
+                "bytes_out": self.usb.bytes_out,
+                "lost_words": self.lost_usb_words,
+                "log": self.usb_log,
+            },
+            "refused": self.refused,
+            "warnings": self.warnings,
+        })
+    }
+
+    /// One line for a person.
+    pub fn line(&self) -> String {
+        let per_frame = self
+            .wall_per_frame_s()
+            .map_or(String::new(), |s| format!(" ({s:.3} s per frame)"));
+        format!(
+            "{:.3} s of virtual time in {:.1} s{per_frame}; {} exposures, {} frames captured, {} overruns; {} bytes over USB, {} resets",
+            self.virtual_ns as f64 / 1e9,
+            self.wall.as_secs_f64(),
+            self.exposures,
+            self.dcmi.frames,
+            self.dcmi.overruns,
+            self.usb.bytes_in,
+            self.resets,
+        )
+    }
+}

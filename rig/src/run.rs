@@ -1,0 +1,381 @@
+//! One run: the board, the host's program, the limits, and the report.
+
+use std::collections::VecDeque;
+use std::num::{NonZeroU32, NonZeroU64};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, bail};
+use rigless::emulator::{self, AccessKind, Driver, Host, Settled, Start, Stop};
+use rigless::image::Image;
+use rigless::machine::{Board, Target, armv7m};
+use rigless::mcu::{Mcu, Operate};
+use rigless::session::Session;
+use rigless::snapshot::Store;
+use rigless::time::VirtualNanos;
+
+use crate::camera::{Camera, SharedCamera};
+use crate::chip::Chip;
+use crate::dma_reach;
+use crate::faults::Faults;
+use crate::frame_source::FrameSource;
+use crate::link::Link;
+use crate::report::Report;
+use crate::rules::Rules;
+use crate::script::Script;
+use crate::truth::TruthLog;
+use crate::usb_host::{self, SharedHost};
+
+/// Instructions per second that a run assumes unless told otherwise: five in six cycles at 480 MHz.
+pub const INSTRUCTIONS_PER_SECOND: u64 = 400_000_000;
+/// The core's clock, Hz. Only SysTick's reference depends on it.
+const CORE_HZ: u64 = 480_000_000;
+/// How often the program on the host's port looks, ns.
+const LOOK_NS: u64 = 1_000_000;
+/// How long a run goes on after its client left, before it waits for the next one, ns.
+const LINGER_NS: u64 = 100_000_000;
+/// How long after a change of clocks or pins they are watched, ns: oscillators and loops take up to 2.1 ms.
+const SETTLING_NS: u64 = 10_000_000;
+
+/// Who uses the serial port.
+#[derive(Debug)]
+pub enum Program {
+    /// A script, in virtual time; what the device sends is kept.
+    Script(Script),
+    /// A program on this machine.
+    Client {
+        /// The port's other end.
+        link: Link,
+        /// Start, and go on, only while a client holds the port.
+        wait: bool,
+        /// End when the client leaves.
+        exit_on_hangup: bool,
+    },
+}
+
+/// When a run ends by itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits {
+    /// After so many captured frames.
+    pub frames: Option<u64>,
+    /// After so much virtual time, ns.
+    pub virtual_ns: Option<u64>,
+}
+
+/// Everything a run needs.
+#[derive(Debug)]
+pub struct Options {
+    /// The firmware.
+    pub elf: PathBuf,
+    /// What stands before the camera.
+    pub source: Box<dyn FrameSource>,
+    /// Where the truth goes.
+    pub truth: TruthLog,
+    /// What goes wrong.
+    pub faults: Faults,
+    /// Who uses the port.
+    pub program: Program,
+    /// When to end.
+    pub limits: Limits,
+    /// Instructions per second of virtual time.
+    pub instructions_per_second: NonZeroU64,
+    /// Ends the run when set.
+    pub interrupt: Arc<AtomicBool>,
+}
+
+/// What a run leaves.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What the device sent, when a script read it.
+    pub bytes: Vec<u8>,
+    /// Counters.
+    pub report: Report,
+}
+
+/// The board with its one microcontroller.
+#[derive(Debug)]
+struct Sensor {
+    chip: Chip,
+    instructions_per_second: NonZeroU64,
+}
+
+// Snapshots are not taken.
+impl Store for Sensor {}
+
+impl Board for Sensor {
+    fn name(&self) -> &'static str {
+        "weact-h743"
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec!["stm32h743"]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.chip)
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        let core = armv7m::Core {
+            variant: armv7m::Variant::M7,
+            clock_hz: NonZeroU64::new(CORE_HZ).expect("not zero"),
+            interrupt_lines: NonZeroU32::new(self.chip.cpu().interrupt_lines.into())
+                .expect("the part has interrupts"),
+            priority_bits: 4,
+            refclk_divider: NonZeroU32::new(8).expect("not zero"),
+            instructions_per_second: self.instructions_per_second,
+            boot: "flash",
+        };
+        let mut config = armv7m::Config::new(core, &rigless::cpu::armv7m::windows(self.chip.bus()));
+        config.fpu = armv7m::Fpu::FpV5Dp;
+        config.mpu_regions = armv7m::MpuRegions::Sixteen;
+        config.cpuid = 0x411F_C271;
+        config.branch_prediction = armv7m::BranchPrediction::Always;
+        config.caches = Some(armv7m::Caches {
+            clidr: 0x0900_0003,
+            ctr: 0x8303_C003,
+            ccsidr: &[0xF00F_E019, 0xF01F_E009],
+        });
+        config.vector_table = Some(0x0800_0000);
+        vec![Target::new("stm32h743", &mut self.chip, config.spec())]
+    }
+}
+
+/// Runs the firmware until a limit, the client's leaving, an interrupt, or a broken rule.
+///
+/// # Errors
+/// When the firmware cannot be loaded, a rule of the chip was broken, or the emulator gave up.
+pub fn run(options: Options) -> anyhow::Result<Outcome> {
+    let images = vec![load(&options.elf)?];
+    let rules = Rules::default();
+    let camera = SharedCamera::new(Camera::new(
+        options.source,
+        options.truth,
+        options.faults.clone(),
+    ));
+    let host = SharedHost::new(usb_host::Host::new(options.faults.clone()));
+    let chip = Chip::new(camera.clone(), host.clone(), options.faults, rules.clone())?;
+    let board = Sensor {
+        chip,
+        instructions_per_second: options.instructions_per_second,
+    };
+    let session = Session::new(Box::new(board), 0, VirtualNanos(0))?;
+    let driver = Conductor {
+        host: host.clone(),
+        camera: camera.clone(),
+        rules: rules.clone(),
+        program: options.program,
+        limits: options.limits,
+        interrupt: options.interrupt.clone(),
+        bytes: Vec::new(),
+        client: Client::None,
+        settling_until: 0,
+        settled_at_ns: 0,
+    };
+    let began = Instant::now();
+    let mut start = Start::new(&images);
+    start.interrupt = Some(&options.interrupt);
+    let finished = emulator::run(session, &start, driver)?;
+    if let Some(broken) = rules.first() {
+        bail!("the firmware broke a rule of the chip: {broken}");
+    }
+    let report = Report::new(
+        &finished.session,
+        &finished.session.board().chip,
+        &camera,
+        &host,
+        began.elapsed(),
+        finished.driver.settled_at_ns,
+    );
+    Ok(Outcome {
+        bytes: finished.driver.bytes,
+        report,
+    })
+}
+
+fn load(path: &Path) -> anyhow::Result<Image> {
+    let magic = std::fs::read(path).with_context(|| format!("firmware {}", path.display()))?;
+    if !magic.starts_with(b"\x7FELF") {
+        bail!(
+            "firmware {}: not an ELF file; build one with `cargo build --release -p hivtac-firmware --target thumbv7em-none-eabihf`",
+            path.display()
+        );
+    }
+    Image::new(path, magic, None).with_context(|| format!("firmware {}", path.display()))
+}
+
+/// Whether a client holds the port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Client {
+    /// None has come yet.
+    None,
+    /// One is there.
+    Here,
+    /// It left at this virtual time.
+    Left(u64),
+}
+
+/// Watches the firmware's accesses, moves the port's bytes, and ends the run.
+struct Conductor {
+    host: SharedHost,
+    camera: SharedCamera,
+    rules: Rules,
+    program: Program,
+    limits: Limits,
+    interrupt: Arc<AtomicBool>,
+    bytes: Vec<u8>,
+    client: Client,
+    settling_until: u64,
+    settled_at_ns: u64,
+}
+
+/// Registers that change the board's wiring: GPIOA to GPIOE, RCC, PWR.
+fn changes_wiring(address: u64) -> bool {
+    matches!(address, 0x5802_0000..=0x5802_13FF | 0x5802_4400..=0x5802_4BFF)
+}
+
+impl Driver<Sensor> for Conductor {
+    fn on_settled(
+        &mut self,
+        session: &mut Session<Sensor>,
+        _host: &mut dyn Host,
+        settled: Settled,
+    ) {
+        let now = match settled {
+            Settled::Access { access, value } => {
+                if access.kind == AccessKind::Write {
+                    self.written(session, access.address, value, access.virtual_time);
+                }
+                access.virtual_time
+            }
+            Settled::Stop(stop) => stop.at,
+            _ => return,
+        };
+        self.settled_at_ns = now.0;
+        if now.0 < self.settling_until || self.camera.lock().restarts() {
+            session.board_mut().chip.rewire(now);
+        }
+        if self.rules.are_broken() {
+            session.run_until(now);
+        }
+    }
+
+    fn on_stop(
+        &mut self,
+        session: &mut Session<Sensor>,
+        stop: Stop,
+        _host: &mut dyn Host,
+    ) -> Option<VirtualNanos> {
+        let now = stop.at.0;
+        let frames = session.board().chip.dcmi.counters().frames;
+        let full = self.limits.frames.is_some_and(|limit| frames >= limit);
+        let late = self.limits.virtual_ns.is_some_and(|limit| now >= limit);
+        if full || late || self.rules.are_broken() || !self.serve(now) {
+            return None;
+        }
+        let limit = self.limits.virtual_ns.unwrap_or(u64::MAX);
+        let action = match &self.program {
+            Program::Script(script) => script.next_at().unwrap_or(u64::MAX),
+            Program::Client { .. } => u64::MAX,
+        };
+        Some(VirtualNanos(
+            (now + LOOK_NS).min(limit).min(action.max(now + 1)),
+        ))
+    }
+}
+
+impl Conductor {
+    fn written(
+        &mut self,
+        session: &mut Session<Sensor>,
+        address: u64,
+        value: u64,
+        at: VirtualNanos,
+    ) {
+        if changes_wiring(address) {
+            self.settling_until = at.0 + SETTLING_NS;
+        } else if let Some(stream) = dma_reach::enabled_stream(address, value) {
+            let registers = session.board().chip.bus().registers(stream.controller);
+            let registers = registers.map(dma_reach::values).unwrap_or_default();
+            dma_reach::check(stream, value, &registers, &self.rules);
+        }
+    }
+
+    /// The port's program has its turn. Answers whether the run goes on.
+    fn serve(&mut self, now: u64) -> bool {
+        match &mut self.program {
+            Program::Script(script) => {
+                let mut host = self.host.lock();
+                script.run(now, &mut host);
+                self.bytes.extend(host.from_device.drain(..));
+                true
+            }
+            Program::Client { .. } => self.serve_client(now),
+        }
+    }
+
+    fn serve_client(&mut self, now: u64) -> bool {
+        let Program::Client {
+            link,
+            wait,
+            exit_on_hangup,
+        } = &mut self.program
+        else {
+            return true;
+        };
+        loop {
+            if self.interrupt.load(Ordering::Relaxed) {
+                return false;
+            }
+            self.client = match (link.connected(), self.client) {
+                (true, _) => Client::Here,
+                (false, Client::Here) => Client::Left(now),
+                (false, before) => before,
+            };
+            let mut host = self.host.lock();
+            host.set_open(self.client == Client::Here);
+            let (mut from_device, mut to_device) = (VecDeque::new(), VecDeque::new());
+            std::mem::swap(&mut from_device, &mut host.from_device);
+            std::mem::swap(&mut to_device, &mut host.to_device);
+            link.exchange(&mut from_device, &mut to_device);
+            (host.from_device, host.to_device) = (from_device, to_device);
+            let held_up = match self.client {
+                // A slow client slows the run down; it does not make the device lose samples.
+                Client::Here => !host.from_device.is_empty(),
+                Client::None => *wait,
+                Client::Left(_) if *exit_on_hangup => return false,
+                Client::Left(at) => *wait && now >= at + LINGER_NS,
+            };
+            drop(host);
+            if !held_up {
+                return true;
+            }
+            link.wait();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_elf_is_refused_with_advice() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), b"MZ").unwrap();
+        assert!(
+            load(file.path())
+                .unwrap_err()
+                .to_string()
+                .contains("not an ELF file")
+        );
+        assert!(
+            load(Path::new("/nowhere.elf"))
+                .unwrap_err()
+                .to_string()
+                .contains("/nowhere.elf")
+        );
+    }
+}

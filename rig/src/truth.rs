@@ -1,0 +1,76 @@
+//! The truth log: one JSON object per exposure, for whoever compares it with what the firmware says.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Context;
+use serde_json::{Value, json};
+
+/// Where the truth goes. It never enters the firmware.
+#[derive(Debug, Default)]
+pub struct TruthLog {
+    file: Option<File>,
+    failed: Option<String>,
+}
+
+/// One exposure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Exposed {
+    /// Ends of VSYNC pulses since the camera's first register reset after the microcontroller's reset; the first one is
+    /// 1. Zero before that.
+    pub frame: u64,
+    /// Ends of VSYNC pulses since the run began: what the scene's noise depends on.
+    pub exposure: u64,
+    /// Virtual time of the edge, ns.
+    pub at_ns: u64,
+}
+
+impl Exposed {
+    /// The time the scene was asked for, s.
+    pub fn time_s(&self) -> f64 {
+        self.at_ns as f64 / 1e9
+    }
+}
+
+impl TruthLog {
+    /// A log in a file, which is emptied first.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn create(path: &Path) -> anyhow::Result<Self> {
+        let file = File::create(path).with_context(|| format!("truth log {}", path.display()))?;
+        Ok(Self {
+            file: Some(file),
+            failed: None,
+        })
+    }
+
+    /// Whether anybody reads it.
+    pub fn wanted(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// Writes one exposure, at once, so that a reader that follows the file sees it.
+    pub fn exposed(&mut self, exposed: Exposed, truth: Value) {
+        let Some(file) = &mut self.file else { return };
+        let mut line = json!({
+            "frame": exposed.frame,
+            "exposure": exposed.exposure,
+            "time_us": exposed.at_ns / 1000,
+            "time_s": exposed.time_s(),
+        });
+        if let (Some(line), Value::Object(truth)) = (line.as_object_mut(), truth) {
+            line.extend(truth);
+        }
+        if let Err(error) = writeln!(file, "{line}") {
+            self.failed = Some(error.to_string());
+            self.file = None;
+        }
+    }
+
+    /// Why the log ended early.
+    pub fn failure(&self) -> Option<&str> {
+        self.failed.as_deref()
+    }
+}

@@ -1,0 +1,177 @@
+//! Control transfers: SETUP, data, status, one transaction at a time.
+
+use crate::otg::{Answer, Core};
+
+/// The address the host gives the device.
+pub const ADDRESS: u8 = 7;
+/// Name of the transfer that sets it.
+pub const SET_ADDRESS: &str = "SET_ADDRESS";
+/// Name of the transfer that reads the whole configuration.
+pub const CONFIGURATION: &str = "GET_DESCRIPTOR configuration";
+/// Largest packet of endpoint 0.
+const PACKET: usize = 64;
+
+/// What comes next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Setup,
+    DataIn,
+    DataOut,
+    StatusIn,
+    StatusOut,
+}
+
+/// How a transfer stands after a transaction.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Not done.
+    Going,
+    /// Done, with what was read.
+    Done(Vec<u8>),
+    /// Over without success.
+    Failed(&'static str),
+}
+
+/// A control transfer.
+#[derive(Clone, Debug)]
+pub struct Transfer {
+    /// For the log.
+    pub name: &'static str,
+    setup: [u8; 8],
+    data: Vec<u8>,
+    stage: Stage,
+    deadline: u64,
+}
+
+impl Transfer {
+    fn read(name: &'static str, setup: [u8; 8]) -> Self {
+        Self {
+            name,
+            setup,
+            data: Vec::new(),
+            stage: Stage::Setup,
+            deadline: 0,
+        }
+    }
+
+    fn write(name: &'static str, setup: [u8; 8], data: &[u8]) -> Self {
+        Self {
+            data: data.to_vec(),
+            ..Self::read(name, setup)
+        }
+    }
+
+    /// Starts; fails at the deadline.
+    pub fn begin(&mut self, deadline: u64) {
+        self.deadline = deadline;
+    }
+
+    fn wanted(&self) -> usize {
+        usize::from(u16::from_le_bytes([self.setup[6], self.setup[7]]))
+    }
+
+    fn is_read(&self) -> bool {
+        self.setup[0] & 0x80 != 0
+    }
+
+    /// One transaction.
+    pub fn step(&mut self, now: u64, address: u8, device: &mut Core) -> Progress {
+        if now >= self.deadline {
+            return Progress::Failed("timed out");
+        }
+        match self.stage {
+            Stage::Setup => self.send_setup(address, device),
+            Stage::DataIn => match device.transmit(address, 0) {
+                Answer::Ack(packet) => self.data_in(&packet),
+                other => waiting(other),
+            },
+            Stage::DataOut => match device.receive(address, 0, &self.data) {
+                Answer::Ack(()) => self.go(Stage::StatusIn),
+                other => waiting(other),
+            },
+            Stage::StatusIn => match device.transmit(address, 0) {
+                Answer::Ack(_) => Progress::Done(Vec::new()),
+                other => waiting(other),
+            },
+            Stage::StatusOut => match device.receive(address, 0, &[]) {
+                Answer::Ack(()) => Progress::Done(std::mem::take(&mut self.data)),
+                other => waiting(other),
+            },
+        }
+    }
+
+    fn send_setup(&mut self, address: u8, device: &mut Core) -> Progress {
+        if device.setup(address, self.setup) != Answer::Ack(()) {
+            return Progress::Going;
+        }
+        self.go(match (self.is_read(), self.wanted()) {
+            (_, 0) => Stage::StatusIn,
+            (true, _) => Stage::DataIn,
+            (false, _) => Stage::DataOut,
+        })
+    }
+
+    fn data_in(&mut self, packet: &[u8]) -> Progress {
+        self.data.extend(packet);
+        if packet.len() < PACKET || self.data.len() >= self.wanted() {
+            self.go(Stage::StatusOut)
+        } else {
+            Progress::Going
+        }
+    }
+
+    fn go(&mut self, stage: Stage) -> Progress {
+        self.stage = stage;
+        Progress::Going
+    }
+}
+
+fn waiting<T>(answer: Answer<T>) -> Progress {
+    if matches!(answer, Answer::Stall) {
+        Progress::Failed("stalled")
+    } else {
+        Progress::Going
+    }
+}
+
+/// What a host asks a new device.
+pub fn enumeration() -> Vec<Transfer> {
+    vec![
+        Transfer::read(
+            "GET_DESCRIPTOR device, first part",
+            [0x80, 6, 0, 1, 0, 0, 8, 0],
+        ),
+        Transfer::write(SET_ADDRESS, [0, 5, ADDRESS, 0, 0, 0, 0, 0], &[]),
+        Transfer::read("GET_DESCRIPTOR device", [0x80, 6, 0, 1, 0, 0, 18, 0]),
+        Transfer::read(
+            "GET_DESCRIPTOR configuration, first part",
+            [0x80, 6, 0, 2, 0, 0, 9, 0],
+        ),
+        Transfer::read(CONFIGURATION, [0x80, 6, 0, 2, 0, 0, 0xFF, 0]),
+        Transfer::read(
+            "GET_DESCRIPTOR manufacturer",
+            [0x80, 6, 1, 3, 9, 4, 0xFF, 0],
+        ),
+        Transfer::read("GET_DESCRIPTOR product", [0x80, 6, 2, 3, 9, 4, 0xFF, 0]),
+        Transfer::write("SET_CONFIGURATION", [0, 9, 1, 0, 0, 0, 0, 0], &[]),
+    ]
+}
+
+/// What a host says when a program opens (115200 8N1, DTR and RTS) or closes the port.
+pub fn line(interface: u8, open: bool) -> Vec<Transfer> {
+    let state = Transfer::write(
+        "SET_CONTROL_LINE_STATE",
+        [0x21, 0x22, if open { 3 } else { 0 }, 0, interface, 0, 0, 0],
+        &[],
+    );
+    let coding = Transfer::write(
+        "SET_LINE_CODING",
+        [0x21, 0x20, 0, 0, interface, 0, 7, 0],
+        &[0, 0xC2, 1, 0, 0, 0, 8],
+    );
+    if open {
+        vec![coding, state]
+    } else {
+        vec![state]
+    }
+}

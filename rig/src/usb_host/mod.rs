@@ -1,0 +1,377 @@
+//! A USB host with one full-speed port: enumerates a CDC-ACM device and moves its bytes.
+//!
+//! One transaction every 1/19 ms, which is what a full-speed bus carries of 64-byte bulk packets. Times are those of
+//! USB 2.0 chapters 7 and 9: 100 ms debounce, 10 ms reset, 10 ms recovery, suspend after 3 ms without activity.
+
+mod control;
+mod descriptors;
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::faults::{Faults, Kind};
+use crate::otg::{Answer, Core};
+use control::{Progress, Transfer};
+use descriptors::Function;
+
+/// One transaction, ns.
+const TRANSACTION_NS: u64 = 1_000_000 / 19;
+/// How often an empty port is looked at, ns.
+const IDLE_NS: u64 = 500_000;
+const DEBOUNCE_NS: u64 = 100_000_000;
+const RESET_NS: u64 = 10_000_000;
+const RECOVERY_NS: u64 = 10_000_000;
+const SUSPEND_NS: u64 = 3_000_000;
+/// How long a control transfer may take.
+const CONTROL_TIMEOUT_NS: u64 = 500_000_000;
+/// Port resets before the host gives a device up.
+const ATTEMPTS: u32 = 3;
+/// Largest bulk packet.
+const PACKET: usize = 64;
+/// Bytes that wait for a client before the host stops asking for more.
+const BACKLOG: usize = 1 << 16;
+
+/// Where the port stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// Nothing pulls D+ up.
+    Empty,
+    /// A device appeared; wait until its plug sits.
+    Debounce(u64),
+    /// The bus is in reset.
+    Reset(u64),
+    /// The device may recover.
+    Recovery(u64),
+    /// Control transfers run.
+    Enumerating,
+    /// The serial port exists.
+    Configured,
+    /// The host gave the device up.
+    Failed,
+}
+
+/// Counters for the report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Bytes from the device.
+    pub bytes_in: u64,
+    /// Bulk packets from the device.
+    pub packets_in: u64,
+    /// Bytes to the device.
+    pub bytes_out: u64,
+    /// Times the device was configured.
+    pub enumerations: u64,
+    /// Control transfers that timed out or stalled.
+    pub failed_transfers: u64,
+}
+
+/// The host.
+#[derive(Debug)]
+pub struct Host {
+    port: Port,
+    faults: Faults,
+    cable: bool,
+    idle_since: Option<u64>,
+    attempts: u32,
+    address: u8,
+    transfer: Option<Transfer>,
+    queue: VecDeque<Transfer>,
+    function: Option<Function>,
+    /// Whether a program has the serial port open.
+    open: bool,
+    /// Whether the device was told so.
+    told_open: bool,
+    /// Whether the program reads.
+    reading: bool,
+    bulk_turn_in: bool,
+    next_frame_ns: u64,
+    /// Bytes from the device.
+    pub from_device: VecDeque<u8>,
+    /// Bytes for the device.
+    pub to_device: VecDeque<u8>,
+    counters: Counters,
+    log: Vec<String>,
+}
+
+/// The host as the bus and the run share it.
+#[derive(Clone, Debug)]
+pub struct SharedHost(Arc<Mutex<Host>>);
+
+impl SharedHost {
+    /// Shares a host.
+    pub fn new(host: Host) -> Self {
+        Self(Arc::new(Mutex::new(host)))
+    }
+
+    /// The host. One thread runs the whole rig, so nobody waits here.
+    pub fn lock(&self) -> MutexGuard<'_, Host> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Host {
+    /// A host with the cable plugged in and no program on the port.
+    pub fn new(faults: Faults) -> Self {
+        Self {
+            port: Port::Empty,
+            faults,
+            cable: true,
+            idle_since: None,
+            attempts: 0,
+            address: 0,
+            transfer: None,
+            queue: VecDeque::new(),
+            function: None,
+            open: false,
+            told_open: false,
+            reading: true,
+            bulk_turn_in: true,
+            next_frame_ns: 0,
+            from_device: VecDeque::new(),
+            to_device: VecDeque::new(),
+            counters: Counters::default(),
+            log: Vec::new(),
+        }
+    }
+
+    /// Where the port stands.
+    pub fn port(&self) -> Port {
+        self.port
+    }
+
+    /// Counters so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// What happened on the port, a line each.
+    pub fn log(&self) -> &[String] {
+        &self.log
+    }
+
+    /// A program opens or closes the serial port: sets or clears DTR and RTS.
+    pub fn set_open(&mut self, open: bool) {
+        self.open = open;
+        if !open {
+            self.to_device.clear();
+            self.from_device.clear();
+        }
+    }
+
+    /// The program reads, or does not.
+    pub fn set_reading(&mut self, reading: bool) {
+        self.reading = reading;
+    }
+
+    /// The cable is plugged in, or not.
+    pub fn set_cable(&mut self, plugged: bool) {
+        self.cable = plugged;
+    }
+
+    /// The next transaction, or whatever the port is waiting for. Answers when to come again, ns.
+    pub fn tick(&mut self, now: u64, device: &mut Core) -> u64 {
+        let plugged = self.cable && !self.faults.on(Kind::CablePulled, now);
+        if !plugged || !device.attached() {
+            return self.disconnected(now, device);
+        }
+        self.idle_since = None;
+        self.start_of_frame(now, device);
+        match self.port {
+            Port::Empty => self.wait(now, "device attached", Port::Debounce(now + DEBOUNCE_NS)),
+            Port::Debounce(until) if now >= until => self.reset_bus(now, device),
+            Port::Reset(until) if now >= until => {
+                device.enumerated();
+                self.port = Port::Recovery(now + RECOVERY_NS);
+            }
+            Port::Recovery(until) if now >= until => self.enumerate(now),
+            Port::Enumerating => self.control(now, device),
+            Port::Configured => self.work(now, device),
+            _ => {}
+        }
+        match self.port {
+            Port::Enumerating | Port::Configured => now + TRANSACTION_NS,
+            _ => now + IDLE_NS,
+        }
+    }
+
+    fn wait(&mut self, now: u64, what: &str, port: Port) {
+        self.note(now, what);
+        self.attempts = 0;
+        self.port = port;
+    }
+
+    /// No device, or no cable. A device on a cut cable sees the bus go idle.
+    fn disconnected(&mut self, now: u64, device: &mut Core) -> u64 {
+        if self.port != Port::Empty {
+            self.note(now, "device gone");
+            self.forget_device();
+        }
+        let since = *self.idle_since.get_or_insert(now);
+        if device.attached() && now >= since + SUSPEND_NS {
+            device.suspend();
+        }
+        now + IDLE_NS
+    }
+
+    fn forget_device(&mut self) {
+        self.port = Port::Empty;
+        self.transfer = None;
+        self.queue.clear();
+        self.function = None;
+        self.told_open = false;
+        self.to_device.clear();
+    }
+
+    fn start_of_frame(&mut self, now: u64, device: &mut Core) {
+        if matches!(self.port, Port::Enumerating | Port::Configured) && now >= self.next_frame_ns {
+            self.next_frame_ns = now - now % 1_000_000 + 1_000_000;
+            device.start_of_frame();
+        }
+    }
+
+    fn reset_bus(&mut self, now: u64, device: &mut Core) {
+        device.bus_reset();
+        self.address = 0;
+        self.attempts += 1;
+        self.port = Port::Reset(now + RESET_NS);
+    }
+
+    fn enumerate(&mut self, now: u64) {
+        self.queue = control::enumeration().into();
+        self.transfer = None;
+        self.port = Port::Enumerating;
+        self.next_transfer(now);
+    }
+
+    fn next_transfer(&mut self, now: u64) {
+        self.transfer = self.queue.pop_front().map(|mut transfer| {
+            transfer.begin(now + CONTROL_TIMEOUT_NS);
+            transfer
+        });
+    }
+
+    /// One transaction of the control transfer at hand.
+    fn control(&mut self, now: u64, device: &mut Core) {
+        let Some(transfer) = &mut self.transfer else {
+            return;
+        };
+        match transfer.step(now, self.address, device) {
+            Progress::Going => {}
+            Progress::Done(data) => {
+                let name = transfer.name;
+                self.note(now, &format!("{name}: {} bytes", data.len()));
+                self.transferred(now, name, &data);
+            }
+            Progress::Failed(why) => {
+                let message = format!("{}: {why}", transfer.name);
+                self.note(now, &message);
+                self.counters.failed_transfers += 1;
+                self.transfer_failed(now, device);
+            }
+        }
+    }
+
+    fn transferred(&mut self, now: u64, name: &str, data: &[u8]) {
+        match name {
+            control::SET_ADDRESS => self.address = control::ADDRESS,
+            control::CONFIGURATION => match Function::parse(data) {
+                Ok(function) => self.function = Some(function),
+                Err(why) => {
+                    self.note(now, &format!("not a CDC-ACM device: {why}"));
+                    self.port = Port::Failed;
+                    return;
+                }
+            },
+            _ => {}
+        }
+        self.next_transfer(now);
+        if self.transfer.is_none() && self.port == Port::Enumerating {
+            self.note(now, "configured");
+            self.counters.enumerations += 1;
+            self.port = Port::Configured;
+        }
+    }
+
+    fn transfer_failed(&mut self, now: u64, device: &mut Core) {
+        if self.port == Port::Configured {
+            return self.next_transfer(now);
+        }
+        if self.attempts < ATTEMPTS {
+            return self.reset_bus(now, device);
+        }
+        self.note(now, "gave up");
+        self.port = Port::Failed;
+    }
+
+    /// A configured device: control transfers first, then bulk data, in turn.
+    fn work(&mut self, now: u64, device: &mut Core) {
+        if self.transfer.is_none() && self.open != self.told_open {
+            self.tell_open(now);
+        }
+        if self.transfer.is_some() {
+            return self.control(now, device);
+        }
+        self.bulk_turn_in = !self.bulk_turn_in;
+        let moved = if self.bulk_turn_in {
+            self.bulk_in(now, device)
+        } else {
+            self.bulk_out(device)
+        };
+        if !moved {
+            if self.bulk_turn_in {
+                self.bulk_out(device)
+            } else {
+                self.bulk_in(now, device)
+            };
+        }
+    }
+
+    fn tell_open(&mut self, now: u64) {
+        let interface = self
+            .function
+            .map_or(0, |function| function.control_interface);
+        self.told_open = self.open;
+        self.queue = control::line(interface, self.open).into();
+        self.next_transfer(now);
+    }
+
+    fn bulk_in(&mut self, now: u64, device: &mut Core) -> bool {
+        let Some(function) = self.function else {
+            return false;
+        };
+        let refused = !self.open || !self.reading || self.faults.on(Kind::HostNotReading, now);
+        if refused || self.from_device.len() > BACKLOG {
+            return false;
+        }
+        let Answer::Ack(packet) = device.transmit(self.address, function.bulk_in) else {
+            return false;
+        };
+        self.counters.bytes_in += packet.len() as u64;
+        self.counters.packets_in += 1;
+        self.from_device.extend(packet);
+        true
+    }
+
+    fn bulk_out(&mut self, device: &mut Core) -> bool {
+        let Some(function) = self.function else {
+            return false;
+        };
+        let packet: Vec<u8> = self.to_device.iter().take(PACKET).copied().collect();
+        if packet.is_empty()
+            || device.receive(self.address, function.bulk_out, &packet) != Answer::Ack(())
+        {
+            return false;
+        }
+        self.to_device.drain(..packet.len());
+        self.counters.bytes_out += packet.len() as u64;
+        true
+    }
+
+    fn note(&mut self, now: u64, what: &str) {
+        self.log.push(format!(
+            "{}.{:03} ms {what}",
+            now / 1_000_000,
+            now / 1000 % 1000
+        ));
+    }
+}
