@@ -12,8 +12,11 @@ use hivtac_wire::version::HelloPrefix;
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
-/// Time between two hellos that were not answered.
-const HELLO_EVERY: Duration = Duration::from_millis(250);
+/// Time after the first hello until the second; doubles with each that is not answered, so that a device that still boots
+/// finds few of them in the line.
+const HELLO_AGAIN: Duration = Duration::from_millis(250);
+/// Longest time between two hellos.
+const HELLO_AT_LEAST_EVERY: Duration = Duration::from_secs(2);
 /// Longest time the device may take no byte of a command.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -52,9 +55,11 @@ impl Link {
 
     fn exchange_hellos(&mut self, patience: Duration) -> Result<DeviceHello, Failure> {
         let end = Instant::now() + patience;
+        let mut pause = HELLO_AGAIN;
         while Instant::now() < end {
             self.say_hello()?;
-            let next = end.min(Instant::now() + HELLO_EVERY);
+            let next = end.min(Instant::now() + pause);
+            pause = HELLO_AT_LEAST_EVERY.min(pause * 2);
             while let Some(message) = self.receive(next)? {
                 // Anything else is left over from an earlier conversation.
                 if let DeviceMessage::Hello(hello) = message {

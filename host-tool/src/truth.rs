@@ -12,12 +12,18 @@ const PATIENCE: Duration = Duration::from_millis(300);
 /// Time between two looks at a file that grows.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
-/// One line of the log.
+/// One line of the log. A line without a force, as of a test picture, is that of a frame without a truth.
+#[derive(Deserialize)]
+struct Line {
+    /// Frame number, as in the samples.
+    frame: u32,
+    #[serde(flatten)]
+    truth: Option<Truth>,
+}
+
+/// The true force of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Truth {
-    /// Frame number, as in the samples.
-    #[serde(skip_serializing)]
-    frame: u32,
     /// α, degrees.
     pub alpha_deg: f64,
     /// β, degrees.
@@ -39,7 +45,7 @@ pub struct TruthFile {
     /// What was read of a line that has no end yet.
     partial: Vec<u8>,
     lines: usize,
-    frames: HashMap<u32, Truth>,
+    frames: HashMap<u32, Option<Truth>>,
 }
 
 impl TruthFile {
@@ -70,9 +76,10 @@ impl TruthFile {
         let end = Instant::now() + PATIENCE;
         loop {
             self.read_on()?;
-            let truth = self.frames.remove(&frame);
-            if truth.is_some() || Instant::now() >= end {
-                return Ok(truth);
+            match self.frames.remove(&frame) {
+                Some(truth) => return Ok(truth),
+                None if Instant::now() >= end => return Ok(None),
+                None => (),
             }
             std::thread::sleep(LOOK_EVERY);
         }
@@ -94,9 +101,9 @@ impl TruthFile {
 
     fn keep(&mut self, line: &[u8]) -> Result<(), Failure> {
         self.lines += 1;
-        let truth: Truth = serde_json::from_slice(line)
+        let line: Line = serde_json::from_slice(line)
             .map_err(|error| self.failure(&format!("line {}: {error}", self.lines)))?;
-        self.frames.insert(truth.frame, truth);
+        self.frames.insert(line.frame, line.truth);
         Ok(())
     }
 
@@ -155,6 +162,22 @@ mod tests {
             4.0
         );
         thread.join().unwrap();
+    }
+
+    #[test]
+    fn a_line_without_a_force_is_a_frame_without_a_truth() {
+        let mut log = tempfile::NamedTempFile::new().unwrap();
+        writeln!(
+            log,
+            "{{\"frame\":1,\"time_us\":5}}\n{}",
+            line(2, 1.0).replace("0.1,", "null,")
+        )
+        .unwrap();
+        writeln!(log, "{}", line(3, 7.0)).unwrap();
+        let mut truth = TruthFile::open(log.path().to_str().unwrap()).unwrap();
+        assert_eq!(truth.take(1).unwrap(), None);
+        assert_eq!(truth.take(2).unwrap(), None);
+        assert_eq!(truth.take(3).unwrap().unwrap().alpha_deg, 7.0);
     }
 
     #[test]
