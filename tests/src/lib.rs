@@ -18,4 +18,6 @@ pub mod pictures;
 #[cfg(feature = "host")]
 pub mod qemu;
 #[cfg(feature = "host")]
+pub mod rig;
+#[cfg(feature = "host")]
 pub mod script;

@@ -1,0 +1,99 @@
+//! Faults of the rig, seen through the host tool: each ends in its documented status or counter, and passes.
+
+use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
+use serde_json::Value;
+
+/// A run with faults, watched for so many frames.
+fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>) {
+    let mut rig_options = vec!["--scene", "static", "--exit-on-hangup"];
+    for fault in faults {
+        rig_options.extend(["--fault", fault]);
+    }
+    let rig = Rig::start(&rig_options).unwrap();
+    let output = tool(&rig, "monitor", &[&["--json"], options].concat()).unwrap();
+    let lines = json_lines(&output.out).unwrap();
+    rig.finish().unwrap();
+    (output, lines)
+}
+
+fn has_status(line: &Value, name: &str) -> bool {
+    line["status"]
+        .as_array()
+        .is_some_and(|names| names.iter().any(|n| n == name))
+}
+
+/// The number before which the summary says `what`, as in `overrun 3`.
+fn counter(output: &ToolOutput, what: &str) -> u64 {
+    let rest = output
+        .err
+        .split_once(&format!("{what} "))
+        .map(|(_, rest)| rest);
+    let digits = rest.and_then(|rest| rest.split(|c: char| !c.is_ascii_digit()).next());
+    let number = digits.and_then(|digits| digits.parse().ok());
+    number.unwrap_or_else(|| panic!("no {what} in the summary: {}", output.err))
+}
+
+/// The last frames have forces again.
+fn check_recovery(output: &ToolOutput, lines: &[Value]) {
+    assert_eq!(output.code, Some(0), "{output:?}");
+    let last = lines.last().expect("at least one line");
+    assert!(last["force"].is_object(), "recovered: {last}");
+    assert!(!has_status(last, "frame_dropped"), "recovered: {last}");
+}
+
+#[test]
+fn a_silent_camera_is_started_again() {
+    let (output, lines) = watch(&["camera-silent@1500-2000"], &["--frames", "30"]);
+    check_recovery(&output, &lines);
+    assert!(
+        lines
+            .iter()
+            .any(|line| has_status(line, "camera_restarted")),
+        "{lines:?}"
+    );
+    assert!(counter(&output, "camera timeouts") > 0, "{}", output.err);
+    assert!(counter(&output, "restarts") > 0, "{}", output.err);
+}
+
+#[test]
+fn an_overrun_costs_its_frame_and_no_more() {
+    let (output, lines) = watch(&["dcmi-overrun@1500"], &["--frames", "30"]);
+    check_recovery(&output, &lines);
+    assert!(
+        lines.iter().any(|line| has_status(line, "capture_overrun")),
+        "{lines:?}"
+    );
+    assert!(counter(&output, "overruns") > 0, "{}", output.err);
+}
+
+#[test]
+fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
+    let (output, lines) = watch(&["host-not-reading@1500-3000"], &["--frames", "60"]);
+    check_recovery(&output, &lines);
+    assert!(counter(&output, "USB") > 0, "{}", output.err);
+    assert_eq!(
+        counter(&output, "busy"),
+        0,
+        "the camera never waits: {}",
+        output.err
+    );
+    let gap = lines.windows(2).any(|pair| {
+        let step = |key: &str| pair[1][key].as_u64().unwrap() - pair[0][key].as_u64().unwrap();
+        step("seq") > 1 && step("frame") == step("seq")
+    });
+    assert!(gap, "the loss is a gap in the sequence: {lines:?}");
+}
+
+#[test]
+fn a_pulled_cable_is_reported_and_survived() {
+    let options = ["--frames", "20", "--reconnect"];
+    let (output, lines) = watch(&["cable-pulled@1500-2000"], &options);
+    check_recovery(&output, &lines);
+    assert!(output.err.contains("connected again"), "{}", output.err);
+}
+
+#[test]
+fn a_pulled_cable_ends_a_monitor_that_does_not_reconnect() {
+    let (output, _) = watch(&["cable-pulled@1500-2000"], &["--frames", "20"]);
+    assert_eq!(output.code, Some(5), "{output:?}");
+}

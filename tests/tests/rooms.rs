@@ -1,0 +1,170 @@
+//! Each of the project's packages depends only on those that the table of rooms in `docs/architecture.md` allows.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Workspaces of the project, from its root.
+const WORKSPACES: [&str; 4] = ["", "rig", "tests/qemu", "xtask/instruction-counter"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap()
+        .to_owned()
+}
+
+fn cargo(folder: &Path, arguments: &[&str]) -> String {
+    let program = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(program)
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success(),
+        "cargo {arguments:?} in {}: {said}",
+        folder.display()
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// A row of the table: a folder, its package, and the folders it may use; `None` for everything.
+struct Room {
+    folder: String,
+    package: String,
+    may_use: Option<BTreeSet<String>>,
+}
+
+/// The words of a cell that are set as code.
+fn code_words(cell: &str) -> Vec<String> {
+    cell.split('`')
+        .skip(1)
+        .step_by(2)
+        .map(|word| word.trim_end_matches('/').to_owned())
+        .collect()
+}
+
+fn rooms() -> Vec<Room> {
+    let text = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    text.lines().filter_map(room).collect()
+}
+
+fn room(line: &str) -> Option<Room> {
+    let cells: Vec<&str> = line.strip_prefix('|')?.split('|').map(str::trim).collect();
+    let [folder, package, _, may_use, _] = cells[..] else {
+        return None;
+    };
+    Some(Room {
+        folder: code_words(folder).first()?.clone(),
+        package: code_words(package).first()?.clone(),
+        may_use: (may_use != "everything").then(|| code_words(may_use).into_iter().collect()),
+    })
+}
+
+/// The project's packages: name, folder from the root, and the folders of the project that it depends on.
+fn packages() -> BTreeMap<String, (String, BTreeSet<String>)> {
+    let mut packages = BTreeMap::new();
+    for workspace in WORKSPACES {
+        let arguments = ["metadata", "--no-deps", "--format-version", "1"];
+        let text = cargo(&root().join(workspace), &arguments);
+        let metadata: Value = serde_json::from_str(&text).unwrap();
+        for package in metadata["packages"].as_array().unwrap() {
+            let manifest = Path::new(package["manifest_path"].as_str().unwrap());
+            let uses = package["dependencies"].as_array().unwrap().iter();
+            // What only a package's own tests use goes into nothing that is built from it.
+            let uses = uses.filter(|dependency| dependency["kind"] != "dev");
+            let uses = uses.filter_map(|dependency| dependency["path"].as_str());
+            let uses = uses.map(|path| from_root(Path::new(path))).collect();
+            let name = package["name"].as_str().unwrap().to_owned();
+            packages.insert(name, (from_root(manifest.parent().unwrap()), uses));
+        }
+    }
+    packages
+}
+
+fn from_root(path: &Path) -> String {
+    let path = path.canonicalize().unwrap();
+    let root = root().canonicalize().unwrap();
+    path.strip_prefix(root)
+        .unwrap()
+        .to_str()
+        .unwrap()
+        .to_owned()
+}
+
+#[test]
+fn packages_use_only_what_the_table_allows() {
+    let (rooms, packages) = (rooms(), packages());
+    assert!(rooms.len() >= 9, "the table of rooms has a row for each");
+    for room in rooms {
+        let (folder, uses) = packages
+            .get(&room.package)
+            .unwrap_or_else(|| panic!("no package {}", room.package));
+        assert_eq!(
+            folder, &room.folder,
+            "{} lies where the table says",
+            room.package
+        );
+        let Some(may_use) = room.may_use else {
+            continue;
+        };
+        let others: Vec<_> = uses.difference(&may_use).collect();
+        assert!(
+            others.is_empty(),
+            "{} must not use {others:?}",
+            room.package
+        );
+    }
+}
+
+#[test]
+fn every_package_has_a_room() {
+    let rooms = rooms();
+    for (package, (folder, _)) in packages() {
+        let is_inside = |room: &Room| Path::new(&folder).starts_with(&room.folder);
+        assert!(
+            rooms.iter().any(is_inside),
+            "{package} in {folder} is in no room of the table"
+        );
+    }
+}
+
+#[test]
+fn the_demo_builds_no_training_code() {
+    let of = |folder: &str, package: &str| {
+        let arguments = [
+            "tree",
+            "--package",
+            package,
+            "--prefix",
+            "none",
+            "--edges",
+            "normal,build",
+        ];
+        cargo(&root().join(folder), &arguments)
+    };
+    let demo = [
+        of("", "hivtac"),
+        of("", "hivtac-firmware"),
+        of("", "xtask"),
+        of("rig", "hivtac-rig"),
+    ];
+    for line in demo.iter().flat_map(|tree| tree.lines()) {
+        let name = line.split(' ').next().unwrap_or("");
+        let trains = name.starts_with("burn") || name.starts_with("faer");
+        assert!(
+            !trains && name != "hivtac-calibration",
+            "the demo builds {name}"
+        );
+    }
+    assert!(
+        of("", "hivtac-calibration").contains("\nburn"),
+        "the test can see training code"
+    );
+}
