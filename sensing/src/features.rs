@@ -64,3 +64,73 @@ fn extent(values: [Px; 4]) -> (i64, i64) {
 fn middle(low: i64, high: i64) -> Px {
     Px(((low + high + 1) >> 1) as i32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marker(x: f64, y: f64) -> Marker {
+        let px = |value: f64| Px((value * 65_536.0) as i32);
+        Marker {
+            x: px(x),
+            y: px(y),
+            area: 1,
+        }
+    }
+
+    #[test]
+    fn the_rectangle_is_that_of_the_centroids() {
+        let turned = [
+            marker(10.5, 11.25),
+            marker(20.0, 10.0),
+            marker(21.5, 20.0),
+            marker(11.0, 22.0),
+        ];
+        let features = Features::of_markers(&turned);
+        assert_eq!(features.rect_center.0.to_f64(), 16.0);
+        assert_eq!(features.rect_center.1.to_f64(), 16.0);
+        assert_eq!(features.rect_area, (11 * 12) << 16);
+        assert_eq!(features.centroids[2], (turned[2].x, turned[2].y));
+    }
+
+    #[test]
+    fn the_largest_frame_fits() {
+        let corners = [
+            marker(0.0, 0.0),
+            marker(799.0, 0.0),
+            marker(799.0, 599.0),
+            marker(0.0, 599.0),
+        ];
+        let features = Features::of_markers(&corners);
+        assert_eq!(features.rect_area, (799 * 599) << 16);
+        assert_eq!(features.rect_center.0.to_f64(), 399.5);
+        assert_eq!(features.rect_center.1.to_f64(), 299.5);
+    }
+
+    #[test]
+    fn area_and_centre_round_to_nearest() {
+        let mut markers = [marker(0.0, 0.0); 4];
+        markers[2] = Marker {
+            x: Px(3),
+            y: Px(1 << 15),
+            area: 1,
+        };
+        let features = Features::of_markers(&markers);
+        assert_eq!(features.rect_center, (Px(2), Px(1 << 14)), "1.5 rounds up");
+        assert_eq!(features.rect_area, 2, "1.5 rounds up");
+    }
+
+    #[test]
+    fn the_array_is_in_the_papers_order_and_comes_back() {
+        let markers = [
+            marker(1.0, 2.0),
+            marker(3.0, 4.0),
+            marker(5.0, 6.0),
+            marker(7.0, 8.0),
+        ];
+        let features = Features::of_markers(&markers);
+        let array = features.to_array().map(|value| value >> 16);
+        assert_eq!(array, [1, 2, 3, 4, 5, 6, 7, 8, 4, 5, 36]);
+        assert_eq!(Features::from_array(features.to_array()), features);
+    }
+}

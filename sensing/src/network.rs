@@ -129,3 +129,256 @@ fn rescaled_rows<X: Copy + Into<i32>>(
 fn rescale(value: i64, multiplier: u32, shift: u8) -> i64 {
     (value * i64::from(multiplier) + (1 << (shift - 1))) >> shift
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        model::{
+            encode::{LayerSpec, ModelSpec},
+            samples::spec,
+        },
+        units::Px,
+    };
+    use proptest::prelude::*;
+    use std::{vec, vec::Vec};
+
+    /// The arithmetic of `docs/architecture.md` in 128 bits, where nothing can overflow.
+    fn reference(spec: &ModelSpec, features: &Features, tare: &Features) -> [i128; OUTPUTS] {
+        let rescale = |value: i128, multiplier: u32, shift: u8| {
+            let exact = value * i128::from(multiplier);
+            let unit = 1i128 << shift;
+            // Half up: floor(exact / unit + ½).
+            (2 * exact + unit).div_euclid(2 * unit)
+        };
+        let (rest, mean) = (spec.rest.features.to_array(), spec.input.mean.to_array());
+        let (features, tare) = (features.to_array(), tare.to_array());
+        let mut values: Vec<i128> = (0..FEATURES)
+            .map(|i| {
+                let moved = i128::from(features[i]) - i128::from(tare[i]);
+                let difference = moved + i128::from(rest[i]) - i128::from(mean[i]);
+                let limited = difference.clamp(-(1 << 38) + 1, (1 << 38) - 1);
+                rescale(limited, spec.input.multipliers[i], spec.input.shifts[i])
+                    .clamp(-32_768, 32_767)
+            })
+            .collect();
+        for (index, layer) in spec.layers.iter().enumerate() {
+            let last = index + 1 == spec.layers.len();
+            values = (0..usize::from(layer.outputs))
+                .map(|row| {
+                    let inputs = usize::from(layer.inputs);
+                    let weights = &layer.weights[row * inputs..(row + 1) * inputs];
+                    let products = weights.iter().zip(&values).map(|(w, x)| i128::from(*w) * x);
+                    let sum = i128::from(layer.biases[row]) + products.sum::<i128>();
+                    let value = rescale(sum, layer.multipliers[row], layer.shifts[row]);
+                    if last {
+                        value.clamp(i32::MIN.into(), i32::MAX.into())
+                    } else {
+                        value.clamp(0, 127)
+                    }
+                })
+                .collect();
+        }
+        [values[0], values[1], values[2]]
+    }
+
+    fn check(spec: &ModelSpec, features: &Features, tare: &Features) -> Output {
+        let bytes = spec.encode().unwrap();
+        let model = Model::parse(&bytes).unwrap();
+        let mut network = Network::new();
+        let output = network.run(&model, features, tare);
+        let expected = reference(spec, features, tare);
+        assert_eq!(output.values.map(i128::from), expected);
+        assert_eq!(
+            network.run(&model, features, tare),
+            output,
+            "buffers keep nothing"
+        );
+        output
+    }
+
+    /// Positions spread over a frame.
+    fn features(seed: u64) -> Features {
+        let mut state = seed;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            Px((state >> 39) as i32)
+        };
+        let mut features = Features::default();
+        for (x, y) in &mut features.centroids {
+            (*x, *y) = (next(), next());
+        }
+        features.rect_center = (next(), next());
+        features.rect_area = i64::from(next().0) * 400;
+        features
+    }
+
+    fn random_layer(inputs: u16, outputs: u16, random: &mut impl FnMut() -> u32) -> LayerSpec {
+        let count = usize::from(outputs);
+        LayerSpec {
+            inputs,
+            outputs,
+            weights: (0..count * usize::from(inputs))
+                .map(|_| (random() as i8).max(-127))
+                .collect(),
+            biases: (0..count).map(|_| random() as i32 >> 8).collect(),
+            multipliers: (0..count).map(|_| 1 + random() % ((1 << 31) - 1)).collect(),
+            shifts: (0..count).map(|_| (28 + random() % 24) as u8).collect(),
+        }
+    }
+
+    fn random_spec(widths: &[u16], seed: u64) -> ModelSpec {
+        let mut state = seed;
+        let mut random = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(7);
+            (state >> 32) as u32
+        };
+        let mut spec = spec(widths);
+        let pairs = widths.windows(2);
+        spec.layers = pairs
+            .map(|pair| random_layer(pair[0], pair[1], &mut random))
+            .collect();
+        spec.input.multipliers = [0; FEATURES].map(|_: u32| 1 + random() % ((1 << 24) - 1));
+        spec.input.shifts = [0; FEATURES].map(|_: u8| (20 + random() % 20) as u8);
+        spec
+    }
+
+    #[test]
+    fn the_small_and_the_papers_network_run() {
+        for widths in [
+            &[11, 64, 64, 3][..],
+            &[11, 512, 512, 512, 3],
+            &[11, 3],
+            &[11, 1, 3],
+        ] {
+            for seed in 0..4 {
+                check(
+                    &random_spec(widths, seed),
+                    &features(seed),
+                    &features(seed + 9),
+                );
+            }
+        }
+    }
+
+    /// Every weight, input and activation at its limit, and the widest layers.
+    #[test]
+    fn extremes_of_every_number() {
+        for weight in [-127, 127] {
+            let mut spec = spec(&[11, 512, 512, 512, 3]);
+            for layer in &mut spec.layers {
+                layer.weights.fill(weight);
+                layer.biases.fill(i32::from(weight) * 1000);
+                layer.multipliers.fill((1 << 31) - 1);
+                // The largest values come out as large as they can.
+                layer.shifts.fill(1);
+            }
+            spec.input.multipliers = [(1 << 24) - 1; FEATURES];
+            spec.input.shifts = [1; FEATURES];
+            for sign in [-1, 1] {
+                let far = 800 << 16;
+                let extreme = Features {
+                    centroids: [(Px(sign * far), Px(sign * far)); 4],
+                    rect_area: i64::from(sign) * (640_000 << 16),
+                    ..Features::default()
+                };
+                let output = check(&spec, &extreme, &Features::default());
+                assert!(output.input_saturated);
+            }
+        }
+    }
+
+    #[test]
+    fn any_number_saturates_and_none_overflows() {
+        let mut spec = spec(&[11, 3]);
+        spec.layers[0].multipliers = vec![(1 << 31) - 1; 3];
+        spec.layers[0].shifts = vec![1; 3];
+        spec.input.shifts = [1; FEATURES];
+        let extreme = |value: i32, area: i64| Features {
+            centroids: [(Px(value), Px(value)); 4],
+            rect_center: (Px(value), Px(value)),
+            rect_area: area,
+        };
+        let values = [(i32::MIN, i64::MIN), (i32::MAX, i64::MAX), (0, 0)];
+        for (a, area_a) in values {
+            for (b, area_b) in values {
+                let bytes = spec.encode().unwrap();
+                let model = Model::parse(&bytes).unwrap();
+                let far = (extreme(a, area_a), extreme(b, area_b));
+                let found = Network::new()
+                    .run(&model, &far.0, &far.1)
+                    .values
+                    .map(i128::from);
+                // The reference does not saturate the difference itself; that only matters beyond ±2⁶³.
+                if area_a != i64::MIN && area_b != i64::MIN {
+                    assert_eq!(found, reference(&spec, &far.0, &far.1));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rescaling_rounds_once_half_up() {
+        for (value, multiplier, shift, expected) in [
+            (1, 1, 1, 1),
+            (-1, 1, 1, 0),
+            (3, 1, 1, 2),
+            (-3, 1, 1, -1),
+            (5, 3, 3, 2),
+            (i64::from(i32::MAX), (1 << 31) - 1, 31, 2_147_483_646),
+            (i64::from(i32::MIN), (1 << 31) - 1, 62, -1),
+            (-1, 1, 62, 0),
+        ] {
+            assert_eq!(
+                rescale(value, multiplier, shift),
+                expected,
+                "{value}·{multiplier}>>{shift}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_input_at_its_limit_is_told() {
+        let mut spec = spec(&[11, 3]);
+        spec.input.mean = spec.rest.features;
+        spec.input.multipliers = [1; FEATURES];
+        spec.input.shifts = [1; FEATURES];
+        let at = |x: i32| Features {
+            rect_center: (Px(x), Px(0)),
+            ..Features::default()
+        };
+        let told = |x| check(&spec, &at(x), &at(0)).input_saturated;
+        assert!(!told(2 * 32_766) && told(2 * 32_767) && told(-2 * 32_768) && told(i32::MAX));
+        assert!(!told(-2 * 32_767));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        #[test]
+        fn it_equals_the_reference(
+            hidden in prop::collection::vec(1u16..=70, 0..4),
+            seed: u64,
+        ) {
+            let widths: Vec<u16> = [11].into_iter().chain(hidden).chain([3]).collect();
+            check(&random_spec(&widths, seed), &features(seed), &features(!seed));
+        }
+
+        /// What enters is features − tare + rest: moving both moves nothing.
+        #[test]
+        fn a_tare_moves_no_calibration(seed: u64, dx in -100_000i32..100_000) {
+            let spec = random_spec(&[11, 8, 3], seed);
+            let (mut now, mut tare) = (features(seed), features(seed + 1));
+            let before = check(&spec, &now, &tare);
+            for features in [&mut now, &mut tare] {
+                features.centroids.iter_mut().for_each(|c| c.0.0 += dx);
+                features.rect_center.0.0 += dx;
+            }
+            prop_assert_eq!(check(&spec, &now, &tare), before);
+        }
+    }
+}

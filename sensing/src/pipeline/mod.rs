@@ -1,5 +1,8 @@
 //! Rows in, measurement out.
 
+#[cfg(test)]
+mod tests;
+
 use crate::{
     blob::Blob,
     features::Features,

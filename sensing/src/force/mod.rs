@@ -9,6 +9,9 @@
 //! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at most 0.5 µN;
 //! a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
 
+#[cfg(test)]
+mod tests;
+
 use crate::{
     cordic::{ONE_BITS, atan2, sin_cos},
     model::{CalibratedRange, ContactReading, Model, OutputKind, Uncertainty},
