@@ -207,14 +207,14 @@ mod tests {
     #[test]
     fn the_largest_weight_of_each_row_is_127() {
         let layer = Layer {
-            weights: vec![vec![0.5, -1.0, 0.25], vec![1e-3, 0.0, 2e-3]],
+            weights: vec![vec![0.5, -1.0, 0.25], vec![0.125, 0.0, 0.25]],
             bias: vec![0.5, 0.0],
         };
-        let spec = quantize_layer(&layer, 1.0 / 4096.0, |_| Output {
+        let output = |_| Output {
             factor: 1.0,
             offset: 0.0,
-        })
-        .unwrap();
+        };
+        let spec = quantize_layer(&layer, 1.0 / 4096.0, output).unwrap();
         assert_eq!(spec.weights, [64, -127, 32, 64, 0, 127]);
         assert_eq!(spec.biases, [260_096, 0]);
     }

@@ -197,6 +197,6 @@ mod tests {
         );
         refused(text.replace("0,0,0,", "0,inf,0,"), "column fy_n");
         refused(text.replace(",200,200,", ",200,2.5,"), "column area");
-        refused(text.replace("markers_missing", "a,b"), "line 7");
+        refused(text.replace("markers_missing", "a,b"), "line: 7");
     }
 }

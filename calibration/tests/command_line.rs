@@ -1,0 +1,117 @@
+//! The program as a user runs it.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn run(directory: &Path, arguments: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_hivtac-calibrate");
+    Command::new(program)
+        .current_dir(directory)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[cfg(feature = "train")]
+fn stdout(output: &Output) -> String {
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr_of_failure(output: &Output) -> String {
+    assert!(!output.status.success());
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+#[cfg(feature = "train")]
+fn from_data_to_a_checked_model() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let made = run(
+        here,
+        &[
+            "dataset",
+            "--samples",
+            "200",
+            "--seed",
+            "4",
+            "--out",
+            "data.csv",
+        ],
+    );
+    assert!(stdout(&made).contains("200 frames, 0 rejected"));
+    let fast = ["--hidden", "8", "--epochs", "2", "--rounded-epochs", "1"];
+    let train = [
+        &["train", "--data", "data.csv", "--out", "a.weights"],
+        &fast[..],
+    ]
+    .concat();
+    assert!(stdout(&run(here, &train)).contains("held-out rows, quantized"));
+    stdout(&run(
+        here,
+        &["export", "--weights", "a.weights", "--out", "a.hvtm"],
+    ));
+    let report = stdout(&run(
+        here,
+        &["check", "--model", "a.hvtm", "--samples", "20"],
+    ));
+    for words in [
+        "11-8-3 ov7725",
+        "simulated",
+        "contact reading `force`",
+        "forces                20",
+    ] {
+        assert!(report.contains(words), "no `{words}` in:\n{report}");
+    }
+
+    // The same rest position again changes nothing.
+    let again = [
+        "export",
+        "--weights",
+        "a.weights",
+        "--rest",
+        "data.csv",
+        "--out",
+        "b.hvtm",
+    ];
+    stdout(&run(here, &again));
+    let bytes = |name: &str| std::fs::read(here.join(name)).unwrap();
+    assert_eq!(bytes("a.hvtm"), bytes("b.hvtm"));
+}
+
+#[test]
+fn mistakes_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let fails = |arguments: &[&str], words: &[&str]| {
+        let error = stderr_of_failure(&run(directory.path(), arguments));
+        words
+            .iter()
+            .for_each(|word| assert!(error.contains(word), "no `{word}` in:\n{error}"));
+    };
+    fails(
+        &["check", "--model", "none.hvtm"],
+        &["cannot read none.hvtm"],
+    );
+    fails(
+        &["export", "--weights", "none.weights", "--out", "a"],
+        &["cannot read none.weights"],
+    );
+    fails(
+        &["dataset", "--preset", "mine", "--out", "a.csv"],
+        &["`mine`", "ov7725"],
+    );
+    fails(
+        &["dataset", "--width", "321", "--out", "a.csv"],
+        &["321×240"],
+    );
+    std::fs::write(directory.path().join("a.weights"), "{}").unwrap();
+    fails(
+        &["export", "--weights", "a.weights", "--out", "a"],
+        &["a.weights is not a usable weights file"],
+    );
+}

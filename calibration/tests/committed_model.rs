@@ -1,0 +1,112 @@
+//! The model that firmware and host tool embed: the committed weights give it, byte for byte, and it is as good as
+//! `docs/calibration.md` says.
+
+use std::fs;
+use std::path::PathBuf;
+
+use hivtac_calibration::check::check;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
+use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::model::{ContactReading, Model, Origin, OutputKind};
+use hivtac_sensing::threshold::HsvBox;
+
+fn models() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("models")
+}
+
+fn committed() -> Vec<u8> {
+    fs::read(models().join("default.hvtm")).unwrap()
+}
+
+#[test]
+fn committed_weights_give_the_committed_model() {
+    let weights = Weights::load(&models().join("default.weights")).unwrap();
+    let bytes = export(&weights).unwrap();
+    assert!(
+        bytes == committed(),
+        "run `hivtac-calibrate export` on the committed weights and commit the result"
+    );
+}
+
+#[test]
+fn it_is_made_for_the_firmware() {
+    let bytes = committed();
+    let model = Model::parse(&bytes).unwrap();
+    let conditions = model.conditions;
+    assert_eq!(
+        conditions.geometry,
+        Geometry::preset(Preset::Ov7725, 320, 240)
+    );
+    assert_eq!(conditions.threshold, HsvBox::RED);
+    assert_eq!(conditions.dilations, 1);
+    assert_eq!(conditions.contact, ContactReading::Force);
+    assert_eq!(conditions.origin, Origin::Simulated);
+    assert_eq!(model.output, OutputKind::ForceVector);
+    assert_eq!(model.name().as_str(), "11-64-64-3 ov7725");
+}
+
+#[test]
+fn it_measures_frames_that_no_training_saw() {
+    let report = check(&committed(), 400, 77, || ()).unwrap();
+    let errors = &report.errors;
+    assert_eq!(errors.count(), 400, "rejected: {:?}", report.rejected);
+    assert!(errors.mean_strong_direction_deg() < 0.8, "{report}");
+    assert!(errors.magnitude_rmse_n() < 1.5e-3, "{report}");
+}
+
+#[test]
+fn its_uncertainties_are_the_errors_that_it_makes() {
+    let bytes = committed();
+    let said = Model::parse(&bytes).unwrap().uncertainty;
+    let errors = check(&bytes, 1000, 78, || ()).unwrap().errors;
+    let near = |un: i32, rmse_n: f64| (0.75..1.33).contains(&(rmse_n * 1e6 / f64::from(un)));
+    assert!(
+        near(said.lateral.0, errors.lateral_rmse_n()),
+        "{said:?} {}",
+        errors.lateral_rmse_n()
+    );
+    assert!(
+        near(said.normal.0, errors.normal_rmse_n()),
+        "{said:?} {}",
+        errors.normal_rmse_n()
+    );
+}
+
+#[test]
+fn damaged_models_are_not_checked() {
+    let mut bytes = committed();
+    bytes[300] ^= 1;
+    let error = check(&bytes, 10, 1, || ()).unwrap_err().to_string();
+    assert!(error.contains("not a usable model file"), "{error}");
+}
+
+#[test]
+fn unusable_weights_are_refused_with_the_reason() {
+    let text = fs::read_to_string(models().join("default.weights")).unwrap();
+    let refused = |bad: String, words: &str| {
+        let error = format!("{:#}", Weights::parse(&bad).unwrap_err());
+        assert!(error.contains(words), "{error}");
+    };
+    refused(
+        text.replace("hivtac-weights 1", "hivtac-weights 2"),
+        "hivtac-weights 2",
+    );
+    refused(
+        text.replace("\"force_n\":0.2", "\"force_n\":-0.2"),
+        "range.force_n",
+    );
+    refused(
+        text.replace("\"alpha_deg\":10.0", "\"alpha_deg\":100.0"),
+        "range.alpha_deg",
+    );
+    refused(
+        text.replace("\"lateral_n\":", "\"lateral_n\":-"),
+        "uncertainty.lateral_n",
+    );
+    refused(
+        text.replace("\"contact\":\"force\"", "\"contact\":\"feel\""),
+        "feel",
+    );
+    refused(text[..text.len() / 2].to_owned(), "EOF");
+}

@@ -1,0 +1,135 @@
+//! Training, small: it learns, it is repeatable, it says what it cannot learn from.
+#![cfg(feature = "train")]
+
+use hivtac_calibration::dataset::{Dataset, Recipe, generate};
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::{INPUTS, OUTPUTS};
+use hivtac_calibration::train::{Options, Samples, train};
+
+fn data() -> Dataset {
+    let recipe = Recipe {
+        samples: 400,
+        rest: 8,
+        ..Recipe::default()
+    };
+    generate(&recipe, || ()).unwrap()
+}
+
+fn small() -> Options {
+    Options {
+        hidden: vec![16, 16],
+        epochs: 60,
+        rounded_epochs: 30,
+        learning_rate: 5e-3,
+        ..Options::default()
+    }
+}
+
+#[test]
+fn a_few_hundred_frames_teach_the_force() {
+    let mut losses = Vec::new();
+    let fitted = fit(&data(), &small(), |progress| losses.push(progress)).unwrap();
+    assert_eq!(losses.len(), 90);
+    assert_eq!(losses.iter().filter(|p| p.rounded).count(), 30);
+    // Standardized forces: always answering their mean has a loss of 1.
+    let last = losses.last().unwrap();
+    assert!(last.loss < 0.1, "{last:?}");
+    // Always answering the mean force is 58 mN off in |F| (0.2 N / √12).
+    assert!(
+        fitted.quantized.magnitude_rmse_n() < 0.012,
+        "{:?}",
+        fitted.quantized.magnitude_rmse_n()
+    );
+    assert!(fitted.quantized.mean_strong_direction_deg() < 3.0);
+    assert_eq!(fitted.weights.training.rows, 360);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_weights() {
+    let data = data();
+    let options = Options {
+        epochs: 2,
+        rounded_epochs: 1,
+        ..small()
+    };
+    let weights = |options: &Options| fit(&data, options, |_| ()).unwrap().weights;
+    assert_eq!(weights(&options), weights(&options));
+    let other = Options {
+        seed: 2,
+        ..options.clone()
+    };
+    assert_ne!(weights(&options).network, weights(&other).network);
+}
+
+#[test]
+fn constant_data_trains_to_the_constant() {
+    let samples = Samples {
+        features: vec![[100.0; INPUTS]; 50],
+        forces: vec![[0.01, 0.0, -0.1]; 50],
+    };
+    let network = train(&samples, &small(), |_| ()).unwrap();
+    let force = network.predict(&[100.0; INPUTS]);
+    for (found, truth) in force.iter().zip([0.01, 0.0, -0.1]) {
+        assert!((found - truth).abs() < 0.05, "{force:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_trained_on_is_said() {
+    let refused = |samples: &Samples, options: &Options, words: &str| {
+        let error = train(samples, options, |_| ()).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    let some = Samples {
+        features: (0..5).map(|i| [f64::from(i); INPUTS]).collect(),
+        forces: (0..5).map(|i| [f64::from(i); OUTPUTS]).collect(),
+    };
+    refused(&Samples::default(), &small(), "no usable row");
+    refused(
+        &Samples {
+            forces: Vec::new(),
+            ..some.clone()
+        },
+        &small(),
+        "5 rows of features",
+    );
+    refused(
+        &some,
+        &Options {
+            batch: 0,
+            ..small()
+        },
+        "batch",
+    );
+    refused(
+        &some,
+        &Options {
+            hidden: vec![513],
+            ..small()
+        },
+        "512 wide",
+    );
+    refused(
+        &some,
+        &Options {
+            learning_rate: 0.0,
+            ..small()
+        },
+        "learning rate",
+    );
+    refused(
+        &some,
+        &Options {
+            learning_rate: 1e30,
+            ..small()
+        },
+        "diverged",
+    );
+
+    let mut untouched_missing = data();
+    untouched_missing.rows.drain(..8);
+    let error = fit(&untouched_missing, &small(), |_| ())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("without force"), "{error}");
+}
