@@ -62,12 +62,14 @@ impl Polar {
     /// Of a vector (Fx, Fy, Fz). |F| is limited to 2,147.483647 N.
     pub fn of_vector(vector: [MicroNewtons; 3]) -> Polar {
         let [x, y, z] = vector.map(|component| i64::from(component.0));
-        // Each square is at most 2⁶²: three fit 64 bits, unsigned.
-        let squares = [x, y, z].map(|component| component.unsigned_abs().pow(2));
-        let magnitude = rounded_root(squares.iter().sum());
+        let magnitude = rounded_root(vector.map(square).iter().sum());
+        // Shifted until the largest fills 31 bits, so that a small force keeps its direction.
+        let shift = (x.unsigned_abs() | y.unsigned_abs() | z.unsigned_abs()).leading_zeros();
+        let [x, y, z] = [x, y, z].map(|component| component << shift.saturating_sub(33));
+        let sideways = rounded_root(x.unsigned_abs().pow(2) + z.unsigned_abs().pow(2));
         Polar {
             alpha: atan2(x, -z),
-            beta: atan2(y << 30, rounded_root_q30(squares[0] + squares[2])),
+            beta: atan2(y, sideways as i64),
             magnitude: MicroNewtons(i32::try_from(magnitude).unwrap_or(i32::MAX)),
         }
     }
@@ -158,26 +160,35 @@ fn of_angles([alpha, beta, magnitude]: [i32; 3]) -> Polar {
 /// With σ_l of Fx and Fy, σ_n of Fz, u = F/|F| and c = u_z²: along u, σ² = σ_l²(1 − c) + σ_n²c; the rest of
 /// 2σ_l² + σ_n² lies across u, and turns it by that over |F|.
 fn propagate(uncertainty: &Uncertainty, vector: [MicroNewtons; 3]) -> (MilliDegrees, MicroNewtons) {
-    let square = |value: MicroNewtons| u128::from(value.0.unsigned_abs()).pow(2);
+    /// A radian in m°, to 4 · 10⁻⁶ of itself.
+    const RADIAN: u64 = 57_296;
     let (lateral, normal) = (square(uncertainty.lateral), square(uncertainty.normal));
-    let length: u128 = vector.map(square).iter().sum();
+    let length: u64 = vector.map(square).iter().sum();
     if length == 0 {
         // No direction: the larger of both holds for |F|.
         return (NO_DIRECTION, uncertainty.lateral.max(uncertainty.normal));
     }
-    let axial = square(vector[2]);
-    let along = (lateral * (length - axial) + normal * axial) / length;
+    let part = part_q30(square(vector[2]), length);
+    let weighted = |variance: u64, part: u64| u128::from(variance) * u128::from(part);
+    let along = ((weighted(lateral, (1 << 30) - part) + weighted(normal, part)) >> 30) as u64;
     let across = 2 * lateral + normal - along;
-    let magnitude_sigma = MicroNewtons(along.isqrt() as i32);
-    (angle_of(across, length), magnitude_sigma)
+    let angle = rounded_root(across) * RADIAN / rounded_root(length);
+    let direction = i32::try_from(angle).map_or(NO_DIRECTION, MilliDegrees);
+    (
+        direction.min(NO_DIRECTION),
+        MicroNewtons(rounded_root(along) as i32),
+    )
 }
 
-/// √(across / length) rad in m°, at most 180°.
-fn angle_of(across: u128, length: u128) -> MilliDegrees {
-    /// (180,000 / π)², m°² in a squared radian.
-    const SQUARED_RADIAN: u128 = 3_282_806_350;
-    let angle = (across * SQUARED_RADIAN / length).isqrt();
-    i32::try_from(angle).map_or(NO_DIRECTION, |angle| MilliDegrees(angle).min(NO_DIRECTION))
+/// Of a component or an uncertainty: at most 2⁶², so that three fit 64 bits, unsigned.
+fn square(value: MicroNewtons) -> u64 {
+    u64::from(value.0.unsigned_abs()).pow(2)
+}
+
+/// part / whole with 30 fractional bits; part ≤ whole, whole > 0.
+fn part_q30(part: u64, whole: u64) -> u64 {
+    let excess = 30u32.saturating_sub(whole.leading_zeros());
+    ((part >> excess) << 30) / (whole >> excess)
 }
 
 /// √n, rounded to nearest.
@@ -185,9 +196,4 @@ fn rounded_root(n: u64) -> u64 {
     let root = n.isqrt();
     // n > (root + ½)² ⇔ n > root² + root.
     root + u64::from(n - root * root > root)
-}
-
-/// √n · 2³⁰, so that small forces keep their angle; n ≤ 2⁶³, the result is below 2⁶².
-fn rounded_root_q30(n: u64) -> i64 {
-    (u128::from(n) << 60).isqrt() as i64
 }

@@ -36,7 +36,7 @@ pub struct Seen {
 /// A pixel is a square, not a point: 1/12 px² in Q16.
 const PIXEL_VARIANCE: i64 = 5_461;
 /// 4π in Q16.
-const FOUR_PI: i128 = 823_550;
+const FOUR_PI: i64 = 823_550;
 /// What soft edges add to a diameter (0.8 px: a pixel half covered by red passes), and a dilation (2 px).
 const SOFT_EDGE: i32 = 52_429;
 const DILATION_EDGE: i32 = 131_072;
@@ -101,9 +101,11 @@ fn diameter(variance: i64) -> i64 {
     4 * (variance.max(0) << 16).isqrt()
 }
 
-/// An ellipse's area is 4π√det of its covariance.
+/// An ellipse's area is 4π√det of its covariance. Variances are below 800²/12 + 1 px² < 2³² in Q16, so that the
+/// determinant fits 64 bits.
 fn fill(area: i64, [xx, xy, yy]: [i64; 3]) -> i64 {
-    let determinant = i128::from(xx) * i128::from(yy) - i128::from(xy) * i128::from(xy);
-    let ellipse_q32 = FOUR_PI * determinant.max(1).isqrt();
-    ((i128::from(area) << 48) / ellipse_q32) as i64
+    let product = |a: i64, b: i64| a.unsigned_abs() * b.unsigned_abs();
+    let determinant = product(xx, yy).saturating_sub(product(xy, xy));
+    let ellipse_q24 = (FOUR_PI * determinant.isqrt() as i64) >> 8;
+    (area << 40) / ellipse_q24.max(1)
 }
