@@ -155,7 +155,8 @@ impl Link {
         }
     }
 
-    fn lost(&self, why: &str) -> Failure {
+    /// The failure of a connection that broke.
+    pub fn lost(&self, why: &str) -> Failure {
         let name = &self.name;
         let message = format!(
             "connection to {name} lost: {why}; cable pulled or device reset? \

@@ -13,10 +13,10 @@ use std::time::{Duration, Instant};
 
 /// Time between two attempts to connect again.
 const RETRY_EVERY: Duration = Duration::from_millis(500);
-/// Silence after which a person is told.
+/// Silence after which the device is asked whether it is still there.
 const SILENCE: Duration = Duration::from_secs(5);
-/// Longest wait for the last counters at the end.
-const FAREWELL: Duration = Duration::from_secs(1);
+/// Longest wait for the last counters at the end, however patient it is otherwise.
+const FAREWELL: Duration = Duration::from_secs(10);
 
 /// What to do.
 pub struct Options {
@@ -53,6 +53,37 @@ enum End {
     Enough,
     /// Nobody reads the output any more.
     ReaderGone,
+}
+
+/// Time without a sample.
+struct Silence {
+    since: Instant,
+    told: bool,
+}
+
+impl Silence {
+    fn new() -> Silence {
+        Silence {
+            since: Instant::now(),
+            told: false,
+        }
+    }
+
+    /// When it is long enough to ask the device.
+    fn end(&self) -> Instant {
+        self.since + SILENCE
+    }
+
+    /// The device answered: tells a person once, and counts anew.
+    fn tell(&mut self) {
+        if !std::mem::replace(&mut self.told, true) {
+            let seconds = SILENCE.as_secs();
+            note(&format!(
+                "hivtac: no sample for {seconds} s, but the device answers; does the camera run? (waiting)"
+            ));
+        }
+        self.since = Instant::now();
+    }
 }
 
 struct Monitor<'o> {
@@ -163,10 +194,12 @@ impl<'o> Monitor<'o> {
     }
 
     fn stream(&mut self, link: &mut Link) -> Result<End, Failure> {
-        let mut heard = Instant::now();
+        let mut silence = Silence::new();
         while !self.time_is_over() {
-            let silence_ends = heard + SILENCE;
-            match link.receive(self.end().map_or(silence_ends, |end| end.min(silence_ends)))? {
+            let wait = self
+                .end()
+                .map_or(silence.end(), |end| end.min(silence.end()));
+            match link.receive(wait)? {
                 Some(message) => {
                     let is_sample = matches!(message, DeviceMessage::Sample(_));
                     if let Some(end) = self.take(message)? {
@@ -174,20 +207,30 @@ impl<'o> Monitor<'o> {
                     }
                     // After `take`, which may have waited for whoever reads the output.
                     if is_sample {
-                        heard = Instant::now();
+                        silence = Silence::new();
                     }
                 }
-                None if heard.elapsed() >= SILENCE => {
-                    let seconds = SILENCE.as_secs();
-                    note(&format!(
-                        "hivtac: no sample for {seconds} s; does the camera run? (still waiting)"
-                    ));
-                    heard = Instant::now();
+                None if Instant::now() >= silence.end() => {
+                    if let Some(end) = self.probe(link)? {
+                        return Ok(end);
+                    }
+                    silence.tell();
                 }
                 None => (),
             }
         }
         Ok(End::Enough)
+    }
+
+    /// Finds out whether the device still knows of this conversation. Behind a TCP port it may have been unplugged or
+    /// restarted without the port closing.
+    fn probe(&mut self, link: &mut Link) -> Result<Option<End>, Failure> {
+        match self.request(link, Request::GetInfo, self.options.patience) {
+            Err(failure) if failure.kind == Kind::Refused => {
+                Err(link.lost("the device sends nothing and does not answer"))
+            }
+            result => result,
+        }
     }
 
     /// Deals with one message; returns why to end, if so.
@@ -244,9 +287,10 @@ impl<'o> Monitor<'o> {
                 stats.stats(&last);
             }
         };
+        let patience = FAREWELL.min(self.options.patience);
         for request in [Request::Stop, Request::GetInfo] {
             let tally = &mut self.tally;
-            let result = link.request(request, FAREWELL, |message| ignore_samples(tally, message));
+            let result = link.request(request, patience, |message| ignore_samples(tally, message));
             if result.is_err() {
                 return;
             }

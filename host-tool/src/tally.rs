@@ -165,16 +165,19 @@ impl Gaps {
 #[derive(Default)]
 struct DeviceCounts {
     last: Option<Stats>,
+    /// How often they were received after the first time.
+    updates: u64,
     grown: [u64; 10],
 }
 
 impl DeviceCounts {
     fn count(&mut self, stats: &Stats) {
         let last = match self.last.replace(*stats) {
-            None => *stats,
+            None => return,
             Some(last) if stats.uptime_us < last.uptime_us => Stats::default(),
             Some(last) => last,
         };
+        self.updates += 1;
         let pairs = counters(stats).into_iter().zip(counters(&last));
         for (sum, (now, before)) in self.grown.iter_mut().zip(pairs) {
             *sum += u64::from(now.saturating_sub(before));
@@ -199,8 +202,8 @@ fn counters(stats: &Stats) -> [u32; 10] {
 
 impl fmt::Display for DeviceCounts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(last) = self.last else {
-            return f.write_str("device: no counters received");
+        let Some(last) = self.last.filter(|_| self.updates > 0) else {
+            return f.write_str("device: no counters received since the start");
         };
         let [
             exposed,

@@ -79,6 +79,12 @@ impl Conversation {
         }
     }
 
+    /// Answers one message like a good device; false when the host is gone.
+    pub fn answer_one(&mut self) -> bool {
+        let message = self.next();
+        message.map(|message| self.answer(message)).is_some()
+    }
+
     /// Answers one message; true for start.
     fn answer(&mut self, message: HostMessage) -> bool {
         let HostMessage::Command(Command { id, request }) = message else {

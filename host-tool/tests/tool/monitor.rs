@@ -227,6 +227,58 @@ fn a_cable_pulled_and_put_back_is_survived() {
     assert!(stderr.contains("\nconnected again 1 times\n"), "{stderr}");
 }
 
+/// The port stays open, but the device behind it was unplugged or restarted and knows nothing of the conversation.
+#[test]
+fn a_device_that_forgot_the_conversation_is_lost() {
+    let forgetful = || -> Script {
+        Box::new(|device| {
+            device.until_start();
+            device.send(sample(5, 5));
+            while device.next().is_some() {}
+        })
+    };
+    let arguments = [
+        "monitor",
+        "--json",
+        "--timeout",
+        "0.5",
+        "--frames",
+        "2",
+        "--port",
+    ];
+    let device = FakeDevice::on_tcp([forgetful()]);
+    let alone = start(&[&arguments[..], &[&device.port]].concat());
+    let device = FakeDevice::on_tcp([forgetful(), streaming(samples(0..1))]);
+    let again = start(&[&arguments[..], &[&device.port, "--reconnect"]].concat());
+    let alone = alone.finish();
+    assert_eq!(alone.code, Some(5), "{alone:?}");
+    let why = "lost: the device sends nothing and does not answer; ";
+    assert!(alone.stderr.contains(why), "{alone:?}");
+    let again = again.finish();
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert_eq!(sequence_numbers(&again.stdout), [5, 0]);
+    assert!(
+        again.stderr.contains("; the device started anew 1 times"),
+        "{again:?}"
+    );
+}
+
+#[test]
+fn a_device_whose_camera_is_silent_is_waited_for() {
+    let device = FakeDevice::on_pty(Box::new(|device| {
+        device.until_start();
+        // The probe.
+        assert!(device.answer_one());
+        device.send(sample(1, 1));
+        device.serve();
+    }));
+    let run = run(&["monitor", "--json", "--frames", "1", "--port", &device.port]);
+    assert_eq!(run.code, Some(0), "{run:?}");
+    let note =
+        "hivtac: no sample for 5 s, but the device answers; does the camera run? (waiting)\n";
+    assert!(run.stderr.starts_with(note), "{run:?}");
+}
+
 #[test]
 fn a_reader_that_goes_away_ends_it_in_peace() {
     let device = FakeDevice::on_tcp([Box::new(|device| {
