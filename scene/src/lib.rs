@@ -39,6 +39,7 @@ mod load;
 mod motion;
 mod noise;
 mod options;
+pub mod paper;
 mod scene;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Preset};
