@@ -143,7 +143,7 @@ impl<'o> Monitor<'o> {
                         "hivtac: connected again to {} after {seconds:.1} s",
                         link.name
                     ));
-                    self.tally.reconnections += 1;
+                    self.tally.connected_again();
                     self.just_back = true;
                     return Ok(Some(link));
                 }
@@ -170,7 +170,7 @@ impl<'o> Monitor<'o> {
 
     fn print_header(&mut self) -> Result<(), Failure> {
         let header = self.options.format.header(self.truth.is_some());
-        if let (Some(header), 0) = (header, self.tally.reconnections) {
+        if let (Some(header), 0) = (header, self.tally.reconnections()) {
             self.reader = print(&header)?;
         }
         Ok(())
@@ -249,7 +249,7 @@ impl<'o> Monitor<'o> {
         let (samples, frames) = self.tally.sample(sample);
         if std::mem::take(&mut self.just_back) {
             note(&format!(
-                "hivtac: {samples} samples missed, {frames} more frames not processed meanwhile"
+                "hivtac: {samples} samples missed, {frames} more frames passed meanwhile"
             ));
         }
         let truth = match &mut self.truth {

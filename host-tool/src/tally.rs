@@ -23,12 +23,22 @@ pub struct Tally {
     /// Of those without a force, how many had each "no force" bit, by its place in [`Status::NAMES`].
     reasons: BTreeMap<usize, u64>,
     errors: Errors,
-    /// Connections after the first.
-    pub reconnections: u64,
+    reconnections: u64,
 }
 
 impl Tally {
-    /// Counts a sample; returns how many samples and frames before it are missing.
+    /// Connected again: frames that passed meanwhile were not sent, so it says nothing that they are missing.
+    pub fn connected_again(&mut self) {
+        self.reconnections += 1;
+        self.gaps.away = true;
+    }
+
+    /// Connections after the first.
+    pub fn reconnections(&self) -> u64 {
+        self.reconnections
+    }
+
+    /// Counts a sample; returns how many samples, and frames beyond those, are missing before it.
     pub fn sample(&mut self, sample: &Sample) -> (u32, u32) {
         self.received += 1;
         if sample.force.is_none() {
@@ -75,7 +85,11 @@ impl Tally {
             lines.push(self.without_force_line());
         }
         if self.reconnections > 0 {
-            lines.push(format!("connected again {} times", self.reconnections));
+            let frames = self.gaps.frames_away;
+            let times = self.reconnections;
+            lines.push(format!(
+                "connected again {times} times; {frames} frames passed meanwhile"
+            ));
         }
         if truth {
             lines.extend(self.errors.lines());
@@ -138,12 +152,17 @@ struct Gaps {
     last: Option<(u32, u32)>,
     samples: u64,
     frames: u64,
+    /// No sample since the connection is back.
+    away: bool,
+    /// Frames, beyond the samples, that passed between connections.
+    frames_away: u64,
     restarts: u64,
 }
 
 impl Gaps {
     /// Missing samples, and missing frames beyond those, between this sample and the one before.
     fn count(&mut self, sequence: u32, frame: u32) -> (u32, u32) {
+        let away = std::mem::take(&mut self.away);
         let Some((last_sequence, last_frame)) = self.last.replace((sequence, frame)) else {
             return (0, 0);
         };
@@ -154,10 +173,14 @@ impl Gaps {
             self.restarts += 1;
             return (0, 0);
         }
-        let unprocessed = frames.saturating_sub(samples);
+        let beyond = frames.saturating_sub(samples);
         self.samples += u64::from(samples);
-        self.frames += u64::from(unprocessed);
-        (samples, unprocessed)
+        *if away {
+            &mut self.frames_away
+        } else {
+            &mut self.frames
+        } += u64::from(beyond);
+        (samples, beyond)
     }
 }
 
@@ -323,8 +346,11 @@ mod tests {
         assert_eq!(gaps.count(3, 15), (2, 0), "two samples lost on the way");
         assert_eq!(gaps.count(4, 18), (0, 2), "two frames not processed");
         assert_eq!(gaps.count(6, 22), (1, 2), "both");
+        gaps.away = true;
+        assert_eq!(gaps.count(8, 40), (1, 16), "back again");
+        assert_eq!(gaps.frames_away, 16);
         assert_eq!(gaps.count(0, 1), (0, 0), "started anew");
-        assert_eq!((gaps.samples, gaps.frames, gaps.restarts), (3, 4, 1));
+        assert_eq!((gaps.samples, gaps.frames, gaps.restarts), (4, 4, 1));
     }
 
     #[test]

@@ -98,7 +98,8 @@ pub struct HsvBox {
 pub struct Sample {
     /// Counts the samples that were produced; a gap is a sample lost on the way to the host.
     pub sequence: u32,
-    /// Counts VSYNC edges since the camera was set up; a gap is a frame that was not processed.
+    /// Counts VSYNC edges since the camera was set up; a gap while streaming is a frame that was not
+    /// processed.
     pub frame: u32,
     /// Device time of that VSYNC edge, µs since boot.
     pub time_us: u64,
