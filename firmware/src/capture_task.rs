@@ -82,7 +82,10 @@ impl CaptureTask {
         }
         match failure {
             Failure::Silence => self.silent().await,
-            _ => self.silences = 0,
+            Failure::Overrun | Failure::Size => {
+                self.silences = 0;
+                health::set(Condition::NoForce);
+            }
         }
     }
 
