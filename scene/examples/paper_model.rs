@@ -3,6 +3,8 @@
 //! Prints the mean of R* in each reading of the paper, where disp_N peaks, and the errors of the model in `f64` and
 //! `f32` against the reference table. With `--figure8 FILE` it also writes Figure 8 as an SVG picture.
 
+#[path = "../tests/paper_reference/picture.rs"]
+mod picture;
 #[path = "../tests/paper_reference/readings.rs"]
 mod readings;
 #[path = "../tests/paper_reference/scan.rs"]
@@ -12,16 +14,15 @@ mod table;
 
 use std::error::Error;
 
-use hivtac_scene::paper::{Design, Map, OutOfDomain, PinholeDistance};
+use hivtac_scene::paper::{Design, OutOfDomain, PinholeDistance};
 
 const READINGS: [PinholeDistance; 2] = [PinholeDistance::Slant, PinholeDistance::Axial];
-/// Cells along each axis: of the means, and of the picture.
+/// Cells along each axis for the means.
 const MEAN_CELLS: usize = 700;
-const PICTURE_CELLS: usize = 100;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let picture = match arguments.as_slice() {
+    let figure8 = match arguments.as_slice() {
         [] => None,
         [flag, file] if flag == "--figure8" => Some(file),
         _ => return Err("usage: paper_model [--figure8 FILE]".into()),
@@ -31,10 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rows = table::rows();
     print_errors(&rows);
     print_second_line(&rows);
-    if let Some(file) = picture {
-        let map = Map::new(&Design::paper(PinholeDistance::Slant), PICTURE_CELLS)?;
-        let title = "R* that maximizes Q (Figure 8; slant D_ph, ε = 0)";
-        std::fs::write(file, map.to_svg(title)).map_err(|why| format!("{file}: {why}"))?;
+    if let Some(file) = figure8 {
+        std::fs::write(file, picture::figure8_svg()?).map_err(|why| format!("{file}: {why}"))?;
         println!("\nwrote {file}");
     }
     Ok(())

@@ -6,6 +6,8 @@ use hivtac_scene::paper::{
 };
 use proptest::prelude::*;
 
+use crate::picture;
+
 const READINGS: [PinholeDistance; 2] = [PinholeDistance::Slant, PinholeDistance::Axial];
 const BAD: [f64; 4] = [-1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
@@ -162,6 +164,16 @@ fn a_map_has_cells_and_stays_before_the_pinhole() {
         ..design()
     };
     refuses(Map::new(&wide, 10), "z_m'");
+}
+
+/// The picture in the documentation is this code's, byte for byte, on every machine.
+#[test]
+fn the_documented_picture_is_the_map() {
+    let documented = include_str!("../../../docs/pictures/figure8.svg");
+    assert!(
+        picture::figure8_svg().unwrap() == documented,
+        "run the example paper_model with --figure8 docs/pictures/figure8.svg"
+    );
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod accuracy;
 mod claims;
 mod domains;
+mod picture;
 mod readings;
 mod scan;
 mod table;
