@@ -134,7 +134,8 @@ pub struct ToolOutput {
     pub err: String,
 }
 
-/// Runs the host tool (`HIVTAC_TOOL`) on a rig's port until it ends.
+/// Runs the host tool (`HIVTAC_TOOL`) on a rig's port until it ends. It waits up to 40 s for an answer: the emulated
+/// board boots slower than a real one.
 ///
 /// # Errors
 /// When it cannot be started, or does not end.
@@ -143,7 +144,7 @@ pub fn tool(rig: &Rig, command: &str, options: &[&str]) -> Result<ToolOutput> {
     let output = Command::new("timeout")
         .arg(std::format!("{seconds}"))
         .arg(artifact::named_by("HIVTAC_TOOL"))
-        .args([command, "--port", rig.port(), "--timeout", "200"])
+        .args([command, "--port", rig.port(), "--timeout", "40"])
         .args(options)
         .stdin(Stdio::null())
         .output()

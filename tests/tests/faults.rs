@@ -43,7 +43,7 @@ fn check_recovery(output: &ToolOutput, lines: &[Value]) {
 
 #[test]
 fn a_silent_camera_is_started_again() {
-    let (output, lines) = watch(&["camera-silent@1500-2000"], &["--frames", "30"]);
+    let (output, lines) = watch(&["camera-silent@500-1000"], &["--frames", "30"]);
     check_recovery(&output, &lines);
     assert!(
         lines
@@ -57,7 +57,7 @@ fn a_silent_camera_is_started_again() {
 
 #[test]
 fn an_overrun_costs_its_frame_and_no_more() {
-    let (output, lines) = watch(&["dcmi-overrun@1500"], &["--frames", "30"]);
+    let (output, lines) = watch(&["dcmi-overrun@500-505"], &["--frames", "30"]);
     check_recovery(&output, &lines);
     assert!(
         lines.iter().any(|line| has_status(line, "capture_overrun")),
@@ -68,12 +68,12 @@ fn an_overrun_costs_its_frame_and_no_more() {
 
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
-    let (output, lines) = watch(&["host-not-reading@1500-3000"], &["--frames", "60"]);
+    let (output, lines) = watch(&["host-not-reading@500-1500"], &["--frames", "30"]);
     check_recovery(&output, &lines);
     assert!(counter(&output, "USB") > 0, "{}", output.err);
-    assert_eq!(
-        counter(&output, "busy"),
-        0,
+    let no_gap = "0 frames not processed";
+    assert!(
+        output.err.contains(no_gap),
         "the camera never waits: {}",
         output.err
     );
@@ -87,13 +87,13 @@ fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
 #[test]
 fn a_pulled_cable_is_reported_and_survived() {
     let options = ["--frames", "20", "--reconnect"];
-    let (output, lines) = watch(&["cable-pulled@1500-2000"], &options);
+    let (output, lines) = watch(&["cable-pulled@500-900"], &options);
     check_recovery(&output, &lines);
     assert!(output.err.contains("connected again"), "{}", output.err);
 }
 
 #[test]
 fn a_pulled_cable_ends_a_monitor_that_does_not_reconnect() {
-    let (output, _) = watch(&["cable-pulled@1500-2000"], &["--frames", "20"]);
+    let (output, _) = watch(&["cable-pulled@500-900"], &["--frames", "20"]);
     assert_eq!(output.code, Some(5), "{output:?}");
 }

@@ -42,11 +42,16 @@ pub fn host_tool() -> Result<PathBuf> {
 
 /// The rig.
 pub fn rig() -> Result<PathBuf> {
-    let mut command = cargo("build", &workspace::folder("rig"));
-    build(
-        command.args(["--release", "--bin", "hivtac-rig"]),
-        "hivtac-rig",
-    )
+    let mut command = rig_cargo("build");
+    build(command.args(["--bin", "hivtac-rig"]), "hivtac-rig")
+}
+
+/// A cargo command for the rig: always in release, so that its emulator is built once, and with an emulator that
+/// declares a newer compiler than it needs.
+pub fn rig_cargo(verb: &str) -> Command {
+    let mut command = cargo(verb, &workspace::folder("rig"));
+    command.args(["--release", "--ignore-rust-version"]);
+    command
 }
 
 /// The sensing as a Cortex-M7 program for QEMU.

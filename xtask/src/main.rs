@@ -13,6 +13,8 @@ mod test;
 mod toolchain;
 mod workspace;
 
+use std::process::ExitCode;
+
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
@@ -47,13 +49,22 @@ enum Task {
     Size(size::Size),
 }
 
-fn main() -> Result<()> {
-    let arguments = Arguments::parse();
-    let toolchain = || Toolchain::prepare(arguments.toolchain);
+fn main() -> ExitCode {
+    match run(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<()> {
+    let toolchain = Toolchain::prepare(arguments.toolchain)?;
     match arguments.task {
-        Task::Demo(demo) => demo.run(&toolchain()?),
-        Task::Test(test) => test.run(&toolchain()?),
-        Task::Bench(bench) => bench.run(&toolchain()?),
-        Task::Size(size) => size.run(&toolchain()?),
+        Task::Demo(demo) => demo.run(&toolchain),
+        Task::Test(test) => test.run(&toolchain),
+        Task::Bench(bench) => bench.run(&toolchain),
+        Task::Size(size) => size.run(&toolchain),
     }
 }

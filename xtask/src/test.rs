@@ -105,9 +105,8 @@ impl Test {
         if self.wants("tests: rig") {
             report.step("tests: rig", |tally| {
                 let programs = programs.context("not run: the firmware could not be built")?;
-                // In release, as the demo runs it: the emulator is built once.
-                let mut command = cargo("test", &workspace::folder("rig"));
-                programs.name_to(command.args(["--release", "--no-fail-fast"]));
+                let mut command = artifacts::rig_cargo("test");
+                programs.name_to(command.arg("--no-fail-fast"));
                 run_tests(&mut command, tally)
             });
         }
@@ -171,8 +170,8 @@ fn host_lints() -> Result<()> {
         "hivtac-firmware",
         "--all-targets",
     ]);
-    let mut rig = cargo("clippy", &workspace::folder("rig"));
-    rig.args(["--release", "--all-targets"]);
+    let mut rig = artifacts::rig_cargo("clippy");
+    rig.arg("--all-targets");
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
     counter.arg("--release");
     for command in [&mut root, &mut rig, &mut counter] {
