@@ -10,8 +10,11 @@
 //! 4. *Trust* (`trust`): with a rest position, much tighter limits relative to it decide whether there may be a
 //!    force.
 //!
-//! Exactly one set of four must pass 1 to 3; two are ambiguous, however different. What cannot be seen: a red disc
-//! of a marker's size that hides a marker and sits within a third of a marker's width of it.
+//! Exactly one set of four must pass 1 to 3; two are ambiguous, however different.
+//!
+//! What stays unseen, at QVGA (`tests/tests/markers.rs` asserts these bounds on rendered frames): a marker covered or
+//! eaten by less than 0.3 mm of its 1 mm, which moves it by up to 0.8 px; a red thing that sticks out of a marker and
+//! moves it by up to 1.5 px; a red disc of a marker's size in place of a hidden one, less than 0.55 mm from it.
 
 mod pattern;
 mod shape;

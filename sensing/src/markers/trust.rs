@@ -2,7 +2,9 @@
 //!
 //! The limits stand between what any load does to the markers and what a false, cut or half dark marker does. The
 //! first was measured on rendered frames of four film shapes (tent, membrane, bowl, spike) at QVGA and 800×600, forces
-//! to 0.4 N, tilts to 27° and contacts to 1.4 mm off the middle; each limit's comment gives the largest value seen.
+//! to 0.4 N tilted by up to 17°, pressed in the middle and up to 2 mm off it; each limit's comment gives the largest
+//! value seen. Presses farther off the middle are refused where they strain the pattern: a model of presses in
+//! the middle would read them wrong.
 
 use super::{
     Found,
