@@ -225,3 +225,8 @@ pub fn streaming(messages: Vec<DeviceMessage>) -> Script {
         }
     })
 }
+
+/// Samples with these sequence and frame numbers.
+pub fn samples(numbers: std::ops::Range<u32>) -> Vec<DeviceMessage> {
+    numbers.map(|number| sample(number, number)).collect()
+}

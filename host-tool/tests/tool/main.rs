@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 mod commands;
+mod endings;
 mod fake;
 mod monitor;
 mod run;

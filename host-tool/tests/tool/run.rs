@@ -71,3 +71,11 @@ impl Finished {
         }
     }
 }
+
+/// The sequence numbers of JSON lines.
+pub fn sequence_numbers(stdout: &str) -> Vec<u64> {
+    let lines = stdout
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    lines.map(|line| line["seq"].as_u64().unwrap()).collect()
+}
