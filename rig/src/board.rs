@@ -8,8 +8,9 @@ use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
 use rigless::soc::stm32h743::generated::gpioa::Register as Port;
 use rigless::soc::stm32h743::generated::{pwr, rcc};
-use rigless::soc::stm32h743::peripherals::gpio::{Gpio, Pin};
+use rigless::soc::stm32h743::peripherals::gpio::{Gpio, PORTS, Pin};
 use rigless::soc::stm32h743::peripherals::rcc::{HSI_HZ, HSI48_HZ, Pll, Tap};
+use rigless::soc::{Bus, Error};
 
 use crate::camera::Supply;
 use crate::dcmi::Pins;
@@ -62,23 +63,52 @@ pub struct Wiring {
     pub usb: bool,
 }
 
-impl Wiring {
+/// Where the part keeps the registers that decide the wiring.
+#[derive(Clone, Copy, Debug)]
+pub struct Slots {
+    ports: [usize; 5],
+    rcc: usize,
+    pwr: usize,
+}
+
+impl Slots {
+    /// Finds them.
+    ///
+    /// # Errors
+    /// When the part is not laid out as expected.
+    pub fn of(bus: &Bus) -> Result<Self, Error> {
+        let mut ports = [0; 5];
+        for (slot, name) in ports.iter_mut().zip(PORTS) {
+            *slot = bus.slot(name)?;
+        }
+        Ok(Self {
+            ports,
+            rcc: bus.slot("RCC")?,
+            pwr: bus.slot("PWR")?,
+        })
+    }
+
+    /// The port of VSYNC.
+    pub fn vsync_port(&self) -> usize {
+        self.ports[VSYNC_PORT]
+    }
+
     /// How the firmware has set the part up now.
-    pub fn of(part: &Stm32h743) -> Wiring {
+    pub fn wiring(&self, part: &Stm32h743) -> Wiring {
         let carries = |port: usize, number: u8, function: u8| {
-            Gpio::function(pin(number), registers(part, port)) == Some(function)
+            Gpio::function(pin(number), self.port(part, port)) == Some(function)
         };
         let bit = |(i, &(port, number)): (usize, &(usize, u8))| {
             u8::from(carries(port, number, AF_DCMI)) << i
         };
         let clock_hz = if carries(A, 8, AF_MCO) {
-            mco1_hz(part)
+            self.mco1_hz(part)
         } else {
             0
         };
         Wiring {
             supply: Supply {
-                powered: camera_powered(part),
+                powered: self.camera_powered(part),
                 clock_hz,
                 sccb: carries(B, 8, AF_I2C1) && carries(B, 9, AF_I2C1),
             },
@@ -88,54 +118,51 @@ impl Wiring {
                 hsync: carries(A, 4, AF_DCMI),
                 vsync: carries(B, 7, AF_DCMI),
             },
-            hclk_hz: part.rcc.hclk(instance(part, "RCC")),
-            usb: carries(A, 11, AF_USB) && carries(A, 12, AF_USB) && usb_supplied(part),
+            hclk_hz: part.rcc.hclk(registers(part, self.rcc)),
+            usb: carries(A, 11, AF_USB) && carries(A, 12, AF_USB) && self.usb_supplied(part),
         }
     }
-}
 
-/// The switch pulls its gate up: it is on only while PA7 is driven low.
-fn camera_powered(part: &Stm32h743) -> bool {
-    const OUTPUT: u64 = 1;
-    let port = registers(part, A);
-    let driven = port.get(Port::Moder) >> 14 & 3 == OUTPUT;
-    driven && part.gpio[A].level(pin(7), port) == Level::Low
-}
+    fn port<'a>(&self, part: &'a Stm32h743, port: usize) -> &'a RegisterFile {
+        registers(part, self.ports[port])
+    }
 
-/// PWR_CR3: USB33DEN, which the firmware sets once the 3.3 V are there.
-fn usb_supplied(part: &Stm32h743) -> bool {
-    instance(part, "PWR").get(pwr::Register::Cr3) >> 24 & 1 == 1
-}
+    /// PA7 high is power-down, and the line is pulled up: the camera is on only while PA7 is driven low.
+    fn camera_powered(&self, part: &Stm32h743) -> bool {
+        const OUTPUT: u64 = 1;
+        let port = self.port(part, A);
+        let driven = port.get(Port::Moder) >> 14 & 3 == OUTPUT;
+        driven && part.gpio[A].level(pin(7), port) == Level::Low
+    }
 
-/// MCO1, RM0433 RCC_CFGR bits 24:22 (source) and 21:18 (divider, 0 is off).
-fn mco1_hz(part: &Stm32h743) -> u64 {
-    let registers = instance(part, "RCC");
-    let (cfgr, cr) = (
-        registers.get(rcc::Register::Cfgr),
-        registers.get(rcc::Register::Cr),
-    );
-    let running = |ready_bit: u32, hz: u64| if cr >> ready_bit & 1 == 1 { hz } else { 0 };
-    let source = match cfgr >> 22 & 7 {
-        0 => running(2, HSI_HZ >> (cr >> 3 & 3)),
-        2 => running(17, CRYSTAL_HZ),
-        3 => running(25, part.rcc.pll_output(registers, Pll::One, Tap::Q)),
-        4 => running(13, HSI48_HZ),
-        _ => 0,
-    };
-    source.checked_div(cfgr >> 18 & 15).unwrap_or(0)
+    /// PWR_CR3: USB33DEN, which the firmware sets once the 3.3 V are there.
+    fn usb_supplied(&self, part: &Stm32h743) -> bool {
+        registers(part, self.pwr).get(pwr::Register::Cr3) >> 24 & 1 == 1
+    }
+
+    /// MCO1, RM0433 RCC_CFGR bits 24:22 (source) and 21:18 (divider, 0 is off).
+    fn mco1_hz(&self, part: &Stm32h743) -> u64 {
+        let registers = registers(part, self.rcc);
+        let cfgr = registers.get(rcc::Register::Cfgr);
+        let cr = registers.get(rcc::Register::Cr);
+        let running = |ready_bit: u32, hz: u64| if cr >> ready_bit & 1 == 1 { hz } else { 0 };
+        let source = match cfgr >> 22 & 7 {
+            0 => running(2, HSI_HZ >> (cr >> 3 & 3)),
+            2 => running(17, CRYSTAL_HZ),
+            3 => running(25, part.rcc.pll_output(registers, Pll::One, Tap::Q)),
+            4 => running(13, HSI48_HZ),
+            _ => 0,
+        };
+        source.checked_div(cfgr >> 18 & 15).unwrap_or(0)
+    }
 }
 
 fn pin(number: u8) -> Pin {
     Pin::new(number).expect("a port has sixteen pins")
 }
 
-fn registers(part: &Stm32h743, port: usize) -> &RegisterFile {
-    use rigless::soc::stm32h743::peripherals::gpio::PORTS;
-    instance(part, PORTS[port])
-}
-
-fn instance<'a>(part: &'a Stm32h743, name: &str) -> &'a RegisterFile {
-    part.bus().registers(name).expect("an instance of the part")
+fn registers(part: &Stm32h743, slot: usize) -> &RegisterFile {
+    part.bus().slots()[slot].registers()
 }
 
 #[cfg(test)]
@@ -147,6 +174,10 @@ mod tests {
 
     const RCC: u64 = 0x5802_4400;
     const PORT_A: u64 = 0x5802_0000;
+
+    fn wiring(part: &Stm32h743) -> Wiring {
+        Slots::of(part.bus()).unwrap().wiring(part)
+    }
 
     fn write(part: &mut Stm32h743, address: u64, value: u64) {
         part.write(VirtualNanos(0), address, Width::W32, value)
@@ -161,10 +192,10 @@ mod tests {
 
     #[test]
     fn out_of_reset_nothing_reaches_the_camera_or_usb() {
-        let wiring = Wiring::of(&part());
-        assert_eq!(wiring.supply, Supply::default());
-        assert_eq!(wiring.pins, Pins::default());
-        assert!(!wiring.usb);
+        let set_up = wiring(&part());
+        assert_eq!(set_up.supply, Supply::default());
+        assert_eq!(set_up.pins, Pins::default());
+        assert!(!set_up.usb);
     }
 
     #[test]
@@ -179,10 +210,10 @@ mod tests {
             0xABFF_FFFF & !(3 << 16) & !(3 << 14) & !(3 << 12) | 2 << 16 | 1 << 14 | 2 << 12,
         );
         write(&mut part, PORT_A + 0x20, 13 << 24);
-        let wiring = Wiring::of(&part);
-        assert!(wiring.supply.powered && wiring.pins.clock && !wiring.pins.hsync);
-        assert_eq!(wiring.supply.clock_hz, 64_000_000 / 3);
+        let set_up = wiring(&part);
+        assert!(set_up.supply.powered && set_up.pins.clock && !set_up.pins.hsync);
+        assert_eq!(set_up.supply.clock_hz, 64_000_000 / 3);
         write(&mut part, PORT_A + 0x18, 1 << 7);
-        assert!(!Wiring::of(&part).supply.powered);
+        assert!(!wiring(&part).supply.powered);
     }
 }

@@ -21,13 +21,6 @@ use crate::usb_host::SharedHost;
 /// The board's supply, mV.
 const SUPPLY_MV: u32 = 3300;
 
-/// The slots that matter here.
-#[derive(Clone, Copy, Debug)]
-struct Slots {
-    dcmi: usize,
-    vsync_port: usize,
-}
-
 /// The part with what the rig adds to it.
 #[derive(Debug)]
 pub struct Chip {
@@ -40,7 +33,8 @@ pub struct Chip {
     core: SharedCore,
     host: SharedHost,
     dormant: Dormant,
-    slots: Slots,
+    slots: board::Slots,
+    dcmi_slot: usize,
     vsync: Level,
     wiring: Wiring,
 }
@@ -64,10 +58,8 @@ impl Chip {
         let core = SharedCore::default();
         let mut otg = Blocks::fit(&mut part, &core, &host)?;
         otg.wake_host(part.bus_mut(), VirtualNanos(0));
-        let slots = Slots {
-            dcmi: part.bus().slot("DCMI")?,
-            vsync_port: part.bus().slot("GPIOB")?,
-        };
+        let slots = board::Slots::of(part.bus())?;
+        let dcmi_slot = part.bus().slot("DCMI")?;
         Ok(Self {
             dormant: Dormant::new(part.bus()),
             dcmi: Dcmi::new(camera.clone(), faults, rules),
@@ -77,6 +69,7 @@ impl Chip {
             core,
             host,
             slots,
+            dcmi_slot,
             vsync: Level::Low,
             wiring: Wiring::default(),
         })
@@ -89,7 +82,7 @@ impl Chip {
 
     /// Looks at the pins and clocks again, and passes on what changed.
     pub fn rewire(&mut self, at: VirtualNanos) {
-        let wiring = Wiring::of(&self.part);
+        let wiring = self.slots.wiring(&self.part);
         if wiring != self.wiring {
             self.wiring = wiring;
             self.dcmi.wire(wiring.pins, wiring.hclk_hz);
@@ -97,7 +90,7 @@ impl Chip {
             self.camera.lock().supply(wiring.supply);
         }
         if self.camera.lock().restarts() {
-            let (registers, mut context) = self.part.bus_mut().drive(at, self.slots.dcmi);
+            let (registers, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
             self.dcmi.start_over(registers, &mut context);
         }
     }
@@ -125,6 +118,7 @@ impl Mcu for Chip {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        self.otg.exchange(&mut self.part);
         self.part.reset(at, cause);
         self.core.lock().reset();
         self.camera.lock().host_reset();
@@ -133,7 +127,7 @@ impl Mcu for Chip {
         self.otg.wake_host(self.part.bus_mut(), at);
         self.dormant = Dormant::new(self.part.bus());
         self.dcmi.part_reset();
-        let (_, mut context) = self.part.bus_mut().drive(at, self.slots.dcmi);
+        let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);
         self.wiring = Wiring::default();
         self.rewire(at);
@@ -143,10 +137,10 @@ impl Mcu for Chip {
     fn poll(&mut self, _now: VirtualNanos) {}
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
-        if slot == self.slots.dcmi {
+        if slot == self.dcmi_slot {
             return (self.part.bus_mut(), Some(&mut self.dcmi));
         }
-        if slot == self.slots.vsync_port {
+        if slot == self.slots.vsync_port() {
             self.drive_vsync(self.dcmi.vsync_at());
         }
         if self.dormant.sleeps(slot, self.part.bus()) {

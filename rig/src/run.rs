@@ -231,9 +231,15 @@ struct Conductor {
     settled_at_ns: u64,
 }
 
-/// Registers that change the board's wiring: GPIOA to GPIOE, RCC, PWR.
-fn changes_wiring(address: u64) -> bool {
-    matches!(address, 0x5802_0000..=0x5802_13FF | 0x5802_4400..=0x5802_4BFF)
+/// How long a write changes the board's wiring: not, now, or until clocks have settled.
+fn settles_in(address: u64) -> Option<u64> {
+    match address {
+        // GPIOA to GPIOE
+        0x5802_0000..=0x5802_13FF => Some(0),
+        // RCC, PWR
+        0x5802_4400..=0x5802_4BFF => Some(SETTLING_NS),
+        _ => None,
+    }
 }
 
 impl Driver<Sensor> for Conductor {
@@ -294,8 +300,9 @@ impl Conductor {
         value: u64,
         at: VirtualNanos,
     ) {
-        if changes_wiring(address) {
-            self.settling_until = at.0 + SETTLING_NS;
+        if let Some(settling_ns) = settles_in(address) {
+            self.settling_until = self.settling_until.max(at.0 + settling_ns);
+            session.board_mut().chip.rewire(at);
         } else if let Some(stream) = dma_reach::enabled_stream(address, value) {
             let registers = session.board().chip.bus().registers(stream.controller);
             let registers = registers.map(dma_reach::values).unwrap_or_default();

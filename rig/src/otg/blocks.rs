@@ -75,6 +75,8 @@ impl Which {
 pub struct Blocks {
     blocks: [Block; 3],
     slots: [usize; 3],
+    /// Holds the part's own slots.
+    donor: Bus,
 }
 
 impl Blocks {
@@ -83,11 +85,9 @@ impl Blocks {
     /// # Errors
     /// When the part is not laid out as expected.
     pub fn fit(part: &mut Stm32h743, core: &SharedCore, host: &SharedHost) -> Result<Self, Error> {
-        let mut donor = donor(part)?;
         let mut slots = [0; 3];
         for (which, slot) in Which::ALL.into_iter().zip(&mut slots) {
             *slot = part.bus().slot(which.peripheral().name)?;
-            std::mem::swap(part.bus_mut().slot_mut(*slot), donor.slot_mut(*slot));
         }
         let block = |which| Block {
             which,
@@ -95,10 +95,20 @@ impl Blocks {
             host: host.clone(),
             tick: None,
         };
-        Ok(Self {
+        let mut blocks = Self {
             blocks: Which::ALL.map(block),
             slots,
-        })
+            donor: donor(part)?,
+        };
+        blocks.exchange(part);
+        Ok(blocks)
+    }
+
+    /// Takes the place of the part's own blocks, or gives it back. A part is reset with its own blocks in place.
+    pub fn exchange(&mut self, part: &mut Stm32h743) {
+        for slot in self.slots {
+            std::mem::swap(part.bus_mut().slot_mut(slot), self.donor.slot_mut(slot));
+        }
     }
 
     /// The model for a slot, if it is one of the three.

@@ -1,0 +1,272 @@
+//! Runs the firmware under a scripted host, and decodes what it sends.
+//!
+//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug.
+
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use hivtac_rig::faults::Faults;
+use hivtac_rig::frame_source::SceneSource;
+use hivtac_rig::report::Report;
+use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
+use hivtac_rig::script::{Action, Script};
+use hivtac_rig::truth::TruthLog;
+use hivtac_wire::decoder::{Decoder, Received, Rejected};
+use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
+use hivtac_wire::message::{
+    Command, DeviceHello, DeviceMessage, HostMessage, Request, Sample, Stats,
+};
+use hivtac_wire::version::HelloPrefix;
+use serde_json::Value;
+
+/// When the host says hello, ms: the port exists from about 140 ms on.
+pub const HELLO_MS: u64 = 160;
+
+/// The firmware under test.
+pub fn firmware() -> PathBuf {
+    path_from("HIVTAC_ELF", "the firmware ELF")
+}
+
+/// The firmware with a seeded bug.
+pub fn bug(name: &str) -> PathBuf {
+    let path = path_from(
+        "HIVTAC_BUG_ELFS",
+        "a directory of firmware ELFs with seeded bugs",
+    )
+    .join(format!("{name}.elf"));
+    assert!(
+        path.exists(),
+        "{} is missing: `cargo xtask test` builds it",
+        path.display()
+    );
+    path
+}
+
+fn path_from(variable: &str, what: &str) -> PathBuf {
+    let Some(path) = std::env::var_os(variable) else {
+        panic!(
+            "set {variable} to {what}. `cargo xtask test` does; by hand: in the project's root, \
+             `cargo build --release -p hivtac-firmware --target thumbv7em-none-eabihf`, then \
+             HIVTAC_ELF=$PWD/target/thumbv7em-none-eabihf/release/hivtac-firmware; the seeded bugs are cargo features \
+             of that package"
+        )
+    };
+    // Cargo runs tests in the package's folder; a relative path is meant from the project's root.
+    let path = PathBuf::from(path);
+    let path = if path.is_relative() {
+        PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+            .join("..")
+            .join(path)
+    } else {
+        path
+    };
+    assert!(
+        path.exists(),
+        "{variable}: {} does not exist",
+        path.display()
+    );
+    path
+}
+
+/// A run under a scripted host that opens the port, says hello, starts the stream, and asks for counters at the end.
+pub struct Setup {
+    pub elf: PathBuf,
+    pub scene: &'static str,
+    pub seed: u64,
+    pub faults: Vec<&'static str>,
+    pub actions: Vec<(u64, Action)>,
+    pub virtual_ms: u64,
+    pub instructions_per_second: u64,
+}
+
+impl Setup {
+    pub fn new(elf: PathBuf, virtual_ms: u64) -> Self {
+        Self {
+            elf,
+            scene: "demo",
+            seed: 1,
+            faults: Vec::new(),
+            actions: Vec::new(),
+            virtual_ms,
+            instructions_per_second: INSTRUCTIONS_PER_SECOND,
+        }
+    }
+
+    pub fn fault(mut self, fault: &'static str) -> Self {
+        self.faults.push(fault);
+        self
+    }
+
+    pub fn at(mut self, ms: u64, action: Action) -> Self {
+        self.actions.push((ms * 1_000_000, action));
+        self
+    }
+
+    pub fn run(self) -> Run {
+        let directory = tempfile::tempdir().unwrap();
+        let truth = directory.path().join("truth.jsonl");
+        let outcome = self.try_run(&truth).unwrap();
+        let truth = std::fs::read_to_string(truth).unwrap();
+        Run::new(
+            outcome,
+            truth
+                .lines()
+                .map(|line| serde_json::from_str(line).unwrap())
+                .collect(),
+        )
+    }
+
+    pub fn try_run(self, truth: &std::path::Path) -> anyhow::Result<Outcome> {
+        let ms = |ms: u64| ms * 1_000_000;
+        let mut actions = vec![
+            (0, Action::Open),
+            (ms(HELLO_MS), Action::Send(hello())),
+            (ms(HELLO_MS + 2), Action::Send(command(1, Request::Start))),
+            (
+                ms(self.virtual_ms - 4),
+                Action::Send(command(2, Request::GetInfo)),
+            ),
+        ];
+        actions.extend(self.actions);
+        run(Options {
+            elf: self.elf,
+            source: Box::new(SceneSource::new(self.scene, "ov7725", self.seed)?),
+            truth: TruthLog::create(truth)?,
+            faults: Faults::new(
+                self.faults
+                    .iter()
+                    .map(|fault| fault.parse().unwrap())
+                    .collect(),
+            ),
+            program: Program::Script(Script::new(actions)),
+            limits: Limits {
+                frames: None,
+                virtual_ns: Some(ms(self.virtual_ms)),
+            },
+            instructions_per_second: NonZeroU64::new(self.instructions_per_second).unwrap(),
+            interrupt: Arc::new(AtomicBool::new(false)),
+        })
+    }
+}
+
+/// A host's hello, with a zero byte before it.
+pub fn hello() -> Vec<u8> {
+    frame(&HostMessage::Hello(HelloPrefix::OURS.into()))
+}
+
+/// A command.
+pub fn command(id: u16, request: Request) -> Vec<u8> {
+    frame(&HostMessage::Command(Command { id, request }))
+}
+
+fn frame(message: &HostMessage) -> Vec<u8> {
+    let mut buffer = [0; MAX_HOST_FRAME];
+    [&[0], encode(message, &mut buffer).unwrap()].concat()
+}
+
+/// What a run gave.
+pub struct Run {
+    pub bytes: Vec<u8>,
+    pub messages: Vec<DeviceMessage>,
+    pub rejected: Rejected,
+    pub report: Report,
+    pub truth: Vec<Value>,
+}
+
+impl Run {
+    fn new(outcome: Outcome, truth: Vec<Value>) -> Self {
+        let mut decoder = Decoder::<DEVICE_FRAME_LIMIT>::new();
+        let mut rest = &outcome.bytes[..];
+        let mut messages = Vec::new();
+        while let Some(received) = decoder.feed(&mut rest) {
+            match received {
+                Received::Message(message) => messages.push(message),
+                Received::ForeignHello(prefix) => {
+                    panic!("the firmware speaks {prefix:?}: build it from this tree")
+                }
+            }
+        }
+        let rejected = decoder.rejected();
+        Self {
+            bytes: outcome.bytes,
+            messages,
+            rejected,
+            report: outcome.report,
+            truth,
+        }
+    }
+
+    pub fn samples(&self) -> Vec<&Sample> {
+        self.messages
+            .iter()
+            .filter_map(|m| {
+                if let DeviceMessage::Sample(s) = m {
+                    Some(s)
+                } else {
+                    None
+                }
+            })
+            .collect()
+    }
+
+    pub fn hellos(&self) -> Vec<&DeviceHello> {
+        self.messages
+            .iter()
+            .filter_map(|m| {
+                if let DeviceMessage::Hello(h) = m {
+                    Some(h)
+                } else {
+                    None
+                }
+            })
+            .collect()
+    }
+
+    /// The last counters.
+    pub fn stats(&self) -> &Stats {
+        let stats = self.messages.iter().rev().find_map(|m| {
+            if let DeviceMessage::Stats(s) = m {
+                Some(s)
+            } else {
+                None
+            }
+        });
+        stats.unwrap_or_else(|| panic!("no stats came; the USB port: {:#?}", self.report.usb_log))
+    }
+
+    /// Log lines, joined.
+    pub fn log(&self) -> String {
+        let lines = self.messages.iter().filter_map(|m| {
+            if let DeviceMessage::Log(l) = m {
+                Some(l.text.as_str())
+            } else {
+                None
+            }
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
+    /// Asserts that every sample names an exposure, and that the device's clock and the true one differ by one and the
+    /// same time: its start.
+    pub fn assert_times(&self) {
+        let ahead = |sample: &&Sample| sample.time_us as i64 - self.true_time_us(sample.frame);
+        let ahead: Vec<i64> = self.samples().iter().map(ahead).collect();
+        let first = *ahead.first().expect("samples");
+        // HAL and emulator disagree about a compare flag at the timer's start: half a turn of 16 bits, 65.5 ms.
+        assert!((-20_000..70_000).contains(&first), "{ahead:?}");
+        assert!(
+            ahead.iter().all(|other| other.abs_diff(first) <= 10),
+            "{ahead:?}"
+        );
+    }
+
+    fn true_time_us(&self, frame: u32) -> i64 {
+        let exposed = self.truth.iter().find(|t| t["frame"] == frame);
+        let exposed = exposed.unwrap_or_else(|| panic!("frame {frame} was never exposed"));
+        exposed["time_us"].as_i64().unwrap()
+    }
+}

@@ -1,0 +1,125 @@
+//! Each fault ends in the status or counter that the firmware's documents name, and is survived.
+
+mod common;
+
+use common::{HELLO_MS, Setup, command, firmware, hello};
+use hivtac_rig::script::Action;
+use hivtac_rig::usb_host::Port;
+use hivtac_wire::message::Request;
+use hivtac_wire::status::Status;
+
+/// The camera is plugged in late. It is looked for again and again, and frames come.
+#[test]
+fn an_absent_camera_is_reported_and_found_later() {
+    let run = Setup::new(firmware(), 1300)
+        .fault("camera-absent@0-700")
+        .run();
+    assert!(run.log().contains("no OV7725"), "{}", run.log());
+    assert!(run.samples().len() >= 3, "{:?}", run.stats());
+}
+
+/// Another camera is not driven with this one's registers.
+#[test]
+fn a_camera_with_another_id_is_refused() {
+    let run = Setup::new(firmware(), 700).fault("camera-wrong-id").run();
+    assert!(run.log().contains("76 21"), "{}", run.log());
+    assert!(run.samples().is_empty());
+    assert_eq!(run.report.sccb_writes, 0);
+}
+
+/// The camera's clock stops for a while: time-outs, then a restart, and frames again.
+#[test]
+fn a_silent_camera_is_restarted() {
+    let run = Setup::new(firmware(), 1000)
+        .fault("camera-silent@300-550")
+        .run();
+    let stats = run.stats();
+    assert!(
+        stats.camera_timeouts >= 1 && stats.camera_restarts >= 1,
+        "{stats:?}"
+    );
+    let restarted = run
+        .samples()
+        .into_iter()
+        .find(|sample| sample.status.contains(Status::CAMERA_RESTARTED));
+    let restarted = restarted.expect("a sample says that the camera was restarted");
+    assert!(
+        restarted.time_us > 550_000
+            && restarted.force.is_some() | restarted.status.contains(Status::MODEL_MISSING)
+    );
+    // Frame numbers go on: they still name the exposures.
+    run.assert_times();
+}
+
+/// The DMA loses the bus for a millisecond: the frame is dropped, counted, and the next sample says so.
+#[test]
+fn an_overrun_costs_a_frame_and_is_told() {
+    let run = Setup::new(firmware(), 480).fault("dcmi-overrun@250").run();
+    let stats = run.stats();
+    assert_eq!(
+        (
+            run.report.dcmi.overruns,
+            stats.capture_overruns,
+            stats.dropped_overrun
+        ),
+        (1, 1, 1),
+        "{stats:?}"
+    );
+    let told: Vec<bool> = run
+        .samples()
+        .iter()
+        .map(|sample| sample.status.contains(Status::CAPTURE_OVERRUN))
+        .collect();
+    assert_eq!(told.iter().filter(|told| **told).count(), 1, "{told:?}");
+    assert!(told.len() >= 5 && told.last() == Some(&false), "{told:?}");
+}
+
+/// The host leaves the port open and does not read: samples are dropped and counted, the camera goes on, and the
+/// stream is in step again at once.
+#[test]
+fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
+    let run = Setup::new(firmware(), 1300)
+        .fault("host-not-reading@250-900")
+        .run();
+    let stats = run.stats();
+    assert!(stats.usb_dropped >= 1, "{stats:?}");
+    assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
+    assert!(run.rejected.frames() <= 3, "{:?}", run.rejected);
+    let samples = run.samples();
+    assert!(
+        samples
+            .last()
+            .is_some_and(|sample| sample.time_us > 1_000_000)
+    );
+    let gaps = samples
+        .windows(2)
+        .filter(|pair| pair[1].sequence != pair[0].sequence + 1)
+        .count();
+    assert!(gaps >= 1, "the loss shows in the sequence numbers");
+}
+
+/// The cable is pulled and put back: a new enumeration, a new conversation, frame numbers that went on.
+#[test]
+fn a_pulled_cable_is_survived() {
+    let ms = HELLO_MS;
+    let run = Setup::new(firmware(), 900)
+        .fault("cable-pulled@300-420")
+        .at(ms + 500, Action::Send(hello()))
+        .at(ms + 502, Action::Send(command(3, Request::Start)))
+        .run();
+    assert_eq!(
+        (run.report.port, run.report.usb.enumerations),
+        (Port::Configured, 2),
+        "{:#?}",
+        run.report.usb_log
+    );
+    assert!(run.hellos().len() >= 2);
+    let samples = run.samples();
+    assert!(samples.iter().any(|sample| sample.time_us < 310_000));
+    let after = samples
+        .iter()
+        .filter(|sample| sample.time_us > 600_000)
+        .count();
+    assert!(after >= 3, "{after} samples after the cable was put back");
+    assert_eq!(run.report.resets, 0);
+}

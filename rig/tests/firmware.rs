@@ -1,0 +1,87 @@
+//! The firmware as it is flashed: what it sends is what the camera saw.
+
+mod common;
+
+use common::{Setup, firmware};
+use hivtac_rig::run::INSTRUCTIONS_PER_SECOND;
+use hivtac_wire::status::Status;
+
+/// Statuses that say something about the picture. On an undisturbed scene none of them may appear.
+const PICTURE: Status = Status(
+    Status::MARKERS_MISSING.0
+        | Status::MARKERS_AMBIGUOUS.0
+        | Status::BLOB_OVERFLOW.0
+        | Status::MARKERS_IMPLAUSIBLE.0
+        | Status::IMAGE_SATURATED.0
+        | Status::IMAGE_DARK.0
+        | Status::FRAME_INCOMPLETE.0,
+);
+
+fn undisturbed(setup: Setup) -> common::Run {
+    let run = setup.run();
+    assert_eq!(run.rejected.frames(), 0, "{:?}", run.rejected);
+    assert_eq!((run.report.dcmi.overruns, run.report.resets), (0, 0));
+    let hello = run.hellos()[0];
+    assert_eq!((hello.width, hello.height), (320, 240));
+    let samples = run.samples();
+    assert!(
+        samples.len() >= 4,
+        "{} samples; {:?}",
+        samples.len(),
+        run.stats()
+    );
+    for sample in samples {
+        assert_eq!(sample.status.0 & PICTURE.0, 0, "{sample:?}");
+    }
+    run.assert_times();
+    run
+}
+
+#[test]
+fn every_sample_is_of_an_exposure_and_shows_its_markers() {
+    let run = undisturbed(Setup::new(firmware(), 480));
+    let frames: Vec<u32> = run.samples().iter().map(|sample| sample.frame).collect();
+    assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
+    let stats = run.stats();
+    assert_eq!(
+        (
+            stats.capture_overruns,
+            stats.dropped_size,
+            stats.camera_timeouts
+        ),
+        (0, 0, 0)
+    );
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let [first, second] = [(); 2].map(|()| Setup::new(firmware(), 330).run());
+    assert!(!first.bytes.is_empty());
+    assert_eq!(first.bytes, second.bytes);
+    assert_eq!(first.truth, second.truth);
+    assert_eq!(first.report.virtual_ns, second.report.virtual_ns);
+}
+
+#[test]
+fn another_seed_gives_other_forces() {
+    let forces = |seed| {
+        let run = undisturbed(Setup {
+            seed,
+            ..Setup::new(firmware(), 380)
+        });
+        run.samples()
+            .iter()
+            .map(|sample| sample.force)
+            .collect::<Vec<_>>()
+    };
+    assert_ne!(forces(1), forces(2));
+}
+
+#[test]
+fn half_as_many_instructions_per_second_are_enough() {
+    let setup = Setup {
+        instructions_per_second: INSTRUCTIONS_PER_SECOND / 2,
+        ..Setup::new(firmware(), 480)
+    };
+    undisturbed(setup);
+}

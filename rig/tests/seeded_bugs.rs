@@ -1,0 +1,85 @@
+//! Firmware with a seeded bug must fail, each in its own way: that is what shows that the rig would notice.
+
+mod common;
+
+use common::{Setup, bug};
+use hivtac_rig::usb_host::Port;
+use hivtac_wire::status::Status;
+
+/// DMAMUX connects another request: nobody empties the FIFO, so every frame overruns at its fifth word.
+#[test]
+fn a_wrong_dmamux_request_overruns_every_frame() {
+    let run = Setup::new(bug("bug-dmamux-request"), 350).run();
+    assert!(run.samples().is_empty());
+    assert!(run.report.dcmi.overruns >= 4, "{:?}", run.report.dcmi);
+    assert_eq!(run.report.dcmi.frames, 0);
+    let stats = run.stats();
+    assert!(
+        stats.capture_overruns >= 4 && stats.frames_processed == 0,
+        "{stats:?}"
+    );
+}
+
+/// DCMI takes VSYNC's pulse for the frame and HREF's gaps for the rows.
+#[test]
+fn wrong_polarities_give_frames_of_the_wrong_size() {
+    let run = Setup::new(bug("bug-polarity"), 350).run();
+    assert!(run.samples().is_empty());
+    let stats = run.stats();
+    assert!(
+        stats.dropped_size >= 2 && stats.frames_processed == 0,
+        "{stats:?}"
+    );
+}
+
+/// The camera's format register stays at YUV: frames of the right size, without a red marker in them.
+#[test]
+fn a_wrong_camera_register_leaves_no_markers() {
+    let run = Setup::new(bug("bug-camera-register"), 350).run();
+    let samples = run.samples();
+    assert!(
+        samples.len() >= 3,
+        "{} samples; {:?}",
+        samples.len(),
+        run.stats()
+    );
+    for sample in samples {
+        assert_eq!(sample.force, None);
+        let blamed = [
+            Status::MARKERS_MISSING,
+            Status::MARKERS_AMBIGUOUS,
+            Status::BLOB_OVERFLOW,
+            Status::MARKERS_IMPLAUSIBLE,
+            Status::IMAGE_SATURATED,
+            Status::IMAGE_DARK,
+        ];
+        assert!(
+            blamed.iter().any(|bit| sample.status.contains(*bit)),
+            "{sample:?}"
+        );
+    }
+}
+
+/// The DMA stops at half a frame: the FIFO overruns in the middle of each.
+#[test]
+fn a_half_size_buffer_overruns_in_the_middle() {
+    let run = Setup::new(bug("bug-half-buffer"), 350).run();
+    assert!(run.samples().is_empty());
+    let dcmi = run.report.dcmi;
+    assert!(dcmi.overruns >= 2 && dcmi.frames == 0, "{dcmi:?}");
+    // Half a frame, and the four words of the FIFO.
+    assert!(dcmi.words >= dcmi.overruns * 19_200, "{dcmi:?}");
+    let stats = run.stats();
+    assert!(
+        stats.dropped_size + stats.dropped_overrun >= 2 && stats.frames_processed == 0,
+        "{stats:?}"
+    );
+}
+
+/// Without its 48 MHz the transceiver cannot pull D+ up: no host ever sees the device.
+#[test]
+fn without_its_oscillator_usb_never_attaches() {
+    let run = Setup::new(bug("bug-no-hsi48"), 350).run();
+    assert_eq!(run.report.port, Port::Empty);
+    assert_eq!((run.report.usb_log.len(), run.bytes.len()), (0, 0));
+}
