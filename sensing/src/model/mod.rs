@@ -1,7 +1,7 @@
 //! The model file: a quantized network, its input scaling, and the conditions it was made under.
 //!
 //! [`Model::parse`] reads a file in place, from flash or from memory, without copying and without alignment
-//! needs, and proves it sound before it can be used. Feature `encode` adds the writer, [`encode::ModelSpec`].
+//! needs, and proves it sound before it can be used. Feature `encode` adds the writer, `encode::ModelSpec`.
 //! Both follow `docs/model-file.md`.
 
 #[cfg(any(test, feature = "encode"))]
