@@ -11,7 +11,7 @@ use hivtac_wire::status::Status;
 /// The camera is plugged in late. It is looked for again and again, and frames come.
 #[test]
 fn an_absent_camera_is_reported_and_found_later() {
-    let run = Setup::new(firmware(), 1300)
+    let run = Setup::new(firmware(), 1500)
         .fault("camera-absent@0-700")
         .run();
     assert!(run.log().contains("no OV7725"), "{}", run.log());

@@ -1,0 +1,196 @@
+//! The command: ready line, clients, hang-up, signals, limits and errors.
+
+mod common;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use common::{firmware, hello};
+use hivtac_wire::decoder::{Decoder, Received};
+use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
+use hivtac_wire::message::DeviceMessage;
+
+/// Longest wall time of anything here.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn rig() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hivtac-rig"));
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// Starts a rig and reads its ready line: the words after `ready`.
+fn start(arguments: &[&str]) -> (Child, Vec<String>) {
+    let mut child = rig().arg(firmware()).args(arguments).spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.as_mut().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    let mut words = line.split_whitespace().map(str::to_owned);
+    assert_eq!(words.next().as_deref(), Some("ready"), "{line}");
+    (child, words.collect())
+}
+
+/// Waits for the end; the code and what was said on standard error.
+fn end(mut child: Child) -> (Option<i32>, String) {
+    let began = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if began.elapsed() > PATIENCE {
+            child.kill().unwrap();
+            panic!("the rig did not end");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let mut error = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut error)
+        .unwrap();
+    (child.wait().unwrap().code(), error)
+}
+
+/// Says hello again and again, as a client does that does not know when the device listens, until it answers.
+fn greet(port: &mut (impl Read + Write)) -> DeviceMessage {
+    let mut decoder = Decoder::<DEVICE_FRAME_LIMIT>::new();
+    let began = Instant::now();
+    loop {
+        assert!(began.elapsed() < PATIENCE, "no hello");
+        port.write_all(&hello()).unwrap();
+        let mut buffer = [0; 512];
+        let length = match port.read(&mut buffer) {
+            Ok(0) => panic!("the rig hung up"),
+            Ok(length) => length,
+            Err(_) => continue,
+        };
+        let mut bytes = &buffer[..length];
+        if let Some(Received::Message(message)) = decoder.feed(&mut bytes) {
+            return message;
+        }
+    }
+}
+
+#[test]
+fn a_tcp_client_is_served_and_its_hangup_ends_the_run() {
+    let (child, ready) = start(&["--tcp", "0", "--exit-on-hangup"]);
+    let address = ready[0].strip_prefix("tcp=").unwrap();
+    let mut client = TcpStream::connect(address).unwrap();
+    client
+        .set_read_timeout(Some(Duration::from_secs(2)))
+        .unwrap();
+    assert!(matches!(greet(&mut client), DeviceMessage::Hello(hello) if hello.width == 320));
+    drop(client);
+    let (code, error) = end(child);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(error.contains("virtual time"), "{error}");
+}
+
+#[test]
+fn a_terminal_client_is_served_and_its_hangup_ends_the_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let link = directory.path().join("port");
+    let (child, ready) = start(&[
+        "--pty",
+        "--pty-link",
+        link.to_str().unwrap(),
+        "--exit-on-hangup",
+    ]);
+    assert!(ready[0].starts_with("pty=/dev/"), "{ready:?}");
+    let mut client = std::fs::OpenOptions::new()
+        .read(true)
+        .write(true)
+        .open(&link)
+        .unwrap();
+    assert!(matches!(greet(&mut client), DeviceMessage::Hello(_)));
+    drop(client);
+    let (code, error) = end(child);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(!link.exists());
+}
+
+#[test]
+fn a_signal_ends_a_rig_that_waits_for_its_client() {
+    let (child, _) = start(&["--tcp", "0"]);
+    let process = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-TERM", &process])
+            .status()
+            .unwrap()
+            .success()
+    );
+    assert_eq!(end(child).0, Some(0));
+}
+
+#[test]
+fn a_script_gives_bytes_truth_and_counters() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let hello: String = hello().iter().map(|byte| format!("{byte:02x}")).collect();
+    std::fs::write(path("script"), format!("0 open\n160 send {hello}\n")).unwrap();
+    let output = rig()
+        .arg(firmware())
+        .args(["--scene", "test-picture", "--virtual-ms", "200"])
+        .arg("--script")
+        .arg(path("script"))
+        .arg("--out")
+        .arg(path("out"))
+        .arg("--truth")
+        .arg(path("truth"))
+        .arg("--stats-json")
+        .arg(path("stats"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let read = |name: &str| std::fs::read(path(name)).unwrap();
+    assert!(!read("out").is_empty());
+    let stats: serde_json::Value = serde_json::from_slice(&read("stats")).unwrap();
+    assert_eq!(stats["virtual_s"], 0.2);
+    assert_eq!(stats["usb"]["bytes_in"], read("out").len());
+    let truth = String::from_utf8(read("truth")).unwrap();
+    assert_eq!(
+        truth.lines().count(),
+        stats["camera"]["exposures"].as_u64().unwrap() as usize
+    );
+}
+
+fn failing(arguments: &[&str]) -> (Option<i32>, String) {
+    let Output { status, stderr, .. } = rig().args(arguments).output().unwrap();
+    (status.code(), String::from_utf8(stderr).unwrap())
+}
+
+#[test]
+fn what_cannot_be_done_is_said() {
+    for (arguments, code, word) in [
+        (&["/nowhere.elf"][..], 1, "/nowhere.elf"),
+        (&["x.elf", "--scene", "dance"], 1, "dance"),
+        (&["x.elf", "--preset", "moon"], 1, "moon"),
+        (&["x.elf", "--fault", "fire"], 2, "fire"),
+        (
+            &["x.elf", "--script", "/nowhere.txt", "--frames", "1"],
+            1,
+            "/nowhere.txt",
+        ),
+        (
+            &["x.elf", "--instructions-per-second", "0"],
+            1,
+            "instructions-per-second",
+        ),
+        (&["x.elf", "--script", "x", "--tcp", "0"], 2, "--tcp"),
+    ] {
+        let script_only = arguments.contains(&"--script");
+        let arguments: Vec<&str> = if code == 1 && !script_only {
+            [arguments, &["--tcp", "0", "--no-wait"]].concat()
+        } else {
+            arguments.to_vec()
+        };
+        let (found, error) = failing(&arguments);
+        assert!(
+            found == Some(code) && error.contains(word),
+            "{arguments:?}: {found:?} {error}"
+        );
+    }
+}

@@ -1,0 +1,130 @@
+//! What a program must not do ends the run with a message. The programs here are a few instructions that write
+//! registers, in an ELF made on the spot.
+
+use std::num::NonZeroU64;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use hivtac_rig::faults::Faults;
+use hivtac_rig::frame_source::TestPicture;
+use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
+use hivtac_rig::script::Script;
+use hivtac_rig::truth::TruthLog;
+
+const AHB1ENR: u32 = 0x5802_44D8;
+const AHB2ENR: u32 = 0x5802_44DC;
+const DMA1_STREAM0: u32 = 0x4002_0010;
+const DCMI_CR: u32 = 0x4802_0000;
+
+/// An ELF that writes (address, value) pairs and then stands still.
+fn program(writes: &[(u32, u32)]) -> Vec<u8> {
+    const BASE: u32 = 0x0800_0000;
+    // ldr r0, table; loop: ldmia r0!, {r1, r2}; cbz r1, end; str r2, [r1]; b loop; end: b end
+    const CODE: [u16; 6] = [0x4802, 0xC806, 0xB109, 0x600A, 0xE7FB, 0xE7FE];
+    let mut image = Vec::new();
+    image.extend(
+        [0x2002_0000, BASE + 8 + 1]
+            .iter()
+            .flat_map(|word: &u32| word.to_le_bytes()),
+    );
+    image.extend(CODE.iter().flat_map(|half| half.to_le_bytes()));
+    image.extend((BASE + 24).to_le_bytes());
+    for (address, value) in writes.iter().chain(&[(0, 0)]) {
+        image.extend([address.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    let mut elf = b"\x7FELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
+    let halves =
+        |elf: &mut Vec<u8>, values: &[u16]| elf.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    let words =
+        |elf: &mut Vec<u8>, values: &[u32]| elf.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    halves(&mut elf, &[2, 40]);
+    words(&mut elf, &[1, BASE + 9, 52, 0, 0x0500_0000]);
+    halves(&mut elf, &[52, 32, 1, 40, 0, 0]);
+    let length = image.len() as u32;
+    words(&mut elf, &[1, 84, BASE, BASE, length, length, 5, 4]);
+    elf.extend(image);
+    elf
+}
+
+fn run_program(elf: &Path) -> anyhow::Result<Outcome> {
+    run(Options {
+        elf: elf.to_owned(),
+        source: Box::new(TestPicture),
+        truth: TruthLog::default(),
+        faults: Faults::default(),
+        program: Program::Script(Script::default()),
+        limits: Limits {
+            frames: None,
+            virtual_ns: Some(20_000_000),
+        },
+        instructions_per_second: NonZeroU64::new(INSTRUCTIONS_PER_SECOND).unwrap(),
+        interrupt: Arc::new(AtomicBool::new(false)),
+    })
+}
+
+fn outcome(writes: &[(u32, u32)]) -> Result<Outcome, String> {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), program(writes)).unwrap();
+    run_program(file.path()).map_err(|error| format!("{error:#}"))
+}
+
+/// DMA1 stream 0, peripheral to memory, from DCMI_DR to an address.
+fn dma_to(memory: u32) -> [(u32, u32); 5] {
+    [
+        (AHB1ENR, 1),
+        (DMA1_STREAM0 + 0x04, 16),
+        (DMA1_STREAM0 + 0x08, DCMI_CR + 0x28),
+        (DMA1_STREAM0 + 0x0C, memory),
+        (DMA1_STREAM0, 1 << 10 | 2 << 11 | 2 << 13 | 1),
+    ]
+}
+
+#[test]
+fn a_dma_buffer_in_dtcm_ends_the_run() {
+    let error = outcome(&dma_to(0x2000_1000)).unwrap_err();
+    for part in ["DMA1 stream 0", "0x20001000", "DTCM", "AXI SRAM"] {
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn a_dma_buffer_in_axi_sram_does_not() {
+    let outcome = outcome(&dma_to(0x2400_0000)).unwrap();
+    assert_eq!(outcome.report.refused, [] as [String; 0]);
+    assert!(
+        outcome.report.virtual_ns >= 19_000_000,
+        "{}",
+        outcome.report.line()
+    );
+}
+
+#[test]
+fn a_mode_that_is_not_simulated_is_no_silent_success() {
+    let error = outcome(&[(AHB2ENR, 1), (DCMI_CR, 1 << 14 | 1 << 3)]).unwrap_err();
+    assert!(error.contains("JPEG"), "{error}");
+}
+
+#[test]
+fn registers_without_their_clock_are_refused_and_reported() {
+    let outcome = outcome(&[(DCMI_CR, 1 << 14)]).unwrap();
+    assert!(
+        outcome
+            .report
+            .refused
+            .iter()
+            .any(|line| line.contains("DCMI")),
+        "{:?}",
+        outcome.report.refused
+    );
+    let outcome = self::outcome(&[(0x4008_0008, 1)]).unwrap();
+    assert!(
+        outcome
+            .report
+            .refused
+            .iter()
+            .any(|line| line.contains("OTG2")),
+        "{:?}",
+        outcome.report.refused
+    );
+}
