@@ -1,0 +1,121 @@
+//! Presses the film once and prints what the tip, the markers and the camera make of it.
+//!
+//! `cargo run --release --example solve -- --force-n 0.1 --alpha-deg 5`
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use hivtac_film::{Contact, Design, Film, markers, paper_camera};
+use hivtac_scene::Load;
+
+const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact force|stick] [--offset-x-mm 0] \
+[--offset-y-mm 0] [--overhang-mm 0] [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1]";
+
+/// What to press, and how.
+struct Request {
+    design: Design,
+    force_n: f64,
+    alpha_deg: f64,
+    beta_deg: f64,
+    stick: bool,
+}
+
+fn main() -> ExitCode {
+    match Request::parse(std::env::args().skip(1)).and_then(|request| request.run()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("{why}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+impl Request {
+    fn parse(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
+        let mut request = Request {
+            design: Design::default(),
+            force_n: 0.1,
+            alpha_deg: 0.0,
+            beta_deg: 0.0,
+            stick: false,
+        };
+        while let Some(name) = words.next() {
+            let value = words.next().ok_or(format!("{name}: no value\n{USAGE}"))?;
+            request.set(&name, &value)?;
+        }
+        Ok(request)
+    }
+
+    fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
+        if name == "--contact" {
+            self.stick = match value {
+                "force" => false,
+                "stick" => true,
+                _ => return Err(format!("--contact {value}: force or stick\n{USAGE}")),
+            };
+            return Ok(());
+        }
+        let slot = match name {
+            "--force-n" => &mut self.force_n,
+            "--alpha-deg" => &mut self.alpha_deg,
+            "--beta-deg" => &mut self.beta_deg,
+            "--offset-x-mm" => &mut self.design.tip_offset_mm[0],
+            "--offset-y-mm" => &mut self.design.tip_offset_mm[1],
+            "--overhang-mm" => &mut self.design.overhang_mm,
+            "--post-radius-mm" => &mut self.design.post_radius_mm,
+            "--post-grip" => &mut self.design.post_grip_n_per_mm3,
+            "--tip-radius-mm" => &mut self.design.tip_radius_mm,
+            "--fineness" => &mut self.design.fineness,
+            _ => return Err(format!("{name}: unknown\n{USAGE}")),
+        };
+        *slot = value
+            .parse()
+            .map_err(|_| format!("{name} {value}: not a number"))?;
+        Ok(())
+    }
+
+    fn contact(&self) -> Result<Contact, String> {
+        let load = Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg);
+        let force = load.map_err(|error| error.to_string())?.vector_n();
+        Ok(match self.stick {
+            false => Contact::Force(force),
+            true => Contact::Stick {
+                direction: force,
+                force_n: self.force_n,
+            },
+        })
+    }
+
+    fn run(&self) -> Result<(), String> {
+        let contact = self.contact()?;
+        let begin = Instant::now();
+        let film = Film::new(&self.design).map_err(|error| error.to_string())?;
+        let prepared = begin.elapsed();
+        let state = film
+            .press(contact, &film.rest())
+            .map_err(|error| error.to_string())?;
+        let solved = begin.elapsed() - prepared;
+        let camera = paper_camera().map_err(|error| error.to_string())?;
+
+        let three = |v: [f64; 3]| format!("({:9.4}, {:9.4}, {:9.4})", v[0], v[1], v[2]);
+        println!("tip depth      {:.4} mm", -state.tip_mm[2]);
+        println!("tip moved      {} mm", three(state.tip_mm));
+        println!("force on film  {} N", three(state.force_n));
+        println!("posts' force   {} N", three(state.reaction_n));
+        for (id, marker) in markers(&film, &state, &camera).iter().enumerate() {
+            let [x, y] = marker.seen_px;
+            println!(
+                "marker {id}: moved {} mm, seen at ({x:8.3}, {y:8.3}) px",
+                three(marker.moved_mm)
+            );
+        }
+        println!(
+            "{} unknowns, {} Newton steps; prepared in {:.3} s, solved in {:.3} s",
+            film.unknowns(),
+            state.steps,
+            prepared.as_secs_f64(),
+            solved.as_secs_f64()
+        );
+        Ok(())
+    }
+}

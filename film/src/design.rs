@@ -1,0 +1,264 @@
+//! What a film is: its dimensions, its material and how finely it is computed.
+
+use std::f64::consts::PI;
+
+use crate::FilmError;
+use crate::grid::Grid;
+use crate::point::Material;
+use crate::shell::{Shell, Spring};
+use crate::spline::Axis;
+
+/// Rings and rays of the points by which a post holds the film.
+const POST_RINGS: usize = 16;
+const POST_RAYS: usize = 64;
+/// Rings and rays of the points on which a tip presses.
+const TIP_RINGS: usize = 10;
+const TIP_RAYS: usize = 32;
+/// How fast cells grow away from posts and tip, mm per mm.
+const GROWTH: f64 = 0.15;
+/// The largest cell at fineness 1, mm.
+const LARGEST_CELL_MM: f64 = 1.4;
+
+/// A film on four posts, pressed by a tip. Lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    /// Distance between neighbouring posts' centres, > 0 (the paper's 28).
+    pub span_mm: f64,
+    /// How far the film reaches beyond the posts' centres, ≥ 0 (0: the paper's model; 6: its 40 × 40 mm cut).
+    pub overhang_mm: f64,
+    /// What it is made of.
+    pub material: Material,
+    /// Radius of the discs around the posts' centres on which the film is held, > 0.
+    pub post_radius_mm: f64,
+    /// How stiffly a post holds the film, N/mm per mm². Stiffer than the film can tell is clamped; its inverse is
+    /// what the cells near a post must resolve.
+    pub post_grip_n_per_mm3: f64,
+    /// Radius of the disc over which the tip spreads its force, > 0; by (1 − r²/R²)².
+    pub tip_radius_mm: f64,
+    /// Where the tip meets the film at rest, from the centre.
+    pub tip_offset_mm: [f64; 2],
+    /// 1: the default mesh; 2: cells of half the size; 0.25 to 8.
+    pub fineness: f64,
+}
+
+impl Default for Design {
+    fn default() -> Design {
+        Design {
+            span_mm: 28.0,
+            overhang_mm: 0.0,
+            material: Material {
+                youngs_mpa: 1.0,
+                poisson: 0.49,
+                thickness_mm: 0.5,
+            },
+            post_radius_mm: 1.5,
+            post_grip_n_per_mm3: 20.0,
+            tip_radius_mm: 0.5,
+            tip_offset_mm: [0.0; 2],
+            fineness: 1.0,
+        }
+    }
+}
+
+impl Design {
+    /// Half the length of the film's edge.
+    pub fn half_edge_mm(&self) -> f64 {
+        self.span_mm / 2.0 + self.overhang_mm
+    }
+
+    /// Whether such a film can be.
+    ///
+    /// # Errors
+    /// When a number is out of its range, or the tip would press on a post.
+    pub fn check(&self) -> Result<(), FilmError> {
+        let Design { material, .. } = self;
+        positive("span", self.span_mm)?;
+        positive("post radius", self.post_radius_mm)?;
+        positive("post grip", self.post_grip_n_per_mm3)?;
+        positive("tip radius", self.tip_radius_mm)?;
+        positive("Young's modulus", material.youngs_mpa)?;
+        positive("thickness", material.thickness_mm)?;
+        let ranged = [
+            ("overhang", self.overhang_mm, 0.0, self.span_mm),
+            ("Poisson's ratio", material.poisson, -0.99, 0.5),
+            ("fineness", self.fineness, 0.25, 8.0),
+        ];
+        for (what, value, from, to) in ranged {
+            if !(from..=to).contains(&value) {
+                return Err(refused(what, value, &format!("between {from} and {to}")));
+            }
+        }
+        self.check_tip()
+    }
+
+    fn check_tip(&self) -> Result<(), FilmError> {
+        let free = self.span_mm / 2.0 - self.post_radius_mm - self.tip_radius_mm;
+        for offset in self.tip_offset_mm {
+            if !(-free..=free).contains(&offset) {
+                let bound = format!("within ±{free} mm, where the tip is clear of the posts");
+                return Err(refused("tip offset", offset, &bound));
+            }
+        }
+        Ok(())
+    }
+
+    /// The film, held by its posts.
+    pub(crate) fn shell(&self) -> Shell {
+        let breaks = self.breaks();
+        let axes = [Axis::new(&breaks), Axis::new(&breaks)];
+        let mut shell = Shell::new(Grid { axes }, &self.material);
+        let springs: Vec<Spring> = self
+            .post_points()
+            .map(|(point, area)| Spring {
+                place: shell.grid().place(point),
+                stiffness: area * self.post_grip_n_per_mm3,
+            })
+            .collect();
+        shell.hold(springs);
+        shell
+    }
+
+    /// The points of the film on which the tip presses, with their shares of its force.
+    pub(crate) fn tip_points(&self) -> Vec<([f64; 2], f64)> {
+        let radius = self.tip_radius_mm;
+        let points: Vec<_> = disc(self.tip_offset_mm, radius, TIP_RINGS, TIP_RAYS)
+            .map(|(point, area, r)| (point, area * (1.0 - (r / radius).powi(2)).powi(2)))
+            .collect();
+        let total: f64 = points.iter().map(|(_, share)| share).sum();
+        points
+            .into_iter()
+            .map(|(point, share)| (point, share / total))
+            .collect()
+    }
+
+    /// The points of the film on posts, with their areas in mm².
+    fn post_points(&self) -> impl Iterator<Item = ([f64; 2], f64)> + '_ {
+        let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
+        let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];
+        centres
+            .into_iter()
+            .flat_map(|centre| disc(centre, self.post_radius_mm, POST_RINGS, POST_RAYS))
+            .filter(move |([x, y], ..)| x.abs() <= edge && y.abs() <= edge)
+            .map(|(point, area, _)| (point, area))
+    }
+
+    /// Cell borders along one side: even steps in the integral of 1 / (wanted size), symmetric.
+    fn breaks(&self) -> Vec<f64> {
+        const SAMPLES: usize = 4000;
+        let edge = self.half_edge_mm();
+        let step = edge / SAMPLES as f64;
+        let mut counts = vec![0.0];
+        for i in 0..SAMPLES {
+            let at = (i as f64 + 0.5) * step;
+            counts.push(counts[i] + step / self.cell_mm(at));
+        }
+        let cells = counts[SAMPLES].ceil();
+        let scale = counts[SAMPLES] / cells;
+        let border = |k: usize| {
+            let i = counts
+                .partition_point(|count| *count < k as f64 * scale)
+                .clamp(1, SAMPLES);
+            let share = (k as f64 * scale - counts[i - 1]) / (counts[i] - counts[i - 1]);
+            (i as f64 - 1.0 + share.min(1.0)) * step
+        };
+        let half: Vec<f64> = (1..=cells as usize).map(border).collect();
+        let left = half.iter().rev().map(|x| -x);
+        left.chain([0.0]).chain(half.iter().copied()).collect()
+    }
+
+    /// The wanted size of a cell `at` mm from the middle: small at the tip and at the posts.
+    fn cell_mm(&self, at: f64) -> f64 {
+        let tip = 0.5 + GROWTH * (at - self.tip_radius_mm).max(0.0);
+        let outside = (at - self.span_mm / 2.0).abs() - self.post_radius_mm;
+        let post = 0.5 + GROWTH * outside.max(0.0);
+        tip.min(post).min(LARGEST_CELL_MM) / self.fineness
+    }
+}
+
+/// Points of a disc in rings: place, area and distance from its centre.
+fn disc(
+    [cx, cy]: [f64; 2],
+    radius: f64,
+    rings: usize,
+    rays: usize,
+) -> impl Iterator<Item = ([f64; 2], f64, f64)> {
+    let (width, angle) = (radius / rings as f64, 2.0 * PI / rays as f64);
+    let ring = move |i: usize| {
+        let r = (i as f64 + 0.5) * width;
+        (0..rays).map(move |k| {
+            let (sin, cos) = ((k as f64 + 0.5) * angle).sin_cos();
+            ([cx + r * cos, cy + r * sin], r * width * angle, r)
+        })
+    };
+    (0..rings).flat_map(ring)
+}
+
+fn positive(what: &str, value: f64) -> Result<(), FilmError> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(());
+    }
+    Err(refused(what, value, "more than 0"))
+}
+
+fn refused(what: &str, value: f64, bound: &str) -> FilmError {
+    FilmError::Design(format!("{what} is {value}: use a number {bound}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn impossible_films_are_refused_by_name() {
+        let refused = |change: fn(&mut Design)| {
+            let mut design = Design::default();
+            change(&mut design);
+            design.check().unwrap_err().to_string()
+        };
+        assert!(refused(|d| d.span_mm = 0.0).contains("span"));
+        assert!(refused(|d| d.overhang_mm = -1.0).contains("overhang"));
+        assert!(refused(|d| d.post_radius_mm = f64::NAN).contains("post radius"));
+        assert!(refused(|d| d.material.poisson = 0.6).contains("Poisson"));
+        assert!(refused(|d| d.material.thickness_mm = -0.5).contains("thickness"));
+        assert!(refused(|d| d.fineness = 100.0).contains("fineness"));
+        assert!(refused(|d| d.tip_offset_mm = [0.0, 13.0]).contains("tip offset"));
+        assert!(refused(|d| d.tip_offset_mm = [f64::NAN, 0.0]).contains("tip offset"));
+    }
+
+    #[test]
+    fn cells_are_symmetric_and_fill_the_film() {
+        for overhang_mm in [0.0, 6.0] {
+            let design = Design {
+                overhang_mm,
+                ..Design::default()
+            };
+            let breaks = design.breaks();
+            let edge = design.half_edge_mm();
+            assert!((breaks[breaks.len() - 1] - edge).abs() < 1e-9);
+            assert!(breaks.windows(2).all(|pair| pair[1] > pair[0]));
+            for (left, right) in breaks.iter().zip(breaks.iter().rev()) {
+                assert!((left + right).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn posts_and_tip_have_their_size() {
+        let area = |overhang_mm| -> f64 {
+            let design = Design {
+                overhang_mm,
+                ..Design::default()
+            };
+            design.post_points().map(|(_, area)| area).sum()
+        };
+        let disc = PI * 1.5 * 1.5;
+        assert!((area(0.0) - disc).abs() < 1e-9, "four quarters");
+        assert!((area(6.0) - 4.0 * disc).abs() < 1e-9, "four discs");
+        let shares: f64 = Design::default()
+            .tip_points()
+            .iter()
+            .map(|(_, share)| share)
+            .sum();
+        assert!((shares - 1.0).abs() < 1e-12);
+    }
+}

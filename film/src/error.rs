@@ -1,0 +1,39 @@
+use std::fmt;
+
+/// Why a film cannot be made or pressed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FilmError {
+    /// A dimension, a material or a mesh that cannot be.
+    Design(String),
+    /// A contact that cannot be.
+    Contact(String),
+    /// Newton's method ended without an equilibrium.
+    NoEquilibrium {
+        /// Steps taken.
+        steps: usize,
+        /// The largest force left over, N.
+        left_over_n: f64,
+    },
+    /// The sparse solver gave up.
+    Solver(String),
+    /// The camera or a curve cannot be had.
+    Scene(String),
+}
+
+impl fmt::Display for FilmError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FilmError::Design(why) => write!(f, "film: {why}"),
+            FilmError::Contact(why) => write!(f, "contact: {why}"),
+            FilmError::NoEquilibrium { steps, left_over_n } => write!(
+                f,
+                "no equilibrium after {steps} steps ({left_over_n:.1e} N left over): press less, or start from a \
+                 state nearby"
+            ),
+            FilmError::Solver(why) => write!(f, "sparse solver: {why}"),
+            FilmError::Scene(why) => f.write_str(why),
+        }
+    }
+}
+
+impl std::error::Error for FilmError {}

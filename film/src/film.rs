@@ -1,0 +1,325 @@
+//! The film under a tip.
+
+use crate::newton::{Guide, Problem, Solution};
+use crate::point::{V3, dot, normal};
+use crate::shell::Shell;
+use crate::sparse::{COMPONENTS, Solver};
+use crate::{Design, FilmError};
+
+/// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a press has F_z < 0).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Contact {
+    /// It presses with this force (N) and goes where the film lets it: the `force` reading.
+    Force([f64; 3]),
+    /// It goes this far (mm) with the film stuck to it, whatever the force.
+    Travel([f64; 3]),
+    /// It moves along a direction (of any length) with the film stuck to it, until the force along that direction
+    /// is `force_n`, as a gauge on a stage reads it: the `stick` reading.
+    Stick {
+        /// Where the tip moves; its third part < 0.
+        direction: [f64; 3],
+        /// The force along it, N.
+        force_n: f64,
+    },
+}
+
+/// A film ready to be pressed.
+pub struct Film {
+    design: Design,
+    shell: Shell,
+    solver: Solver,
+    /// The share of each coefficient in the tip's mean displacement.
+    tip: Vec<f64>,
+}
+
+/// A film at rest or pressed.
+#[derive(Clone, Debug)]
+pub struct Equilibrium {
+    unknowns: Vec<f64>,
+    /// Where the tip's disc went (mean over it, weighted as its force), mm.
+    pub tip_mm: [f64; 3],
+    /// The tip's force on the film, N.
+    pub force_n: [f64; 3],
+    /// The posts' force on the film, N.
+    pub reaction_n: [f64; 3],
+    /// Newton steps that it took.
+    pub steps: usize,
+}
+
+impl Film {
+    /// Prepares the film of a design.
+    ///
+    /// # Errors
+    /// When the design cannot be ([`Design::check`]), or memory runs out.
+    pub fn new(design: &Design) -> Result<Film, FilmError> {
+        design.check()?;
+        let shell = design.shell();
+        let solver = Solver::new(shell.pattern())?;
+        let tip = tip_shares(&shell, design);
+        Ok(Film {
+            design: design.clone(),
+            shell,
+            solver,
+            tip,
+        })
+    }
+
+    /// What it was made from.
+    pub fn design(&self) -> &Design {
+        &self.design
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.shell.grid().unknowns()
+    }
+
+    /// The film at rest.
+    pub fn rest(&self) -> Equilibrium {
+        Equilibrium {
+            unknowns: vec![0.0; self.unknowns()],
+            tip_mm: [0.0; 3],
+            force_n: [0.0; 3],
+            reaction_n: [0.0; 3],
+            steps: 0,
+        }
+    }
+
+    /// The film under a contact, found from the state `start` (of this film; the nearer, the quicker).
+    ///
+    /// # Errors
+    /// When the contact's numbers are not finite, its direction is none, or no equilibrium is found.
+    pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, FilmError> {
+        let (force, guides) = self.asked(contact)?;
+        let guided: Vec<V3> = guides.iter().map(|(direction, _)| *direction).collect();
+        let problem = Problem {
+            shell: &self.shell,
+            load: self.on_tip(&force),
+            guides: guides
+                .iter()
+                .map(|(direction, target_mm)| Guide {
+                    weights: self.on_tip(direction),
+                    target_mm: *target_mm,
+                })
+                .collect(),
+        };
+        let solution = problem.solve(&self.solver, &start.unknowns)?;
+        Ok(self.equilibrium(solution, force, &guided))
+    }
+
+    /// How the camera-side surface point that rests at (x, y) mm moves, mm: half the thickness below the middle
+    /// surface, along its normal.
+    pub fn displacement(&self, state: &Equilibrium, rest_mm: [f64; 2]) -> [f64; 3] {
+        let grid = self.shell.grid();
+        let place = grid.place(rest_mm);
+        let [mut a1, mut a2] = grid.gradients(&state.unknowns, &place);
+        a1[0] += 1.0;
+        a2[1] += 1.0;
+        let half = self.design.material.thickness_mm / 2.0;
+        let n = normal(&a1, &a2);
+        let [dx, dy, dz] = grid.interpolate(&state.unknowns, &place);
+        [dx - half * n[0], dy - half * n[1], dz + half * (1.0 - n[2])]
+    }
+
+    /// The force on the tip, and directions in which its travel is given (mm).
+    fn asked(&self, contact: Contact) -> Result<(V3, Vec<(V3, f64)>), FilmError> {
+        match contact {
+            Contact::Force(force) => finite("force", force).map(|force| (force, Vec::new())),
+            Contact::Travel(travel) => {
+                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+                let travel = finite("travel", travel)?;
+                Ok(([0.0; 3], axes.into_iter().zip(travel).collect()))
+            }
+            Contact::Stick { direction, force_n } => {
+                finite("force", [force_n; 3])?;
+                let along = unit(finite("direction", direction)?)?;
+                let sides = across(&along).map(|side| (side, 0.0));
+                Ok((along.map(|part| force_n * part), sides.to_vec()))
+            }
+        }
+    }
+
+    fn on_tip(&self, vector: &V3) -> Vec<f64> {
+        let parts = self
+            .tip
+            .iter()
+            .flat_map(|share| vector.map(|part| share * part));
+        parts.collect()
+    }
+
+    fn equilibrium(&self, solution: Solution, load: V3, guided: &[V3]) -> Equilibrium {
+        let mut force_n = load;
+        for (direction, size) in guided.iter().zip(&solution.guide_n) {
+            for (sum, part) in force_n.iter_mut().zip(direction) {
+                *sum += size * part;
+            }
+        }
+        let mut tip_mm = [0.0; 3];
+        for (share, u) in self.tip.iter().zip(solution.unknowns.chunks(COMPONENTS)) {
+            for (sum, part) in tip_mm.iter_mut().zip(u) {
+                *sum += share * part;
+            }
+        }
+        Equilibrium {
+            tip_mm,
+            force_n,
+            reaction_n: self.shell.reaction(&solution.unknowns),
+            unknowns: solution.unknowns,
+            steps: solution.steps,
+        }
+    }
+}
+
+fn tip_shares(shell: &Shell, design: &Design) -> Vec<f64> {
+    let grid = shell.grid();
+    let mut shares = vec![0.0; grid.unknowns() / COMPONENTS];
+    for (point, share) in design.tip_points() {
+        let place = grid.place(point);
+        for (local, value) in place.values.iter().enumerate() {
+            shares[grid.coefficient(place.origin, local)] += share * value;
+        }
+    }
+    shares
+}
+
+fn finite(what: &str, vector: V3) -> Result<V3, FilmError> {
+    if vector.iter().all(|part| part.is_finite()) {
+        return Ok(vector);
+    }
+    Err(FilmError::Contact(format!(
+        "{what} is {vector:?}: use finite numbers"
+    )))
+}
+
+fn unit(vector: V3) -> Result<V3, FilmError> {
+    let length = dot(&vector, &vector).sqrt();
+    if length > 0.0 && vector[2] < 0.0 {
+        return Ok(vector.map(|part| part / length));
+    }
+    Err(FilmError::Contact(format!(
+        "direction is {vector:?}: a tip presses towards the camera, which is z < 0"
+    )))
+}
+
+/// Two unit vectors across a unit vector that is not along x.
+fn across(along: &V3) -> [V3; 2] {
+    let [x, y, z] = *along;
+    let size = (y * y + z * z).sqrt();
+    let first = [0.0, -z / size, y / size];
+    let second = [size, -x * y / size, -x * z / size];
+    [first, second]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film(fineness: f64) -> Film {
+        let design = Design {
+            fineness,
+            ..Design::default()
+        };
+        Film::new(&design).unwrap()
+    }
+
+    fn pressed(film: &Film, contact: Contact) -> Equilibrium {
+        film.press(contact, &film.rest()).unwrap()
+    }
+
+    fn close(a: [f64; 3], b: [f64; 3], tolerance: f64) {
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() < tolerance, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn posts_carry_the_load() {
+        let film = film(0.5);
+        for force in [[0.0, 0.0, -0.01], [0.05, -0.03, -0.2], [0.0, 0.02, -1.0]] {
+            let state = pressed(&film, Contact::Force(force));
+            assert_eq!(state.force_n, force);
+            close(state.reaction_n, force.map(|part| -part), 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_normal_press_is_symmetric() {
+        let film = film(0.5);
+        let state = pressed(&film, Contact::Force([0.0, 0.0, -0.2]));
+        for (x, y) in [(3.717, 3.717), (8.0, 2.0), (13.0, 0.5)] {
+            let [dx, dy, dz] = film.displacement(&state, [x, y]);
+            assert!(dz < -0.1);
+            close(film.displacement(&state, [-x, y]), [-dx, dy, dz], 1e-8);
+            close(film.displacement(&state, [x, -y]), [dx, -dy, dz], 1e-8);
+            close(film.displacement(&state, [y, x]), [dy, dx, dz], 1e-8);
+        }
+    }
+
+    #[test]
+    fn force_and_travel_are_two_views_of_one_state() {
+        let film = film(0.5);
+        let force = [0.02, -0.01, -0.15];
+        let by_force = pressed(&film, Contact::Force(force));
+        let by_travel = pressed(&film, Contact::Travel(by_force.tip_mm));
+        close(by_travel.force_n, force, 1e-8);
+        close(by_travel.tip_mm, by_force.tip_mm, 1e-9);
+        let direction = [0.1, 0.05, -1.0];
+        let stuck = pressed(
+            &film,
+            Contact::Stick {
+                direction,
+                force_n: 0.1,
+            },
+        );
+        let [x, y, z] = stuck.tip_mm;
+        assert!((x + 0.1 * z).abs() < 1e-9 && (y + 0.05 * z).abs() < 1e-9);
+        let along = unit(direction).unwrap();
+        assert!((dot(&stuck.force_n, &along) - 0.1).abs() < 1e-9);
+        close(
+            pressed(&film, Contact::Force(stuck.force_n)).tip_mm,
+            stuck.tip_mm,
+            1e-7,
+        );
+    }
+
+    #[test]
+    fn the_mesh_converges() {
+        let depth = |fineness| {
+            let film = film(fineness);
+            pressed(&film, Contact::Force([0.0, 0.0, -0.2])).tip_mm[2]
+        };
+        let [coarse, middle, fine] = [0.5, 1.0, 1.4].map(depth);
+        assert!(
+            (fine - middle).abs() < 0.006 && (fine - middle).abs() < (middle - coarse).abs() / 4.0
+        );
+    }
+
+    #[test]
+    fn a_thin_film_takes_force_with_the_cube_of_depth() {
+        let mut design = Design {
+            fineness: 0.5,
+            ..Design::default()
+        };
+        design.material.thickness_mm = 0.01;
+        let film = Film::new(&design).unwrap();
+        // Shallow, but a hundred times the thickness.
+        let force = |depth: f64| pressed(&film, Contact::Travel([0.0, 0.0, -depth])).force_n[2];
+        let order = (force(1.0) / force(0.5)).log2();
+        assert!((order - 3.0).abs() < 0.1, "{order}");
+    }
+
+    #[test]
+    fn what_cannot_be_pressed_is_refused() {
+        let film = film(0.25);
+        let refused = |contact| film.press(contact, &film.rest()).unwrap_err().to_string();
+        assert!(refused(Contact::Force([0.0, f64::NAN, 0.0])).contains("finite"));
+        assert!(refused(Contact::Travel([f64::INFINITY, 0.0, 0.0])).contains("finite"));
+        for direction in [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]] {
+            let contact = Contact::Stick {
+                direction,
+                force_n: 0.1,
+            };
+            assert!(refused(contact).contains("z < 0"));
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Equilibrium by Newton's method.
+//!
+//! Finds the displacements where the energy less the loads' work is stationary, on the set where each guided sum of
+//! unknowns has its target. Every step solves the linearized problem by Cholesky's factors, with the guides by their
+//! Schur complement; a stiffness that is not positive definite is shifted until it is. Once the guides are met (after one full step:
+//! they are linear), a step is shortened until the energy falls.
+
+use crate::FilmError;
+use crate::shell::{Derivatives, Shell};
+use crate::sparse::{Factors, Solver};
+
+/// Equilibrium: no unknown has more force left over, N.
+pub const FORCE_TOLERANCE_N: f64 = 1e-10;
+const TARGET_TOLERANCE_MM: f64 = 1e-11;
+const MAX_STEPS: usize = 80;
+/// The part of the promised fall of energy that a step must bring (Armijo).
+const SUFFICIENT: f64 = 1e-4;
+/// The fall of energy below which rounding hides it, N·mm: a full step is then taken.
+const HIDDEN_N_MM: f64 = 1e-12;
+
+/// A sum of unknowns that is led to a target.
+pub struct Guide {
+    /// The unknowns' weights.
+    pub weights: Vec<f64>,
+    /// What the sum shall be, mm.
+    pub target_mm: f64,
+}
+
+/// What is asked of the film.
+pub struct Problem<'a> {
+    /// The film.
+    pub shell: &'a Shell,
+    /// The force on each unknown, N.
+    pub load: Vec<f64>,
+    /// At most a few guides.
+    pub guides: Vec<Guide>,
+}
+
+/// An equilibrium.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The unknowns, mm.
+    pub unknowns: Vec<f64>,
+    /// The guides' forces, N.
+    pub guide_n: Vec<f64>,
+    /// Newton steps taken.
+    pub steps: usize,
+}
+
+/// A step towards equilibrium and what it was made of.
+struct Step {
+    step: Vec<f64>,
+    guide_n: Vec<f64>,
+}
+
+impl Problem<'_> {
+    /// Finds the equilibrium from `start`.
+    ///
+    /// # Errors
+    /// When there is none within reach.
+    pub fn solve(&self, solver: &Solver, start: &[f64]) -> Result<Solution, FilmError> {
+        let mut u = start.to_vec();
+        let mut guide_n = vec![0.0; self.guides.len()];
+        let mut left_over_n = f64::INFINITY;
+        for steps in 0..=MAX_STEPS {
+            let at = self.shell.derivatives(&u);
+            let missing = self.missing(&u);
+            let met = missing.iter().all(|gap| gap.abs() < TARGET_TOLERANCE_MM);
+            left_over_n = largest(&self.left_over(&at, &guide_n));
+            if left_over_n.is_nan() {
+                break;
+            }
+            // Guides' forces are known only after a step.
+            if met && left_over_n < FORCE_TOLERANCE_N && (steps > 0 || guide_n.is_empty()) {
+                return Ok(Solution {
+                    unknowns: u,
+                    guide_n,
+                    steps,
+                });
+            }
+            let step = self.step(solver, &at, &missing)?;
+            let length = if met {
+                self.length(&u, &at, &step.step)
+            } else {
+                1.0
+            };
+            advance(&mut u, &step.step, length);
+            guide_n = step.guide_n;
+        }
+        Err(FilmError::NoEquilibrium {
+            steps: MAX_STEPS,
+            left_over_n,
+        })
+    }
+
+    /// Load + guides' forces − the film's own, for each unknown.
+    fn left_over(&self, at: &Derivatives, guide_n: &[f64]) -> Vec<f64> {
+        let mut rest: Vec<f64> = self
+            .load
+            .iter()
+            .zip(&at.gradient)
+            .map(|(f, g)| f - g)
+            .collect();
+        for (guide, force) in self.guides.iter().zip(guide_n) {
+            advance(&mut rest, &guide.weights, *force);
+        }
+        rest
+    }
+
+    fn missing(&self, u: &[f64]) -> Vec<f64> {
+        let gap = |guide: &Guide| guide.target_mm - inner(&guide.weights, u);
+        self.guides.iter().map(gap).collect()
+    }
+
+    fn step(&self, solver: &Solver, at: &Derivatives, missing: &[f64]) -> Result<Step, FilmError> {
+        let factors = self.factors(solver, at)?;
+        let count = self.guides.len();
+        let unknowns = self.load.len();
+        let mut sides = self.left_over(at, &vec![0.0; count]);
+        for guide in &self.guides {
+            sides.extend(&guide.weights);
+        }
+        factors.solve(&mut sides, 1 + count);
+        let mut columns = sides.chunks(unknowns);
+        let mut step = columns.next().unwrap_or_default().to_vec();
+        let answers: Vec<&[f64]> = columns.collect();
+        let guide_n = self.guide_forces(&step, &answers, missing)?;
+        for (answer, force) in answers.iter().zip(&guide_n) {
+            advance(&mut step, answer, *force);
+        }
+        Ok(Step { step, guide_n })
+    }
+
+    /// Solves the Schur complement: guides' weights · (step + Σ answer · force) = what is missing.
+    fn guide_forces(
+        &self,
+        step: &[f64],
+        answers: &[&[f64]],
+        missing: &[f64],
+    ) -> Result<Vec<f64>, FilmError> {
+        let row = |guide: &Guide| -> Vec<f64> {
+            let parts = answers.iter().map(|answer| inner(&guide.weights, answer));
+            parts.collect()
+        };
+        let matrix = self.guides.iter().map(row).collect();
+        let gaps = self.guides.iter().zip(missing);
+        let side = gaps.map(|(guide, gap)| gap - inner(&guide.weights, step));
+        solve_small(matrix, side.collect())
+            .ok_or_else(|| FilmError::Solver("the guides depend on each other".into()))
+    }
+
+    /// Factors of the stiffness, shifted if need be.
+    fn factors(&self, solver: &Solver, at: &Derivatives) -> Result<Factors, FilmError> {
+        let pattern = self.shell.pattern();
+        if let Some(factors) = solver.factor(pattern, &at.stiffness) {
+            return Ok(factors);
+        }
+        let diagonal = pattern.diagonal();
+        let mean = diagonal.iter().map(|&k| at.stiffness[k].abs()).sum::<f64>();
+        let mut shift = 1e-5 * mean / diagonal.len() as f64;
+        let mut shifted = at.stiffness.clone();
+        for _ in 0..12 {
+            for &entry in diagonal {
+                shifted[entry] = at.stiffness[entry] + shift;
+            }
+            if let Some(factors) = solver.factor(pattern, &shifted) {
+                return Ok(factors);
+            }
+            shift *= 8.0;
+        }
+        Err(FilmError::Solver("the stiffness has no factors".into()))
+    }
+
+    /// How much of the step to take: all of it, or the half, quarter … at which the energy falls most.
+    fn length(&self, u: &[f64], at: &Derivatives, step: &[f64]) -> f64 {
+        let here = at.energy - inner(&self.load, u);
+        let slope = inner(&at.gradient, step) - inner(&self.load, step);
+        if slope > -HIDDEN_N_MM {
+            return 1.0;
+        }
+        let energy = |length: f64| {
+            let mut there = u.to_vec();
+            advance(&mut there, step, length);
+            self.shell.energy(&there) - inner(&self.load, &there)
+        };
+        let mut length = 1.0;
+        let mut best = energy(length);
+        if best <= here + SUFFICIENT * slope {
+            return length;
+        }
+        for _ in 0..30 {
+            let half = energy(length / 2.0);
+            if best <= here + SUFFICIENT * length * slope && best <= half {
+                break;
+            }
+            length /= 2.0;
+            best = half;
+        }
+        length
+    }
+}
+
+/// a · b.
+pub fn inner(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn advance(u: &mut [f64], step: &[f64], length: f64) {
+    for (part, add) in u.iter_mut().zip(step) {
+        *part += length * add;
+    }
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| {
+        if value.is_nan() {
+            f64::NAN
+        } else {
+            value.abs().max(most)
+        }
+    })
+}
+
+/// Gauss elimination with pivoting, for systems of a few unknowns; `None` when singular.
+pub fn solve_small(mut matrix: Vec<Vec<f64>>, mut side: Vec<f64>) -> Option<Vec<f64>> {
+    let n = side.len();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&a, &b| matrix[a][k].abs().total_cmp(&matrix[b][k].abs()))?;
+        matrix.swap(k, pivot);
+        side.swap(k, pivot);
+        if matrix[k][k] == 0.0 || !matrix[k][k].is_finite() {
+            return None;
+        }
+        for row in k + 1..n {
+            let factor = matrix[row][k] / matrix[k][k];
+            for column in k..n {
+                matrix[row][column] -= factor * matrix[k][column];
+            }
+            side[row] -= factor * side[k];
+        }
+    }
+    for k in (0..n).rev() {
+        let known: f64 = (k + 1..n)
+            .map(|column| matrix[k][column] * side[column])
+            .sum();
+        side[k] = (side[k] - known) / matrix[k][k];
+    }
+    Some(side)
+}

@@ -1,0 +1,70 @@
+//! The limit of large deflection: a membrane.
+
+use super::*;
+
+const HALF_MM: f64 = 5.0;
+const LOAD_N_PER_MM2: f64 = 0.02;
+
+/// A long strip between two held edges under a dead load is a string of St Venant–Kirchhoff's law: with H the
+/// constant horizontal force and q X the vertical one, A λ(λ²−1)/2 = √(H² + q² X²) gives the stretch λ at each X, and
+/// the strip must still span the gap: ∫ λ H/T dX = half of it. Returns the depth in the middle, ∫ λ q X/T dX.
+fn string_depth(stiffness: f64) -> f64 {
+    let integrals = |h: f64| {
+        let (mut across, mut down) = (0.0, 0.0);
+        let n = 20_000;
+        for i in 0..n {
+            let vertical = LOAD_N_PER_MM2 * HALF_MM * (i as f64 + 0.5) / n as f64;
+            let tension = (h * h + vertical * vertical).sqrt();
+            let per_tension = stretch(2.0 * tension / stiffness) / tension * HALF_MM / n as f64;
+            across += per_tension * h;
+            down += per_tension * vertical;
+        }
+        (across, down)
+    };
+    let (mut low, mut high) = (1e-9, stiffness);
+    for _ in 0..100 {
+        let middle = (low + high) / 2.0;
+        if integrals(middle).0 < HALF_MM {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    integrals(low).1
+}
+
+/// λ ≥ 1 with λ³ − λ = c.
+fn stretch(c: f64) -> f64 {
+    let mut x = 1.0 + c.cbrt();
+    for _ in 0..60 {
+        x -= (x * x * x - x - c) / (3.0 * x * x - 1.0);
+    }
+    x
+}
+
+#[test]
+fn a_strip_under_load_is_a_string() {
+    // Thin, so that bending is 10⁻⁶ of it, and soft, so that it stretches by half.
+    let strip = Material {
+        youngs_mpa: 10.0,
+        poisson: 0.49,
+        thickness_mm: 0.01,
+    };
+    let mut shell = rectangle([2.0 * HALF_MM, 1.0], [24, 1], &strip);
+    let columns = shell.grid().functions()[0];
+    for k in 0..shell.grid().unknowns() / 3 {
+        let edge = depth(&shell, k)[0] == 0;
+        // Plane strain: nothing moves along y, and nothing varies along it.
+        shell.pin(3 * k + 1, PIN_N_PER_MM);
+        if edge {
+            shell.pin(3 * k, PIN_N_PER_MM);
+            shell.pin(3 * k + 2, PIN_N_PER_MM);
+        }
+    }
+    assert_eq!(columns, 27);
+    let u = ramped(&shell, &pressure(&shell, LOAD_N_PER_MM2, 2), 1);
+    let w = displacement(&shell, &u, [HALF_MM, 0.5])[2];
+    let expected = string_depth(strip.membrane_n_per_mm());
+    assert!(expected > 3.0, "a large deflection: {expected}");
+    assert!((w / expected - 1.0).abs() < 2e-3, "{w} {expected}");
+}

@@ -1,0 +1,113 @@
+//! The shell against what is known without it.
+
+mod bending;
+mod derivatives;
+mod large;
+mod patch;
+mod plates;
+
+use crate::Material;
+use crate::grid::Grid;
+use crate::newton::Problem;
+use crate::shell::Shell;
+use crate::sparse::Solver;
+use crate::spline::Axis;
+
+/// As stiff as pins need to be, and no stiffer than rounding allows, N/mm.
+const PIN_N_PER_MM: f64 = 1e7;
+
+/// A rectangle [0, a] × [0, b] in equal cells.
+fn rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], material: &Material) -> Shell {
+    let axis = |length: f64, cells: usize| {
+        let breaks: Vec<f64> = (0..=cells)
+            .map(|i| length * i as f64 / cells as f64)
+            .collect();
+        Axis::new(&breaks)
+    };
+    let axes = [axis(a, columns), axis(b, rows)];
+    Shell::new(Grid { axes }, material)
+}
+
+/// How far coefficient `k` is from the film's edges, in coefficients: along x and along y.
+fn depth(shell: &Shell, k: usize) -> [usize; 2] {
+    let [columns, rows] = shell.grid().functions();
+    let (i, j) = (k % columns, k / columns);
+    [i.min(columns - 1 - i), j.min(rows - 1 - j)]
+}
+
+/// Coefficients that move each point (x, y) by an affine function.
+fn coefficients(shell: &Shell, u: impl Fn(f64, f64) -> [f64; 3]) -> Vec<f64> {
+    let [x, y] = &shell.grid().axes;
+    let xs: Vec<f64> = x.greville().collect();
+    y.greville()
+        .flat_map(|y| xs.iter().flat_map(|&x| u(x, y)).collect::<Vec<_>>())
+        .collect()
+}
+
+/// A force spread evenly over the film, N per mm² of it at rest, along component `c`.
+fn pressure(shell: &Shell, size: f64, c: usize) -> Vec<f64> {
+    let integrals = |axis: &Axis| -> Vec<f64> {
+        let mut sums = vec![0.0; axis.functions()];
+        for span in 0..axis.spans() {
+            let [from, to] = axis.ends(span);
+            for (at, weight) in [(-1.0, 1.0), (0.0, 4.0), (1.0, 1.0)] {
+                // Simpson's rule is exact for cubics.
+                let x = (from + to + at * (to - from)) / 2.0;
+                for (i, value) in axis.basis(span, x)[0].iter().enumerate() {
+                    sums[span + i] += weight / 6.0 * (to - from) * value;
+                }
+            }
+        }
+        sums
+    };
+    let (x, y) = (
+        integrals(&shell.grid().axes[0]),
+        integrals(&shell.grid().axes[1]),
+    );
+    let mut load = vec![0.0; shell.grid().unknowns()];
+    for (j, down) in y.iter().enumerate() {
+        for (i, across) in x.iter().enumerate() {
+            load[3 * (j * x.len() + i) + c] = size * across * down;
+        }
+    }
+    load
+}
+
+/// A force at a point, along component `c`.
+fn point_force(shell: &Shell, at: [f64; 2], size: f64, c: usize) -> Vec<f64> {
+    let mut load = vec![0.0; shell.grid().unknowns()];
+    let place = shell.grid().place(at);
+    for (local, value) in place.values.iter().enumerate() {
+        load[3 * shell.grid().coefficient(place.origin, local) + c] += size * value;
+    }
+    load
+}
+
+/// The linear answer of the film at rest to a load.
+fn linear(shell: &Shell, mut load: Vec<f64>) -> Vec<f64> {
+    let at_rest = shell.derivatives(&vec![0.0; load.len()]);
+    let solver = Solver::new(shell.pattern()).unwrap();
+    let factors = solver.factor(shell.pattern(), &at_rest.stiffness).unwrap();
+    factors.solve(&mut load, 1);
+    load
+}
+
+/// The nonlinear answer, with the load in `stages` equal steps.
+fn ramped(shell: &Shell, load: &[f64], stages: usize) -> Vec<f64> {
+    let solver = Solver::new(shell.pattern()).unwrap();
+    let mut u = vec![0.0; load.len()];
+    for stage in 1..=stages {
+        let share = stage as f64 / stages as f64;
+        let problem = Problem {
+            shell,
+            load: load.iter().map(|part| share * part).collect(),
+            guides: Vec::new(),
+        };
+        u = problem.solve(&solver, &u).unwrap().unknowns;
+    }
+    u
+}
+
+fn displacement(shell: &Shell, u: &[f64], at: [f64; 2]) -> [f64; 3] {
+    shell.grid().interpolate(u, &shell.grid().place(at))
+}
