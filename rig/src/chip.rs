@@ -137,14 +137,14 @@ impl Mcu for Chip {
     fn poll(&mut self, _now: VirtualNanos) {}
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        if self.dormant.sleeps(slot, self.part.bus()) {
+            return (self.part.bus_mut(), None);
+        }
         if slot == self.dcmi_slot {
             return (self.part.bus_mut(), Some(&mut self.dcmi));
         }
         if slot == self.slots.vsync_port() {
             self.drive_vsync(self.dcmi.vsync_at());
-        }
-        if self.dormant.sleeps(slot, self.part.bus()) {
-            return (self.part.bus_mut(), None);
         }
         match self.otg.model(slot) {
             Some(model) => (self.part.bus_mut(), Some(model)),

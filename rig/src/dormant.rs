@@ -39,34 +39,52 @@ const LISTENERS: [(&str, Register, u32); 23] = [
 #[derive(Debug)]
 pub struct Dormant {
     rcc: usize,
-    asleep: Vec<Option<(Register, u32)>>,
+    asleep: Vec<bool>,
+    listeners: Vec<(usize, Register, u32)>,
+    /// The enables may have changed since they were looked at.
+    stale: bool,
 }
 
 impl Dormant {
     /// Every listener of a part out of reset.
     pub fn new(bus: &Bus) -> Self {
-        let mut asleep = vec![None; bus.slots().len()];
-        for (name, register, bit) in LISTENERS {
-            if let Some(slot) = bus.slot_of(name) {
-                asleep[slot] = Some((register, bit));
-            }
+        let place = |(name, register, bit)| Some((bus.slot_of(name)?, register, bit));
+        let listeners: Vec<_> = LISTENERS.into_iter().filter_map(place).collect();
+        let mut asleep = vec![false; bus.slots().len()];
+        for (slot, ..) in &listeners {
+            asleep[*slot] = true;
         }
+        let rcc = bus.slot_of("RCC").expect("the part has an RCC");
         Self {
-            rcc: bus.slot_of("RCC").expect("the part has an RCC"),
+            rcc,
             asleep,
+            listeners,
+            stale: false,
         }
     }
 
-    /// Whether the peripheral in a slot was never clocked.
+    /// Whether the peripheral in a slot was never clocked. Asked before every access and event of the slot.
     pub fn sleeps(&mut self, slot: usize, bus: &Bus) -> bool {
-        let Some(Some((register, bit))) = self.asleep.get(slot) else {
+        if slot == self.rcc {
+            // The write, if it is one, lands after this.
+            self.stale = true;
             return false;
-        };
-        let enabled = bus.slots()[self.rcc].registers().get(*register) >> bit & 1 == 1;
-        if enabled {
-            self.asleep[slot] = None;
         }
-        !enabled
+        let asleep = self.asleep.get(slot).copied().unwrap_or(false);
+        if asleep && std::mem::take(&mut self.stale) {
+            self.wake(bus);
+            return self.asleep[slot];
+        }
+        asleep
+    }
+
+    fn wake(&mut self, bus: &Bus) {
+        let registers = bus.slots()[self.rcc].registers();
+        for &(slot, register, bit) in &self.listeners {
+            if registers.get(register) >> bit & 1 == 1 {
+                self.asleep[slot] = false;
+            }
+        }
     }
 }
 
@@ -97,6 +115,7 @@ mod tests {
                 part.read(now, base, Width::W32).is_ok(),
                 "{name} does not answer with its clock"
             );
+            dormant.sleeps(dormant.rcc, part.bus());
             assert!(!dormant.sleeps(slot, part.bus()), "{name}");
         }
     }

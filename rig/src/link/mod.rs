@@ -18,8 +18,11 @@ const LOOK: u8 = 20;
 
 /// A byte stream that a client may or may not hold.
 pub trait Endpoint: Send + std::fmt::Debug {
-    /// Whether a client holds the other end; looks for a new one.
-    fn connected(&mut self) -> bool;
+    /// Whether the client still holds the other end.
+    fn held(&mut self) -> bool;
+
+    /// Whether a client has come to the other end.
+    fn offered(&mut self) -> bool;
 
     /// Takes what the client sent into `to`. Nothing when there is nothing.
     fn read(&mut self, to: &mut VecDeque<u8>);
@@ -48,16 +51,21 @@ impl Link {
         }
     }
 
-    /// Whether a client holds the port; looks for a new one when none does.
+    /// Whether a client holds the port; looks for a new one when none did. A client that leaves is seen to leave
+    /// before the next one is seen to come.
     pub fn connected(&mut self) -> bool {
-        let still = self
-            .holder
-            .is_some_and(|holder| self.endpoints[holder].connected());
-        if !still {
-            self.holder = self
-                .endpoints
-                .iter_mut()
-                .position(|endpoint| endpoint.connected());
+        match self.holder {
+            Some(holder) => {
+                if !self.endpoints[holder].held() {
+                    self.holder = None;
+                }
+            }
+            None => {
+                self.holder = self
+                    .endpoints
+                    .iter_mut()
+                    .position(|endpoint| endpoint.offered())
+            }
         }
         self.holder.is_some()
     }

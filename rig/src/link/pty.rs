@@ -73,9 +73,13 @@ fn make_link(path: &Path, link: &Path) -> anyhow::Result<()> {
 }
 
 impl Endpoint for Pty {
-    fn connected(&mut self) -> bool {
+    fn held(&mut self) -> bool {
         self.count_clients();
         self.clients > 0
+    }
+
+    fn offered(&mut self) -> bool {
+        self.held()
     }
 
     fn read(&mut self, to: &mut VecDeque<u8>) {
@@ -113,13 +117,13 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let link = directory.path().join("port");
         let mut pty = Pty::open(Some(&link)).unwrap();
-        assert!(!pty.connected());
+        assert!(!pty.held());
         let mut client = OpenOptions::new()
             .read(true)
             .write(true)
             .open(&link)
             .unwrap();
-        assert!(pty.connected());
+        assert!(pty.held());
         client.write_all(b"a\r\n\x03").unwrap();
         let mut got = VecDeque::new();
         while got.len() < 4 {
@@ -131,7 +135,7 @@ mod tests {
         client.read_exact(&mut answer).unwrap();
         assert_eq!(&answer, b"\n\x00\x04");
         drop(client);
-        assert!(!pty.connected());
+        assert!(!pty.held());
         drop(pty);
         assert!(!link.is_symlink());
     }

@@ -50,7 +50,11 @@ impl Tcp {
 }
 
 impl Endpoint for Tcp {
-    fn connected(&mut self) -> bool {
+    fn held(&mut self) -> bool {
+        self.client.is_some()
+    }
+
+    fn offered(&mut self) -> bool {
         if self.client.is_none() {
             self.accept();
         }
@@ -90,9 +94,9 @@ mod tests {
     #[test]
     fn bytes_go_both_ways_and_a_hangup_is_noticed() {
         let mut tcp = Tcp::listen(0).unwrap();
-        assert!(!tcp.connected());
+        assert!(!tcp.offered());
         let mut client = TcpStream::connect((Ipv4Addr::LOCALHOST, tcp.port().unwrap())).unwrap();
-        while !tcp.connected() {}
+        while !tcp.offered() {}
         client.write_all(b"in").unwrap();
         let mut got = VecDeque::new();
         while got.len() < 2 {
@@ -103,7 +107,7 @@ mod tests {
         client.read_exact(&mut answer).unwrap();
         assert_eq!((got, &answer), (VecDeque::from(b"in".to_vec()), b"out"));
         drop(client);
-        while tcp.connected() {
+        while tcp.held() {
             tcp.read(&mut VecDeque::new());
         }
     }

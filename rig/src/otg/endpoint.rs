@@ -223,8 +223,10 @@ mod tests {
 
     #[test]
     fn an_out_endpoint_takes_one_packet_per_arming() {
-        let mut endpoint = Out::default();
-        endpoint.size = 1 << 19 | 64;
+        let mut endpoint = Out {
+            size: 1 << 19 | 64,
+            ..Out::default()
+        };
         endpoint.write_control(bit::ACTIVE | bit::CLEAR_NAK);
         assert!(!endpoint.armed(2), "never enabled");
         endpoint.write_control(bit::ACTIVE | bit::CLEAR_NAK | bit::ENABLE);
