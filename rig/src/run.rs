@@ -139,8 +139,16 @@ impl Board for Sensor {
             ccsidr: &[0xF00F_E019, 0xF01F_E009],
         });
         config.vector_table = Some(0x0800_0000);
-        vec![Target::new("stm32h743", &mut self.chip, config.spec())]
+        let mut core = config.spec();
+        core.factory_images = vec![unique_id()];
+        vec![Target::new("stm32h743", &mut self.chip, core)]
     }
+}
+
+/// The 96-bit number that every part is made with, at its address in system memory (RM0433 chapter 61).
+fn unique_id() -> Image {
+    let bytes = b"hivtac-rig-1".to_vec();
+    Image::new(Path::new("unique-id"), bytes, Some(0x1FF1_E800)).expect("plain bytes are an image")
 }
 
 /// Runs the firmware until a limit, the client's leaving, an interrupt, or a broken rule.

@@ -23,6 +23,7 @@ fn undisturbed(setup: Setup) -> common::Run {
     assert_eq!((run.report.dcmi.overruns, run.report.resets), (0, 0));
     let hello = run.hellos()[0];
     assert_eq!((hello.width, hello.height), (320, 240));
+    assert_eq!(&hello.device_id, b"hivtac-rig-1");
     let samples = run.samples();
     assert!(
         samples.len() >= 4,
