@@ -88,11 +88,17 @@ impl Rig {
         fs::read_to_string(self.file("log")).unwrap_or_default()
     }
 
-    /// Waits for its end, which `--exit-on-hangup` or a limit brings, and gives its counters.
+    /// Ends it, and gives its counters.
     ///
     /// # Errors
     /// When it does not end, or failed.
     pub fn finish(mut self) -> Result<Value> {
+        let id = std::format!("{}", self.process.id());
+        // Fails when it has ended already, and its exit code says why.
+        let _ = Command::new("kill")
+            .args(["-TERM", &id])
+            .stderr(Stdio::null())
+            .status();
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
             if let Some(status) = self.process.try_wait()? {

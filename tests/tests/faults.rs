@@ -3,17 +3,17 @@
 use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
 use serde_json::Value;
 
-/// A run with faults, watched for so many frames.
-fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>) {
-    let mut rig_options = vec!["--scene", "static", "--exit-on-hangup"];
+/// A run with faults, watched by `monitor --json`: its output, its lines, and the rig's counters.
+fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
+    let mut rig_options = vec!["--scene", "static"];
     for fault in faults {
         rig_options.extend(["--fault", fault]);
     }
     let rig = Rig::start(&rig_options).unwrap();
     let output = tool(&rig, "monitor", &[&["--json"], options].concat()).unwrap();
     let lines = json_lines(&output.out).unwrap();
-    rig.finish().unwrap();
-    (output, lines)
+    let counters = rig.finish().unwrap();
+    (output, lines, counters)
 }
 
 fn has_status(line: &Value, name: &str) -> bool {
@@ -43,7 +43,7 @@ fn check_recovery(output: &ToolOutput, lines: &[Value]) {
 
 #[test]
 fn a_silent_camera_is_started_again() {
-    let (output, lines) = watch(&["camera-silent@500-1000"], &["--frames", "30"]);
+    let (output, lines, _) = watch(&["camera-silent@500-1000"], &["--frames", "30"]);
     check_recovery(&output, &lines);
     assert!(
         lines
@@ -57,7 +57,7 @@ fn a_silent_camera_is_started_again() {
 
 #[test]
 fn an_overrun_costs_its_frame_and_no_more() {
-    let (output, lines) = watch(&["dcmi-overrun@500-505"], &["--frames", "30"]);
+    let (output, lines, _) = watch(&["dcmi-overrun@500-505"], &["--frames", "30"]);
     check_recovery(&output, &lines);
     assert!(
         lines.iter().any(|line| has_status(line, "capture_overrun")),
@@ -68,7 +68,8 @@ fn an_overrun_costs_its_frame_and_no_more() {
 
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
-    let (output, lines) = watch(&["host-not-reading@500-1500"], &["--frames", "30"]);
+    // Longer than the device's own buffers, shorter than the silence after which the monitor asks.
+    let (output, lines, _) = watch(&["host-not-reading@500-900"], &["--frames", "30"]);
     check_recovery(&output, &lines);
     assert!(counter(&output, "USB") > 0, "{}", output.err);
     let no_gap = "0 frames not processed";
@@ -87,13 +88,14 @@ fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
 #[test]
 fn a_pulled_cable_is_reported_and_survived() {
     let options = ["--frames", "20", "--reconnect"];
-    let (output, lines) = watch(&["cable-pulled@500-900"], &options);
+    let (output, lines, counters) = watch(&["cable-pulled@500-900"], &options);
     check_recovery(&output, &lines);
+    assert_eq!(counters["usb"]["enumerations"], 2, "{counters}");
     assert!(output.err.contains("connected again"), "{}", output.err);
 }
 
 #[test]
 fn a_pulled_cable_ends_a_monitor_that_does_not_reconnect() {
-    let (output, _) = watch(&["cable-pulled@500-900"], &["--frames", "20"]);
+    let (output, ..) = watch(&["cable-pulled@500-900"], &["--frames", "20"]);
     assert_eq!(output.code, Some(5), "{output:?}");
 }

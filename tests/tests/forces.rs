@@ -76,15 +76,7 @@ fn said(line: &Value) -> Value {
 /// Runs a scene and holds every line of the host tool against the sensing here. Gives the lines.
 fn compare(name: &str, preset: Preset, frames: usize) -> Vec<Value> {
     let seed = SEED.to_string();
-    let options = [
-        "--scene",
-        name,
-        "--seed",
-        &seed,
-        "--preset",
-        preset.name(),
-        "--exit-on-hangup",
-    ];
+    let options = ["--scene", name, "--seed", &seed, "--preset", preset.name()];
     let rig = Rig::start(&options).unwrap();
     let output = tool(
         &rig,

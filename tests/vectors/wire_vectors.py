@@ -11,7 +11,7 @@ import pathlib
 import sys
 import zlib
 
-SCHEMA = 0x277B4C2C7A18DDFC
+SCHEMA = 0xCC4ABA547086D851
 
 
 def varint(value):
