@@ -11,7 +11,7 @@
 //! | module | subject |
 //! |---|---|
 //! | [`run`], [`report`] | one run from options to outcome |
-//! | [`chip`], [`board`], `dormant` | the microcontroller; which pins and clocks reach the camera and USB |
+//! | [`chip`], [`board`], `machine`, `dormant` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`dcmi`], [`camera`], [`frame_source`] | the camera interface; the sensor; what it looks at |
 //! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
 //! | [`faults`], [`rules`], [`dma_reach`], [`truth`] | what goes wrong on request; what firmware must not do; what is true |
@@ -25,6 +25,7 @@ mod dormant;
 pub mod faults;
 pub mod frame_source;
 pub mod link;
+mod machine;
 pub mod otg;
 pub mod report;
 pub mod rules;

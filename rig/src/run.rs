@@ -1,19 +1,16 @@
 //! One run: the board, the host's program, the limits, and the report.
 
-use std::collections::VecDeque;
-use std::num::{NonZeroU32, NonZeroU64};
+use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, bail};
-use rigless::emulator::{self, AccessKind, Driver, Host, Settled, Start, Stop};
+use rigless::emulator::{self, AccessKind, Driver, Settled, Start, Stop};
 use rigless::image::Image;
-use rigless::machine::{Board, Target, armv7m};
-use rigless::mcu::{Mcu, Operate};
+use rigless::mcu::Mcu;
 use rigless::session::Session;
-use rigless::snapshot::Store;
 use rigless::time::VirtualNanos;
 
 use crate::camera::{Camera, SharedCamera};
@@ -22,16 +19,15 @@ use crate::dma_reach;
 use crate::faults::Faults;
 use crate::frame_source::FrameSource;
 use crate::link::Link;
+use crate::machine::Sensor;
 use crate::report::Report;
 use crate::rules::Rules;
 use crate::script::Script;
 use crate::truth::TruthLog;
-use crate::usb_host::{self, SharedHost};
+use crate::usb_host::{Host, SharedHost};
 
 /// Instructions per second that a run assumes unless told otherwise: five in six cycles at 480 MHz.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 400_000_000;
-/// The core's clock, Hz. Only SysTick's reference depends on it.
-const CORE_HZ: u64 = 480_000_000;
 /// How often the program on the host's port looks, ns.
 const LOOK_NS: u64 = 1_000_000;
 /// How long a run goes on after its client left, before it waits for the next one, ns.
@@ -94,63 +90,6 @@ pub struct Outcome {
     pub report: Report,
 }
 
-/// The board with its one microcontroller.
-#[derive(Debug)]
-struct Sensor {
-    chip: Chip,
-    instructions_per_second: NonZeroU64,
-}
-
-// Snapshots are not taken.
-impl Store for Sensor {}
-
-impl Board for Sensor {
-    fn name(&self) -> &'static str {
-        "weact-h743"
-    }
-
-    fn target_names(&self) -> Vec<&'static str> {
-        vec!["stm32h743"]
-    }
-
-    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
-        (target == 0).then_some(&mut self.chip)
-    }
-
-    fn targets(&mut self) -> Vec<Target<'_>> {
-        let core = armv7m::Core {
-            variant: armv7m::Variant::M7,
-            clock_hz: NonZeroU64::new(CORE_HZ).expect("not zero"),
-            interrupt_lines: NonZeroU32::new(self.chip.cpu().interrupt_lines.into())
-                .expect("the part has interrupts"),
-            priority_bits: 4,
-            refclk_divider: NonZeroU32::new(8).expect("not zero"),
-            instructions_per_second: self.instructions_per_second,
-            boot: "flash",
-        };
-        let mut config = armv7m::Config::new(core, &rigless::cpu::armv7m::windows(self.chip.bus()));
-        config.fpu = armv7m::Fpu::FpV5Dp;
-        config.mpu_regions = armv7m::MpuRegions::Sixteen;
-        config.cpuid = 0x411F_C271;
-        config.branch_prediction = armv7m::BranchPrediction::Always;
-        config.caches = Some(armv7m::Caches {
-            clidr: 0x0900_0003,
-            ctr: 0x8303_C003,
-            ccsidr: &[0xF00F_E019, 0xF01F_E009],
-        });
-        config.vector_table = Some(0x0800_0000);
-        let mut core = config.spec();
-        core.factory_images = vec![unique_id()];
-        vec![Target::new("stm32h743", &mut self.chip, core)]
-    }
-}
-
-/// The 96-bit number that every part is made with, at its address in system memory (RM0433 chapter 61).
-fn unique_id() -> Image {
-    let bytes = b"hivtac-rig-1".to_vec();
-    Image::new(Path::new("unique-id"), bytes, Some(0x1FF1_E800)).expect("plain bytes are an image")
-}
-
 /// Runs the firmware until a limit, the client's leaving, an interrupt, or a broken rule.
 ///
 /// # Errors
@@ -163,7 +102,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         options.truth,
         options.faults.clone(),
     ));
-    let host = SharedHost::new(usb_host::Host::new(options.faults.clone()));
+    let host = SharedHost::new(Host::new(options.faults.clone()));
     let chip = Chip::new(camera.clone(), host.clone(), options.faults, rules.clone())?;
     let board = Sensor {
         chip,
@@ -254,7 +193,7 @@ impl Driver<Sensor> for Conductor {
     fn on_settled(
         &mut self,
         session: &mut Session<Sensor>,
-        _host: &mut dyn Host,
+        _host: &mut dyn emulator::Host,
         settled: Settled,
     ) {
         let now = match settled {
@@ -280,7 +219,7 @@ impl Driver<Sensor> for Conductor {
         &mut self,
         session: &mut Session<Sensor>,
         stop: Stop,
-        _host: &mut dyn Host,
+        _host: &mut dyn emulator::Host,
     ) -> Option<VirtualNanos> {
         let now = stop.at.0;
         let frames = session.board().chip.dcmi.counters().frames;
@@ -331,45 +270,71 @@ impl Conductor {
         }
     }
 
+    /// Gives the client its turn, and holds the run up as long as it has to wait. Answers whether the run goes on.
     fn serve_client(&mut self, now: u64) -> bool {
+        while !self.interrupt.load(Ordering::Relaxed) {
+            self.client = self.look_for_client(now);
+            match self.exchange(now) {
+                Turn::Over => return true,
+                Turn::End => return false,
+                Turn::Wait => {
+                    if let Program::Client { link, .. } = &self.program {
+                        link.wait();
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    fn look_for_client(&mut self, now: u64) -> Client {
+        let Program::Client { link, .. } = &mut self.program else {
+            return Client::None;
+        };
+        match (link.connected(), self.client) {
+            (true, _) => Client::Here,
+            (false, Client::Here) => Client::Left(now),
+            (false, before) => before,
+        }
+    }
+
+    fn exchange(&mut self, now: u64) -> Turn {
         let Program::Client {
             link,
             wait,
             exit_on_hangup,
         } = &mut self.program
         else {
-            return true;
+            return Turn::Over;
         };
-        loop {
-            if self.interrupt.load(Ordering::Relaxed) {
-                return false;
-            }
-            self.client = match (link.connected(), self.client) {
-                (true, _) => Client::Here,
-                (false, Client::Here) => Client::Left(now),
-                (false, before) => before,
-            };
-            let mut host = self.host.lock();
-            host.set_open(self.client == Client::Here);
-            let (mut from_device, mut to_device) = (VecDeque::new(), VecDeque::new());
-            std::mem::swap(&mut from_device, &mut host.from_device);
-            std::mem::swap(&mut to_device, &mut host.to_device);
-            link.exchange(&mut from_device, &mut to_device);
-            (host.from_device, host.to_device) = (from_device, to_device);
-            let held_up = match self.client {
-                // A slow client slows the run down; it does not make the device lose samples.
-                Client::Here => !host.from_device.is_empty(),
-                Client::None => *wait,
-                Client::Left(_) if *exit_on_hangup => return false,
-                Client::Left(at) => *wait && now >= at + LINGER_NS,
-            };
-            drop(host);
-            if !held_up {
-                return true;
-            }
-            link.wait();
-        }
+        let mut host = self.host.lock();
+        host.set_open(self.client == Client::Here);
+        let Host {
+            from_device,
+            to_device,
+            ..
+        } = &mut *host;
+        link.exchange(from_device, to_device);
+        let held_up = match self.client {
+            // A slow client slows the run down; it does not make the device lose samples.
+            Client::Here => !from_device.is_empty(),
+            Client::None => *wait,
+            Client::Left(_) if *exit_on_hangup => return Turn::End,
+            Client::Left(at) => *wait && now >= at + LINGER_NS,
+        };
+        if held_up { Turn::Wait } else { Turn::Over }
     }
+}
+
+/// What follows from a client's turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Turn {
+    /// The run goes on.
+    Over,
+    /// The run stands still until the client is ready.
+    Wait,
+    /// The run ends.
+    End,
 }
 
 #[cfg(test)]

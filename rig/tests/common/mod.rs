@@ -1,6 +1,7 @@
 //! Runs the firmware under a scripted host, and decodes what it sends.
 //!
 //! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug.
+//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -72,6 +73,16 @@ fn path_from(variable: &str, what: &str) -> PathBuf {
     path
 }
 
+/// What every test assumes of the core, unless it says otherwise: `HIVTAC_INSTRUCTIONS_PER_SECOND`, or the default.
+pub fn instructions_per_second() -> u64 {
+    match std::env::var("HIVTAC_INSTRUCTIONS_PER_SECOND") {
+        Ok(text) => text
+            .parse()
+            .expect("HIVTAC_INSTRUCTIONS_PER_SECOND is a whole number"),
+        Err(_) => INSTRUCTIONS_PER_SECOND,
+    }
+}
+
 /// A run under a scripted host that opens the port, says hello, starts the stream, and asks for counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
@@ -92,7 +103,7 @@ impl Setup {
             faults: Vec::new(),
             actions: Vec::new(),
             virtual_ms,
-            instructions_per_second: INSTRUCTIONS_PER_SECOND,
+            instructions_per_second: instructions_per_second(),
         }
     }
 

@@ -1,0 +1,168 @@
+//! The sensor's signals one after the other: which comes next, and when.
+
+use rigless::device::{DeviceContext, Level, RegisterFile};
+use rigless::time::{EventId, VirtualNanos};
+
+use super::receiver::control;
+use super::signals::{Frame, Run};
+use super::{Dcmi, GROUP, flag};
+use crate::camera::output::{Output, VSYNC_LINES};
+
+/// What the sensor does next.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Step {
+    /// VSYNC goes to its active level: a frame begins.
+    VsyncBegins,
+    /// VSYNC goes back.
+    VsyncEnds,
+    /// Bytes of a run, from this one on.
+    Bytes(Run, u32),
+    /// A silent sensor may speak again.
+    Retry,
+}
+
+/// The step that is planned.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Next {
+    pub step: Step,
+    pub at: VirtualNanos,
+    pub event: EventId,
+}
+
+/// Where frame starts are counted from, so that they do not drift.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Epoch {
+    at_ns: u64,
+    clock_hz: u64,
+    clocks: u64,
+}
+
+impl Dcmi {
+    /// Starts the sensor's frame timing afresh: after power-up, a new clock, a register reset.
+    pub fn start_over(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let now = context.now().0;
+        self.next = None;
+        self.epoch = Epoch::default();
+        if self
+            .frame
+            .take()
+            .is_some_and(|frame| frame.exposed.is_none())
+        {
+            // VSYNC was at its active level. That it falls back is an edge like any other.
+            self.camera.lock().count_edge(now);
+        }
+        self.set_vsync(Level::Low, registers, context);
+        self.camera.lock().restart();
+        let (output, fault) = {
+            let camera = self.camera.lock();
+            (camera.output(now), camera.next_fault(now))
+        };
+        match (output, fault) {
+            (Some(output), _) => self.plan(
+                Step::VsyncBegins,
+                now + output.clocks_ns(output.frame_clocks()),
+                context,
+            ),
+            (None, Some(at)) => self.plan(Step::Retry, at, context),
+            (None, None) => {}
+        }
+    }
+
+    /// The events of this slot were dropped by a reset; the sensor does not care.
+    pub fn reschedule(&mut self, context: &mut DeviceContext<'_>) {
+        if let Some(next) = &mut self.next {
+            next.event = context.schedule(next.at);
+        }
+    }
+
+    pub(super) fn plan(&mut self, step: Step, at_ns: u64, context: &mut DeviceContext<'_>) {
+        let at = VirtualNanos(at_ns);
+        self.next = Some(Next {
+            step,
+            at,
+            event: context.schedule(at),
+        });
+    }
+
+    /// Plans what follows from the beginning of a line on.
+    pub(super) fn plan_from(&mut self, line: u32, context: &mut DeviceContext<'_>) {
+        let Some(frame) = &self.frame else { return };
+        let end = if line < VSYNC_LINES {
+            VSYNC_LINES
+        } else {
+            frame.output.lines
+        };
+        let run = if self.listens() {
+            frame.run_from(line, end, self.inverted(&frame.output))
+        } else {
+            None
+        };
+        match run {
+            Some(run) => self.plan_group(run, 0, context),
+            None if line < VSYNC_LINES => {
+                let at = frame.instant(VSYNC_LINES, 0);
+                self.plan(Step::VsyncEnds, at, context);
+            }
+            None => {
+                let clocks = self.epoch.clocks + frame.output.frame_clocks();
+                let at = self.epoch.at_ns + frame.output.clocks_ns(clocks);
+                self.epoch.clocks = clocks;
+                self.plan(Step::VsyncBegins, at, context);
+            }
+        }
+    }
+
+    pub(super) fn plan_group(&mut self, run: Run, from: u32, context: &mut DeviceContext<'_>) {
+        let Some(frame) = &self.frame else { return };
+        let at = frame.instant(run.line, run.start + (from + GROUP).min(run.bytes));
+        self.plan(Step::Bytes(run, from), at, context);
+    }
+
+    /// Whether data lines matter at all now.
+    pub(super) fn listens(&self) -> bool {
+        let wanted = self.receiver.capturing() || self.enabled & flag::LINE != 0;
+        wanted && self.settings.has(control::ENABLE) && self.pins.clock && self.pins.hsync
+    }
+
+    /// Whether HREF's idle level is taken for data.
+    pub(super) fn inverted(&self, output: &Output) -> bool {
+        output.href_active_high == self.settings.has(control::HSYNC_BLANKS_HIGH)
+    }
+
+    pub(super) fn begin_frame(
+        &mut self,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let now = context.now().0;
+        let Some(output) = self.camera.lock().output(now) else {
+            return self.start_over(registers, context);
+        };
+        self.camera.lock().complain(&output);
+        if output.pixel_clock_hz != self.epoch.clock_hz {
+            self.epoch = Epoch {
+                at_ns: now,
+                clock_hz: output.pixel_clock_hz,
+                clocks: 0,
+            };
+        }
+        let level = Level::from(output.vsync_active_high);
+        self.frame = Some(Frame::new(now, output));
+        self.set_vsync(level, registers, context);
+        self.plan_from(0, context);
+    }
+
+    pub(super) fn end_vsync(
+        &mut self,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        let exposed = self.camera.lock().count_edge(context.now().0);
+        let Some(frame) = &mut self.frame else { return };
+        frame.exposed = Some(exposed);
+        let level = Level::from(!frame.output.vsync_active_high);
+        self.set_vsync(level, registers, context);
+        self.camera.lock().log_truth(exposed);
+        self.plan_from(VSYNC_LINES, context);
+    }
+}
