@@ -149,8 +149,11 @@ impl PipelineTask {
             return;
         };
         if let Some(rest) = taring.add(measurement) {
-            reply(taring.id(), Outcome::Done);
-            self.sensor.set_tare(Some(rest));
+            let at_rest = rest.fits(&self.sensor.settings().geometry);
+            if at_rest {
+                self.sensor.set_tare(Some(rest));
+            }
+            reply(taring.id(), tare_outcome(at_rest));
             self.taring = None;
         }
     }
@@ -159,6 +162,14 @@ impl PipelineTask {
         if let Some(taring) = self.taring.take() {
             reply(taring.id(), Outcome::NoGoodFrames);
         }
+    }
+}
+
+fn tare_outcome(at_rest: bool) -> Outcome {
+    if at_rest {
+        Outcome::Done
+    } else {
+        Outcome::NotAtRest
     }
 }
 

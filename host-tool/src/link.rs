@@ -241,6 +241,9 @@ fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::Done => return Ok(()),
         Outcome::InvalidArgument => "an argument is outside its range",
         Outcome::Busy => "it is busy with the same thing; try again later",
+        Outcome::NotAtRest => {
+            "the markers are not where a film at rest has them; take away what touches it, and check the film's distance"
+        }
         Outcome::NoGoodFrames => {
             "not enough good frames came in time; does the camera see all four markers? (hivtac monitor)"
         }

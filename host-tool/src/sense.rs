@@ -100,6 +100,12 @@ impl<'a> Bench<'a> {
                     picture.width, picture.height
                 )));
             }
+            if !tare.rest.fits(&sensor.settings().geometry) {
+                return Err(failure(format!(
+                    "the tare's picture does not show a film at rest for {path}: its markers are more than 15 % nearer \
+                     to or farther from their centre than the preset has them; use a picture without a press, or another --preset"
+                )));
+            }
             sensor.set_tare(Some(tare.rest));
         }
         let measurement = measure(&mut sensor, &picture);

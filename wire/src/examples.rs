@@ -240,6 +240,7 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::InvalidArgument),
         Just(Outcome::Busy),
         Just(Outcome::NoGoodFrames),
+        Just(Outcome::NotAtRest),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }

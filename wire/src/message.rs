@@ -224,4 +224,6 @@ pub enum Outcome {
     Busy,
     /// Tare gave up: not enough good frames arrived in time.
     NoGoodFrames,
+    /// Refused: the markers are not where a film at rest has them. Something presses it, or the sensor is built otherwise.
+    NotAtRest,
 }

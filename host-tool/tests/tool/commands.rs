@@ -178,6 +178,13 @@ fn a_tare_is_taken_refused_or_not_answered() {
         "hivtac: the device refused \"tare\": not enough good frames came in time; \
          does the camera see all four markers? (hivtac monitor)\n"
     );
+    let pressed = run(&["tare", "--port", &device(Some(Outcome::NotAtRest)).port]);
+    assert_eq!(pressed.code, Some(6));
+    assert_eq!(
+        pressed.stderr,
+        "hivtac: the device refused \"tare\": the markers are not where a film at rest has them; \
+         take away what touches it, and check the film's distance\n"
+    );
     let mute = run(&["tare", "--frames", "1", "--port", &device(None).port]);
     assert_eq!(mute.code, Some(6));
     assert_eq!(

@@ -16,7 +16,7 @@
 //! eaten by less than 0.3 mm of its 1 mm, which moves it by up to 0.8 px; a red thing that sticks out of a marker and
 //! moves it by up to 1.5 px; a red disc of a marker's size in place of a hidden one, less than 0.55 mm from it.
 
-mod pattern;
+pub(crate) mod pattern;
 mod shape;
 #[cfg(test)]
 mod tests;

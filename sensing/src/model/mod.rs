@@ -21,6 +21,7 @@ pub use layer::Layer;
 use crate::{
     features::{FEATURES, Features},
     geometry::{Geometry, Preset},
+    markers::pattern::{Pattern, distance},
     threshold::HsvBox,
     units::{MicroNewtons, MilliDegrees, Px},
 };
@@ -169,6 +170,21 @@ impl Rest {
             .iter()
             .all(|c| inside(c.0) && inside(c.1))
             && self.areas.iter().all(|area| (1..=largest).contains(area))
+    }
+
+    /// Whether the markers are as far from their common centre as a film at rest shows them, to 15 %. That leaves room
+    /// for a film 1.5 mm nearer or farther and for markers 0.7 mm off their places, and refuses a film that something
+    /// presses: every force against such a rest would be wrong.
+    pub fn fits(&self, geometry: &Geometry) -> bool {
+        let center = Pattern::of_centroids(self.features.centroids).center;
+        let sum: i64 = self
+            .features
+            .centroids
+            .iter()
+            .map(|&centroid| i64::from(distance(centroid, center).0))
+            .sum();
+        let expected = 4 * i64::from(geometry.rest_distance().0);
+        (sum - expected).abs() * 100 <= expected * 15
     }
 }
 

@@ -89,6 +89,25 @@ fn a_tare_takes_the_place_of_the_models_rest() {
 }
 
 #[test]
+fn a_rest_position_has_its_markers_where_the_geometry_has_them() {
+    let rest = *tared(GEOMETRY).tare().unwrap();
+    let scaled = |percent: i32| {
+        let mut scaled = rest;
+        let (center_x, center_y) = GEOMETRY.center();
+        for (x, y) in &mut scaled.features.centroids {
+            *x = Px(center_x.0 + (x.0 - center_x.0) / 100 * percent);
+            *y = Px(center_y.0 + (y.0 - center_y.0) / 100 * percent);
+        }
+        scaled.fits(&GEOMETRY)
+    };
+    assert!(rest.fits(&GEOMETRY) && scaled(87) && scaled(113));
+    assert!(
+        !scaled(83) && !scaled(117),
+        "pressed, or another film distance"
+    );
+}
+
+#[test]
 fn a_tare_that_cannot_be_is_none() {
     let mut sensor = tared(GEOMETRY);
     let mut rest = *sensor.tare().unwrap();
