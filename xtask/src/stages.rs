@@ -14,7 +14,7 @@ pub const ORDER: [&str; 9] = [
     "markers",
     "features",
     "network",
-    "force",
+    "angles, force",
     "pipeline",
     "library",
 ];
@@ -78,7 +78,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         "markers" | "geometry" => Some("markers"),
         "features" => Some("features"),
         "network" | "model" => Some("network"),
-        "force" | "cordic" => Some("force"),
+        "force" | "cordic" => Some("angles, force"),
         // Small things that belong to whoever uses them.
         "units" | "status" => None,
         _ => Some("pipeline"),
