@@ -118,8 +118,15 @@ impl CaptureTask {
         }
     }
 
-    /// Sets the camera up; tries until it answers.
+    /// Sets the camera up; tries until it answers. Frames that pass meanwhile count as dropped at once.
     async fn start_camera(&mut self) {
+        stats::pass_over_frames_after(self.last.number);
+        self.try_until_it_answers().await;
+        self.last = vsync::newest();
+        stats::end_passing_over(self.last.number);
+    }
+
+    async fn try_until_it_answers(&mut self) {
         while let Err(error) = self.try_camera().await {
             health::set(Condition::NoCamera);
             log::say(LogLevel::Error, format_args!("camera: {error}"));

@@ -37,6 +37,28 @@ impl Counter {
     }
 }
 
+/// Number of the newest frame before the camera's set-up, while that lasts.
+static PASSING_OVER: AtomicU32 = AtomicU32::new(NOT_PASSING);
+const NOT_PASSING: u32 = u32::MAX;
+
+/// From now on, every frame after number `last` counts as dropped.
+pub fn pass_over_frames_after(last: u32) {
+    PASSING_OVER.store(last, Ordering::Relaxed);
+}
+
+/// Ends that; `newest` is the last such frame.
+pub fn end_passing_over(newest: u32) {
+    DROPPED_BUSY.add(passed_over(newest));
+    PASSING_OVER.store(NOT_PASSING, Ordering::Relaxed);
+}
+
+fn passed_over(newest: u32) -> u32 {
+    match PASSING_OVER.load(Ordering::Relaxed) {
+        NOT_PASSING => 0,
+        last => newest.saturating_sub(last),
+    }
+}
+
 macro_rules! counters {
     ($($name:ident => $field:ident;)*) => {
         $(
@@ -46,11 +68,14 @@ macro_rules! counters {
 
         /// All counters. Each is exact; they are read one after the other.
         pub fn snapshot() -> Stats {
-            Stats {
-                frames_exposed: vsync::newest().number,
+            let frames_exposed = vsync::newest().number;
+            let mut stats = Stats {
+                frames_exposed,
                 uptime_us: Instant::now().as_micros(),
                 $($field: $name.get(),)*
-            }
+            };
+            stats.dropped_busy = stats.dropped_busy.saturating_add(passed_over(frames_exposed));
+            stats
         }
     };
 }
