@@ -15,9 +15,11 @@ const POST_RAYS: usize = 64;
 const TIP_RINGS: usize = 10;
 const TIP_RAYS: usize = 32;
 /// How fast cells grow away from posts and tip, mm per mm.
-const GROWTH: f64 = 0.15;
-/// The largest cell at fineness 1, mm.
-const LARGEST_CELL_MM: f64 = 1.4;
+const GROWTH: f64 = 0.25;
+/// Cells at fineness 1, mm: under the tip, at a post (where the film's grip ends within 0.2 mm), and anywhere.
+const TIP_CELL_MM: f64 = 0.5;
+const POST_CELL_MM: f64 = 0.35;
+const LARGEST_CELL_MM: f64 = 1.6;
 
 /// A film on four posts, pressed by a tip. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +32,9 @@ pub struct Design {
     pub material: Material,
     /// Radius of the discs around the posts' centres on which the film is held, > 0.
     pub post_radius_mm: f64,
-    /// How stiffly a post holds the film, N/mm per mm². Stiffer than the film can tell is clamped; its inverse is
-    /// what the cells near a post must resolve.
+    /// How stiffly a post holds the film, N/mm per mm², > 0. The film slips by √(membrane stiffness / grip) at a
+    /// post's rim: 0.18 mm at the default 20, as if the post were that much smaller. A rubber film that is clamped on
+    /// both faces gives by shear through its thickness, about 12 G/t = 8 N/mm³: the default is no softer than that.
     pub post_grip_n_per_mm3: f64,
     /// Radius of the disc over which the tip spreads its force, > 0; by (1 − r²/R²)².
     pub tip_radius_mm: f64,
@@ -168,9 +171,9 @@ impl Design {
 
     /// The wanted size of a cell `at` mm from the middle: small at the tip and at the posts.
     fn cell_mm(&self, at: f64) -> f64 {
-        let tip = 0.5 + GROWTH * (at - self.tip_radius_mm).max(0.0);
+        let tip = TIP_CELL_MM + GROWTH * (at - self.tip_radius_mm).max(0.0);
         let outside = (at - self.span_mm / 2.0).abs() - self.post_radius_mm;
-        let post = 0.5 + GROWTH * outside.max(0.0);
+        let post = POST_CELL_MM + GROWTH * outside.max(0.0);
         tip.min(post).min(LARGEST_CELL_MM) / self.fineness
     }
 }

@@ -16,8 +16,10 @@ pub enum FilmError {
     },
     /// The sparse solver gave up.
     Solver(String),
-    /// The camera or a curve cannot be had.
+    /// A camera or a load cannot be.
     Scene(String),
+    /// A text does not hold a reduced film's curves.
+    Curves(String),
 }
 
 impl fmt::Display for FilmError {
@@ -31,6 +33,7 @@ impl fmt::Display for FilmError {
                  state nearby"
             ),
             FilmError::Solver(why) => write!(f, "sparse solver: {why}"),
+            FilmError::Curves(why) => write!(f, "reduced film: {why}"),
             FilmError::Scene(why) => f.write_str(why),
         }
     }

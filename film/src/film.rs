@@ -64,6 +64,21 @@ impl Film {
         })
     }
 
+    /// Puts the tip elsewhere (mm from the centre). States found before stay good to start from.
+    ///
+    /// # Errors
+    /// When the tip would press on a post.
+    pub fn move_tip(&mut self, offset_mm: [f64; 2]) -> Result<(), FilmError> {
+        let design = Design {
+            tip_offset_mm: offset_mm,
+            ..self.design.clone()
+        };
+        design.check()?;
+        self.tip = tip_shares(&self.shell, &design);
+        self.design = design;
+        Ok(())
+    }
+
     /// What it was made from.
     pub fn design(&self) -> &Design {
         &self.design
@@ -305,6 +320,7 @@ mod tests {
         // Shallow, but a hundred times the thickness.
         let force = |depth: f64| pressed(&film, Contact::Travel([0.0, 0.0, -depth])).force_n[2];
         let order = (force(1.0) / force(0.5)).log2();
+        println!("thin film: force with depth to the {order:.3}");
         assert!((order - 3.0).abs() < 0.1, "{order}");
     }
 

@@ -37,6 +37,11 @@ fn a_cantilever_bends_as_eulers_elastica() {
         let end = [length, width / 2.0];
         let u = ramped(&shell, &point_force(&shell, end, force, 2), 10);
         let [dx, _, dz] = displacement(&shell, &u, end);
+        println!(
+            "elastica {load}: {:.5} {down:.5}, {:.5} {back:.5}",
+            dz / length,
+            -dx / length
+        );
         assert!(
             (dz / length - down).abs() < 3e-4,
             "load {load}: {} {down}",
