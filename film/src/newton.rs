@@ -2,8 +2,8 @@
 //!
 //! Finds the displacements where the energy less the loads' work is stationary, on the set where each guided sum of
 //! unknowns has its target. Every step solves the linearized problem by Cholesky's factors, with the guides by their
-//! Schur complement; a stiffness that is not positive definite is shifted until it is. Once the guides are met (after one full step:
-//! they are linear), a step is shortened until the energy falls.
+//! Schur complement; a stiffness that is not positive definite is shifted until it is. Once the guides are met (after
+//! one full step: they are linear), a step is shortened until the energy falls.
 
 use crate::FilmError;
 use crate::shell::{Derivatives, Shell};
