@@ -1,6 +1,6 @@
 //! Makes the reduced film's curves and checks them against the full solution.
 //!
-//! `cargo run --release --example reduce -- data/force.csv`
+//! `cargo run --release -p hivtac-film --example reduce -- film/data/force.csv`
 
 use std::hint::black_box;
 use std::io::Write;

@@ -1,6 +1,6 @@
 //! Presses the film once and prints what the tip, the markers and the camera make of it.
 //!
-//! `cargo run --release --example solve -- --force-n 0.1 --alpha-deg 5`
+//! `cargo run --release -p hivtac-film --example solve -- --force-n 0.1 --alpha-deg 5`
 
 use std::process::ExitCode;
 use std::time::Instant;
