@@ -36,7 +36,7 @@ fn reduce(path: &str) -> Result<(), Box<dyn std::error::Error>> {
     let seconds = begin.elapsed().as_secs_f64();
     let notes = format!(
         "# The reduced film, contact reading `force`: {} curves (see src/reduced/mod.rs).\n\
-         # cargo run --release --example reduce -- {path}\n\
+         # cargo run --release -p hivtac-film --example reduce -- {path}\n\
          # Against the full solution at {} poses: at most {:.3} px, rms {:.3} px; tip depth within {:.4} mm.\n\
          # motion, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients in mm\n",
         curves.curves(),
