@@ -50,7 +50,7 @@ impl Test {
         let mut report = Report::default();
         self.checks(&mut report, toolchain);
         self.host_tests(&mut report);
-        if self.wants_one_of(&["tests: rig", "tests: across rooms"]) {
+        if self.wants_one_of(&["tests: rig at half speed", "tests: across rooms"]) {
             let programs = report.step("build: firmware", |_| Programs::build(toolchain));
             self.rig_tests(&mut report, programs.as_ref());
             self.cross_room_tests(&mut report, toolchain, programs.as_ref());
@@ -101,14 +101,21 @@ impl Test {
         }
     }
 
+    /// The rig's tests at the speed that it assumes of the core, and at half of it.
     fn rig_tests(&self, report: &mut Report, programs: Option<&Programs>) {
-        if self.wants("tests: rig") {
-            report.step("tests: rig", |tally| {
-                let programs = programs.context("not run: the firmware could not be built")?;
-                let mut command = artifacts::rig_cargo("test");
-                programs.name_to(command.arg("--no-fail-fast"));
-                run_tests(&mut command, tally)
-            });
+        for (step, speed) in [
+            ("tests: rig", None),
+            ("tests: rig at half speed", Some("200000000")),
+        ] {
+            if self.wants(step) {
+                report.step(step, |tally| {
+                    let programs = programs.context("not run: the firmware could not be built")?;
+                    let mut command = artifacts::rig_cargo("test");
+                    programs.name_to(command.arg("--no-fail-fast"));
+                    command.envs(speed.map(|speed| ("HIVTAC_INSTRUCTIONS_PER_SECOND", speed)));
+                    run_tests(&mut command, tally)
+                });
+            }
         }
     }
 
