@@ -1,24 +1,57 @@
 //! Makes the reduced film's curves and checks them against the full solution.
 //!
-//! `cargo run --release -p hivtac-film --example reduce -- film/data/force.csv`
+//! `cargo run --release -p hivtac-film --example reduce -- scene/data`
 
-use std::hint::black_box;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_film::{Design, Reduced, fit};
-use hivtac_scene::Load;
+use hivtac_film::{Design, check, fit};
+use hivtac_scene::Contact;
+use hivtac_scene::film::curves::Curves;
+use hivtac_scene::film::{Family, Film};
 
-const CHECKS: usize = 60;
+const USAGE: &str = "reduce FOLDER [--check] [force] [stick] [slip] [force-overhang]
+--check: hold the files that are there against the full solution instead of making them";
+
+/// One file to make.
+struct Task {
+    name: &'static str,
+    family: Family,
+    contact: Contact,
+    overhang_mm: f64,
+    /// Loads of its check.
+    checks: usize,
+}
+
+const TASKS: [Task; 4] = [
+    Task::new("force", Family::Force, Contact::Force, 0.0, 60),
+    Task::new("stick", Family::Stick, Contact::Stick, 0.0, 60),
+    Task::new("slip", Family::Slip, Contact::Slip { mu: 0.6 }, 0.0, 30),
+    Task::new("force-overhang", Family::Force, Contact::Force, 6.0, 20),
+];
+
+impl Task {
+    const fn new(
+        name: &'static str,
+        family: Family,
+        contact: Contact,
+        overhang_mm: f64,
+        checks: usize,
+    ) -> Task {
+        Task {
+            name,
+            family,
+            contact,
+            overhang_mm,
+            checks,
+        }
+    }
+}
 
 fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let done = match &words[..] {
-        [path] => reduce(path),
-        _ => Err("reduce OUT.csv".into()),
-    };
-    match done {
+    match reduce(std::env::args().skip(1)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
             eprintln!("{why}");
@@ -27,51 +60,84 @@ fn main() -> ExitCode {
     }
 }
 
-fn reduce(path: &str) -> Result<(), Box<dyn std::error::Error>> {
+fn reduce(mut words: impl Iterator<Item = String>) -> Result<(), Box<dyn std::error::Error>> {
+    let folder = words.next().ok_or(USAGE)?;
+    let (flags, names): (Vec<String>, Vec<String>) = words.partition(|word| word == "--check");
+    let known = |name: &String| TASKS.iter().any(|task| task.name == name);
+    if let Some(name) = names.iter().find(|name| !known(name)) {
+        return Err(format!("{name}: unknown\n{USAGE}").into());
+    }
     let begin = Instant::now();
-    let threads = std::thread::available_parallelism()?.get();
-    let design = Design::default();
-    let curves = fit(&design, threads, progress("curves"))?;
-    let check = curves.check(&design, CHECKS, threads, progress("check"))?;
-    let seconds = begin.elapsed().as_secs_f64();
-    let notes = format!(
-        "# The reduced film, contact reading `force`: {} curves (see src/reduced/mod.rs).\n\
-         # cargo run --release -p hivtac-film --example reduce -- {path}\n\
-         # Against the full solution at {} poses: at most {:.3} px, rms {:.3} px; tip depth within {:.4} mm.\n\
-         # motion, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients in mm\n",
-        curves.curves(),
-        check.poses,
-        check.worst_px,
-        check.rms_px,
-        check.worst_depth_mm
-    );
-    std::fs::write(path, format!("{notes}{curves}"))?;
-    print!("{notes}");
-    println!(
-        "{seconds:.0} s on {threads} threads; one evaluation {:.2} µs",
-        evaluation_us(&curves)?
-    );
+    for task in &TASKS {
+        if names.is_empty() || names.iter().any(|name| name == task.name) {
+            make(task, Path::new(&folder), flags.is_empty())?;
+        }
+    }
+    println!("{:.0} s", begin.elapsed().as_secs_f64());
     Ok(())
 }
 
-/// What one load costs, mean of many.
-fn evaluation_us(curves: &Reduced) -> Result<f64, Box<dyn std::error::Error>> {
-    const LOADS: u32 = 200_000;
-    let begin = Instant::now();
-    for k in 0..LOADS {
-        let load = Load::from_angles(0.25 * f64::from(k) / f64::from(LOADS), 5.0, -3.0)?;
-        black_box(curves.press(&load, [0.1, -0.1])?);
+/// Makes one file, unless it is there already, and checks it.
+fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let threads = std::thread::available_parallelism()?.get();
+    let design = Design {
+        overhang_mm: task.overhang_mm,
+        ..Design::default()
+    };
+    let path = file(folder, task.name);
+    if anew {
+        let curves = fit(task.family, &design, threads, progress(task.name, "curves"))?;
+        std::fs::write(&path, curves.to_string())?;
     }
-    Ok(begin.elapsed().as_secs_f64() * 1e6 / f64::from(LOADS))
+    let curves: Curves = std::fs::read_to_string(&path)?.parse()?;
+    let text = curves.to_string();
+    // As rounded in the file. A tip that slides has stuck before.
+    let mut film = Film::default().with_curves(task.family, curves);
+    if task.family == Family::Slip {
+        let stick = std::fs::read_to_string(file(folder, "stick"))?;
+        film = film.with_curves(Family::Stick, stick.parse()?);
+    }
+    let check = check(
+        &film,
+        &design,
+        task.contact,
+        task.checks,
+        threads,
+        progress(task.name, "check"),
+    )?;
+    let notes = format!(
+        "# The reduced film, {:?}, overhang {} mm: {} curves (see scene/src/film/curves.rs).\n\
+         # cargo run --release -p hivtac-film --example reduce -- scene/data {}\n\
+         # Against the full solution at {} loads of the whole domain: at most {:.3} px, rms {:.3} px; the tip within \
+         {:.4} mm.\n\
+         # output, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients\n",
+        task.family,
+        task.overhang_mm,
+        text.lines().count(),
+        task.name,
+        check.poses,
+        check.worst_px,
+        check.rms_px,
+        check.worst_tip_mm
+    );
+    std::fs::write(path, format!("{notes}{text}"))?;
+    print!("{notes}");
+    Ok(())
+}
+
+fn file(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.csv"))
 }
 
 /// A line that counts.
-fn progress(what: &str) -> impl Fn(usize, usize) + Sync {
+fn progress(task: &str, what: &str) -> impl Fn(usize, usize) + Sync {
+    const WIDTH: usize = 30;
     let begin = Instant::now();
     move |done, all| {
         let left = begin.elapsed().as_secs_f64() * (all - done) as f64 / done as f64;
+        let full = "#".repeat(WIDTH * done / all);
         let end = if done == all { "\n" } else { "" };
-        eprint!("\r{what}: {done} of {all}, {left:.0} s left   {end}");
+        eprint!("\r{task} {what} [{full:WIDTH$}] {done} of {all}, {left:.0} s left   {end}");
         // A progress that cannot be shown is no reason to stop.
         let _ = std::io::stderr().flush();
     }

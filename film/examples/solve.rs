@@ -5,10 +5,10 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_film::{Contact, Design, Film, markers, paper_camera};
-use hivtac_scene::Load;
+use hivtac_film::{Design, Film, markers, paper_camera, press_load};
+use hivtac_scene::{Contact, Load, SceneError};
 
-const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact force|stick] [--offset-x-mm 0] \
+const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact force|stick|slip:0.6] [--offset-x-mm 0] \
 [--offset-y-mm 0] [--overhang-mm 0] [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1]";
 
 /// What to press, and how.
@@ -17,7 +17,8 @@ struct Request {
     force_n: f64,
     alpha_deg: f64,
     beta_deg: f64,
-    stick: bool,
+    contact: Contact,
+    offset_mm: [f64; 2],
 }
 
 fn main() -> ExitCode {
@@ -37,7 +38,8 @@ impl Request {
             force_n: 0.1,
             alpha_deg: 0.0,
             beta_deg: 0.0,
-            stick: false,
+            contact: Contact::Force,
+            offset_mm: [0.0; 2],
         };
         while let Some(name) = words.next() {
             let value = words.next().ok_or(format!("{name}: no value\n{USAGE}"))?;
@@ -48,19 +50,15 @@ impl Request {
 
     fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
         if name == "--contact" {
-            self.stick = match value {
-                "force" => false,
-                "stick" => true,
-                _ => return Err(format!("--contact {value}: force or stick\n{USAGE}")),
-            };
+            self.contact = value.parse().map_err(|why: SceneError| why.to_string())?;
             return Ok(());
         }
         let slot = match name {
             "--force-n" => &mut self.force_n,
             "--alpha-deg" => &mut self.alpha_deg,
             "--beta-deg" => &mut self.beta_deg,
-            "--offset-x-mm" => &mut self.design.tip_offset_mm[0],
-            "--offset-y-mm" => &mut self.design.tip_offset_mm[1],
+            "--offset-x-mm" => &mut self.offset_mm[0],
+            "--offset-y-mm" => &mut self.offset_mm[1],
             "--overhang-mm" => &mut self.design.overhang_mm,
             "--post-radius-mm" => &mut self.design.post_radius_mm,
             "--post-grip" => &mut self.design.post_grip_n_per_mm3,
@@ -74,32 +72,27 @@ impl Request {
         Ok(())
     }
 
-    fn contact(&self) -> Result<Contact, String> {
-        let load = Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg);
-        let force = load.map_err(|error| error.to_string())?.vector_n();
-        Ok(match self.stick {
-            false => Contact::Force(force),
-            true => Contact::Stick {
-                direction: force,
-                force_n: self.force_n,
-            },
-        })
+    fn load(&self) -> Result<Load, SceneError> {
+        Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg)?
+            .with_contact(self.contact)?
+            .with_offset_mm(self.offset_mm)
     }
 
     fn run(&self) -> Result<(), String> {
-        let contact = self.contact()?;
+        let load = self.load().map_err(|error| error.to_string())?;
         let begin = Instant::now();
-        let film = Film::new(&self.design).map_err(|error| error.to_string())?;
+        let mut film = Film::new(&self.design).map_err(|error| error.to_string())?;
         let prepared = begin.elapsed();
-        let state = film
-            .press(contact, &film.rest())
-            .map_err(|error| error.to_string())?;
+        let loaded = press_load(&mut film, &load).map_err(|error| error.to_string())?;
+        let state = loaded.state;
         let solved = begin.elapsed() - prepared;
         let camera = paper_camera().map_err(|error| error.to_string())?;
 
         let three = |v: [f64; 3]| format!("({:9.4}, {:9.4}, {:9.4})", v[0], v[1], v[2]);
         println!("tip depth      {:.4} mm", -state.tip_mm[2]);
         println!("tip moved      {} mm", three(state.tip_mm));
+        let [x, y] = loaded.touches_mm;
+        println!("tip touches    ({x:9.4}, {y:9.4}) mm of the film at rest");
         println!("force on film  {} N", three(state.force_n));
         println!("posts' force   {} N", three(state.reaction_n));
         for (id, marker) in markers(&film, &state, &camera).iter().enumerate() {

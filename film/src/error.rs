@@ -18,8 +18,6 @@ pub enum FilmError {
     Solver(String),
     /// A camera or a load cannot be.
     Scene(String),
-    /// A text does not hold a reduced film's curves.
-    Curves(String),
 }
 
 impl fmt::Display for FilmError {
@@ -33,7 +31,6 @@ impl fmt::Display for FilmError {
                  state nearby"
             ),
             FilmError::Solver(why) => write!(f, "sparse solver: {why}"),
-            FilmError::Curves(why) => write!(f, "reduced film: {why}"),
             FilmError::Scene(why) => f.write_str(why),
         }
     }

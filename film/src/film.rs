@@ -20,6 +20,8 @@ pub enum Contact {
         direction: [f64; 3],
         /// The force along it, N.
         force_n: f64,
+        /// How far the tip has slid over the film from where its way began, mm: the film lags behind it by so much.
+        slid_mm: [f64; 2],
     },
 }
 
@@ -145,10 +147,15 @@ impl Film {
                 let travel = finite("travel", travel)?;
                 Ok(([0.0; 3], axes.into_iter().zip(travel).collect()))
             }
-            Contact::Stick { direction, force_n } => {
+            Contact::Stick {
+                direction,
+                force_n,
+                slid_mm: [x, y],
+            } => {
                 finite("force", [force_n; 3])?;
+                let lag = finite("slide", [-x, -y, 0.0])?;
                 let along = unit(finite("direction", direction)?)?;
-                let sides = across(&along).map(|side| (side, 0.0));
+                let sides = across(&along).map(|side| (side, dot(&side, &lag)));
                 Ok((along.map(|part| force_n * part), sides.to_vec()))
             }
         }
@@ -284,6 +291,7 @@ mod tests {
             Contact::Stick {
                 direction,
                 force_n: 0.1,
+                slid_mm: [0.0; 2],
             },
         );
         let [x, y, z] = stuck.tip_mm;
@@ -334,6 +342,7 @@ mod tests {
             let contact = Contact::Stick {
                 direction,
                 force_n: 0.1,
+                slid_mm: [0.0; 2],
             };
             assert!(refused(contact).contains("z < 0"));
         }

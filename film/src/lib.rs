@@ -7,13 +7,16 @@
     reason = "formulas in indices read best with indices"
 )]
 
+mod check;
 mod design;
 mod error;
 mod film;
 mod grid;
+mod load;
 mod newton;
+mod parallel;
 mod point;
-mod reduced;
+mod reduce;
 mod shell;
 mod sparse;
 mod spline;
@@ -21,9 +24,11 @@ mod spline;
 mod verification;
 mod view;
 
+pub use check::{Check, check};
 pub use design::Design;
 pub use error::FilmError;
 pub use film::{Contact, Equilibrium, Film};
+pub use load::{Loaded, press_load};
 pub use point::Material;
-pub use reduced::{Check, MAX_FORCE_N, MAX_OFFSET_MM, MAX_TILT_DEG, Pressed, Reduced, fit};
-pub use view::{MARKER_MM, MARKERS_MM, Marker, markers, paper_camera};
+pub use reduce::fit;
+pub use view::{Marker, markers, paper_camera};

@@ -1,25 +1,23 @@
 //! What the camera sees of the film.
 
-use hivtac_scene::{Camera, Preset};
+use std::f64::consts::PI;
+
+use hivtac_scene::film::curves::DiscMotion;
+use hivtac_scene::{Camera, Disc, MARKERS, Preset};
 
 use crate::{Equilibrium, Film, FilmError};
 
-/// Distance of a marker from the centre along x and along y, mm (`docs/architecture.md`).
-pub const MARKER_MM: f64 = 3.717;
-/// Where the markers rest, in the order of their identities: upper left, upper right, lower right, lower left.
-pub const MARKERS_MM: [[f64; 2]; 4] = [
-    [-MARKER_MM, -MARKER_MM],
-    [MARKER_MM, -MARKER_MM],
-    [MARKER_MM, MARKER_MM],
-    [-MARKER_MM, MARKER_MM],
-];
+/// Rays of the points that a disc's motion is taken from.
+const RAYS: usize = 8;
+/// Their rings, in parts of the radius: Gauss's two points for sums over a disc, each half of its area.
+const RINGS: [f64; 2] = [0.459_700_843_380_983_1, 0.888_073_833_977_115_3];
 
-/// A marker's centre on a pressed film.
+/// A marker on a pressed film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Marker {
-    /// How it moved, mm, film frame.
+    /// How it moved, mm, film frame: the mean over its disc.
     pub moved_mm: [f64; 3],
-    /// Where it is seen, px.
+    /// The centroid of its image, px.
     pub seen_px: [f64; 2],
 }
 
@@ -33,24 +31,43 @@ pub fn paper_camera() -> Result<Camera, FilmError> {
 
 /// The four markers of a film in a state.
 pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4] {
-    MARKERS_MM.map(|rest| {
-        let moved_mm = film.displacement(state, rest);
-        Marker {
-            moved_mm,
-            seen_px: seen(rest, moved_mm, camera),
-        }
+    MARKERS.map(|disc| Marker {
+        moved_mm: disc_motion(film, state, &disc).moved_mm,
+        seen_px: disc.centroid_px(|rest| film.displacement(state, rest), camera),
     })
 }
 
-/// Where the camera sees a point of the film's camera side; that side rests at the film's distance.
-pub(crate) fn seen([x, y]: [f64; 2], [dx, dy, dz]: [f64; 3], camera: &Camera) -> [f64; 2] {
-    camera.project([x + dx, y + dy, dz])
+/// How the film moves around each marker.
+pub(crate) fn disc_motions(film: &Film, state: &Equilibrium) -> [DiscMotion; 4] {
+    MARKERS.map(|disc| disc_motion(film, state, &disc))
+}
+
+/// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u · (x, y)).
+fn disc_motion(film: &Film, state: &Equilibrium, disc: &Disc) -> DiscMotion {
+    let mut motion = DiscMotion::default();
+    let [cx, cy] = disc.centre_mm;
+    let count = (RAYS * RINGS.len()) as f64;
+    let slope = 4.0 / (disc.radius_mm * disc.radius_mm * count);
+    for ring in RINGS {
+        for ray in 0..RAYS {
+            let (sin, cos) = (ray as f64 * 2.0 * PI / RAYS as f64).sin_cos();
+            let [x, y] = [cos, sin].map(|part| ring * disc.radius_mm * part);
+            let moved = film.displacement(state, [cx + x, cy + y]);
+            for (c, part) in moved.into_iter().enumerate() {
+                motion.moved_mm[c] += part / count;
+                motion.along_x[c] += slope * part * x;
+                motion.along_y[c] += slope * part * y;
+            }
+        }
+    }
+    motion
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{Contact, Design};
+    use hivtac_scene::MARKER_REST_MM;
 
     fn film() -> Film {
         let design = Design {
@@ -81,8 +98,11 @@ mod tests {
             radius_and_shift(&markers(&film, &state, &camera)).0
         };
         let at_rest = radius_and_shift(&markers(&film, &film.rest(), &camera)).0;
-        let expected = camera.focal_px() * (MARKER_MM * 2f64.sqrt() / 10.0).atan();
-        assert!((at_rest - expected).abs() < 1e-9);
+        let of_centre = camera.focal_px() * (MARKER_REST_MM * 2f64.sqrt() / 10.0).atan();
+        assert!(
+            (0.2..0.4).contains(&(of_centre - at_rest)),
+            "the fisheye squeezes the outer half"
+        );
         let [slight, full] =
             [(0.009, 0.011), (0.19, 0.21)].map(|(a, b)| (radius(b) - radius(a)) / (b - a));
         // A membrane stiffens as it is pressed.
@@ -102,6 +122,7 @@ mod tests {
         let [by_travel, _] = shift(Contact::Stick {
             direction,
             force_n: 0.2,
+            slid_mm: [0.0; 2],
         });
         assert!(by_force > 0.5 && aside.abs() < 1e-6);
         assert!(by_travel > 5.0 * by_force, "{by_travel} {by_force}");
