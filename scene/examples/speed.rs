@@ -1,8 +1,9 @@
-//! Frames rendered per second, on one core: `cargo run --release -p hivtac-scene --example speed`.
+//! Frames rendered per second, and what the film costs of one, on one core: `cargo run --release -p hivtac-scene --example speed`.
 
 use std::time::Instant;
 
-use hivtac_scene::{Preset, Scene, SceneError};
+use hivtac_scene::film::Film;
+use hivtac_scene::{Contact, Load, Preset, Scene, SceneError};
 
 /// Frames per measurement; the fastest of a few is printed, as others may use the machine.
 const FRAMES: u32 = 100;
@@ -19,7 +20,28 @@ fn main() -> Result<(), SceneError> {
             println!("{preset:6} {width}×{height}: {rate:5.0} frames/s");
         }
     }
+    for contact in [Contact::Force, Contact::Stick, Contact::Slip { mu: 0.6 }] {
+        let microseconds = (0..REPEATS)
+            .map(|_| film_us(contact))
+            .collect::<Result<Vec<_>, _>>()?;
+        let fastest = microseconds.into_iter().fold(f64::MAX, f64::min);
+        println!("film, {contact}: {fastest:.2} µs for tip and markers");
+    }
     Ok(())
+}
+
+/// What one load costs, mean of many.
+fn film_us(contact: Contact) -> Result<f64, SceneError> {
+    const LOADS: u32 = 20_000;
+    let film = Film::default();
+    let start = Instant::now();
+    for k in 1..=LOADS {
+        let size_n = 0.25 * f64::from(k) / f64::from(LOADS);
+        let load = Load::from_vector([0.1 * size_n, -0.05 * size_n, -size_n])?;
+        let load = load.with_contact(contact)?;
+        std::hint::black_box(film.press(std::hint::black_box(&load)));
+    }
+    Ok(start.elapsed().as_secs_f64() * 1e6 / f64::from(LOADS))
 }
 
 fn measure(scene: &Scene) -> f64 {

@@ -1,10 +1,10 @@
-//! Presets and the equidistant fisheye.
+//! Presets, and where a point in space is seen.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::load::radians;
-use crate::{Mounting, SceneError};
+use crate::{Lens, Mounting, Projection, SceneError};
 
 /// Focal length of the lens, mm.
 pub const FOCAL_LENGTH_MM: f64 = 2.1;
@@ -17,6 +17,8 @@ const OV7725_WIDTH_MM: f64 = 3.84;
 
 /// A named geometry (`docs/architecture.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "file", derive(serde::Deserialize))]
+#[cfg_attr(feature = "file", serde(rename_all = "lowercase"))]
 pub enum Preset {
     /// The paper's lens and picture: 150° across the diagonal at every size.
     Paper,
@@ -62,7 +64,7 @@ impl FromStr for Preset {
 
 /// Lens and picture: where a point in space is seen.
 ///
-/// An equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z), ρ the distance from the optical
+/// Usually an equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z), ρ the distance from the optical
 /// axis and Z the *axial* distance from the pinhole. The paper's eq. 15 means this Z; its eq. 23 puts the slant
 /// distance √(ρ² + Z²) in its place, which is not a ray's angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,7 @@ pub struct Camera {
     height: u32,
     /// Focal length in pixels.
     focal_px: f64,
+    projection: Projection,
     /// Where the axis meets the picture, px.
     axis_px: [f64; 2],
     /// Sine and cosine of the roll about the optical axis.
@@ -92,13 +95,18 @@ impl Camera {
             width,
             height,
             focal_px: FOCAL_LENGTH_MM / preset.pitch_mm(width, height),
+            projection: Projection::Equidistant,
             axis_px: [centre(width), centre(height)],
             roll: (0.0, 1.0),
         })
     }
 
-    /// The same camera, mounted a little off.
-    pub(crate) fn mounted(mut self, mounting: &Mounting) -> Camera {
+    /// The same camera with another lens, mounted a little off.
+    pub(crate) fn fitted(mut self, lens: &Lens, mounting: &Mounting) -> Camera {
+        let preset_mm = self.preset.pitch_mm(self.width, self.height);
+        let pitch_mm = lens.pitch_um.map_or(preset_mm, |um| um / 1000.0);
+        self.focal_px = FOCAL_LENGTH_MM / pitch_mm;
+        self.projection = lens.projection;
         let [dx, dy] = mounting.shift_px;
         self.axis_px = [centre(self.width) + dx, centre(self.height) + dy];
         self.roll = libm::sincos(radians(mounting.roll_deg));
@@ -131,8 +139,11 @@ impl Camera {
         if rho == 0.0 {
             return self.axis_px;
         }
-        let theta = libm::atan2(rho, FILM_DISTANCE_MM + z);
-        let scale = self.focal_px * theta / rho;
+        let axial = FILM_DISTANCE_MM + z;
+        let scale = match self.projection {
+            Projection::Equidistant => self.focal_px * libm::atan2(rho, axial) / rho,
+            Projection::Pinhole => self.focal_px / axial,
+        };
         let (sin, cos) = self.roll;
         let [cx, cy] = self.axis_px;
         [
@@ -144,7 +155,11 @@ impl Camera {
     /// The angle from the optical axis at which a pixel looks, radians.
     pub(crate) fn view_angle(&self, [x, y]: [f64; 2]) -> f64 {
         let (dx, dy) = (x - self.axis_px[0], y - self.axis_px[1]);
-        (dx * dx + dy * dy).sqrt() / self.focal_px
+        let part = (dx * dx + dy * dy).sqrt() / self.focal_px;
+        match self.projection {
+            Projection::Equidistant => part,
+            Projection::Pinhole => libm::atan(part),
+        }
     }
 }
 
@@ -190,12 +205,26 @@ mod tests {
     }
 
     #[test]
+    fn a_pinhole_sees_without_distortion_and_by_its_own_pitch() {
+        let lens = Lens {
+            projection: Projection::Pinhole,
+            pitch_um: Some(6.0),
+            ..Lens::default()
+        };
+        let camera = camera(Preset::Ov7725, 320).fitted(&lens, &Mounting::default());
+        // 2.1 mm · 3/10 on pixels of 6 µm.
+        let [x, y] = camera.project([3.0, 0.0, 0.0]);
+        assert!((x - 159.5 - 105.0).abs() < 1e-9 && (y - 119.5).abs() < 1e-9);
+        assert!((camera.view_angle([x, y]) - libm::atan(0.3)).abs() < 1e-12);
+    }
+
+    #[test]
     fn roll_turns_x_towards_y() {
         let mounting = Mounting {
             shift_px: [1.0, -2.0],
             roll_deg: 90.0,
         };
-        let camera = camera(Preset::Ov7725, 320).mounted(&mounting);
+        let camera = camera(Preset::Ov7725, 320).fitted(&Lens::default(), &mounting);
         let [x, y] = camera.project([10.0, 0.0, 0.0]);
         assert!((x - 160.5).abs() < 1e-9);
         assert!((y - 117.5 - 175.0 * radians(45.0)).abs() < 1e-9);

@@ -1,6 +1,7 @@
-//! How much of each pixel a polygon covers, exactly.
+//! How much of each pixel a disc's image covers: exactly, then blurred by the lens.
 
 use crate::disc::Outline;
+use crate::exposure::Image;
 
 /// A grid of pixels around a polygon, with the covered part (0 to 1) of each.
 ///
@@ -17,11 +18,33 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// The coverage by a polygon of finite corners, clockwise on the screen.
-    pub(crate) fn of(outline: &Outline) -> Coverage {
-        let mut grid = Coverage::around(outline);
-        for (from, to) in outline.edges() {
-            grid.add_edge(from, to);
+    /// The coverage by an image, as far as a frame of this size can see it.
+    pub(crate) fn of(image: &Image, width: u32, height: u32) -> Coverage {
+        // Room for what is blurred into the frame, and never a larger grid than it takes.
+        let margin = 4.0 * image.blur_px + 2.0;
+        let fits = |outline: &Outline| {
+            let (low, high) = outline.bounds();
+            let size = [f64::from(width), f64::from(height)];
+            (0..2).all(|i| low[i] >= -margin && high[i] <= size[i] - 1.0 + margin)
+        };
+        if image.outlines.iter().all(fits) {
+            return Coverage::mean(&image.outlines, image.blur_px);
+        }
+        let clipped = image.outlines.iter();
+        let clipped: Vec<Outline> = clipped
+            .map(|outline| outline.clipped(width, height, margin))
+            .collect();
+        Coverage::mean(&clipped, image.blur_px)
+    }
+
+    /// The mean coverage by polygons of finite corners, clockwise on the screen: one, or several during an exposure.
+    /// Blurred by a Gaussian of standard deviation `blur_px` ≥ 0 along x and along y.
+    fn mean(outlines: &[Outline], blur_px: f64) -> Coverage {
+        let margin = (3.0 * blur_px).ceil() as i64;
+        let mut grid = Coverage::around(outlines, margin);
+        let weight = 1.0 / outlines.len() as f64;
+        for (from, to) in outlines.iter().flat_map(Outline::edges) {
+            grid.add_edge(from, to, weight);
         }
         for row in grid.parts.chunks_exact_mut(grid.columns) {
             let mut sum = 0.0;
@@ -30,14 +53,27 @@ impl Coverage {
                 *part = sum.clamp(0.0, 1.0);
             }
         }
+        if margin > 0 {
+            grid.blur(&bell(blur_px, margin));
+        }
         grid
     }
 
-    /// An empty grid that holds the polygon, with one spare column that takes what the last edges leave over.
-    fn around(outline: &Outline) -> Coverage {
-        let (low, high) = outline.bounds();
-        let first = low.map(|v| (v + 0.5).floor() as i64);
-        let last = high.map(|v| (v + 0.5).floor() as i64);
+    /// An empty grid that holds the polygons and a margin, with one spare column that takes what the last edges leave
+    /// over.
+    fn around(outlines: &[Outline], margin: i64) -> Coverage {
+        let start = ([0.0; 2], [0.0; 2]);
+        let outlines = outlines
+            .iter()
+            .filter(|outline| !outline.corners.is_empty());
+        let bounds = outlines.map(Outline::bounds);
+        let both = |a: Bounds, b: Bounds| {
+            let low = std::array::from_fn(|i| a.0[i].min(b.0[i]));
+            (low, std::array::from_fn(|i| a.1[i].max(b.1[i])))
+        };
+        let (low, high) = bounds.reduce(both).unwrap_or(start);
+        let first = low.map(|v| (v + 0.5).floor() as i64 - margin);
+        let last = high.map(|v| (v + 0.5).floor() as i64 + margin);
         let columns = (last[0] - first[0] + 2) as usize;
         let rows = (last[1] - first[1] + 1) as usize;
         Coverage {
@@ -48,8 +84,24 @@ impl Coverage {
         }
     }
 
+    /// Convolves the grid with a bell along its rows, then along its columns. Outside the grid nothing is covered.
+    fn blur(&mut self, bell: &[f64]) {
+        let columns = self.columns;
+        let rows = self.parts.len() / columns;
+        for row in self.parts.chunks_exact_mut(columns) {
+            let blurred = convolved(row, bell);
+            row.copy_from_slice(&blurred);
+        }
+        for x in 0..columns {
+            let column: Vec<f64> = (0..rows).map(|y| self.parts[y * columns + x]).collect();
+            for (y, part) in convolved(&column, bell).into_iter().enumerate() {
+                self.parts[y * columns + x] = part;
+            }
+        }
+    }
+
     /// Splits an edge at the borders between rows.
-    fn add_edge(&mut self, from: [f64; 2], to: [f64; 2]) {
+    fn add_edge(&mut self, from: [f64; 2], to: [f64; 2], weight: f64) {
         let [x0, y0] = self.in_grid(from);
         let [x1, y1] = self.in_grid(to);
         if y0 == y1 {
@@ -57,8 +109,8 @@ impl Coverage {
         }
         // Edges downwards lie on the right of a clockwise polygon: what is on their right is outside.
         let (sign, [xa, ya], [xb, yb]) = match y0 < y1 {
-            true => (-1.0, [x0, y0], [x1, y1]),
-            false => (1.0, [x1, y1], [x0, y0]),
+            true => (-weight, [x0, y0], [x1, y1]),
+            false => (weight, [x1, y1], [x0, y0]),
         };
         let x_at = |y: f64| (xa + (xb - xa) * ((y - ya) / (yb - ya))).clamp(xa.min(xb), xa.max(xb));
         let rows = self.parts.len() / self.columns;
@@ -112,6 +164,34 @@ impl Coverage {
     }
 }
 
+/// Lowest and highest x and y.
+type Bounds = ([f64; 2], [f64; 2]);
+
+/// Weights of a Gaussian at whole pixels from −margin to margin; they add up to one.
+fn bell(deviation: f64, margin: i64) -> Vec<f64> {
+    let weight = |i: i64| {
+        let z = i as f64 / deviation;
+        libm::exp(-z * z / 2.0)
+    };
+    let weights: Vec<f64> = (-margin..=margin).map(weight).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| weight / sum).collect()
+}
+
+/// A line of parts convolved with a bell of odd length, nothing beyond its ends.
+fn convolved(line: &[f64], bell: &[f64]) -> Vec<f64> {
+    let margin = bell.len() / 2;
+    let mut blurred = vec![0.0; line.len() + 2 * margin];
+    for (i, part) in line.iter().enumerate().filter(|(_, part)| **part > 0.0) {
+        for (sum, weight) in blurred[i..].iter_mut().zip(bell) {
+            *sum += part * weight;
+        }
+    }
+    blurred.drain(..margin);
+    blurred.truncate(line.len());
+    blurred
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -124,7 +204,9 @@ mod tests {
     }
 
     fn covered(outline: &Outline) -> Vec<(usize, f64)> {
-        Coverage::of(outline).pixels(10, 10).collect()
+        Coverage::mean(std::slice::from_ref(outline), 0.0)
+            .pixels(10, 10)
+            .collect()
     }
 
     #[test]
@@ -142,6 +224,46 @@ mod tests {
     fn outside_the_frame_nothing_is_covered() {
         assert_eq!(covered(&rectangle(-9.0, -9.0, -2.0, -2.0)), []);
         assert_eq!(covered(&rectangle(-3.5, 8.5, 0.5, 12.5)), [(90, 1.0)]);
+    }
+
+    #[test]
+    fn several_images_are_averaged() {
+        let images = [rectangle(2.5, 1.5, 3.5, 2.5), rectangle(3.5, 1.5, 5.5, 2.5)];
+        let parts: Vec<_> = Coverage::mean(&images, 0.0).pixels(10, 10).collect();
+        assert_eq!(parts, [(23, 0.5), (24, 0.5), (25, 0.5)]);
+    }
+
+    /// Area, centroid and variance about it along x and along y.
+    fn moments(image: &Outline, blur_px: f64) -> [f64; 5] {
+        let grid = Coverage::mean(std::slice::from_ref(image), blur_px);
+        let parts = || {
+            let at = |(pixel, part)| ((pixel % 100) as f64, (pixel / 100) as f64, part);
+            grid.pixels(100, 100).map(at)
+        };
+        let area: f64 = parts().map(|(.., part)| part).sum();
+        let x = parts().map(|(x, _, part)| part * x).sum::<f64>() / area;
+        let y = parts().map(|(_, y, part)| part * y).sum::<f64>() / area;
+        let xx = parts().map(|(u, _, part)| part * (u - x) * (u - x));
+        let yy = parts().map(|(_, v, part)| part * (v - y) * (v - y));
+        [area, x, y, xx.sum::<f64>() / area, yy.sum::<f64>() / area]
+    }
+
+    #[test]
+    fn blur_keeps_area_and_centroid_and_adds_its_variance() {
+        let image = rectangle(40.25, 30.5, 52.0, 47.75);
+        let sharp = moments(&image, 0.0);
+        for blur_px in [0.5, 1.0, 2.7] {
+            let soft = moments(&image, blur_px);
+            for (a, b) in sharp.iter().zip(&soft).take(3) {
+                assert!((a - b).abs() < 1e-9, "{a} {b}");
+            }
+            for (a, b) in sharp[3..].iter().zip(&soft[3..]) {
+                let added = (b - a) / (blur_px * blur_px);
+                // The bell ends at three deviations, and a narrow one falls between pixels.
+                let least = if blur_px < 1.0 { 0.85 } else { 0.95 };
+                assert!((least..1.01).contains(&added), "{blur_px}: {added}");
+            }
+        }
     }
 
     /// The covered part of a pixel by brute force.
@@ -167,7 +289,7 @@ mod tests {
                 std::mem::swap(&mut b, &mut c);
             }
             let inside = |x, y| cross(a, b, x, y) >= 0.0 && cross(b, c, x, y) >= 0.0 && cross(c, a, x, y) >= 0.0;
-            let grid = Coverage::of(&Outline { corners: vec![a, b, c] });
+            let grid = Coverage::mean(&[Outline { corners: vec![a, b, c] }], 0.0);
             let mut exact = [0.0; 100];
             for (pixel, part) in grid.pixels(10, 10) {
                 exact[pixel] = part;

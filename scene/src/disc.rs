@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::{Camera, Film, Load};
+use crate::Camera;
 
 /// Distance of the markers' centres from the film's middle along x and along y, mm.
 pub const MARKER_REST_MM: f64 = 3.717;
@@ -18,6 +18,9 @@ pub const MARKERS: [Disc; 4] = [
 
 /// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than 1e-4 px.
 const CORNERS: u32 = 48;
+/// Discs of a smaller radius, mm, make do with fewer corners: they are specks of a few pixels.
+const SPECK_RADIUS_MM: f64 = 0.15;
+const SPECK_CORNERS: u32 = 12;
 
 /// A disc drawn on the film at rest; it follows the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,11 +39,25 @@ impl Disc {
         }
     }
 
-    /// The disc's image under a load that the film accepts: the image of its rim, not of its centre.
-    pub(crate) fn image(&self, film: &impl Film, load: &Load, camera: &Camera) -> Outline {
+    /// The centroid of the disc's image, px, on a film that moves its points (mm) by `displacement`.
+    pub fn centroid_px(
+        &self,
+        displacement: impl Fn([f64; 2]) -> [f64; 3],
+        camera: &Camera,
+    ) -> [f64; 2] {
+        self.image(displacement, camera).area_and_centroid().1
+    }
+
+    /// The disc's image on a film that moves its points (mm) by `displacement`: the image of its rim, not of its
+    /// centre.
+    pub(crate) fn image(
+        &self,
+        displacement: impl Fn([f64; 2]) -> [f64; 3],
+        camera: &Camera,
+    ) -> Outline {
         let rim = rim(self.centre_mm, self.radius_mm);
         let seen = rim.map(|[x, y]| {
-            let [dx, dy, dz] = film.displacement(load, [x, y]);
+            let [dx, dy, dz] = displacement([x, y]);
             camera.project([x + dx, y + dy, dz])
         });
         Outline {
@@ -51,9 +68,14 @@ impl Disc {
 
 /// Corners of a regular polygon of the circle's area.
 fn rim([x, y]: [f64; 2], radius: f64) -> impl Iterator<Item = [f64; 2]> {
-    let step = 2.0 * PI / f64::from(CORNERS);
+    let corners = if radius < SPECK_RADIUS_MM {
+        SPECK_CORNERS
+    } else {
+        CORNERS
+    };
+    let step = 2.0 * PI / f64::from(corners);
     let radius = radius * (step / libm::sin(step)).sqrt();
-    (0..CORNERS).map(move |corner| {
+    (0..corners).map(move |corner| {
         let (sin, cos) = libm::sincos(step * f64::from(corner));
         [x + radius * cos, y + radius * sin]
     })
@@ -107,14 +129,23 @@ impl Outline {
         (twice_area / 2.0, centroid)
     }
 
-    /// The part of it inside a frame; without corners where there is none.
-    pub(crate) fn clipped(&self, width: u32, height: u32) -> Outline {
-        let right = f64::from(width) - 0.5;
-        let bottom = f64::from(height) - 0.5;
-        self.clip_half(|[x, _]| x + 0.5)
+    /// The part of it inside a frame with a margin around it, px; without corners where there is none.
+    pub(crate) fn clipped(&self, width: u32, height: u32, margin: f64) -> Outline {
+        let before = 0.5 + margin;
+        let right = f64::from(width) - 0.5 + margin;
+        let bottom = f64::from(height) - 0.5 + margin;
+        self.clip_half(|[x, _]| x + before)
             .clip_half(|[x, _]| right - x)
-            .clip_half(|[_, y]| y + 0.5)
+            .clip_half(|[_, y]| y + before)
             .clip_half(|[_, y]| bottom - y)
+    }
+
+    /// Moved as a whole, px.
+    pub(crate) fn moved(mut self, [dx, dy]: [f64; 2]) -> Outline {
+        for corner in &mut self.corners {
+            *corner = [corner[0] + dx, corner[1] + dy];
+        }
+        self
     }
 
     /// The part where `inside` (a signed distance) is not negative (Sutherland and Hodgman).
@@ -137,7 +168,7 @@ impl Outline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Preset, StandInFilm};
+    use crate::Preset;
 
     fn circle(centre: [f64; 2], radius: f64) -> Outline {
         Outline {
@@ -155,12 +186,12 @@ mod tests {
     #[test]
     fn clipping_keeps_the_half_inside() {
         let (area, [x, _]) = circle([-0.5, 50.0], 6.0)
-            .clipped(320, 240)
+            .clipped(320, 240, 0.0)
             .area_and_centroid();
         assert!((area - PI * 18.0).abs() < 1e-6);
         // Centroid of a half disc: 4 r / 3π from its straight side.
         assert!((x + 0.5 - 8.0 / PI).abs() < 0.01);
-        let outside = circle([-20.0, 50.0], 6.0).clipped(320, 240);
+        let outside = circle([-20.0, 50.0], 6.0).clipped(320, 240, 0.0);
         assert!(outside.corners.is_empty());
     }
 
@@ -187,7 +218,7 @@ mod tests {
     #[test]
     fn the_centroid_is_that_of_the_disc_and_not_the_image_of_its_centre() {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
-        let image = MARKERS[2].image(&StandInFilm, &Load::REST, &camera);
+        let image = MARKERS[2].image(|_| [0.0; 3], &camera);
         let (_, [x, y]) = image.area_and_centroid();
         assert!((x - 159.5 - (y - 119.5)).abs() < 1e-9, "on the diagonal");
         let radius_px = (x - 159.5) * std::f64::consts::SQRT_2;

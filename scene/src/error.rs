@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::Motion;
+
 /// A scene, size, load or option that cannot be simulated. The message says what, where and what is possible.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneError {
@@ -9,6 +11,8 @@ pub enum SceneError {
     UnknownScene(String),
     /// No geometry preset of this name.
     UnknownPreset(String),
+    /// No pixel format of this name.
+    UnknownFormat(String),
     /// A frame size that the simulated camera does not have.
     Size {
         /// Columns asked for.
@@ -18,6 +22,19 @@ pub enum SceneError {
     },
     /// A load that is no number, pulls, or presses the film further than it can go.
     Load(String),
+    /// A text does not hold a reduced film's curves.
+    Curves(String),
+    /// A scene file that is not one: the line, the key and what is possible.
+    #[cfg(feature = "file")]
+    File(String),
+    /// A key of a scene file whose value does not fit the others.
+    #[cfg(feature = "file")]
+    Key {
+        /// The key.
+        key: &'static str,
+        /// Why not.
+        why: String,
+    },
     /// An option outside its range.
     Option {
         /// The option's name.
@@ -29,23 +46,37 @@ pub enum SceneError {
     },
 }
 
+#[cfg(feature = "jpeg")]
+const FORMATS: &str = "rgb565, yuv422, mono or jpeg";
+#[cfg(not(feature = "jpeg"))]
+const FORMATS: &str = "rgb565, yuv422 or mono (this program was built without jpeg)";
+
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             SceneError::UnknownScene(name) => {
-                write!(f, "unknown scene `{name}`: use rest, static, demo or sweep")
+                let names = Motion::NAMES.join(", ");
+                write!(f, "unknown scene `{name}`: use one of {names}")
             }
             SceneError::UnknownPreset(name) => {
                 write!(f, "unknown preset `{name}`: use paper or ov7725")
+            }
+            SceneError::UnknownFormat(name) => {
+                write!(f, "unknown pixel format `{name}`: use {FORMATS}")
             }
             SceneError::Size { width, height } => write!(
                 f,
                 "frame size {width}×{height}: use a 4:3 size from 160×120 to 800×600, such as 320×240"
             ),
             SceneError::Load(why) => write!(f, "load: {why}"),
+            SceneError::Curves(why) => write!(f, "film's curves: {why}"),
+            #[cfg(feature = "file")]
+            SceneError::File(why) => write!(f, "scene file: {why}"),
+            #[cfg(feature = "file")]
+            SceneError::Key { key, why } => write!(f, "{key}: {why}"),
             SceneError::Option { name, value, range } => {
                 let [low, high] = range;
-                write!(f, "option {name} is {value}: use {low} to {high}")
+                write!(f, "{name} is {value}: use {low} to {high}")
             }
         }
     }

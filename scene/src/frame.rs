@@ -1,7 +1,9 @@
 //! A rendered frame and the truth behind it.
 
-use crate::Load;
-use crate::light::WHITE;
+use std::borrow::Cow;
+
+use crate::format::{levels_of_rgb565, levels_of_yuyv, rgb565_of_levels};
+use crate::{Format, Load};
 
 /// One exposure with what is true of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,17 +12,48 @@ pub struct Frame {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// RGB565 in native order (red in bits 15–11), row by row, `width · height` of them.
+    /// How its pixels are coded.
+    pub format: Format,
+    /// Row by row, `width · height` of them, coded as [`Format`] says, in native order; none in [`Format::Mono`].
     pub pixels: Vec<u16>,
+    /// Row by row, `width · height` of them, in [`Format::Mono`]; otherwise none.
+    pub mono: Vec<u8>,
     /// What is true of it.
     pub truth: Truth,
+}
+
+/// A coded picture.
+#[derive(Debug, Default)]
+pub(crate) struct Raster {
+    pub(crate) words: Vec<u16>,
+    pub(crate) bytes: Vec<u8>,
+}
+
+impl Raster {
+    pub(crate) fn words(words: Vec<u16>) -> Raster {
+        Raster {
+            words,
+            bytes: Vec::new(),
+        }
+    }
+
+    pub(crate) fn bytes(bytes: Vec<u8>) -> Raster {
+        Raster {
+            words: Vec::new(),
+            bytes,
+        }
+    }
 }
 
 /// What is true of a scene at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// The force on the film.
+    /// The load as it is labelled: what a stage and its gauge say.
     pub force: Load,
+    /// The tip's force on the film, N: the label's in the contact reading `force`, another one otherwise.
+    pub on_film_n: [f64; 3],
+    /// Where the tip went, mm, film frame.
+    pub tip_mm: [f64; 3],
     /// The markers by identity; `None` where a marker is missing or no part of it is in the frame.
     pub markers: [Option<MarkerTruth>; 4],
 }
@@ -28,7 +61,7 @@ pub struct Truth {
 /// What is true of one marker's image. Patches over it are not taken off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkerTruth {
-    /// Centroid of the disc's whole image, px; the centre of pixel (0, 0) is the origin.
+    /// Centroid of the disc's whole image in this frame, as its shutter exposes it, px; the centre of pixel (0, 0) is the origin.
     pub centroid_px: [f64; 2],
     /// Area of the disc's whole image, px².
     pub area_px2: f64,
@@ -37,26 +70,49 @@ pub struct MarkerTruth {
 }
 
 impl Frame {
-    /// The frame as a binary PPM picture, its colours widened to 8 bits by repeating their upper bits.
+    /// The rows of [`Self::pixels`] from top to bottom; none in [`Format::Mono`].
+    pub fn rows(&self) -> impl Iterator<Item = &[u16]> {
+        self.pixels.chunks_exact(self.width as usize)
+    }
+
+    /// The rows of [`Self::mono`] from top to bottom; none in the other formats.
+    pub fn mono_rows(&self) -> impl Iterator<Item = &[u8]> {
+        self.mono.chunks_exact(self.width as usize)
+    }
+
+    /// The picture in 8-bit red, green and blue, three bytes per pixel, row by row, whatever its format. RGB565 is
+    /// widened by repeating the upper bits of a channel.
+    pub fn to_rgb888(&self) -> Vec<u8> {
+        match self.format {
+            Format::Mono => self.mono.iter().flat_map(|&grey| [grey; 3]).collect(),
+            Format::Yuv422 => {
+                let pairs = self.pixels.chunks_exact(2);
+                let colours = pairs.flat_map(|pair| levels_of_yuyv([pair[0], pair[1]]));
+                colours.flatten().collect()
+            }
+            _ => {
+                let pixels = self.pixels.iter();
+                pixels.flat_map(|&pixel| levels_of_rgb565(pixel)).collect()
+            }
+        }
+    }
+
+    /// The picture in RGB565, whatever its format: [`Self::pixels`] where they are that, otherwise the nearest codes.
+    pub fn to_rgb565(&self) -> Cow<'_, [u16]> {
+        if matches!(self.format, Format::Yuv422 | Format::Mono) {
+            let levels = self.to_rgb888();
+            let pixels = levels.chunks_exact(3);
+            return pixels
+                .map(|pixel| rgb565_of_levels([pixel[0], pixel[1], pixel[2]]))
+                .collect();
+        }
+        Cow::Borrowed(&self.pixels)
+    }
+
+    /// The frame as a binary PPM picture.
     pub fn to_ppm(&self) -> Vec<u8> {
         let mut ppm = format!("P6\n{} {}\n255\n", self.width, self.height).into_bytes();
-        ppm.extend(self.pixels.iter().flat_map(|&pixel| rgb888(pixel)));
+        ppm.extend(self.to_rgb888());
         ppm
     }
-}
-
-fn rgb888(pixel: u16) -> [u8; 3] {
-    let five = |v: u16| ((v << 3) | (v >> 2)) as u8;
-    let six = |v: u16| ((v << 2) | (v >> 4)) as u8;
-    [five(pixel >> 11), six((pixel >> 5) & 63), five(pixel & 31)]
-}
-
-/// RGB565 from channels in steps of 1/64 level, clipped and rounded to the nearest code.
-pub(crate) fn rgb565(steps: [i32; 3]) -> u16 {
-    let code = |value: i32, highest: u32| {
-        let value = value.clamp(0, WHITE) as u32;
-        (value * highest + WHITE as u32 / 2) / WHITE as u32
-    };
-    let [red, green, blue] = steps;
-    (code(red, 31) << 11 | code(green, 63) << 5 | code(blue, 31)) as u16
 }

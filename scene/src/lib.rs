@@ -1,7 +1,7 @@
 //! The simulated HiVTac sensor: what presses the film, how the film gives, what the camera sees of it.
 //!
 //! ```text
-//! load → film → marker discs in space → fisheye → coverage of pixels → light → noise → RGB565
+//! load → film → marker discs in space → fisheye → coverage of pixels → light → noise → pixels
 //! ```
 //!
 //! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure functions of scene, seed,
@@ -21,32 +21,62 @@
 //! | file | subject |
 //! |---|---|
 //! | `load` | the force on the film and its convention |
-//! | `film` | where a point of the film goes under a load: the stand-in film behind the trait [`Film`] |
+//! | [`film`] | where a point of the film goes under a load: curves made from finite elements |
+//! | [`paper`] | the paper's analytic model, equations 13–25 |
 //! | `camera` | presets, equidistant fisheye |
 //! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |
-//! | `options`, `light` | what makes a frame hard: gain, gradient, falloff, missing markers, patches, mounting |
-//! | `noise`, `frame` | seeded sensor noise; RGB565 and the truth |
+//! | `options` | what makes a frame hard, and its ranges |
+//! | `light`, `patch`, `lens` | light and colours; what lies on the film; projection, focus, mounting and shutter |
+//! | `exposure` | where a disc is while its rows are exposed |
+//! | `noise` | seeded sensor noise |
+//! | `format`, `jpeg`, `frame` | RGB565, YUV422, mono and JPEG; the frame and the truth |
+//! | `mechanics`, `surface` | the film as it is, or simplified |
 //! | `motion`, `scene` | loads in time; the scene itself |
+//! | `file` | scenes from TOML files |
+//! | `hard` | the catalogue of scenes in which markers are hard to find |
+//! | `effects` | the list of effects, each with its switch |
 
 mod camera;
 mod coverage;
 mod disc;
+mod effects;
 mod error;
-mod film;
+mod exposure;
+#[cfg(feature = "file")]
+mod file;
+pub mod film;
+mod format;
 mod frame;
+mod hard;
+#[cfg(feature = "jpeg")]
+mod jpeg;
+mod lens;
 mod light;
 mod load;
+mod mechanics;
 mod motion;
 mod noise;
 mod options;
 pub mod paper;
+mod patch;
 mod scene;
+mod surface;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Preset};
 pub use disc::{Disc, MARKER_RADIUS_MM, MARKER_REST_MM, MARKERS};
+pub use effects::{Compare, Effect, effects};
 pub use error::SceneError;
-pub use film::{Film, HALF_SIDE_MM, StandInFilm};
+pub use film::HALF_SIDE_MM;
+pub use format::Format;
+#[cfg(feature = "jpeg")]
+pub use format::JPEG_QUALITY;
 pub use frame::{Frame, MarkerTruth, Truth};
-pub use load::Load;
-pub use options::{Mounting, Options, Paint, Patch};
+pub use hard::{Expected, HardCase, hard_cases, hard_loads};
+pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
+pub use load::{Contact, Load};
+pub use mechanics::{Mechanics, Stiffness};
+pub use motion::{Catch, Drag, Grasp, Motion, Press, Vibration};
+pub use options::{Options, Salt};
+pub use patch::{Paint, Patch, Specks};
 pub use scene::Scene;
+pub use surface::Surface;

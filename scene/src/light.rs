@@ -5,7 +5,7 @@
 
 use crate::camera::centre;
 use crate::load::radians;
-use crate::{Camera, Options, Paint};
+use crate::{Camera, Options, Paint, noise};
 
 /// Steps of one 8-bit level: channels are whole numbers of 1/64 level until they become pixels.
 pub(crate) const STEPS: f64 = 64.0;
@@ -15,6 +15,8 @@ pub(crate) const WHITE: i32 = 255 * 64;
 const FILM_COLOUR: [f64; 3] = [150.0, 141.0, 128.0];
 /// Red tape: hue 179, saturation 197 of 255, and a value that meets the threshold's 45 at a gain of about 0.3.
 const RED_COLOUR: [f64; 3] = [160.0, 36.0, 40.0];
+/// A lamp's reflection: white even in dim light.
+const GLARE_COLOUR: [f64; 3] = [2000.0; 3];
 /// The angle that [`Options::falloff`] is given for, degrees.
 const FALLOFF_ANGLE_DEG: f64 = 75.0;
 
@@ -23,6 +25,7 @@ impl Paint {
         match self {
             Paint::Red => RED_COLOUR,
             Paint::Film => FILM_COLOUR,
+            Paint::Glare => GLARE_COLOUR,
         }
     }
 }
@@ -32,21 +35,29 @@ impl Paint {
 pub(crate) struct Light {
     /// Brightness per pixel, row by row; 1 is nominal.
     brightness: Vec<f64>,
+    /// What is added to red, green and blue before their gain, in levels.
+    haze: f64,
+    /// Gain of red, green and blue.
+    balance: [f64; 3],
     /// The film without markers, in steps.
     film: Vec<[i16; 3]>,
 }
 
 impl Light {
-    pub(crate) fn new(camera: &Camera, options: &Options) -> Light {
-        let pixels = (0..camera.height()).flat_map(|y| (0..camera.width()).map(move |x| [x, y]));
-        let brightness: Vec<f64> = pixels
-            .map(|pixel| brightness(camera, options, pixel.map(f64::from)))
+    pub(crate) fn new(camera: &Camera, options: &Options, seed: u64) -> Light {
+        let mut light = Light {
+            brightness: brightness(camera, options, seed),
+            haze: options.haze * options.gain,
+            balance: options.white_balance,
+            film: Vec::new(),
+        };
+        let width = camera.width() as usize;
+        let paint = |pixel: usize| board(options.checkerboard_px, pixel % width, pixel / width);
+        let pixels = light.brightness.iter().enumerate();
+        light.film = pixels
+            .map(|(pixel, &brightness)| light.seen(paint(pixel), brightness).map(steps))
             .collect();
-        let film = brightness
-            .iter()
-            .map(|&light| seen(Paint::Film, light).map(steps))
-            .collect();
-        Light { brightness, film }
+        light
     }
 
     /// The film without markers: three channels per pixel, in steps.
@@ -62,29 +73,60 @@ impl Light {
         paint: Paint,
         part: f64,
     ) -> [i16; 3] {
-        let above = seen(paint, self.brightness[pixel]);
+        let above = self.seen(paint, self.brightness[pixel]);
         std::array::from_fn(|c| {
             let below = f64::from(below[c]);
             steps(below + (above[c] - below) * part)
         })
     }
+
+    /// A paint in the light of a brightness, in steps, at most white: a camera clips what is too bright.
+    fn seen(&self, paint: Paint, brightness: f64) -> [f64; 3] {
+        let colour = paint.colour();
+        std::array::from_fn(|c| {
+            let level = (colour[c] * brightness + self.haze) * self.balance[c];
+            (level * STEPS).min(f64::from(WHITE))
+        })
+    }
+
+    /// A paint in the light of the picture's middle, in steps.
+    pub(crate) fn in_the_middle(&self, paint: Paint) -> [i32; 3] {
+        let middle = self.brightness[self.brightness.len() / 2];
+        self.seen(paint, middle)
+            .map(|value| i32::from(steps(value)))
+    }
+}
+
+/// The paint at a pixel of a checkerboard; without squares it is the film everywhere.
+fn board(square_px: u32, x: usize, y: usize) -> Paint {
+    let square = square_px as usize;
+    match square > 0 && (x / square + y / square) % 2 == 1 {
+        true => Paint::Red,
+        false => Paint::Film,
+    }
+}
+
+fn brightness(camera: &Camera, options: &Options, seed: u64) -> Vec<f64> {
+    let pixels = (0..camera.height()).flat_map(|y| (0..camera.width()).map(move |x| [x, y]));
+    let smooth = pixels.map(|pixel| brightness_at(camera, options, pixel.map(f64::from)));
+    if options.texture == 0.0 {
+        return smooth.collect();
+    }
+    let uneven = noise::pattern(seed).map(|z| (1.0 + options.texture * z).max(0.0));
+    smooth
+        .zip(uneven)
+        .map(|(light, part)| light * part)
+        .collect()
 }
 
 /// Light at a pixel: gain, gradient across the picture, falloff with the square of the angle off the axis.
-fn brightness(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
+fn brightness_at(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
     let across = |v: f64, count: u32| (v - centre(count)) / centre(count);
     let slope = options.gradient[0] * across(x, camera.width())
         + options.gradient[1] * across(y, camera.height());
     let angle = camera.view_angle([x, y]) / radians(FALLOFF_ANGLE_DEG);
     let falloff = 1.0 - options.falloff * angle * angle;
     options.gain * (1.0 + slope).max(0.0) * falloff.max(0.0)
-}
-
-/// A paint in the light, in steps, at most white: a camera clips what is too bright.
-fn seen(paint: Paint, light: f64) -> [f64; 3] {
-    paint
-        .colour()
-        .map(|c| (c * light * STEPS).min(f64::from(WHITE)))
 }
 
 fn steps(value: f64) -> i16 {

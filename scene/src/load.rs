@@ -1,20 +1,96 @@
 //! The force on the film.
 
 use std::f64::consts::PI;
+use std::fmt;
+use std::str::FromStr;
 
 use crate::SceneError;
 
-/// A force on the film's centre, in newtons.
+/// What the label (α, β, |F|) of a load says of the tip. It decides how well anything can be measured: at 0.2 N a
+/// degree moves the markers by 0.2 px (`Force`) or 1.8 px (`Stick`) at 800×600.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "file", derive(serde::Deserialize))]
+#[cfg_attr(feature = "file", serde(try_from = "String"))]
+pub enum Contact {
+    /// The force on the film has that direction and size; the tip goes where the film lets it.
+    #[default]
+    Force,
+    /// The tip moves in that direction and the film sticks to it; |F| is the force along it, as a gauge on the paper's
+    /// stage reads it. The force on the film is tilted more than the travel.
+    Stick,
+    /// As `Stick`, until the sideways force is μ times the normal one (in the film's frame). Then the tip slides over
+    /// the film the way it is moved, and the sideways force stays μ times the normal one.
+    Slip {
+        /// The friction ratio, 0.05 to 1.
+        mu: f64,
+    },
+}
+
+impl FromStr for Contact {
+    type Err = SceneError;
+
+    /// `force`, `stick` or `slip:0.6`, the friction ratio.
+    fn from_str(text: &str) -> Result<Contact, SceneError> {
+        let contact = match (text, text.strip_prefix("slip:")) {
+            ("force", _) => Some(Contact::Force),
+            ("stick", _) => Some(Contact::Stick),
+            (_, Some(mu)) => mu.parse().ok().map(|mu| Contact::Slip { mu }),
+            _ => None,
+        };
+        let contact = contact.ok_or_else(|| {
+            SceneError::Load(format!("contact `{text}`: use force, stick or slip:0.6"))
+        })?;
+        contact.check()?;
+        Ok(contact)
+    }
+}
+
+#[cfg(feature = "file")]
+impl TryFrom<String> for Contact {
+    type Error = SceneError;
+
+    fn try_from(text: String) -> Result<Contact, SceneError> {
+        text.parse()
+    }
+}
+
+impl fmt::Display for Contact {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Contact::Force => f.write_str("force"),
+            Contact::Stick => f.write_str("stick"),
+            Contact::Slip { mu } => write!(f, "slip:{mu}"),
+        }
+    }
+}
+
+impl Contact {
+    /// # Errors
+    /// When the friction ratio is outside its range.
+    fn check(self) -> Result<(), SceneError> {
+        match self {
+            Contact::Slip { mu } if !(0.05..=1.0).contains(&mu) => Err(SceneError::Load(format!(
+                "the friction ratio is {mu}: use 0.05 to 1; what holds better sticks"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What presses on the film: a labelled force in newtons, what its label means and where it acts.
 ///
 /// Film frame, right-handed: x right and y down in the image, z away from the camera, so that a press has F_z < 0.
 /// F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's (the paper's goniometer, Section 6).
-/// Whether the film can take it is the film's to say ([`crate::Film::check`]).
+/// Whether the film can take it is the film's to say ([`crate::film::Film::check`]), and what force then really acts on
+/// it ([`crate::film::Pressed::force_n`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     vector_n: [f64; 3],
     magnitude_n: f64,
     alpha_deg: f64,
     beta_deg: f64,
+    contact: Contact,
+    offset_mm: [f64; 2],
 }
 
 impl Load {
@@ -24,6 +100,8 @@ impl Load {
         magnitude_n: 0.0,
         alpha_deg: 0.0,
         beta_deg: 0.0,
+        contact: Contact::Force,
+        offset_mm: [0.0; 2],
     };
 
     /// A force by size (N, ≥ 0) and direction (degrees, between −90 and 90).
@@ -49,6 +127,7 @@ impl Load {
             magnitude_n,
             alpha_deg,
             beta_deg,
+            ..Load::REST
         })
     }
 
@@ -73,10 +152,65 @@ impl Load {
             magnitude_n,
             alpha_deg: degrees(libm::atan2(x, -z)),
             beta_deg: degrees(libm::asin(y / magnitude_n)),
+            ..Load::REST
         })
     }
 
-    /// (F_x, F_y, F_z) in N.
+    /// The same label with another meaning.
+    ///
+    /// # Errors
+    /// When the friction ratio is outside its range.
+    pub fn with_contact(self, contact: Contact) -> Result<Load, SceneError> {
+        contact.check()?;
+        Ok(Load { contact, ..self })
+    }
+
+    /// The same load where the tip first touches the film (x, y) mm from the middle.
+    ///
+    /// # Errors
+    /// When a number is not finite.
+    pub fn with_offset_mm(self, offset_mm: [f64; 2]) -> Result<Load, SceneError> {
+        if !offset_mm.iter().all(|part| part.is_finite()) {
+            return Err(SceneError::Load(format!(
+                "the tip's offset is {offset_mm:?} mm: use finite numbers"
+            )));
+        }
+        Ok(Load { offset_mm, ..self })
+    }
+
+    /// A force of another size, N, > 0, as this one otherwise; this one must be a force.
+    pub(crate) fn of_size(self, magnitude_n: f64) -> Load {
+        let part = magnitude_n / self.magnitude_n;
+        Load {
+            vector_n: self.vector_n.map(|component| part * component),
+            magnitude_n,
+            ..self
+        }
+    }
+
+    /// The same load with what it leaves open, which is what every load begins with; both must be possible.
+    pub(crate) fn or(self, contact: Contact, offset_mm: [f64; 2]) -> Load {
+        let plain = self.contact == Contact::Force;
+        let central = self.offset_mm == [0.0; 2];
+        Load {
+            contact: if plain { contact } else { self.contact },
+            offset_mm: if central { offset_mm } else { self.offset_mm },
+            ..self
+        }
+    }
+
+    /// What the label means.
+    pub fn contact(&self) -> Contact {
+        self.contact
+    }
+
+    /// Where the tip first touches the film, mm from the middle along x and y.
+    pub fn offset_mm(&self) -> [f64; 2] {
+        self.offset_mm
+    }
+
+    /// (F_x, F_y, F_z) in N, as the label says: the force on the film in the reading [`Contact::Force`], otherwise |F|
+    /// along the tip's way.
     pub fn vector_n(&self) -> [f64; 3] {
         self.vector_n
     }
@@ -156,6 +290,30 @@ mod tests {
     fn no_force_has_no_direction() {
         assert_eq!(Load::from_angles(0.0, 5.0, 5.0).unwrap(), Load::REST);
         assert_eq!(Load::from_vector([0.0; 3]).unwrap(), Load::REST);
+    }
+
+    #[test]
+    fn contact_and_offset_are_kept_or_refused() {
+        let load = Load::from_angles(0.1, 5.0, 0.0).unwrap();
+        assert_eq!(
+            (load.contact(), load.offset_mm()),
+            (Contact::Force, [0.0; 2])
+        );
+        let slip = load.with_contact(Contact::Slip { mu: 0.6 }).unwrap();
+        let slip = slip.with_offset_mm([0.1, -0.2]).unwrap();
+        assert_eq!(slip.contact(), Contact::Slip { mu: 0.6 });
+        assert_eq!(slip.offset_mm(), [0.1, -0.2]);
+        assert_eq!(slip.vector_n(), load.vector_n());
+        for mu in [0.0, 1.1, -0.6, f64::NAN] {
+            assert!(load.with_contact(Contact::Slip { mu }).is_err(), "μ = {mu}");
+        }
+        assert!(load.with_offset_mm([0.0, f64::NAN]).is_err());
+        for name in ["force", "stick", "slip:0.6"] {
+            assert_eq!(name.parse::<Contact>().unwrap().to_string(), name);
+        }
+        for name in ["slip", "slip:", "slip:2", "glue"] {
+            assert!(name.parse::<Contact>().is_err(), "{name}");
+        }
     }
 
     proptest! {

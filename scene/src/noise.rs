@@ -11,6 +11,9 @@ const QUANTILES: usize = 4096;
 /// SplitMix64's increment, the odd number nearest to 2⁶⁴ / golden ratio.
 const WEYL: u64 = 0x9e37_79b9_7f4a_7c15;
 
+/// How many values the number beside a pixel's noise has.
+pub(crate) const LOTS: u32 = 1 << 28;
+
 /// The middle quantiles of as many equal parts of the standard normal distribution; made once, as that takes a while.
 static UNIT: LazyLock<Vec<f64>> = LazyLock::new(|| {
     let middle = |i: usize| (i as f64 + 0.5) / QUANTILES as f64;
@@ -34,16 +37,37 @@ impl Noise {
         }
     }
 
-    /// The noise of one frame, pixel by pixel: three channels each, in steps.
-    pub(crate) fn of_frame(&self, number: u64) -> impl Iterator<Item = [i32; 3]> {
+    /// The noise of one frame, pixel by pixel: three channels each, in steps, and a number below [`LOTS`] that is
+    /// independent of them.
+    pub(crate) fn of_frame(&self, number: u64) -> impl Iterator<Item = ([i32; 3], u32)> {
         let mut state = mix(mix(self.seed).wrapping_add(number.wrapping_mul(WEYL)));
         let table: &[i16; QUANTILES] = self.table[..].try_into().expect("built with this length");
         std::iter::repeat_with(move || {
             state = state.wrapping_add(WEYL);
             let bits = mix(state);
-            [bits >> 52, bits >> 40, bits >> 28].map(|b| i32::from(table[b as usize % QUANTILES]))
+            let channels = [bits >> 52, bits >> 40, bits >> 28];
+            let noise = channels.map(|b| i32::from(table[b as usize % QUANTILES]));
+            (noise, bits as u32 % LOTS)
         })
     }
+}
+
+/// What never changes: pixel by pixel, a number of the standard normal distribution.
+pub(crate) fn pattern(seed: u64) -> impl Iterator<Item = f64> {
+    let mut state = mix(seed ^ 0x7465_7874_7572_6500);
+    std::iter::repeat_with(move || {
+        state = state.wrapping_add(WEYL);
+        UNIT[mix(state) as usize % QUANTILES]
+    })
+}
+
+/// Numbers from 0 to below 1, one after the other.
+pub(crate) fn uniform(seed: u64) -> impl Iterator<Item = f64> {
+    let mut state = mix(seed ^ 0x7370_6563_6b73_0000);
+    std::iter::repeat_with(move || {
+        state = state.wrapping_add(WEYL);
+        (mix(state) >> 11) as f64 / (1_u64 << 53) as f64
+    })
 }
 
 /// A well-mixed 64-bit hash (SplitMix64, variant 13 of Stafford's mixers).
@@ -77,7 +101,7 @@ mod tests {
 
     fn samples(noise: &Noise, number: u64) -> Vec<[f64; 3]> {
         let frame = noise.of_frame(number).take(PIXELS);
-        frame.map(|pixel| pixel.map(f64::from)).collect()
+        frame.map(|(pixel, _)| pixel.map(f64::from)).collect()
     }
 
     /// Mean of the product of two series of deviation 160, as a correlation.
@@ -138,8 +162,24 @@ mod tests {
     }
 
     #[test]
+    fn lots_are_uniform_and_independent_of_the_noise() {
+        let noise = Noise::new(160.0, 1);
+        let drawn: Vec<_> = noise.of_frame(3).take(PIXELS).collect();
+        let low = drawn.iter().filter(|(_, lot)| *lot < LOTS / 10);
+        let low_and_bright = low.clone().filter(|(noise, _)| noise[2] > 0);
+        let share = |count: usize| count as f64 / PIXELS as f64;
+        assert!((share(low.count()) - 0.1).abs() < 0.003);
+        assert!((share(low_and_bright.count()) - 0.05).abs() < 0.002);
+    }
+
+    #[test]
     fn without_deviation_there_is_none() {
         let noise = Noise::new(0.0, 1);
-        assert!(noise.of_frame(0).take(100).all(|pixel| pixel == [0; 3]));
+        assert!(
+            noise
+                .of_frame(0)
+                .take(100)
+                .all(|(pixel, _)| pixel == [0; 3])
+        );
     }
 }

@@ -1,10 +1,13 @@
 //! What makes a frame harder or easier than the default.
 
-use crate::SceneError;
+use crate::{Format, Lens, Mechanics, Mounting, Patch, SceneError, Shutter};
+use crate::{Paint, Specks};
 
-/// How a scene is lit, mounted and disturbed. The default is the nominal sensor.
+/// How a scene is lit, mounted, exposed and disturbed. The default is the nominal sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
+    /// How the camera codes its pixels.
+    pub format: Format,
     /// Brightness of the whole picture, 0 to 4; 1 is nominal. At about 0.3 the default threshold starts to eat the
     /// markers.
     pub gain: f64,
@@ -13,55 +16,67 @@ pub struct Options {
     pub gradient: [f64; 2],
     /// The part of the light that is lost 75° off the optical axis, 0 to 1; it grows with the square of the angle.
     pub falloff: f64,
+    /// Veiling light on the whole picture, 0 to 255 levels at a gain of 1: stray light that washes out colours.
+    pub haze: f64,
+    /// Gain of red, green and blue, 0 to 4 each: (1, 1, 1) is the balance that makes the film nearly grey.
+    pub white_balance: [f64; 3],
+    /// Standard deviation of a fixed pattern of brightness from pixel to pixel, 0 to 0.5 of the brightness: the film's
+    /// grain and the sensor's uneven pixels.
+    pub texture: f64,
     /// Standard deviation of the noise of each channel, 0 to 64 of 255 levels.
     pub noise: f64,
+    /// Pixels that show a colour of their own, in each frame others.
+    pub salt: Salt,
+    /// What is taken of the film's answer.
+    pub film: Mechanics,
     /// Which markers (by identity) have come off.
     pub missing: [bool; 4],
     /// Round patches on the film, painted over the markers in this order.
     pub patches: Vec<Patch>,
+    /// Red specks all over the film, under the markers.
+    pub specks: Specks,
+    /// Side of the squares of a checkerboard of film and markers' red in the whole picture, 0 to 400 px; 0 is none.
+    pub checkerboard_px: u32,
+    /// What the lens does with a point.
+    pub lens: Lens,
     /// How the camera sits.
     pub mounting: Mounting,
+    /// When which row is exposed.
+    pub shutter: Shutter,
 }
 
-/// A round patch that moves with the film.
+/// Pixels that show a colour of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patch {
-    /// Where its centre rests on the film, mm, within ±14.
-    pub centre_mm: [f64; 2],
-    /// Radius, 0.01 to 10 mm; a marker has 0.5 mm.
-    pub radius_mm: f64,
-    /// Its colour.
+pub struct Salt {
+    /// The part of all pixels, 0 to 1.
+    pub fraction: f64,
+    /// Their colour, in the light of the picture's middle.
     pub paint: Paint,
-}
-
-/// The colour of a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Paint {
-    /// The markers' red: a distracting thing, or a bridge that merges two markers.
-    Red,
-    /// The film's own colour: cuts what lies beneath.
-    Film,
-}
-
-/// How far the camera sits from its nominal place.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mounting {
-    /// Shift of the whole picture, px, within ±200.
-    pub shift_px: [f64; 2],
-    /// Rotation of the picture about the optical axis, degrees, within ±45; positive turns x towards y.
-    pub roll_deg: f64,
 }
 
 impl Default for Options {
     fn default() -> Options {
         Options {
+            format: Format::default(),
             gain: 1.0,
             gradient: [0.0; 2],
             falloff: 0.3,
+            haze: 0.0,
+            white_balance: [1.0; 3],
+            texture: 0.0,
             noise: 2.5,
+            salt: Salt {
+                fraction: 0.0,
+                paint: Paint::Red,
+            },
+            film: Mechanics::default(),
             missing: [false; 4],
             patches: Vec::new(),
+            specks: Specks::default(),
+            checkerboard_px: 0,
+            lens: Lens::default(),
             mounting: Mounting::default(),
+            shutter: Shutter::default(),
         }
     }
 }
@@ -70,39 +85,46 @@ impl Options {
     /// # Errors
     /// When a value is outside its range or not a number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
+        #[cfg(feature = "jpeg")]
+        if let Format::Jpeg { quality } = self.format {
+            within("jpeg_quality", f64::from(quality), [1.0, 100.0])?;
+        }
         within("gain", self.gain, [0.0, 4.0])?;
-        within("gradient", self.gradient[0], [-1.0, 1.0])?;
-        within("gradient", self.gradient[1], [-1.0, 1.0])?;
+        all_within("gradient", self.gradient, [-1.0, 1.0])?;
         within("falloff", self.falloff, [0.0, 1.0])?;
+        within("haze", self.haze, [0.0, 255.0])?;
+        all_within("white_balance", self.white_balance, [0.0, 4.0])?;
+        within("texture", self.texture, [0.0, 0.5])?;
         within("noise", self.noise, [0.0, 64.0])?;
+        within("salt", self.salt.fraction, [0.0, 1.0])?;
         within(
-            "mounting.shift_px",
-            self.mounting.shift_px[0],
-            [-200.0, 200.0],
+            "checkerboard_px",
+            f64::from(self.checkerboard_px),
+            [0.0, 400.0],
         )?;
-        within(
-            "mounting.shift_px",
-            self.mounting.shift_px[1],
-            [-200.0, 200.0],
-        )?;
-        within("mounting.roll_deg", self.mounting.roll_deg, [-45.0, 45.0])?;
-        self.patches.iter().try_for_each(Patch::check)
+        self.patches.iter().try_for_each(Patch::check)?;
+        self.specks.check()?;
+        self.lens.check()?;
+        self.mounting.check()?;
+        self.shutter.check()
     }
 }
 
-impl Patch {
-    fn check(&self) -> Result<(), SceneError> {
-        within("patch.centre_mm", self.centre_mm[0], [-14.0, 14.0])?;
-        within("patch.centre_mm", self.centre_mm[1], [-14.0, 14.0])?;
-        within("patch.radius_mm", self.radius_mm, [0.01, 10.0])
-    }
-}
-
-fn within(name: &'static str, value: f64, range: [f64; 2]) -> Result<(), SceneError> {
+pub(crate) fn within(name: &'static str, value: f64, range: [f64; 2]) -> Result<(), SceneError> {
     if value >= range[0] && value <= range[1] {
         return Ok(());
     }
     Err(SceneError::Option { name, value, range })
+}
+
+pub(crate) fn all_within<const N: usize>(
+    name: &'static str,
+    values: [f64; N],
+    range: [f64; 2],
+) -> Result<(), SceneError> {
+    values
+        .into_iter()
+        .try_for_each(|value| within(name, value, range))
 }
 
 #[cfg(test)]
@@ -114,23 +136,45 @@ mod tests {
         assert_eq!(Options::default().check(), Ok(()));
     }
 
+    /// What is said of the default with one thing changed.
+    fn said_of(change: impl Fn(&mut Options)) -> String {
+        let mut options = Options::default();
+        change(&mut options);
+        options.check().unwrap_err().to_string()
+    }
+
     #[test]
     fn what_cannot_be_is_named() {
-        let mut options = Options {
-            gain: f64::NAN,
-            ..Options::default()
-        };
-        assert!(options.check().unwrap_err().to_string().contains("gain"));
-        options.gain = 1.0;
-        options.patches.push(Patch {
-            centre_mm: [0.0; 2],
-            radius_mm: -1.0,
-            paint: Paint::Red,
+        assert!(said_of(|o| o.gain = f64::NAN).contains("gain"));
+        let said = said_of(|o| {
+            o.patches.push(Patch {
+                centre_mm: [0.0; 2],
+                radius_mm: -1.0,
+                paint: Paint::Red,
+            });
         });
-        let error = options.check().unwrap_err().to_string();
-        assert!(
-            error.contains("patch.radius_mm is -1: use 0.01 to 10"),
-            "{error}"
-        );
+        assert!(said.contains("radius_mm is -1: use 0.01 to 10"), "{said}");
+        for (said, name) in [
+            (said_of(|o| o.gradient[1] = 1.5), "gradient"),
+            (said_of(|o| o.haze = -1.0), "haze"),
+            (said_of(|o| o.white_balance[2] = 5.0), "white_balance"),
+            (said_of(|o| o.texture = f64::INFINITY), "texture"),
+            (said_of(|o| o.salt.fraction = 1.1), "salt"),
+            (said_of(|o| o.checkerboard_px = 401), "checkerboard_px"),
+            (said_of(|o| o.specks.count = 100_001), "specks"),
+            (said_of(|o| o.specks.radius_mm = 0.0), "speck_radius_mm"),
+            (said_of(|o| o.lens.blur_px = 21.0), "blur_px"),
+            (said_of(|o| o.lens.pitch_um = Some(0.5)), "pitch_um"),
+            (said_of(|o| o.lens.aperture_mm = 3.0), "aperture_mm"),
+            (said_of(|o| o.lens.focus_mm = 0.0), "focus_mm"),
+            (said_of(|o| o.mounting.shift_px[0] = 300.0), "shift_px"),
+            (said_of(|o| o.mounting.roll_deg = 50.0), "roll_deg"),
+            (said_of(|o| o.shutter.exposure_s = -0.1), "exposure_s"),
+            (said_of(|o| o.shutter.readout_s = 0.2), "readout_s"),
+        ] {
+            assert!(said.contains(name), "{name}: {said}");
+        }
+        #[cfg(feature = "jpeg")]
+        assert!(said_of(|o| o.format = Format::Jpeg { quality: 0 }).contains("jpeg_quality"));
     }
 }

@@ -1,26 +1,25 @@
 //! The scene: what presses the sensor, and the frames its camera takes of it.
 
 use crate::coverage::Coverage;
-use crate::disc::Outline;
-use crate::frame::rgb565;
+use crate::exposure::{Exposure, Image};
+use crate::film::Film;
+use crate::frame::Raster;
 use crate::light::{Light, STEPS};
 use crate::motion::Motion;
-use crate::noise::Noise;
-use crate::{
-    Camera, Disc, Film, Frame, Load, MARKERS, MarkerTruth, Options, Paint, Preset, SceneError,
-    StandInFilm, Truth,
-};
+use crate::noise::{LOTS, Noise};
+use crate::{Camera, Disc, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Truth};
 
 /// A simulated sensor and what presses it. Frames depend on nothing but the scene and the arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    film: StandInFilm,
+    film: Film,
     camera: Camera,
     motion: Motion,
     options: Options,
     seed: u64,
     light: Light,
     noise: Noise,
+    specks: Vec<Disc>,
 }
 
 impl Scene {
@@ -32,6 +31,9 @@ impl Scene {
     /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F| 0.02–0.2 N, |α| ≤ 8°,
     ///   |β| ≤ 6°.
     /// - `sweep`: |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then at α = ±8°, then at β = ±6°.
+    /// - `press`, `drag`, `grasp`, `catch`, `vibration`: after a tenth of a second of rest, what [`Press`](crate::Press),
+    ///   [`Drag`](crate::Drag), [`Grasp`](crate::Grasp), [`Catch`](crate::Catch) and
+    ///   [`Vibration`](crate::Vibration) are by default.
     ///
     /// # Errors
     /// When there is no scene of that name or the size is another.
@@ -45,10 +47,11 @@ impl Scene {
         let camera = Camera::new(preset, width, height)?;
         let options = Options::default();
         Ok(Scene {
-            film: StandInFilm,
+            film: Film::default(),
             motion: Motion::named(name, seed)?,
-            light: Light::new(&camera, &options),
+            light: Light::new(&camera, &options, seed),
             noise: Noise::new(options.noise * STEPS, seed),
+            specks: Vec::new(),
             camera,
             options,
             seed,
@@ -59,28 +62,51 @@ impl Scene {
     ///
     /// # Errors
     /// When the film cannot take the load.
-    pub fn with_load(mut self, load: Load) -> Result<Scene, SceneError> {
-        self.film.check(&load)?;
-        self.motion = Motion::Static(load);
+    pub fn with_load(self, load: Load) -> Result<Scene, SceneError> {
+        self.with_motion(Motion::Static(load))
+    }
+
+    /// The same scene with something else that presses.
+    ///
+    /// # Errors
+    /// When a parameter is outside its range, or the film cannot take a load within the motion's first ten seconds.
+    pub fn with_motion(mut self, motion: Motion) -> Result<Scene, SceneError> {
+        self.try_motion(&motion)?;
+        self.motion = motion;
         Ok(self)
     }
 
     /// The same scene under other conditions.
     ///
     /// # Errors
-    /// When an option is outside its range.
+    /// When an option is outside its range, or the film that it asks for cannot take what presses.
     pub fn with_options(mut self, options: Options) -> Result<Scene, SceneError> {
         options.check()?;
-        self.camera = self.camera.mounted(&options.mounting);
-        self.light = Light::new(&self.camera, &options);
+        self.film = options.film.film()?;
+        self.camera = self.camera.fitted(&options.lens, &options.mounting);
+        self.light = Light::new(&self.camera, &options, self.seed);
+        self.specks = options.specks.discs(self.seed);
         self.noise = Noise::new(options.noise * STEPS, self.seed);
+        let other_film = self.options.film != options.film;
         self.options = options;
+        if other_film {
+            self.try_motion(&self.motion)?;
+        }
         Ok(self)
+    }
+
+    fn try_motion(&self, motion: &Motion) -> Result<(), SceneError> {
+        motion.check(|load| self.options.film.check(&self.film, load))
     }
 
     /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
+    }
+
+    /// What presses.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
     }
 
     /// The conditions.
@@ -90,87 +116,110 @@ impl Scene {
 
     /// The frame taken at a time in seconds; its number selects its noise.
     pub fn frame(&self, number: u64, time_s: f64) -> Frame {
-        self.expose(&self.motion.load(time_s), number)
+        self.expose(|after_s| self.motion.load(time_s + after_s), number)
     }
 
     /// What is true at a time in seconds, without rendering.
     pub fn truth(&self, time_s: f64) -> Truth {
-        let load = self.motion.load(time_s);
-        self.truth_of(&load, &self.marker_images(&load))
+        let exposure = self.exposure(|after_s| self.motion.load(time_s + after_s));
+        self.truth_of(&exposure, &self.marker_images(&exposure))
     }
 
-    /// A frame under any load, whatever the scene's motion; the number selects its noise.
+    /// A frame under any constant load, whatever the scene's motion; the number selects its noise.
     ///
     /// # Errors
     /// When the film cannot take the load.
     pub fn render_load(&self, load: &Load, number: u64) -> Result<Frame, SceneError> {
-        self.film.check(load)?;
-        Ok(self.expose(load, number))
+        self.options.film.check(&self.film, load)?;
+        Ok(self.expose(|_| *load, number))
     }
 
-    fn expose(&self, load: &Load, number: u64) -> Frame {
-        let markers = self.marker_images(load);
-        let mut picture = self.light.bare_film();
-        for image in markers.iter().flatten() {
-            self.paint(&mut picture, image, Paint::Red);
+    fn exposure<L: Fn(f64) -> Load>(&self, load: L) -> Exposure<'_, L> {
+        Exposure {
+            film: &self.film,
+            mechanics: &self.options.film,
+            camera: &self.camera,
+            lens: &self.options.lens,
+            shutter: &self.options.shutter,
+            now: self.options.film.seen(&self.film, &load(0.0)),
+            load,
         }
-        for patch in &self.options.patches {
-            let disc = Disc {
-                centre_mm: patch.centre_mm,
-                radius_mm: patch.radius_mm,
-            };
-            self.paint(&mut picture, &self.image(&disc, load), patch.paint);
-        }
+    }
+
+    fn expose(&self, load: impl Fn(f64) -> Load, number: u64) -> Frame {
+        let exposure = self.exposure(load);
+        let markers = self.marker_images(&exposure);
+        let picture = self.picture(&exposure, &markers);
+        let Raster { words, bytes } = self.digitize(&picture, number);
         Frame {
             width: self.camera.width(),
             height: self.camera.height(),
-            pixels: self.digitize(&picture, number),
-            truth: self.truth_of(load, &markers),
+            format: self.options.format,
+            pixels: words,
+            mono: bytes,
+            truth: self.truth_of(&exposure, &markers),
         }
     }
 
-    fn image(&self, disc: &Disc, load: &Load) -> Outline {
-        disc.image(&self.film, load, &self.camera)
-    }
-
     /// The images of the markers that have not come off.
-    fn marker_images(&self, load: &Load) -> [Option<Outline>; 4] {
+    fn marker_images<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>) -> [Option<Image>; 4] {
         std::array::from_fn(|id| {
             let there = !self.options.missing[id];
-            there.then(|| self.image(&MARKERS[id], load))
+            there.then(|| exposure.image(&MARKERS[id]))
         })
     }
 
-    fn paint(&self, picture: &mut [[i16; 3]], image: &Outline, paint: Paint) {
+    /// Film, specks, markers and patches in their light, in steps, before any noise.
+    fn picture<L: Fn(f64) -> Load>(
+        &self,
+        exposure: &Exposure<'_, L>,
+        markers: &[Option<Image>; 4],
+    ) -> Vec<[i16; 3]> {
+        let mut picture = self.light.bare_film();
+        for speck in &self.specks {
+            self.paint(&mut picture, &exposure.image(speck), Paint::Red);
+        }
+        for marker in markers.iter().flatten() {
+            self.paint(&mut picture, marker, Paint::Red);
+        }
+        for patch in &self.options.patches {
+            self.paint(&mut picture, &exposure.image(&patch.disc()), patch.paint);
+        }
+        picture
+    }
+
+    fn paint(&self, picture: &mut [[i16; 3]], image: &Image, paint: Paint) {
         let (width, height) = (self.camera.width(), self.camera.height());
-        for (pixel, part) in Coverage::of(image).pixels(width, height) {
+        for (pixel, part) in Coverage::of(image, width, height).pixels(width, height) {
             picture[pixel] = self.light.painted(pixel, picture[pixel], paint, part);
         }
     }
 
-    fn digitize(&self, picture: &[[i16; 3]], number: u64) -> Vec<u16> {
-        let noisy = |(&clean, noise): (&[i16; 3], [i32; 3])| {
-            rgb565(std::array::from_fn(|c| i32::from(clean[c]) + noise[c]))
-        };
+    fn digitize(&self, picture: &[[i16; 3]], number: u64) -> Raster {
+        let salt = self.light.in_the_middle(self.options.salt.paint);
+        let salted = (self.options.salt.fraction * f64::from(LOTS)) as u32;
         let noise = self.noise.of_frame(number);
-        picture.iter().zip(noise).map(noisy).collect()
+        let noisy = picture.iter().zip(noise).map(|(clean, (noise, lot))| {
+            let clean = if lot < salted {
+                salt
+            } else {
+                clean.map(i32::from)
+            };
+            std::array::from_fn(|channel| clean[channel] + noise[channel])
+        });
+        self.options.format.code(self.camera.width(), noisy)
     }
 
-    fn truth_of(&self, load: &Load, markers: &[Option<Outline>; 4]) -> Truth {
+    fn truth_of<L: Fn(f64) -> Load>(
+        &self,
+        exposure: &Exposure<'_, L>,
+        markers: &[Option<Image>; 4],
+    ) -> Truth {
         Truth {
-            force: *load,
-            markers: std::array::from_fn(|id| self.marker_truth(markers[id].as_ref()?)),
+            force: self.options.film.completed(&(exposure.load)(0.0)),
+            on_film_n: exposure.now.force_n,
+            tip_mm: exposure.now.tip_mm,
+            markers: std::array::from_fn(|id| markers[id].as_ref()?.truth(&self.camera)),
         }
-    }
-
-    fn marker_truth(&self, image: &Outline) -> Option<MarkerTruth> {
-        let (area_px2, centroid_px) = image.area_and_centroid();
-        let inside = image.clipped(self.camera.width(), self.camera.height());
-        let visible = inside.area() / area_px2;
-        (visible > 0.0).then_some(MarkerTruth {
-            centroid_px,
-            area_px2,
-            visible: visible.min(1.0),
-        })
     }
 }

@@ -1,10 +1,11 @@
 //! A frame is the same bytes in every run and on every machine.
 
-use hivtac_scene::{Frame, Mounting, Options, Paint, Patch, Preset, Scene};
+use hivtac_scene::{Format, Frame, Mounting, Options, Paint, Patch, Preset, Scene};
 
 /// FNV-1a over the pixels.
 fn checksum(frame: &Frame) -> u64 {
-    let bytes = frame.pixels.iter().flat_map(|pixel| pixel.to_le_bytes());
+    let words = frame.pixels.iter().flat_map(|pixel| pixel.to_le_bytes());
+    let bytes = words.chain(frame.mono.iter().copied());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     })
@@ -30,12 +31,31 @@ fn frames_are_these_bytes_everywhere() {
     ]
     .map(|(preset, width)| film_strip(&demo(preset, width, 1)));
     let expected = [
-        0x7aad_27bb_5e94_fa93,
-        0x531c_f5d2_7a2e_f4e7,
-        0x2c97_bb3a_b8b5_5a3a,
-        0x3f4f_26a9_7d63_6776,
+        0x3954_e458_8082_9605,
+        0x6c0d_e7cc_22f4_8f1f,
+        0x7155_9e09_17fe_2f4b,
+        0x9edc_98a1_ac4c_a7f3,
     ];
     assert_eq!(strips, expected, "{strips:#018x?}");
+}
+
+#[test]
+fn other_formats_are_these_bytes_everywhere() {
+    let formats = [
+        (Format::Yuv422, 0x05ad_4853_5b62_7f3a),
+        (Format::Mono, 0x5bbc_d49a_8ea4_ec80),
+        #[cfg(feature = "jpeg")]
+        (Format::Jpeg { quality: 85 }, 0x6d09_309f_ac6a_02ac),
+    ];
+    for (format, expected) in formats {
+        let options = Options {
+            format,
+            ..Options::default()
+        };
+        let scene = demo(Preset::Ov7725, 320, 1).with_options(options).unwrap();
+        let strip = film_strip(&scene);
+        assert_eq!(strip, expected, "{format}: {strip:#018x}");
+    }
 }
 
 #[test]
@@ -55,9 +75,10 @@ fn hard_frames_are_these_bytes_everywhere() {
             shift_px: [3.25, -7.5],
             roll_deg: 4.0,
         },
+        ..Options::default()
     };
     let strip = film_strip(&demo(Preset::Ov7725, 320, 7).with_options(options).unwrap());
-    assert_eq!(strip, 0x299e_ca79_8d1a_049c, "{strip:#018x}");
+    assert_eq!(strip, 0x7827_d81a_e1c4_140d, "{strip:#018x}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What the pictures show: discs where the truth says, colours that the default threshold tells apart.
 
-use hivtac_scene::{Frame, Load, Options, Paint, Patch, Preset, Scene};
+use hivtac_scene::{Format, Frame, Load, Options, Paint, Patch, Preset, Scene};
 
 const PRESETS: [Preset; 2] = [Preset::Paper, Preset::Ov7725];
 const SIZES: [(u32, u32); 2] = [(320, 240), (800, 600)];
@@ -210,7 +210,7 @@ fn extremes_render() {
         }],
         ..Options::default()
     };
-    let deepest = Load::from_angles(0.83, 0.0, 0.0).unwrap();
+    let deepest = Load::from_angles(0.5, 0.0, 0.0).unwrap();
     let frame = rendered(Preset::Ov7725, (160, 120), &hidden, &deepest);
     let middle = &frame.pixels[60 * 160..][..160];
     assert!(middle.iter().all(|&p| is_red(p)), "red from side to side");
@@ -225,4 +225,60 @@ fn a_ppm_holds_the_pixels() {
     let first = channels(frame.pixels[0]).map(|c| c as u8);
     assert_eq!(&ppm[header.len()..][..3], first);
     assert_eq!(ppm.len(), header.len() + 160 * 120 * 3);
+}
+
+/// What the default threshold's counterpart in each format passes, as a share of the true discs.
+fn markers_found(format: Format, passes: impl Fn(&Frame, usize) -> bool) -> f64 {
+    let options = Options {
+        format,
+        ..Options::default()
+    };
+    let frame = rendered(Preset::Ov7725, (320, 240), &options, &Load::REST);
+    let markers = frame.truth.markers.iter().flatten();
+    let discs: f64 = markers.map(|marker| marker.area_px2).sum();
+    let found = (0..320 * 240).filter(|&pixel| passes(&frame, pixel));
+    found.count() as f64 / discs
+}
+
+#[test]
+fn every_format_tells_the_markers_from_the_film() {
+    let yuv = markers_found(Format::Yuv422, |frame, pixel| {
+        // Cr of the pair, in the top byte of its second word.
+        frame.pixels[pixel | 1] >> 8 > 160
+    });
+    assert!((0.8..1.2).contains(&yuv), "yuv422: {yuv}");
+    let mono = markers_found(Format::Mono, |frame, pixel| frame.mono[pixel] < 80);
+    assert!((0.8..1.2).contains(&mono), "mono: {mono}");
+    let jpeg = markers_found(Format::Jpeg { quality: 85 }, |frame, pixel| {
+        is_red(frame.pixels[pixel])
+    });
+    assert!((0.8..1.3).contains(&jpeg), "jpeg: {jpeg}");
+}
+
+#[test]
+fn every_format_has_its_rows_and_shows_the_same_picture() {
+    let options = |format| Options { format, ..clear() };
+    let film = |format| {
+        let frame = rendered(Preset::Ov7725, (320, 240), &options(format), &Load::REST);
+        let middle = 3 * (120 * 320 + 160);
+        (
+            frame.rows().count(),
+            frame.mono_rows().count(),
+            frame.to_rgb888()[middle..][..3].to_vec(),
+        )
+    };
+    let near = |a: u8, b: u8| a.abs_diff(b) <= 5;
+    for format in [Format::Rgb565, Format::Yuv422, Format::Jpeg { quality: 90 }] {
+        let (rows, mono_rows, colour) = film(format);
+        assert_eq!((rows, mono_rows), (240, 0), "{format}");
+        let same = near(colour[0], 150) && near(colour[1], 141) && near(colour[2], 128);
+        assert!(same, "{format}: {colour:?}");
+    }
+    assert_eq!(film(Format::Mono), (0, 240, vec![141; 3]));
+    for format in [Format::Rgb565, Format::Yuv422] {
+        let frame = rendered(Preset::Ov7725, (320, 240), &options(format), &Load::REST);
+        let pixels = frame.to_rgb565();
+        let middle = channels(pixels[120 * 320 + 160]).map(|c| c as u8);
+        assert!(near(middle[0], 150) && near(middle[2], 128), "{middle:?}");
+    }
 }

@@ -1,9 +1,10 @@
-//! Loads in time.
+//! `demo` and `sweep`: through the paper's whole range.
 
 use std::f64::consts::PI;
 
+use super::load;
+use crate::Load;
 use crate::noise::mix;
-use crate::{Load, SceneError};
 
 /// Size of the largest load of the named scenes, N: the paper's range.
 const FULL_N: f64 = 0.2;
@@ -15,53 +16,8 @@ const SWEEP_S: f64 = 4.0;
 const SWEEP_DIRECTIONS: [(f64, f64); 5] =
     [(0.0, 0.0), (8.0, 0.0), (-8.0, 0.0), (0.0, 6.0), (0.0, -6.0)];
 
-/// What presses the film, as a function of time. Before time 0, and at a time that is no number, nothing does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Motion {
-    /// Nothing presses.
-    Rest,
-    /// One load, from time 0 on.
-    Static(Load),
-    /// A tenth of a second of rest, then a tip whose force wanders smoothly: |F| 0.02–0.2 N, |α| ≤ 8°, |β| ≤ 6°.
-    /// The seed decides where α and β start.
-    Demo {
-        /// Any number.
-        seed: u64,
-    },
-    /// |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then tilted by α = ±8° and by β = ±6°.
-    Sweep,
-}
-
-impl Motion {
-    /// A motion by its name: `rest`, `static` (0.1 N, α = 4°, β = −3°), `demo` or `sweep`.
-    ///
-    /// # Errors
-    /// When there is none of that name.
-    pub(crate) fn named(name: &str, seed: u64) -> Result<Motion, SceneError> {
-        match name {
-            "rest" => Ok(Motion::Rest),
-            "static" => Ok(Motion::Static(load(0.1, 4.0, -3.0))),
-            "demo" => Ok(Motion::Demo { seed }),
-            "sweep" => Ok(Motion::Sweep),
-            _ => Err(SceneError::UnknownScene(name.to_owned())),
-        }
-    }
-
-    /// The load at a time in seconds.
-    pub(crate) fn load(&self, time_s: f64) -> Load {
-        if !time_s.is_finite() || time_s < 0.0 {
-            return Load::REST;
-        }
-        match *self {
-            Motion::Rest => Load::REST,
-            Motion::Static(load) => load,
-            Motion::Demo { seed } => demo(time_s, seed),
-            Motion::Sweep => sweep(time_s),
-        }
-    }
-}
-
-fn demo(time_s: f64, seed: u64) -> Load {
+/// A tenth of a second of rest, then a tip whose force wanders smoothly.
+pub(super) fn demo(time_s: f64, seed: u64) -> Load {
     let pressed_s = time_s - DEMO_REST_S;
     if pressed_s < 0.0 {
         return Load::REST;
@@ -77,21 +33,18 @@ fn demo(time_s: f64, seed: u64) -> Load {
     )
 }
 
-fn sweep(time_s: f64) -> Load {
+/// Up and down, in one direction after the other.
+pub(super) fn sweep(time_s: f64) -> Load {
     let turn = (time_s / SWEEP_S).floor();
     let part = time_s / SWEEP_S - turn;
     let (alpha, beta) = SWEEP_DIRECTIONS[(turn % 5.0) as usize];
     load(FULL_N * (1.0 - (2.0 * part - 1.0).abs()), alpha, beta)
 }
 
-/// A load of the named scenes, all of which are possible.
-fn load(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
-    Load::from_angles(magnitude_n, alpha_deg, beta_deg).expect("the named scenes press gently")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Motion;
 
     #[test]
     fn demo_rests_for_three_frames_and_then_presses_within_its_range() {
@@ -135,16 +88,5 @@ mod tests {
             );
         }
         assert_eq!(motion.load(22.0).alpha_deg(), 0.0, "starts over");
-    }
-
-    #[test]
-    fn outside_time_nothing_presses() {
-        for name in ["rest", "static", "demo", "sweep"] {
-            let motion = Motion::named(name, 0).unwrap();
-            for time_s in [-1.0, f64::NAN, f64::INFINITY] {
-                assert_eq!(motion.load(time_s), Load::REST);
-            }
-        }
-        assert!(Motion::named("dance", 0).is_err());
     }
 }

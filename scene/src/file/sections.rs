@@ -1,0 +1,289 @@
+//! The sections of a scene file, each with its defaults. `docs/scene-file.md` lists every key.
+
+use serde::Deserialize;
+
+use crate::{
+    Catch, Drag, Format, Grasp, JPEG_QUALITY, Lens, Load, Mechanics, Motion, Mounting, Options,
+    Paint, Patch, Preset, Press, Salt, Scene, SceneError, Shutter, Specks, Vibration,
+};
+
+/// A whole file.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct SceneFile {
+    seed: u64,
+    camera: CameraSection,
+    film: Mechanics,
+    lens: Lens,
+    mounting: Mounting,
+    shutter: Shutter,
+    light: LightSection,
+    noise: NoiseSection,
+    marks: MarksSection,
+    load: LoadSection,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct CameraSection {
+    preset: Preset,
+    width: u32,
+    height: u32,
+    format: FormatName,
+    jpeg_quality: Option<u8>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum FormatName {
+    Rgb565,
+    Yuv422,
+    Mono,
+    Jpeg,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct LightSection {
+    gain: f64,
+    gradient: [f64; 2],
+    falloff: f64,
+    haze: f64,
+    white_balance: [f64; 3],
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct NoiseSection {
+    noise: f64,
+    texture: f64,
+    salt: f64,
+    salt_paint: Paint,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct MarksSection {
+    missing: Vec<u8>,
+    patch: Vec<Patch>,
+    specks: u32,
+    speck_radius_mm: f64,
+    checkerboard_px: u32,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct LoadSection {
+    motion: MotionName,
+    #[serde(rename = "static")]
+    constant: Option<ConstantSection>,
+    press: Option<Press>,
+    drag: Option<Drag>,
+    grasp: Option<Grasp>,
+    catch: Option<Catch>,
+    vibration: Option<Vibration>,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+enum MotionName {
+    #[default]
+    Rest,
+    Static,
+    Demo,
+    Sweep,
+    Press,
+    Drag,
+    Grasp,
+    Catch,
+    Vibration,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct ConstantSection {
+    force_n: f64,
+    alpha_deg: f64,
+    beta_deg: f64,
+}
+
+impl SceneFile {
+    pub(super) fn scene(&self) -> Result<Scene, SceneError> {
+        let CameraSection { width, height, .. } = self.camera;
+        Scene::preset("rest", self.camera.preset, width, height, self.seed)?
+            .with_options(self.options()?)?
+            .with_motion(self.load.motion(self.seed)?)
+    }
+
+    fn options(&self) -> Result<Options, SceneError> {
+        let LightSection {
+            gain,
+            gradient,
+            falloff,
+            haze,
+            white_balance,
+        } = self.light;
+        Ok(Options {
+            format: self.camera.format()?,
+            gain,
+            gradient,
+            falloff,
+            haze,
+            white_balance,
+            texture: self.noise.texture,
+            noise: self.noise.noise,
+            salt: Salt {
+                fraction: self.noise.salt,
+                paint: self.noise.salt_paint,
+            },
+            missing: self.marks.missing()?,
+            patches: self.marks.patch.clone(),
+            specks: Specks {
+                count: self.marks.specks,
+                radius_mm: self.marks.speck_radius_mm,
+            },
+            checkerboard_px: self.marks.checkerboard_px,
+            film: self.film,
+            lens: self.lens,
+            mounting: self.mounting,
+            shutter: self.shutter,
+        })
+    }
+}
+
+impl CameraSection {
+    fn format(&self) -> Result<Format, SceneError> {
+        let format = match self.format {
+            FormatName::Rgb565 => Format::Rgb565,
+            FormatName::Yuv422 => Format::Yuv422,
+            FormatName::Mono => Format::Mono,
+            FormatName::Jpeg => {
+                let quality = self.jpeg_quality.unwrap_or(JPEG_QUALITY);
+                return Ok(Format::Jpeg { quality });
+            }
+        };
+        match self.jpeg_quality {
+            None => Ok(format),
+            Some(quality) => Err(SceneError::Key {
+                key: "jpeg_quality",
+                why: format!("{quality} is the quality of a JPEG, and the format is {format}"),
+            }),
+        }
+    }
+}
+
+impl MarksSection {
+    fn missing(&self) -> Result<[bool; 4], SceneError> {
+        match self.missing.iter().find(|id| **id > 3) {
+            None => Ok(std::array::from_fn(|id| self.missing.contains(&(id as u8)))),
+            Some(id) => Err(SceneError::Key {
+                key: "missing",
+                why: format!("there is no marker {id}: use 0 to 3"),
+            }),
+        }
+    }
+}
+
+impl LoadSection {
+    fn motion(&self, seed: u64) -> Result<Motion, SceneError> {
+        self.check_tables()?;
+        Ok(match self.motion {
+            MotionName::Rest => Motion::Rest,
+            MotionName::Static => self.constant.unwrap_or_default().motion()?,
+            MotionName::Demo => Motion::Demo { seed },
+            MotionName::Sweep => Motion::Sweep,
+            MotionName::Press => Motion::Press(self.press.unwrap_or_default()),
+            MotionName::Drag => Motion::Drag(self.drag.unwrap_or_default()),
+            MotionName::Grasp => Motion::Grasp(self.grasp.unwrap_or_default()),
+            MotionName::Catch => Motion::Catch(self.catch.unwrap_or_default()),
+            MotionName::Vibration => Motion::Vibration(self.vibration.unwrap_or_default()),
+        })
+    }
+
+    /// A table of another motion than the chosen one would do nothing, silently.
+    fn check_tables(&self) -> Result<(), SceneError> {
+        let tables = [
+            ("static", MotionName::Static, self.constant.is_some()),
+            ("press", MotionName::Press, self.press.is_some()),
+            ("drag", MotionName::Drag, self.drag.is_some()),
+            ("grasp", MotionName::Grasp, self.grasp.is_some()),
+            ("catch", MotionName::Catch, self.catch.is_some()),
+            ("vibration", MotionName::Vibration, self.vibration.is_some()),
+        ];
+        let other = |(_, name, given): &(_, MotionName, bool)| *given && *name != self.motion;
+        match tables.into_iter().find(other) {
+            None => Ok(()),
+            Some((key, ..)) => Err(SceneError::Key {
+                key,
+                why: format!("it does nothing unless load.motion is \"{key}\""),
+            }),
+        }
+    }
+}
+
+impl ConstantSection {
+    fn motion(&self) -> Result<Motion, SceneError> {
+        let load = Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg)?;
+        Ok(Motion::Static(load))
+    }
+}
+
+impl Default for CameraSection {
+    fn default() -> CameraSection {
+        CameraSection {
+            preset: Preset::Ov7725,
+            width: 320,
+            height: 240,
+            format: FormatName::Rgb565,
+            jpeg_quality: None,
+        }
+    }
+}
+
+impl Default for LightSection {
+    fn default() -> LightSection {
+        let usual = Options::default();
+        LightSection {
+            gain: usual.gain,
+            gradient: usual.gradient,
+            falloff: usual.falloff,
+            haze: usual.haze,
+            white_balance: usual.white_balance,
+        }
+    }
+}
+
+impl Default for NoiseSection {
+    fn default() -> NoiseSection {
+        let usual = Options::default();
+        NoiseSection {
+            noise: usual.noise,
+            texture: usual.texture,
+            salt: usual.salt.fraction,
+            salt_paint: usual.salt.paint,
+        }
+    }
+}
+
+impl Default for MarksSection {
+    fn default() -> MarksSection {
+        let usual = Options::default();
+        MarksSection {
+            missing: Vec::new(),
+            patch: Vec::new(),
+            specks: usual.specks.count,
+            speck_radius_mm: usual.specks.radius_mm,
+            checkerboard_px: usual.checkerboard_px,
+        }
+    }
+}
+
+impl Default for ConstantSection {
+    fn default() -> ConstantSection {
+        ConstantSection {
+            force_n: 0.1,
+            alpha_deg: 4.0,
+            beta_deg: -3.0,
+        }
+    }
+}
