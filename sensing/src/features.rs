@@ -4,6 +4,8 @@ use crate::{markers::Marker, units::Px};
 
 /// How many numbers the features are.
 pub const FEATURES: usize = 11;
+/// How many of them, the first ones, are coordinates; the last is an area.
+pub const COORDINATES: usize = 10;
 
 /// x = [x0, y0, x1, y1, x2, y2, x3, y3, x_rect, y_rect, Area_rect].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -28,6 +30,13 @@ impl Features {
             rect_center: (middle(left, right), middle(top, bottom)),
             rect_area: (area_q32 + (1 << (Px::FRACTION_BITS - 1))) >> Px::FRACTION_BITS,
         }
+    }
+
+    /// All but the area, in the paper's order.
+    pub fn coordinates(&self) -> [Px; COORDINATES] {
+        let [(x0, y0), (x1, y1), (x2, y2), (x3, y3)] = self.centroids;
+        let (x, y) = self.rect_center;
+        [x0, y0, x1, y1, x2, y2, x3, y3, x, y]
     }
 
     /// The eleven numbers in the paper's order, each with 16 fractional bits.

@@ -12,8 +12,10 @@ use heapless::Vec;
 
 use crate::{
     blob::Blob,
+    dilate::Part,
     mask::MAX_WIDTH,
     runs::{Run, for_each_run},
+    tables::Weights,
 };
 
 /// Most runs in a row, and most slots in use.
@@ -50,6 +52,8 @@ pub struct Labeller<const BLOBS: usize> {
     free: Vec<Label, MAX_RUNS>,
     kept: Vec<Blob, BLOBS>,
     min_area: u32,
+    /// Runs that the frame may still have; `None` when it had more.
+    runs_left: Option<u32>,
     overflowed: bool,
 }
 
@@ -63,34 +67,53 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             free: Vec::new(),
             kept: Vec::new(),
             min_area: 0,
+            runs_left: Some(0),
             overflowed: false,
         }
     }
 
     /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped.
-    pub fn begin(&mut self, min_area: u32) {
+    /// After a row with which it has more than `max_runs` runs, nothing more of it is taken.
+    pub fn begin(&mut self, min_area: u32, max_runs: u32) {
         self.before.clear();
         self.slots.clear();
         self.free.clear();
         self.kept.clear();
         self.min_area = min_area;
+        self.runs_left = Some(max_runs);
         self.overflowed = false;
     }
 
-    /// Takes row `y` of the mask. Rows come in order, from 0 to at most 799.
-    pub fn push(&mut self, words: &[u32], y: u16) {
+    /// Takes the part of row `y` of the mask that has its set bits; `weigh` gives the weights of one of its runs. Rows come in order, from 0 to at most
+    /// 799.
+    pub fn push(&mut self, part: Part<'_>, y: u16, weigh: impl Fn(Run) -> Weights) {
         self.current.clear();
         let mut first = 0;
-        for_each_run(words, |run| self.push_run(run, y, &mut first));
+        for_each_run(part.first, part.words, |run| {
+            self.push_run(run, y, weigh(run), &mut first)
+        });
+        let count = self.current.len() as u32;
+        self.runs_left = self.runs_left.and_then(|left| left.checked_sub(count));
+        self.overflowed |= self.is_exhausted();
         self.resolve_runs();
         self.finish_untouched(y);
         self.before.clear();
         self.overflowed |= self.before.extend_from_slice(&self.current).is_err();
     }
 
+    /// Whether the frame has had more runs than it may.
+    pub fn is_exhausted(&self) -> bool {
+        self.runs_left.is_none()
+    }
+
+    /// Whether no blob is open, so that an empty row changes nothing.
+    pub fn is_idle(&self) -> bool {
+        self.before.is_empty()
+    }
+
     /// Finishes the blobs that reach the last row, `height` − 1.
     pub fn finish(&mut self, height: u16) {
-        self.push(&[], height);
+        self.push(Part::EMPTY, height, |_| Weights::NONE);
     }
 
     /// The blobs kept so far, ordered by their lowest row, then by where they begin in it.
@@ -104,7 +127,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     }
 
     /// Takes a run of row `y`. `first` is the first run of the row before that can touch this one or a later one.
-    fn push_run(&mut self, run: Run, y: u16, first: &mut usize) {
+    fn push_run(&mut self, run: Run, y: u16, weights: Weights, first: &mut usize) {
         // Columns at most one apart touch, straight or across a corner.
         while self
             .before
@@ -113,7 +136,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         {
             *first += 1;
         }
-        let label = self.label_run(run, y, *first);
+        let label = self.label_run(run, y, weights, *first);
         let stored =
             label.is_some_and(|label| self.current.push(LabelledRun { run, label }).is_ok());
         self.overflowed |= !stored;
@@ -121,8 +144,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
 
     /// Adds a run to the blob of those that it touches, from `first` on in the row before, which become one; or to a new
     /// blob.
-    fn label_run(&mut self, run: Run, y: u16, first: usize) -> Option<Label> {
-        let blob = Blob::of_run(run, y);
+    fn label_run(&mut self, run: Run, y: u16, weights: Weights, first: usize) -> Option<Label> {
         let mut root = None;
         let mut next = first;
         while let Some(touched) = self.before.get(next).filter(|b| b.run.x0 <= run.x1 + 1) {
@@ -131,26 +153,22 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             next += 1;
         }
         let Some(root) = root else {
-            return self.open(blob);
+            return self.open(Blob::of_run(run, y, weights));
         };
-        self.slots[usize::from(root)].blob.add(&blob);
+        let blob = &mut self.slots[usize::from(root)].blob;
+        blob.add(&Blob::of_run(run, y, weights));
         Some(root)
     }
 
     /// Puts a blob into a free slot.
     fn open(&mut self, blob: Blob) -> Option<Label> {
-        let label = match self.free.pop() {
-            Some(label) => label,
-            None => {
-                let label = self.slots.len() as Label;
-                self.slots
-                    .push(Slot {
-                        parent: label,
-                        blob,
-                    })
-                    .ok()?;
-                label
-            }
+        let Some(label) = self.free.pop() else {
+            let label = self.slots.len() as Label;
+            let slot = Slot {
+                parent: label,
+                blob,
+            };
+            return self.slots.push(slot).ok().map(|()| label);
         };
         self.slots[usize::from(label)] = Slot {
             parent: label,

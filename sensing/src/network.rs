@@ -1,73 +1,84 @@
-//! The quantized network: the portable definition that every other kernel must match bit for bit.
+//! The quantized network: the portable definition that every kernel matches bit for bit.
 //!
 //! Every number is an integer and every rescaling rounds once, half up:
 //! `rescale(a, m, s) = (a·m + 2^(s−1)) >> s`.
 //!
 //! 1. Input: `x_i = sat16(rescale(f_i − tare_i + rest_i − mean_i, m_i, s_i))`. The difference is limited to
 //!    ±(2³⁸ − 1) first, which no two frames of up to 800 × 800 px exceed; with m < 2²⁴ the product stays below 2⁶².
-//! 2. Hidden layer: `acc_j = bias_j + Σ w_ji·x_i`, `a_j = clamp(rescale(acc_j, m_j, s_j), 0, 127)`.
+//! 2. Hidden layer: `acc_j = bias_j + Σ w_ji·x_i`, `a_j = clamp(rescale(acc_j, m_j, s_j), 0, A)` with the layer's largest
+//!    activation A.
 //! 3. Output layer: `y_j = sat32(rescale(acc_j, m_j, s_j))`.
 //!
 //! [`Model::parse`] has proven that `acc_j` fits `i32`; with m < 2³¹ the product stays below 2⁶².
 
 use crate::{
-    features::{FEATURES, Features},
+    features::{COORDINATES, FEATURES, Features},
+    kernels::{Inputs, Sums, activate, multiply},
     model::{InputScaling, Layer, MAX_WIDTH, Model, OUTPUTS},
+    rescale::{rescale_input, rescale_small_input, rescale_sum},
 };
 
-/// Largest difference of features that enters the rescaling.
-const LARGEST_DIFFERENCE: i64 = (1 << 38) - 1;
-/// Largest activation of a hidden layer: seven bits.
-const LARGEST_ACTIVATION: i64 = 127;
-
-/// Room for the activations of two layers.
+/// Room for the numbers of one layer.
 #[derive(Clone, Debug)]
 pub struct Network {
-    /// What the layer before gave.
-    current: [u8; MAX_WIDTH],
-    /// What this layer gives.
-    next: [u8; MAX_WIDTH],
+    /// What a layer is fed.
+    inputs: Inputs,
+    /// What its rows add up to.
+    sums: Sums,
 }
 
 /// What the network makes of one set of features.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
     /// The three outputs, in the units of the model's output kind.
     pub values: [i32; OUTPUTS],
-    /// True when an input met the limits of `i16` (8 σ): far from all that the model was trained on.
+    /// True when an input met the limits of `i16` (8 σ), or the markers are further apart than the closed form's curves
+    /// reach: far from all that the model was made from.
     pub input_saturated: bool,
 }
 
 impl Network {
-    /// Buffers for any model.
+    /// Room for any model.
     pub const fn new() -> Network {
         Network {
-            current: [0; MAX_WIDTH],
-            next: [0; MAX_WIDTH],
+            inputs: Inputs::new(),
+            sums: [0; MAX_WIDTH],
         }
     }
 
-    /// Runs `model` on `features`, measured from the rest position `tare`.
+    /// Runs `model` on `features`, measured from the rest position `tare`: its layers, if it has any, and its closed form,
+    /// if it has one; their forces add up.
     pub fn run(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
-        let inputs = scale_inputs(&model.input, features, tare, &model.rest.features);
+        let mut output = match model.layers() {
+            [] => Output::default(),
+            _ => self.run_layers(model, features, tare),
+        };
+        if let Some(form) = &model.closed_form {
+            let (force, beyond) = form.force(features, tare);
+            for (value, part) in output.values.iter_mut().zip(force) {
+                *value = value.saturating_add(part);
+            }
+            output.input_saturated |= beyond;
+        }
+        output
+    }
+
+    fn run_layers(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
+        let scaled = scale_inputs(&model.input, features, tare, &model.rest.features);
+        self.inputs.values_mut()[..FEATURES].copy_from_slice(&scaled);
         let mut values = [0; OUTPUTS];
         // A parsed model has at least one layer.
         if let Some((last, hidden)) = model.layers().split_last() {
-            match hidden.split_first() {
-                None => output_layer(last, &inputs, &mut values),
-                Some((first, others)) => {
-                    hidden_layer(first, &inputs, &mut self.current);
-                    for layer in others {
-                        hidden_layer(layer, &self.current, &mut self.next);
-                        core::mem::swap(&mut self.current, &mut self.next);
-                    }
-                    output_layer(last, &self.current, &mut values);
-                }
+            for layer in hidden {
+                multiply(layer, &mut self.inputs, &mut self.sums);
+                activate(layer, &self.sums, &mut self.inputs);
             }
+            multiply(last, &mut self.inputs, &mut self.sums);
+            output(last, &self.sums, &mut values);
         }
         Output {
             values,
-            input_saturated: inputs.iter().any(|&x| x == i16::MIN || x == i16::MAX),
+            input_saturated: scaled.iter().any(|&x| x == i16::MIN || x == i16::MAX),
         }
     }
 }
@@ -85,49 +96,41 @@ pub fn scale_inputs(
     tare: &Features,
     rest: &Features,
 ) -> [i16; FEATURES] {
-    let (features, tare) = (features.to_array(), tare.to_array());
-    let (rest, mean) = (rest.to_array(), scaling.mean.to_array());
-    core::array::from_fn(|i| {
-        let moved = features[i].saturating_sub(tare[i]);
-        let difference = moved.saturating_add(rest[i]).saturating_sub(mean[i]);
-        let limited = difference.clamp(-LARGEST_DIFFERENCE, LARGEST_DIFFERENCE);
-        let scaled = rescale(limited, scaling.multipliers[i], scaling.shifts[i]);
-        scaled.clamp(i64::from(i16::MIN), i64::from(i16::MAX)) as i16
-    })
-}
-
-/// Step 2, for one layer. `inputs` may be longer than the layer asks for.
-fn hidden_layer<X: Copy + Into<i32>>(layer: &Layer<'_>, inputs: &[X], outputs: &mut [u8]) {
-    for (value, output) in rescaled_rows(layer, inputs).zip(outputs) {
-        *output = value.clamp(0, LARGEST_ACTIVATION) as u8;
+    let mean = &scaling.mean;
+    let mut inputs = [0; FEATURES];
+    let all = [features, tare, rest, mean].map(Features::coordinates);
+    for i in 0..COORDINATES {
+        let [feature, tare, rest, mean] =
+            [all[0][i], all[1][i], all[2][i], all[3][i]].map(|px| px.0);
+        let (multiplier, shift) = (scaling.multipliers[i], scaling.shifts[i]);
+        let difference = feature
+            .checked_sub(tare)
+            .and_then(|moved| moved.checked_add(rest));
+        inputs[i] = match difference.and_then(|now| now.checked_sub(mean)) {
+            Some(difference) => rescale_small_input(difference, multiplier, shift),
+            None => {
+                let [feature, tare, rest, mean] = [feature, tare, rest, mean].map(i64::from);
+                rescale_input(feature - tare + rest - mean, multiplier, shift)
+            }
+        };
     }
+    let moved = features.rect_area.saturating_sub(tare.rect_area);
+    let difference = moved
+        .saturating_add(rest.rect_area)
+        .saturating_sub(mean.rect_area);
+    let (multiplier, shift) = (
+        scaling.multipliers[COORDINATES],
+        scaling.shifts[COORDINATES],
+    );
+    inputs[COORDINATES] = rescale_input(difference, multiplier, shift);
+    inputs
 }
 
-/// Step 3.
-fn output_layer<X: Copy + Into<i32>>(layer: &Layer<'_>, inputs: &[X], outputs: &mut [i32]) {
-    for (value, output) in rescaled_rows(layer, inputs).zip(outputs) {
-        *output = value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32;
+/// What is left of step 3 after the sums.
+fn output(layer: &Layer<'_>, sums: &Sums, outputs: &mut [i32; OUTPUTS]) {
+    for ((row, sum), output) in layer.rows().zip(sums).zip(outputs) {
+        *output = rescale_sum(sum + row.bias, row.multiplier, row.shift);
     }
-}
-
-fn rescaled_rows<X: Copy + Into<i32>>(
-    layer: &Layer<'_>,
-    inputs: &[X],
-) -> impl Iterator<Item = i64> {
-    layer.rows().map(move |row| {
-        let products = row
-            .weights
-            .iter()
-            .zip(inputs)
-            .map(|(&w, &x)| i32::from(w as i8) * x.into());
-        let sum = products.fold(row.bias, |sum, product| sum + product);
-        rescale(i64::from(sum), row.multiplier, row.shift)
-    })
-}
-
-/// value · multiplier / 2^shift, rounded once, half up. `shift` ≥ 1.
-fn rescale(value: i64, multiplier: u32, shift: u8) -> i64 {
-    (value * i64::from(multiplier) + (1 << (shift - 1))) >> shift
 }
 
 #[cfg(test)]
@@ -136,7 +139,7 @@ mod tests {
     use crate::{
         model::{
             encode::{LayerSpec, ModelSpec},
-            samples::spec,
+            samples::{spec, spec16},
         },
         units::Px,
     };
@@ -174,7 +177,7 @@ mod tests {
                     if last {
                         value.clamp(i32::MIN.into(), i32::MAX.into())
                     } else {
-                        value.clamp(0, 127)
+                        value.clamp(0, layer.largest_activation.into())
                     }
                 })
                 .collect();
@@ -215,21 +218,24 @@ mod tests {
         features
     }
 
-    fn random_layer(inputs: u16, outputs: u16, random: &mut impl FnMut() -> u32) -> LayerSpec {
-        let count = usize::from(outputs);
-        LayerSpec {
-            inputs,
-            outputs,
-            weights: (0..count * usize::from(inputs))
-                .map(|_| (random() as i8).max(-127))
-                .collect(),
-            biases: (0..count).map(|_| random() as i32 >> 8).collect(),
-            multipliers: (0..count).map(|_| 1 + random() % ((1 << 31) - 1)).collect(),
-            shifts: (0..count).map(|_| (28 + random() % 24) as u8).collect(),
+    /// Random weights as large as its width, and for int16 the proof, allow.
+    fn randomize(layer: &mut LayerSpec, largest_input: u32, random: &mut impl FnMut() -> u32) {
+        let proven = (1 << 30) / largest_input / u32::from(layer.inputs);
+        let largest = proven.min(layer.weight_width.largest_weight().into());
+        let mut weight = || (random() % (2 * largest + 1)) as i32 - largest as i32;
+        layer.weights.iter_mut().for_each(|w| *w = weight() as i16);
+        for bias in &mut layer.biases {
+            *bias = random() as i32 >> 8;
+        }
+        for multiplier in &mut layer.multipliers {
+            *multiplier = 1 + random() % ((1 << 31) - 1);
+        }
+        for shift in &mut layer.shifts {
+            *shift = (28 + random() % 24) as u8;
         }
     }
 
-    fn random_spec(widths: &[u16], seed: u64) -> ModelSpec {
+    fn random_spec(mut spec: ModelSpec, seed: u64) -> ModelSpec {
         let mut state = seed;
         let mut random = move || {
             state = state
@@ -237,11 +243,11 @@ mod tests {
                 .wrapping_add(7);
             (state >> 32) as u32
         };
-        let mut spec = spec(widths);
-        let pairs = widths.windows(2);
-        spec.layers = pairs
-            .map(|pair| random_layer(pair[0], pair[1], &mut random))
-            .collect();
+        let mut largest = 1 << 15;
+        for layer in &mut spec.layers {
+            randomize(layer, largest, &mut random);
+            largest = layer.largest_activation.into();
+        }
         spec.input.multipliers = [0; FEATURES].map(|_: u32| 1 + random() % ((1 << 24) - 1));
         spec.input.shifts = [0; FEATURES].map(|_: u8| (20 + random() % 20) as u8);
         spec
@@ -256,11 +262,10 @@ mod tests {
             &[11, 1, 3],
         ] {
             for seed in 0..4 {
-                check(
-                    &random_spec(widths, seed),
-                    &features(seed),
-                    &features(seed + 9),
-                );
+                for spec in [spec(widths), spec16(widths, 127), spec16(widths, 4095)] {
+                    let spec = random_spec(spec, seed);
+                    check(&spec, &features(seed), &features(seed + 9));
+                }
             }
         }
     }
@@ -322,26 +327,6 @@ mod tests {
     }
 
     #[test]
-    fn rescaling_rounds_once_half_up() {
-        for (value, multiplier, shift, expected) in [
-            (1, 1, 1, 1),
-            (-1, 1, 1, 0),
-            (3, 1, 1, 2),
-            (-3, 1, 1, -1),
-            (5, 3, 3, 2),
-            (i64::from(i32::MAX), (1 << 31) - 1, 31, 2_147_483_646),
-            (i64::from(i32::MIN), (1 << 31) - 1, 62, -1),
-            (-1, 1, 62, 0),
-        ] {
-            assert_eq!(
-                rescale(value, multiplier, shift),
-                expected,
-                "{value}·{multiplier}>>{shift}"
-            );
-        }
-    }
-
-    #[test]
     fn an_input_at_its_limit_is_told() {
         let mut spec = spec(&[11, 3]);
         spec.input.mean = spec.rest.features;
@@ -365,13 +350,24 @@ mod tests {
             seed: u64,
         ) {
             let widths: Vec<u16> = [11].into_iter().chain(hidden).chain([3]).collect();
-            check(&random_spec(&widths, seed), &features(seed), &features(!seed));
+            check(&random_spec(spec(&widths), seed), &features(seed), &features(!seed));
+        }
+
+        #[test]
+        fn int16_equals_the_reference(
+            hidden in prop::collection::vec(1u16..=70, 0..4),
+            largest in 1u16..=32_767,
+            seed: u64,
+        ) {
+            let widths: Vec<u16> = [11].into_iter().chain(hidden).chain([3]).collect();
+            let spec = random_spec(spec16(&widths, largest), seed);
+            check(&spec, &features(seed), &features(!seed));
         }
 
         /// What enters is features − tare + rest: moving both moves nothing.
         #[test]
         fn a_tare_moves_no_calibration(seed: u64, dx in -100_000i32..100_000) {
-            let spec = random_spec(&[11, 8, 3], seed);
+            let spec = random_spec(spec(&[11, 8, 3]), seed);
             let (mut now, mut tare) = (features(seed), features(seed + 1));
             let before = check(&spec, &now, &tare);
             for features in [&mut now, &mut tare] {

@@ -9,14 +9,15 @@ pub struct Run {
     pub x1: u16,
 }
 
-/// Calls `visit` with each run of a row of mask words, from left to right. A row of w pixels has at most ⌈w / 2⌉.
+/// Calls `visit` with each run of a row of mask words, whose first is word `first` of the row, from left to right. A row
+/// of w pixels has at most ⌈w / 2⌉.
 ///
 /// A run begins and ends where a bit differs from the one before it, so the set bits of `word ^ (word << 1)` are the
 /// first columns of runs and of gaps in turn: words without an edge cost one test, whether they are empty or full.
-pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
+pub fn for_each_run(first: usize, words: &[u32], mut visit: impl FnMut(Run)) {
     let mut open = None;
     let mut before = 0;
-    let mut column = 0;
+    let mut column = 32 * first as u16;
     for &word in words {
         let mut edges = word ^ (word << 1 | before);
         before = word >> 31;
@@ -48,7 +49,7 @@ mod tests {
 
     fn runs(words: &[u32]) -> Vec<(u16, u16)> {
         let mut found = Vec::new();
-        for_each_run(words, |run| found.push((run.x0, run.x1)));
+        for_each_run(0, words, |run| found.push((run.x0, run.x1)));
         found
     }
 
@@ -74,6 +75,9 @@ mod tests {
         #[test]
         fn runs_are_those_found_bit_by_bit(words in prop::collection::vec(word(), 0..6)) {
             prop_assert_eq!(runs(&words), bit_by_bit(&words));
+            let mut moved = Vec::new();
+            for_each_run(7, &words, |run| moved.push((run.x0 - 224, run.x1 - 224)));
+            prop_assert_eq!(moved, bit_by_bit(&words));
         }
     }
 

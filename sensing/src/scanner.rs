@@ -5,10 +5,11 @@ use core::fmt;
 use crate::{
     blob::Blob,
     dilate::Dilation,
+    history::{Band, History},
     label::Labeller,
-    mask::{EMPTY_ROW, count, last_word_bits, threshold_row, words_of},
+    mask::{last_word_bits, words_of},
     status::Status,
-    threshold::ThresholdTable,
+    tables::{Pixels, Weights},
 };
 
 pub use crate::{dilate::MAX_DILATIONS, mask::MAX_WIDTH};
@@ -27,6 +28,10 @@ pub struct ScanSettings {
     pub dilations: u8,
     /// Blobs of fewer pixels, after dilation, are dropped.
     pub min_area: u32,
+    /// Whether the pixels of blobs are weighed: their weighted centroids are wanted.
+    pub weighted: bool,
+    /// A frame of more runs is not looked at to its end: [`Status::BLOB_OVERFLOW`]. It bounds the time that noise takes.
+    pub max_runs: u32,
 }
 
 /// Why a frame cannot be scanned.
@@ -91,20 +96,23 @@ pub struct Scan<'a> {
     /// Pixels that passed the threshold, before dilation.
     pub set_pixels: u32,
     /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width, [`Status::BLOB_OVERFLOW`] when
-    /// there were more than `BLOBS` blobs; either means that `blobs` is not the whole truth.
+    /// there were more than `BLOBS` blobs or [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
     pub status: Status,
 }
 
 /// Scans frames row by row and keeps up to `BLOBS` blobs of each.
 ///
-/// For each frame: [`begin`](Self::begin), one [`push_row`](Self::push_row) for each row from the top, as rows
-/// arrive, and [`finish`](Self::finish). It holds a few rows of mask and the sums of the blobs that the current row may
-/// still touch: below 37 KiB with 64 blobs, whatever the height, and 56 bytes for each blob more.
+/// For each frame: [`begin`](Self::begin), [`push_rows`](Self::push_rows) with all rows from the top, one or more at
+/// a time as they arrive, and [`finish`](Self::finish). It holds a few rows of mask and of pixels and the sums of the
+/// blobs that the current row may still touch: below 68 KiB with 64 blobs, whatever the height, and 104 bytes for each
+/// blob more.
 #[derive(Clone, Debug)]
 pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
     dilation: Dilation,
     labels: Labeller<BLOBS>,
+    /// The pixels of rows that the dilation still holds, when they are weighed.
+    history: History,
     /// Rows taken so far.
     rows_in: u16,
     /// Rows that came out of the dilation so far.
@@ -124,9 +132,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
                 height: 0,
                 dilations: 0,
                 min_area: 0,
+                weighted: false,
+                max_runs: u32::MAX,
             },
             dilation: Dilation::new(),
             labels: Labeller::new(),
+            history: History::new(),
             rows_in: 0,
             rows_out: 0,
             set_pixels: 0,
@@ -145,7 +156,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.rows_in = 0;
         self.rows_out = 0;
         self.set_pixels = 0;
-        self.labels.begin(settings.min_area);
+        self.labels.begin(settings.min_area, settings.max_runs);
         settings.check()?;
         self.settings = settings;
         self.dilation.begin(settings.width, settings.dilations);
@@ -154,37 +165,69 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         Ok(())
     }
 
-    /// Takes the next row of pixels, as they lie in memory. A row of another width, or one too many, is left out and
+    /// Takes the next row of pixels, as they lie in memory. A row of another length, or one too many, is left out and
     /// makes the frame incomplete.
-    pub fn push_row(&mut self, table: &ThresholdTable, row: &[u16]) {
-        if !self.expects(row.len() == usize::from(self.settings.width)) {
+    pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
+        if !self.expects(row.len() == pixels.row_length(self.settings.width)) {
             return;
         }
-        let mut mask = EMPTY_ROW;
-        threshold_row(table, row, &mut mask);
-        self.take(&mask[..words_of(self.settings.width)]);
+        let band = Band {
+            first: self.rows_in,
+            row_length: row.len(),
+            pixels: row,
+        };
+        pixels.mask_row(row, self.dilation.incoming());
+        self.take(pixels, &band);
+        if self.settings.weighted {
+            self.history.keep(band.first, row, row.len());
+        }
     }
 
-    /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Otherwise as
-    /// [`push_row`](Self::push_row).
+    /// Takes the next rows of pixels, as they lie in memory one after the other. What is no whole row, or too many,
+    /// is left out and makes the frame incomplete. The more rows at a time, the fewer of them are copied.
+    pub fn push_rows(&mut self, pixels: &impl Pixels, rows: &[u16]) {
+        let row_length = pixels.row_length(self.settings.width).max(1);
+        let band = Band {
+            first: self.rows_in,
+            row_length,
+            pixels: rows,
+        };
+        if !rows.len().is_multiple_of(row_length) {
+            self.status |= Status::FRAME_INCOMPLETE;
+        }
+        for row in rows.chunks_exact(row_length) {
+            if !self.expects(true) {
+                break;
+            }
+            pixels.mask_row(row, self.dilation.incoming());
+            self.take(pixels, &band);
+        }
+        if self.settings.weighted {
+            let taken = usize::from(self.rows_in - band.first) * row_length;
+            self.history.keep(band.first, &rows[..taken], row_length);
+        }
+    }
+
+    /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Its pixels are unknown,
+    /// so that nothing of it is weighed. Otherwise as [`push_row`](Self::push_row).
     pub fn push_mask_row(&mut self, words: &[u32]) {
         if !self.expects(words.len() == words_of(self.settings.width)) {
             return;
         }
-        let mut mask = EMPTY_ROW;
-        let mask = &mut mask[..words.len()];
-        mask.copy_from_slice(words);
-        if let Some(last) = mask.last_mut() {
+        let incoming = self.dilation.incoming();
+        incoming.copy_from_slice(words);
+        if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
         }
-        self.take(mask);
+        self.take(&(), &Band::EMPTY);
     }
 
-    /// Ends the frame. Without a frame (no successful `begin` since the last `finish`), it repeats the last result.
-    pub fn finish(&mut self) -> Scan<'_> {
+    /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no successful `begin`
+    /// since the last `finish`), it repeats the last result.
+    pub fn finish(&mut self, pixels: &impl Pixels) -> Scan<'_> {
         if self.active {
             self.active = false;
-            self.flush();
+            self.flush(pixels);
         }
         Scan {
             blobs: self.blobs(),
@@ -207,28 +250,46 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         expected
     }
 
-    fn take(&mut self, mask: &[u32]) {
+    /// Takes the row that was written to the dilation.
+    #[inline(always)]
+    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>) {
         self.rows_in += 1;
-        self.set_pixels += count(mask);
-        self.advance(mask);
+        self.advance(pixels, band);
     }
 
-    /// Passes a row through the dilation to the labels.
-    fn advance(&mut self, mask: &[u32]) {
-        if let Some(dilated) = self.dilation.push(mask) {
-            self.labels.push(dilated, self.rows_out);
-            self.rows_out += 1;
+    /// Passes a row through the dilation to the labels, where the pixels of its runs are weighed.
+    #[inline(always)]
+    fn advance(&mut self, pixels: &impl Pixels, band: &Band<'_>) {
+        if self.labels.is_exhausted() {
+            self.set_pixels += self.dilation.count();
+            return;
+        }
+        let (count, dilated) = self.dilation.push();
+        self.set_pixels += count;
+        let Some(dilated) = dilated else {
+            return;
+        };
+        let y = self.rows_out;
+        self.rows_out += 1;
+        if dilated.words.is_empty() && self.labels.is_idle() {
+            return;
+        }
+        if self.settings.weighted {
+            let row = band.row(y).unwrap_or_else(|| self.history.row(y));
+            self.labels.push(dilated, y, |run| pixels.weigh(row, run));
+        } else {
+            self.labels.push(dilated, y, |_| Weights::NONE);
         }
     }
 
     /// Brings out the rows that the dilation still holds, and the blobs that they end.
-    fn flush(&mut self) {
+    fn flush(&mut self, pixels: &impl Pixels) {
         if self.rows_in < self.settings.height {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        let below = &EMPTY_ROW[..words_of(self.settings.width)];
         for _ in 0..self.dilation.radius() {
-            self.advance(below);
+            self.dilation.incoming().fill(0);
+            self.advance(pixels, &Band::EMPTY);
         }
         self.labels.finish(self.rows_out);
         if self.labels.overflowed() {
@@ -249,7 +310,7 @@ mod tests {
 
     #[test]
     fn memory_is_what_the_documentation_says() {
-        assert!(size_of::<Scanner<64>>() < 37 * 1024);
-        assert_eq!(size_of::<Scanner<65>>() - size_of::<Scanner<64>>(), 56);
+        assert!(size_of::<Scanner<64>>() < 68 * 1024);
+        assert_eq!(size_of::<Scanner<65>>() - size_of::<Scanner<64>>(), 104);
     }
 }

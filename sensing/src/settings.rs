@@ -2,12 +2,18 @@
 
 use crate::{
     geometry::Geometry,
-    model::{Conditions, Model},
+    model::{CentroidEstimator, Conditions, Model},
     scanner::{ScanError, ScanSettings},
     threshold::{ByteOrder, HsvBox, ThresholdError},
     units::Px,
 };
 use core::fmt;
+
+/// Pixels of a frame for each run that it may have. Four markers have a run for about a thousand; this leaves room for
+/// 2,000 specks at 800 × 600, and bounds what a frame of noise costs: three times a usual one.
+const PIXELS_PER_RUN: u32 = 64;
+/// Runs that any frame may have.
+const FEWEST_RUNS: u32 = 64;
 
 /// What a frame looks like and how its markers are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,6 +28,8 @@ pub struct Settings {
     pub dilations: u8,
     /// Blobs of fewer pixels, after dilation, are dropped.
     pub min_area: u32,
+    /// How a marker's position is taken from its pixels.
+    pub centroid: CentroidEstimator,
 }
 
 /// Why a sensor cannot be set so.
@@ -45,6 +53,7 @@ impl Settings {
             byte_order,
             dilations: 1,
             min_area: geometry.rest_area(Px(0)) / 4,
+            centroid: CentroidEstimator::BinaryMask,
         }
     }
 
@@ -54,11 +63,13 @@ impl Settings {
             geometry,
             threshold,
             dilations,
+            centroid,
             ..
         } = model.conditions;
         Settings {
             threshold,
             dilations,
+            centroid,
             ..Settings::usual(geometry, byte_order)
         }
     }
@@ -82,14 +93,18 @@ impl Settings {
         self.geometry == conditions.geometry
             && self.threshold == conditions.threshold
             && self.dilations == conditions.dilations
+            && self.centroid == conditions.centroid
     }
 
     pub(crate) fn scan(&self) -> ScanSettings {
+        let pixels = u32::from(self.geometry.width) * u32::from(self.geometry.height);
         ScanSettings {
             width: self.geometry.width,
             height: self.geometry.height,
             dilations: self.dilations,
             min_area: self.min_area,
+            weighted: self.centroid == CentroidEstimator::RednessWeighted,
+            max_runs: FEWEST_RUNS + pixels / PIXELS_PER_RUN,
         }
     }
 }

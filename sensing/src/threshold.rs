@@ -1,8 +1,7 @@
-//! HSV box threshold, compiled to a bit table over all 65,536 RGB565 values.
-
-use core::fmt;
+//! HSV box threshold: which colours a marker may have. `tables` compiles one to a look-up table.
 
 use crate::hsv::Hsv;
+use core::fmt;
 
 /// An inclusive box in OpenCV's 8-bit HSV (H 0–179). `hue_low > hue_high` wraps through 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,6 +33,38 @@ impl HsvBox {
 
     /// Largest hue.
     pub const MAX_HUE: u8 = 179;
+
+    /// Of its six limits, in the order of the fields, unchecked: as files and commands have them.
+    pub const fn of_limits(limits: [u8; 6]) -> HsvBox {
+        let [
+            hue_low,
+            hue_high,
+            saturation_low,
+            saturation_high,
+            value_low,
+            value_high,
+        ] = limits;
+        HsvBox {
+            hue_low,
+            hue_high,
+            saturation_low,
+            saturation_high,
+            value_low,
+            value_high,
+        }
+    }
+
+    /// Its six limits, in the order of the fields.
+    pub const fn limits(&self) -> [u8; 6] {
+        [
+            self.hue_low,
+            self.hue_high,
+            self.saturation_low,
+            self.saturation_high,
+            self.value_low,
+            self.value_high,
+        ]
+    }
 
     /// Says whether the box means something.
     ///
@@ -136,64 +167,5 @@ impl ByteOrder {
             ByteOrder::Native => raw,
             ByteOrder::Swapped => raw.swap_bytes(),
         }
-    }
-}
-
-/// One bit per `u16` as it lies in memory: set where its colour lies in the box. 8 KiB.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ThresholdTable {
-    /// Bit r % 32 of word r / 32 belongs to the raw value r.
-    words: [u32; 2048],
-}
-
-impl ThresholdTable {
-    /// A table that accepts nothing, to be [`set`](Self::set) later: for a `static`.
-    pub const fn closed() -> ThresholdTable {
-        ThresholdTable { words: [0; 2048] }
-    }
-
-    /// The table of a box.
-    ///
-    /// # Errors
-    /// Those of [`HsvBox::check`].
-    pub fn new(hsv_box: &HsvBox, order: ByteOrder) -> Result<ThresholdTable, ThresholdError> {
-        let mut table = ThresholdTable::closed();
-        table.set(hsv_box, order)?;
-        Ok(table)
-    }
-
-    /// Compiles a box into this table, in place. It takes a few million instructions: once per setting, never per
-    /// frame.
-    ///
-    /// # Errors
-    /// Those of [`HsvBox::check`]; the table is then unchanged.
-    pub fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
-        hsv_box.check()?;
-        for (high, word) in (0_u16..).zip(&mut self.words) {
-            *word = (0..32).fold(0, |bits, low| {
-                let color = Hsv::from_rgb565(order.pixel(high << 5 | low));
-                bits | u32::from(hsv_box.contains(color)) << low
-            });
-        }
-        Ok(())
-    }
-
-    /// Whether the pixel that lies in memory as `raw` passes.
-    pub fn accepts(&self, raw: u16) -> bool {
-        self.rotated(raw) & 1 == 1
-    }
-
-    /// The mask of 32 pixels: bit i is pixel i.
-    pub(crate) fn mask(&self, pixels: &[u16; 32]) -> u32 {
-        pixels
-            .iter()
-            .fold(0, |bits, &raw| bits >> 1 | self.rotated(raw) << 31)
-    }
-
-    /// The bit of `raw` in bit 0, others above it. An index of 11 bits needs no bounds check, and the rotation takes
-    /// its count modulo 32 as the processor does.
-    #[inline(always)]
-    fn rotated(&self, raw: u16) -> u32 {
-        self.words[usize::from(raw >> 5)].rotate_right(u32::from(raw))
     }
 }

@@ -1,6 +1,9 @@
 //! The threshold against OpenCV's own output for every pixel value (`opencv/reference.py`).
 
-use hivtac_sensing::threshold::{ByteOrder, HsvBox, ThresholdTable};
+use hivtac_sensing::{
+    tables::{BitTable, ByteTable, Table},
+    threshold::{ByteOrder, HsvBox},
+};
 
 /// A box and the pixels that OpenCV accepts: bit p % 8 of byte p / 8.
 struct Reference {
@@ -47,7 +50,7 @@ const REFERENCES: [Reference; 6] = [
     },
 ];
 
-fn assert_equals_opencv(table: &ThresholdTable, reference: &Reference, order: ByteOrder) {
+fn assert_equals_opencv(table: &impl Table, reference: &Reference, order: ByteOrder) {
     for pixel in 0..=u16::MAX {
         let raw = match order {
             ByteOrder::Native => pixel,
@@ -67,7 +70,9 @@ fn assert_equals_opencv(table: &ThresholdTable, reference: &Reference, order: By
 fn every_pixel_value_of_six_boxes_equals_opencv() {
     for order in [ByteOrder::Native, ByteOrder::Swapped] {
         for reference in &REFERENCES {
-            let table = ThresholdTable::new(&reference.hsv_box, order).unwrap();
+            let table = BitTable::new(&reference.hsv_box, order).unwrap();
+            assert_equals_opencv(&table, reference, order);
+            let table = ByteTable::new(&reference.hsv_box, order).unwrap();
             assert_equals_opencv(&table, reference, order);
         }
     }
@@ -75,9 +80,11 @@ fn every_pixel_value_of_six_boxes_equals_opencv() {
 
 #[test]
 fn a_table_set_again_forgets_the_box_before() {
-    let mut table = ThresholdTable::closed();
+    let (mut bits, mut bytes) = (BitTable::CLOSED, ByteTable::CLOSED);
     for reference in &REFERENCES {
-        table.set(&reference.hsv_box, ByteOrder::Native).unwrap();
-        assert_equals_opencv(&table, reference, ByteOrder::Native);
+        bits.set(&reference.hsv_box, ByteOrder::Native).unwrap();
+        assert_equals_opencv(&bits, reference, ByteOrder::Native);
+        bytes.set(&reference.hsv_box, ByteOrder::Native).unwrap();
+        assert_equals_opencv(&bytes, reference, ByteOrder::Native);
     }
 }

@@ -1,7 +1,7 @@
 //! How the image of one marker looks: its moments as an ellipse's, and what the optics says of them.
 
-use super::pattern::distance;
-use crate::{blob::Blob, units::Px};
+use super::{lean::ThirdMoments, pattern::distance};
+use crate::{blob::Blob, model::CentroidEstimator, units::Px};
 
 /// A blob's centroid and second moments. Lengths and variances have 16 fractional bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,10 +14,16 @@ pub struct Shape {
     pub area: u32,
     /// Area over that of the ellipse with the same moments, of 65,536. 1 for an ellipse, less for anything else.
     pub fill: i64,
+    /// What [`fill`](Self::fill) lacks of 1, times the mean variance: px² in Q16.16. Pixels make it the same for discs of
+    /// any size.
+    pub hollow: i64,
     /// Distance of the centroid from the middle of the bounding box, the larger of x and y, px in Q16.16: 0 for an
     /// ellipse, more for one that is cut.
     pub lopsided: i64,
+    /// Mean weight of its pixels, of 65,536; 0 when nothing was weighed.
+    pub density: i64,
     variance: [i64; 3],
+    third: ThirdMoments,
 }
 
 /// A shape as its pattern's centre sees it. Diameters in px, Q16.16.
@@ -31,6 +37,8 @@ pub struct Seen {
     pub along: i64,
     /// Covariance of both directions over the variance across, of 65,536: 0 where the ellipse lies across or along.
     pub skew: i64,
+    /// How far it leans to one side ([`ThirdMoments::lean`]), px² in Q16.16.
+    pub lean: i64,
 }
 
 /// A pixel is a square, not a point: 1/12 px² in Q16.
@@ -47,9 +55,12 @@ pub fn nominal_edge(dilations: u8) -> Px {
 }
 
 impl Shape {
-    /// Of a blob of at least one pixel.
-    pub fn of_blob(blob: &Blob) -> Shape {
-        let (x, y) = blob.centroid();
+    /// Of a blob of at least one pixel; `None` when its position cannot be told: no pixel has a weight.
+    pub fn of_blob(blob: &Blob, estimator: CentroidEstimator) -> Option<Shape> {
+        let (x, y) = match estimator {
+            CentroidEstimator::BinaryMask => blob.centroid(),
+            CentroidEstimator::RednessWeighted => blob.weighted_centroid()?,
+        };
         let moments = blob.central_moments();
         let area = i64::from(blob.area.max(1));
         // A whole number of px² first: the fraction lost is below 1/area.
@@ -63,14 +74,18 @@ impl Shape {
             let middle = i64::from(u32::from(low) + u32::from(high)) << 15;
             (middle - i64::from(mean.0)).abs()
         };
-        Shape {
+        let fill = fill(area, variance);
+        Some(Shape {
             x,
             y,
             area: blob.area,
-            fill: fill(area, variance),
+            fill,
+            hollow: ((65_536 - fill) * ((variance[0] + variance[2]) / 2)) >> 16,
             lopsided: lopsided(blob.x0, blob.x1, x).max(lopsided(blob.y0, blob.y1, y)),
+            density: (i64::from(blob.weight) << 16) / area,
             variance,
-        }
+            third: ThirdMoments::of_blob(blob),
+        })
     }
 
     /// Seen from a centre; `None` from its own.
@@ -87,11 +102,14 @@ impl Shape {
         let along = (ux * ux * xx + 2 * ux * uy * xy + uy * uy * yy) / norm;
         let across = (uy * uy * xx - 2 * ux * uy * xy + ux * ux * yy) / norm;
         let covariance = (ux * uy * (yy - xx) + (ux * ux - uy * uy) * xy) / norm;
+        let root = norm.isqrt().max(1);
+        let direction = [ux, uy].map(|part| (part << 14) / root);
         Some(Seen {
             distance: distance((self.x, self.y), center),
             across: diameter(across),
             along: diameter(along),
             skew: (covariance << 16) / across.max(1),
+            lean: self.third.lean(direction, along, across),
         })
     }
 }

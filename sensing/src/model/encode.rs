@@ -1,9 +1,10 @@
 //! The writer of the model file.
 
 use super::{
-    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, Model,
-    ModelError, Origin, OutputKind, PixelFormat, Rest, Uncertainty,
-    layout::{CRC, HEADER_LENGTH, MAGIC, VERSION, padded_name},
+    CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
+    Model, ModelError, Origin, OutputKind, PixelFormat, Rest, Uncertainty, WeightWidth,
+    layout::{CRC, HEADER_LENGTH, MAGIC, PACKING, VERSION, padded_name},
+    packing::{LOADED_AHEAD, pack},
 };
 use crate::features::Features;
 use alloc::vec::Vec;
@@ -17,8 +18,10 @@ pub struct ModelSpec {
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// Its layers, first to last: 1 to 8.
+    /// Its layers, first to last: 1 to 8, or none with a closed form.
     pub layers: Vec<LayerSpec>,
+    /// What it gives without its layers.
+    pub closed_form: Option<ClosedFormSpec>,
     /// What the three outputs are.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
@@ -34,8 +37,12 @@ pub struct LayerSpec {
     pub inputs: u16,
     /// Number of outputs, 1–512: 3 in the last layer.
     pub outputs: u16,
-    /// `outputs` rows of `inputs` weights, −127 to 127.
-    pub weights: Vec<i8>,
+    /// How wide the weights are: int16 in the first layer.
+    pub weight_width: WeightWidth,
+    /// What activations are limited to: 1–32,767, at most 127 before a layer with int8 weights; 0 in the last layer.
+    pub largest_activation: u16,
+    /// `outputs` rows of `inputs` weights, −127 to 127 or −32,767 to 32,767.
+    pub weights: Vec<i16>,
     /// `outputs` biases, in units of the accumulator.
     pub biases: Vec<i32>,
     /// `outputs` multipliers m, 1 to 2³¹ − 1.
@@ -52,6 +59,7 @@ impl ModelSpec {
     pub fn encode(&self) -> Result<Vec<u8>, ModelError> {
         for (index, layer) in self.layers.iter().enumerate() {
             layer.check_lengths(index)?;
+            layer.check_weights(index)?;
         }
         let mut bytes = self.body();
         let length = (bytes.len() + 4) as u32;
@@ -66,12 +74,15 @@ impl ModelSpec {
         let mut bytes = Vec::new();
         bytes.extend(MAGIC);
         bytes.extend(VERSION.to_le_bytes());
-        bytes.extend([0; 2]);
+        bytes.extend([PACKING, 0]);
         bytes.extend([0; 4]); // the length, filled in when it is known
         // More layers than 16 bits count are more than the reader accepts.
         let count = u16::try_from(self.layers.len()).unwrap_or(u16::MAX);
         bytes.extend(count.to_le_bytes());
-        bytes.extend([output_number(self.output), 0]);
+        bytes.extend([
+            output_number(self.output),
+            u8::from(self.closed_form.is_some()),
+        ]);
         push_conditions(&mut bytes, &self.conditions);
         push_features(&mut bytes, &self.rest.features);
         for area in self.rest.areas {
@@ -84,6 +95,9 @@ impl ModelSpec {
         }
         for value in [uncertainty.lateral.0, uncertainty.normal.0] {
             bytes.extend(value.to_le_bytes());
+        }
+        if let Some(form) = &self.closed_form {
+            form.push(&mut bytes);
         }
         for layer in &self.layers {
             push_layer(&mut bytes, layer);
@@ -116,6 +130,21 @@ impl LayerSpec {
         }
         Ok(())
     }
+
+    /// A weight out of range would be packed as another.
+    fn check_weights(&self, layer: usize) -> Result<(), ModelError> {
+        let largest = self.weight_width.largest_weight();
+        let wrong = |weight: &i16| weight.unsigned_abs() > largest;
+        match self.weights.iter().position(wrong) {
+            None => Ok(()),
+            Some(place) => Err(ModelError::Row {
+                layer,
+                row: place / usize::from(self.inputs).max(1),
+                name: "a weight",
+                allowed: self.weight_width.range(),
+            }),
+        }
+    }
 }
 
 fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
@@ -127,16 +156,14 @@ fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
     bytes.extend(geometry.marker_diameter.0.to_le_bytes());
     bytes.extend(geometry.marker_radius.0.to_le_bytes());
     bytes.extend(geometry.film_distance.0.to_le_bytes());
-    let hsv = &conditions.threshold;
-    bytes.extend([hsv.hue_low, hsv.hue_high]);
-    bytes.extend([hsv.saturation_low, hsv.saturation_high]);
-    bytes.extend([hsv.value_low, hsv.value_high]);
+    bytes.extend(conditions.threshold.limits());
     bytes.push(conditions.dilations);
     bytes.push(match conditions.pixel_format {
         PixelFormat::Rgb565 => 0,
     });
     bytes.push(match conditions.centroid {
         CentroidEstimator::BinaryMask => 0,
+        CentroidEstimator::RednessWeighted => 1,
     });
     bytes.push(match conditions.contact {
         ContactReading::Force => 0,
@@ -162,6 +189,13 @@ fn output_number(output: OutputKind) -> u8 {
     }
 }
 
+fn width_number(width: WeightWidth) -> u8 {
+    match width {
+        WeightWidth::Int8 => 0,
+        WeightWidth::Int16 => 1,
+    }
+}
+
 fn push_features(bytes: &mut Vec<u8>, features: &Features) {
     for (x, y) in features.centroids.iter().chain([&features.rect_center]) {
         bytes.extend(x.0.to_le_bytes());
@@ -182,8 +216,11 @@ fn push_input(bytes: &mut Vec<u8>, input: &InputScaling) {
 fn push_layer(bytes: &mut Vec<u8>, layer: &LayerSpec) {
     bytes.extend(layer.inputs.to_le_bytes());
     bytes.extend(layer.outputs.to_le_bytes());
-    bytes.extend(layer.weights.iter().map(|w| *w as u8));
-    pad(bytes);
+    bytes.extend([width_number(layer.weight_width), 0]);
+    bytes.extend(layer.largest_activation.to_le_bytes());
+    let columns = usize::from(layer.inputs);
+    bytes.extend(pack(layer.weight_width, &layer.weights, columns));
+    bytes.extend([0; LOADED_AHEAD]);
     bytes.extend(layer.biases.iter().flat_map(|b| b.to_le_bytes()));
     bytes.extend(layer.multipliers.iter().flat_map(|m| m.to_le_bytes()));
     bytes.extend(&layer.shifts);

@@ -12,6 +12,11 @@ pub enum ModelError {
         /// The file's version.
         found: u16,
     },
+    /// The file's weights lie in an order that this program does not know.
+    Packing {
+        /// The file's packing.
+        found: u8,
+    },
     /// The file ends before what it announces.
     TooShort {
         /// The byte at which more was needed.
@@ -50,6 +55,13 @@ pub enum ModelError {
         inputs: usize,
         /// What it is fed.
         fed: usize,
+    },
+    /// A layer with int8 weights is fed more than seven bits.
+    WideInputs {
+        /// The layer, from 0.
+        layer: usize,
+        /// The largest magnitude that it is fed.
+        largest: u16,
     },
     /// A value of one row of a layer is outside its range.
     Row {
@@ -93,6 +105,11 @@ impl fmt::Display for ModelError {
                 "model file version {found}, this program reads version {}: export the model again",
                 super::layout::VERSION
             ),
+            Self::Packing { found } => write!(
+                f,
+                "model file with weights packed as {found}, this program reads {}: export the model again",
+                super::layout::PACKING
+            ),
             Self::TooShort { offset, length } => {
                 write!(
                     f,
@@ -119,6 +136,10 @@ impl fmt::Display for ModelError {
                     "model file: layer {layer} has {inputs} inputs but is fed {fed}"
                 )
             }
+            Self::WideInputs { layer, largest } => write!(
+                f,
+                "model file: layer {layer} has int8 weights, which take inputs of 0 to 127, but is fed up to {largest}"
+            ),
             Self::Row {
                 layer,
                 row,

@@ -1,17 +1,24 @@
 //! One layer of a model, in place in the file.
 
+use super::packing::{LOADED_AHEAD, ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
+
 /// A fully connected layer: `outputs` rows of `inputs` weights, and a bias and rescaling a row.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Layer<'a> {
     pub(super) inputs: usize,
     pub(super) outputs: usize,
-    /// Row by row, each byte an `i8`.
+    pub(super) weight_width: WeightWidth,
+    pub(super) largest_activation: u16,
+    /// Packed, and [`LOADED_AHEAD`] zeros after them.
     pub(super) weights: &'a [u8],
     /// Four bytes each.
     pub(super) biases: &'a [u8],
     /// Four bytes each.
     pub(super) multipliers: &'a [u8],
     pub(super) shifts: &'a [u8],
+    /// Every shift is 33 or more.
+    #[cfg_attr(not(armv7em), allow(dead_code))]
+    pub(super) rescales_by_high_word: bool,
 }
 
 impl<'a> Layer<'a> {
@@ -25,50 +32,86 @@ impl<'a> Layer<'a> {
         self.outputs
     }
 
-    /// Its rows, one for each output.
-    pub fn rows(&self) -> impl Iterator<Item = Row<'a>> {
-        let words = self
-            .biases
-            .chunks_exact(4)
-            .zip(self.multipliers.chunks_exact(4));
-        self.weights
-            .chunks_exact(self.inputs.max(1))
-            .zip(words)
+    /// How wide its weights are.
+    pub fn weight_width(&self) -> WeightWidth {
+        self.weight_width
+    }
+
+    /// What activations are limited to, 1–32,767; 0 in the last layer, which has none.
+    pub fn largest_activation(&self) -> u16 {
+        self.largest_activation
+    }
+
+    /// A weight, −127 to 127 or −32,767 to 32,767; 0 beyond the layer's rows and columns. Slow: for looking at a model.
+    pub fn weight(&self, row: usize, column: usize) -> i16 {
+        let per_word = self.weight_width.per_word();
+        let group = self.groups().nth(row / ROWS_TOGETHER);
+        let words = group.and_then(|words| words.get(column / per_word));
+        let word = words.map_or([0; 4], |words| words[row % ROWS_TOGETHER]);
+        match self.weight_width {
+            WeightWidth::Int8 => unpack8(word)[column % per_word],
+            WeightWidth::Int16 => unpack16(word)[column % per_word],
+        }
+    }
+
+    /// Bias and rescaling of its rows, one for each output.
+    pub fn rows(&self) -> impl Iterator<Item = Row> + use<'a> {
+        let (biases, _) = self.biases.as_chunks();
+        let (multipliers, _) = self.multipliers.as_chunks();
+        let words = biases.iter().zip(multipliers);
+        words
             .zip(self.shifts)
-            .map(|((weights, (bias, multiplier)), &shift)| Row {
-                weights,
-                bias: word(bias) as i32,
-                multiplier: word(multiplier),
+            .map(|((&bias, &multiplier), &shift)| Row {
+                bias: i32::from_le_bytes(bias),
+                multiplier: u32::from_le_bytes(multiplier),
                 shift,
             })
     }
+
+    /// Its weights, four rows at a time: for each word's worth of columns, a word of each row.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [[[u8; 4]; ROWS_TOGETHER]]> + use<'a> {
+        let packed = self.weights.len().saturating_sub(LOADED_AHEAD);
+        let (words, _) = self.weights[..packed].as_chunks::<4>();
+        let (words, _) = words.as_chunks::<ROWS_TOGETHER>();
+        words.chunks_exact((self.padded_inputs() / self.weight_width.per_word()).max(1))
+    }
+
+    /// Columns of the packed weights.
+    pub(crate) fn padded_inputs(&self) -> usize {
+        self.inputs.next_multiple_of(self.weight_width.block())
+    }
+
+    /// Rows of the packed weights.
+    pub(crate) fn padded_outputs(&self) -> usize {
+        self.outputs.next_multiple_of(ROWS_TOGETHER)
+    }
+
+    /// Biases, multipliers (both four bytes each) and shifts.
+    #[cfg(armv7em)]
+    pub(crate) fn scaling(&self) -> (&'a [u8], &'a [u8], &'a [u8]) {
+        (self.biases, self.multipliers, self.shifts)
+    }
+
+    /// Whether every shift is 33 or more, so that the high word of a product says all.
+    #[cfg(armv7em)]
+    pub(crate) fn rescales_by_high_word(&self) -> bool {
+        self.rescales_by_high_word
+    }
+
+    /// The packed weights, and [`LOADED_AHEAD`] bytes after them that may be read.
+    #[cfg(armv7em)]
+    pub(crate) fn weights_and_more(&self) -> &'a [u8] {
+        self.weights
+    }
 }
 
-/// What makes one output.
+/// What makes an output of a row's sum.
 #[derive(Clone, Copy, Debug)]
-pub struct Row<'a> {
-    /// One byte for each input, to be read as `i8`, −127 to 127.
-    pub weights: &'a [u8],
+pub struct Row {
     /// Added to the sum.
     pub bias: i32,
     /// m of the rescaling, 1 to 2³¹ − 1.
     pub multiplier: u32,
     /// s of the rescaling, 1–62.
     pub shift: u8,
-}
-
-impl Row<'_> {
-    /// The largest |acc| that inputs of magnitude up to `largest_input` can make.
-    pub fn accumulator_bound(&self, largest_input: u32) -> u64 {
-        let weights: u64 = self
-            .weights
-            .iter()
-            .map(|&w| u64::from((w as i8).unsigned_abs()))
-            .sum();
-        weights * u64::from(largest_input) + u64::from(self.bias.unsigned_abs())
-    }
-}
-
-fn word(bytes: &[u8]) -> u32 {
-    u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
 }

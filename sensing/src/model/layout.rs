@@ -1,9 +1,9 @@
 //! The reader of the model file: every check that makes a [`Model`] safe to run is here.
 
 use super::{
-    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, Layer,
-    MAX_LAYERS, MAX_WIDTH, Model, ModelError, OUTPUTS, Origin, OutputKind, PixelFormat, Rest,
-    Uncertainty, reader::Reader,
+    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, MAX_LAYERS,
+    Model, ModelError, Origin, OutputKind, PixelFormat, Rest, Uncertainty, curves::closed_form,
+    layers::layers, reader::Reader,
 };
 use crate::{
     features::{FEATURES, Features},
@@ -16,16 +16,14 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// The first four bytes of a model file.
 pub(super) const MAGIC: [u8; 4] = *b"HVTM";
 /// The layout that this program reads and writes.
-pub(super) const VERSION: u16 = 1;
+pub(super) const VERSION: u16 = 2;
+/// How the weights lie: `packing`.
+pub(super) const PACKING: u8 = 1;
 /// Bytes of the preset's name, filled up with zeros.
 pub(super) const NAME_LENGTH: usize = 16;
 /// The checksum at the end, over all bytes before it: CRC-32 of IEEE 802.3.
 pub(super) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Magnitude of the first layer's inputs: they are `i16`.
-const LARGEST_INPUT: u32 = 1 << 15;
-/// Magnitude of every other layer's inputs: 7-bit activations.
-const LARGEST_ACTIVATION: u32 = 127;
 const LARGEST_SIDE: u16 = 800;
 /// The rectangle of four centroids in the largest frame, px² in Q16.16.
 const LARGEST_RECT: i64 = (LARGEST_SIDE as i64 * LARGEST_SIDE as i64) << 16;
@@ -36,18 +34,36 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         bytes: body,
         offset: HEADER_LENGTH,
     };
-    let layer_count = reader.u16_in("layer count", 1, MAX_LAYERS as u16, "1 to 8")? as usize;
+    let layer_count = reader.u16_in("layer count", 0, MAX_LAYERS as u16, "0 to 8")? as usize;
     let output = reader.choice(
         "output kind",
         &[OutputKind::ForceVector, OutputKind::AnglesMagnitude],
         "0 or 1",
     )?;
-    reader.zero("reserved byte")?;
+    let has_closed_form = reader.choice("closed form", &[false, true], "0 or 1")?;
+    if layer_count == 0 && !has_closed_form {
+        return Err(ModelError::Field {
+            name: "layer count",
+            offset: HEADER_LENGTH,
+            allowed: "1 to 8 without a closed form",
+        });
+    }
+    if has_closed_form && output != OutputKind::ForceVector {
+        return Err(ModelError::Field {
+            name: "output kind",
+            offset: HEADER_LENGTH + 2,
+            allowed: "0 with a closed form",
+        });
+    }
     let conditions = conditions(&mut reader)?;
     let rest = rest(&mut reader)?;
     let input = input_scaling(&mut reader)?;
     let range = range(&mut reader)?;
     let uncertainty = uncertainty(&mut reader)?;
+    let closed_form = match has_closed_form {
+        true => Some(closed_form(&mut reader)?),
+        false => None,
+    };
     let layers = layers(&mut reader, layer_count)?;
     if reader.offset != body.len() {
         let announced = (reader.offset + CRC_LENGTH) as u32;
@@ -63,6 +79,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         output,
         range,
         uncertainty,
+        closed_form,
         crc,
         layers,
         layer_count,
@@ -86,7 +103,10 @@ fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
     if found != VERSION {
         return Err(ModelError::Version { found });
     }
-    reader.zero("reserved byte")?;
+    let found = reader.u8()?;
+    if found != PACKING {
+        return Err(ModelError::Packing { found });
+    }
     reader.zero("reserved byte")?;
     let announced = reader.u32()?;
     if announced as usize != bytes.len() {
@@ -118,7 +138,14 @@ fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
         threshold: threshold(reader)?,
         dilations: reader.u8_in("dilations", 3, "0 to 3")?,
         pixel_format: reader.choice("pixel format", &[PixelFormat::Rgb565], "0")?,
-        centroid: reader.choice("centroid estimator", &[CentroidEstimator::BinaryMask], "0")?,
+        centroid: reader.choice(
+            "centroid estimator",
+            &[
+                CentroidEstimator::BinaryMask,
+                CentroidEstimator::RednessWeighted,
+            ],
+            "0 or 1",
+        )?,
         contact: reader.choice(
             "contact reading",
             &[
@@ -305,86 +332,4 @@ fn uncertainty(reader: &mut Reader<'_>) -> Result<Uncertainty, ModelError> {
         lateral: MicroNewtons(reader.i32_in("lateral uncertainty", i32::MAX, "0 to 2147483647")?),
         normal: MicroNewtons(reader.i32_in("normal uncertainty", i32::MAX, "0 to 2147483647")?),
     })
-}
-
-fn layers<'a>(
-    reader: &mut Reader<'a>,
-    count: usize,
-) -> Result<[Layer<'a>; MAX_LAYERS], ModelError> {
-    let mut layers = [Layer::default(); MAX_LAYERS];
-    let mut fed = FEATURES;
-    for (index, slot) in layers[..count].iter_mut().enumerate() {
-        let layer = layer(reader)?;
-        if layer.inputs != fed {
-            return Err(ModelError::Chain {
-                layer: index,
-                inputs: layer.inputs,
-                fed,
-            });
-        }
-        check_rows(index, &layer)?;
-        fed = layer.outputs;
-        *slot = layer;
-    }
-    if fed != OUTPUTS {
-        return Err(ModelError::Chain {
-            layer: count,
-            inputs: OUTPUTS,
-            fed,
-        });
-    }
-    Ok(layers)
-}
-
-fn layer<'a>(reader: &mut Reader<'a>) -> Result<Layer<'a>, ModelError> {
-    let inputs = reader.u16_in("layer inputs", 1, MAX_WIDTH as u16, "1 to 512")? as usize;
-    let outputs = reader.u16_in("layer outputs", 1, MAX_WIDTH as u16, "1 to 512")? as usize;
-    let weights = reader.take(inputs * outputs)?;
-    reader.pad()?;
-    let biases = reader.take(4 * outputs)?;
-    let multipliers = reader.take(4 * outputs)?;
-    let shifts = reader.take(outputs)?;
-    reader.pad()?;
-    Ok(Layer {
-        inputs,
-        outputs,
-        weights,
-        biases,
-        multipliers,
-        shifts,
-    })
-}
-
-fn check_rows(index: usize, layer: &Layer<'_>) -> Result<(), ModelError> {
-    let largest = if index == 0 {
-        LARGEST_INPUT
-    } else {
-        LARGEST_ACTIVATION
-    };
-    for (number, row) in layer.rows().enumerate() {
-        let error = |name, allowed| ModelError::Row {
-            layer: index,
-            row: number,
-            name,
-            allowed,
-        };
-        if row.weights.contains(&(i8::MIN as u8)) {
-            return Err(error("a weight", "-127 to 127"));
-        }
-        if !(1..1 << 31).contains(&row.multiplier) {
-            return Err(error("the multiplier", "1 to 2147483647"));
-        }
-        if !(1..=62).contains(&row.shift) {
-            return Err(error("the shift", "1 to 62"));
-        }
-        let bound = row.accumulator_bound(largest);
-        if bound > i32::MAX as u64 {
-            return Err(ModelError::Accumulator {
-                layer: index,
-                row: number,
-                bound,
-            });
-        }
-    }
-    Ok(())
 }

@@ -1,24 +1,38 @@
-//! The model file: a quantized network, its input scaling, and the conditions it was made under.
+//! The model file: a quantized network with its input scaling, a closed form or both, and the conditions it was made under.
 //!
-//! [`Model::parse`] reads a file in place, from flash or from memory, without copying and without alignment
-//! needs, and proves it sound before it can be used. Feature `encode` adds the writer, `encode::ModelSpec`.
+//! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves it sound before it can
+//! be used. It may lie anywhere; kernels run one that lies at a multiple of four ([`AlignedFile`]). Feature `encode` adds the writer, `encode::ModelSpec`.
 //! Both follow `docs/model-file.md`.
 
+mod aligned;
+mod curves;
 #[cfg(any(test, feature = "encode"))]
 pub mod encode;
 mod error;
 mod layer;
+#[cfg(test)]
+mod layer_tests;
+mod layers;
 mod layout;
+mod packing;
 mod reader;
 #[cfg(test)]
 pub(crate) mod samples;
 #[cfg(test)]
 mod tests;
 
+pub use aligned::AlignedFile;
+#[cfg(any(test, feature = "encode"))]
+pub use curves::ClosedFormSpec;
 pub use error::ModelError;
-pub use layer::Layer;
+pub use layer::{Layer, Row};
+pub use packing::{
+    MAX_ACTIVATION8, MAX_ACTIVATION16, MAX_WEIGHT8, MAX_WEIGHT16, ROWS_TOGETHER, WeightWidth,
+};
+pub(crate) use packing::{unpack8, unpack16};
 
 use crate::{
+    closed_form::ClosedForm,
     features::{FEATURES, Features},
     geometry::{Geometry, Preset},
     markers::pattern::{Pattern, distance},
@@ -51,6 +65,8 @@ pub struct Model<'a> {
     pub range: CalibratedRange,
     /// How well it knows them.
     pub uncertainty: Uncertainty,
+    /// What it gives without its network; the network's answer is added to it.
+    pub closed_form: Option<ClosedForm<'a>>,
     crc: u32,
     layers: [Layer<'a>; MAX_LAYERS],
     layer_count: usize,
@@ -89,6 +105,8 @@ pub enum PixelFormat {
 pub enum CentroidEstimator {
     /// The mean of its pixels in the mask (the paper's).
     BinaryMask,
+    /// The mean of the same pixels, each weighted with its [`redness`](crate::tables::redness).
+    RednessWeighted,
 }
 
 /// What α and β label.
@@ -203,9 +221,15 @@ impl<'a> Model<'a> {
         self.crc
     }
 
-    /// Its layers, first to last.
+    /// Its layers, first to last; none when it is a closed form alone.
     pub fn layers(&self) -> &[Layer<'a>] {
         &self.layers[..self.layer_count]
+    }
+
+    /// True when its file lies at a multiple of four, so that kernels can run it. Every layer then lies so, too.
+    pub fn is_aligned(&self) -> bool {
+        let lies_so = |layer: &Layer<'_>| layer.weights.as_ptr().cast::<u32>().is_aligned();
+        self.layers().iter().all(lies_so)
     }
 
     /// True when the training data was simulated.
@@ -213,11 +237,16 @@ impl<'a> Model<'a> {
         self.conditions.origin == Origin::Simulated
     }
 
-    /// Layer widths and preset, such as `11-64-64-3 ov7725`; cut after 32 bytes.
+    /// Layer widths and preset, such as `11-64-64-3 ov7725`, `closed form ov7725` or `closed form + 11-8-3 ov7725`; cut
+    /// after 32 bytes.
     pub fn name(&self) -> heapless::String<32> {
         let mut name = heapless::String::new();
         // A full string keeps what it has: the end of a very long name is cut.
-        let _ = write!(name, "{FEATURES}");
+        let _ = match (&self.closed_form, self.layers()) {
+            (None, _) => write!(name, "{FEATURES}"),
+            (Some(_), []) => write!(name, "closed form"),
+            (Some(_), _) => write!(name, "closed form + {FEATURES}"),
+        };
         for layer in self.layers() {
             let _ = write!(name, "-{}", layer.outputs());
         }

@@ -38,8 +38,10 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
         },
         layers: widths
             .windows(2)
-            .map(|pair| layer(pair[0], pair[1]))
+            .enumerate()
+            .map(|(i, pair)| layer(pair[0], pair[1], i == 0, i + 2 == widths.len()))
             .collect(),
+        closed_form: None,
         output: OutputKind::ForceVector,
         range: CalibratedRange {
             magnitude: MicroNewtons(1_000_000),
@@ -53,15 +55,32 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
     }
 }
 
-fn layer(inputs: u16, outputs: u16) -> LayerSpec {
+/// As [`spec`], with int16 weights and activations of up to `largest_activation` in every layer.
+pub(crate) fn spec16(widths: &[u16], largest_activation: u16) -> ModelSpec {
+    let mut spec = spec(widths);
+    for layer in &mut spec.layers {
+        layer.weight_width = WeightWidth::Int16;
+        layer.largest_activation = layer.largest_activation.min(1) * largest_activation;
+        layer.weights.iter_mut().for_each(|w| *w *= 5);
+    }
+    spec
+}
+
+/// Int16 weights for the features, int8 and seven bits for what comes after them.
+fn layer(inputs: u16, outputs: u16, first: bool, last: bool) -> LayerSpec {
     let weights = usize::from(inputs) * usize::from(outputs);
     LayerSpec {
         inputs,
         outputs,
         weights: (0..weights)
-            .map(|i| ((i * 37) % 255) as i8)
-            .map(|w| w.max(-127))
+            .map(|i| ((i * 37) % 255) as i16 - 127)
             .collect(),
+        weight_width: if first {
+            WeightWidth::Int16
+        } else {
+            WeightWidth::Int8
+        },
+        largest_activation: if last { 0 } else { 127 },
         biases: (0..i32::from(outputs)).map(|i| 1000 - 7 * i).collect(),
         multipliers: (0..u32::from(outputs)).map(|i| (1 << 30) + i).collect(),
         shifts: (0..outputs).map(|i| 30 + (i % 8) as u8).collect(),
@@ -73,9 +92,10 @@ pub(super) fn read_back(model: &Model<'_>) -> ModelSpec {
     let layers = model.layers().iter().map(|layer| LayerSpec {
         inputs: layer.inputs() as u16,
         outputs: layer.outputs() as u16,
-        weights: layer
-            .rows()
-            .flat_map(|r| r.weights.iter().map(|w| *w as i8))
+        weight_width: layer.weight_width(),
+        largest_activation: layer.largest_activation(),
+        weights: (0..layer.outputs())
+            .flat_map(|row| (0..layer.inputs()).map(move |column| layer.weight(row, column)))
             .collect(),
         biases: layer.rows().map(|r| r.bias).collect(),
         multipliers: layer.rows().map(|r| r.multiplier).collect(),
@@ -86,6 +106,7 @@ pub(super) fn read_back(model: &Model<'_>) -> ModelSpec {
         rest: model.rest,
         input: model.input,
         layers: layers.collect(),
+        closed_form: model.closed_form.as_ref().map(ClosedFormSpec::of),
         output: model.output,
         range: model.range,
         uncertainty: model.uncertainty,
@@ -103,6 +124,10 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
         ContactReading::Stick,
         ContactReading::Slip,
     ][next() as usize % 3];
+    c.centroid = [
+        CentroidEstimator::BinaryMask,
+        CentroidEstimator::RednessWeighted,
+    ][next() as usize % 2];
     c.preset = Preset::ALL[next() as usize % 2];
     c.geometry.width = 1 + (next() % 800) as u16;
     c.geometry.height = 1 + (next() % 800) as u16;
@@ -129,7 +154,7 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
         layer
             .weights
             .iter_mut()
-            .for_each(|w| *w = (next() as i8).max(-127));
+            .for_each(|w| *w = i16::from(next() as i8).max(-127));
         layer
             .biases
             .iter_mut()

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use std::{string::ToString, vec, vec::Vec};
 
 /// Makes the checksum right again after bytes were changed.
-fn reseal(bytes: &mut [u8]) {
+pub(super) fn reseal(bytes: &mut [u8]) {
     let end = bytes.len() - 4;
     let crc = layout::CRC.checksum(&bytes[..end]);
     bytes[end..].copy_from_slice(&crc.to_le_bytes());
@@ -54,11 +54,11 @@ fn name_and_identity() {
 fn every_field_is_checked() {
     let good = spec(&[11, 5, 3]).encode().unwrap();
     for (offset, value, name) in [
-        (6, 1, "reserved byte"),
+        (7, 1, "reserved byte"),
         (12, 0, "layer count"),
         (12, 9, "layer count"),
         (14, 2, "output kind"),
-        (15, 1, "reserved byte"),
+        (15, 2, "closed form"),
         (16, b'O', "preset name"),
         (31, b'x', "preset name"),
         (33, 4, "width"),
@@ -72,7 +72,7 @@ fn every_field_is_checked() {
         (55, 0, "threshold"),
         (58, 4, "dilations"),
         (59, 1, "pixel format"),
-        (60, 1, "centroid estimator"),
+        (60, 2, "centroid estimator"),
         (61, 3, "contact reading"),
         (62, 2, "origin"),
         (63, 1, "reserved byte"),
@@ -93,7 +93,14 @@ fn every_field_is_checked() {
         (263, 0x80, "normal uncertainty"),
         (265, 4, "layer inputs"),
         (267, 4, "layer outputs"),
-        (268 + 55, 1, "padding"),
+        (268, 2, "weight width"),
+        (269, 1, "reserved byte"),
+        (271, 0x80, "largest activation"),
+        (528, 1, "padding"),
+        (543, 1, "padding"),
+        (589, 1, "padding"),
+        (592 + 6, 1, "largest activation"),
+        (728, 1, "padding"),
     ] {
         let mut bytes = good.clone();
         bytes[offset] = value;
@@ -108,8 +115,9 @@ fn every_field_is_checked() {
 #[test]
 fn every_row_is_checked() {
     type Edit = fn(&mut LayerSpec);
-    let edits: [(Edit, &str); 5] = [
+    let edits: [(Edit, &str); 6] = [
         (|l| l.weights[3] = -128, "a weight"),
+        (|l| l.weights[3] = 300, "a weight"),
         (|l| l.multipliers[0] = 0, "the multiplier"),
         (|l| l.multipliers[0] = 1 << 31, "the multiplier"),
         (|l| l.shifts[0] = 0, "the shift"),
@@ -154,8 +162,8 @@ fn an_accumulator_that_could_overflow_is_refused() {
         Err(ModelError::Accumulator { row: 1, .. })
     ));
     spec.layers[1].biases[1] = 0;
-    spec.layers[0].weights = vec![127; 11 * 512];
-    spec.layers[0].biases = vec![i32::MAX - 11 * 127 * 32_768; 512];
+    spec.layers[0].weights = vec![5_000; 11 * 512];
+    spec.layers[0].biases = vec![i32::MAX - 11 * 5_000 * 32_768; 512];
     assert!(spec.encode().is_ok());
     spec.layers[0].biases[511] += 1;
     assert!(matches!(
@@ -236,7 +244,7 @@ fn damage_is_named() {
         Model::parse(b"\x7fELF....").unwrap_err(),
         ModelError::NotAModel
     );
-    let short = Model::parse(b"HVTM\x01\x00").unwrap_err();
+    let short = Model::parse(b"HVTM\x02\x00").unwrap_err();
     assert_eq!(
         short,
         ModelError::TooShort {
@@ -248,10 +256,16 @@ fn damage_is_named() {
     assert!(matches!(cut, ModelError::Length { .. }), "{cut:?}");
 
     let mut newer = good.clone();
-    newer[4] = 2;
+    newer[4] = 1;
     let error = Model::parse(&newer).unwrap_err();
-    assert_eq!(error, ModelError::Version { found: 2 });
-    assert!(error.to_string().contains("version 2"), "{error}");
+    assert_eq!(error, ModelError::Version { found: 1 });
+    assert!(error.to_string().contains("version 1"), "{error}");
+
+    let mut repacked = good.clone();
+    repacked[6] = 2;
+    let error = Model::parse(&repacked).unwrap_err();
+    assert_eq!(error, ModelError::Packing { found: 2 });
+    assert!(error.to_string().contains("packed as 2"), "{error}");
 
     let mut longer = good.clone();
     let end = longer.len() - 4;
@@ -284,7 +298,7 @@ proptest! {
         // The same with everything right that would stop the reader early.
         if bytes.len() >= 16 {
             let length = bytes.len() as u32;
-            bytes[..8].copy_from_slice(b"HVTM\x01\x00\x00\x00");
+            bytes[..8].copy_from_slice(b"HVTM\x02\x00\x01\x00");
             bytes[8..12].copy_from_slice(&length.to_le_bytes());
             reseal(&mut bytes);
             prop_assert!(Model::parse(&bytes).is_err());

@@ -1,20 +1,23 @@
 //! Rows in, measurement out.
 
+mod cropped;
 #[cfg(test)]
 mod tests;
+mod whole_frame;
 
 use crate::{
     blob::Blob,
     features::Features,
     force::Force,
     geometry::{Geometry, Preset},
-    markers::{Finder, Found, Marker, judge},
-    model::{Model, Rest},
+    markers::{Finder, Found, Marker, Trust},
+    model::{CentroidEstimator, Model, Rest},
     network::Network,
     scanner::Scanner,
     settings::{Settings, SettingsError},
     status::Status,
-    threshold::{ByteOrder, HsvBox, ThresholdError, ThresholdTable},
+    tables::{ByteTable, Table},
+    threshold::{ByteOrder, HsvBox, ThresholdError},
 };
 
 /// What one frame gave.
@@ -33,23 +36,23 @@ pub struct Measurement {
 /// A frame has more set pixels than one in this many: no four dots look like that.
 const SATURATED_PART: u32 = 2;
 
-/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame.
+/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels up in a `T`.
 ///
-/// It holds all its storage, about 50 KiB, so build it where it shall stay: in a `static` as [`Sensor::new`], which is
+/// It holds all its storage, about 74 KiB and the table (64 KiB, or 8 as a [`BitTable`](crate::tables::BitTable)), so build it where it shall stay: in a `static` as [`Sensor::new`], which is
 /// `const`, and then [`configure`](Self::configure) it in place; nothing large crosses the stack.
-/// For each frame: [`begin_frame`](Self::begin_frame), [`push_row`](Self::push_row) for each row from the top, as rows
-/// arrive, and [`finish_frame`](Self::finish_frame).
+/// For each frame: [`begin_frame`](Self::begin_frame), [`push_rows`](Self::push_rows) with all rows from the top, one
+/// or more at a time as they arrive, and [`finish_frame`](Self::finish_frame).
 #[derive(Clone, Debug)]
-pub struct Sensor<'m, const BLOBS: usize = 64> {
+pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
     model: Option<Model<'m>>,
     tare: Option<Rest>,
-    table: ThresholdTable,
+    table: T,
     scanner: Scanner<BLOBS>,
     network: Network,
 }
 
-impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
+impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// A sensor that sees nothing until it is configured: its threshold accepts no colour.
     pub const fn new() -> Self {
         Sensor {
@@ -59,10 +62,11 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
                 byte_order: ByteOrder::Swapped,
                 dilations: 1,
                 min_area: 1,
+                centroid: CentroidEstimator::BinaryMask,
             },
             model: None,
             tare: None,
-            table: ThresholdTable::closed(),
+            table: T::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
         }
@@ -135,14 +139,30 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
         self.scanner.push_row(&self.table, row);
     }
 
+    /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than one by one.
+    pub fn push_rows(&mut self, rows: &[u16]) {
+        self.scanner.push_rows(&self.table, rows);
+    }
+
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
+        let found = self.find_markers();
+        self.measurement(found)
+    }
+
+    /// What follows from the markers.
+    fn measurement(&mut self, found: Result<Found, Status>) -> Measurement {
         let mut status = self.standing_status();
-        let found = self.find_markers().map_err(|reason| status |= reason).ok();
+        let found = found.map_err(|reason| status |= reason).ok();
         let markers = found.map(|found| found.markers);
         let features = markers.as_ref().map(Features::of_markers);
         if let (Some(found), Some(rest)) = (&found, self.rest()) {
-            status |= judge(&self.settings.geometry, &rest, found);
+            let trust = Trust {
+                settings: &self.settings,
+                rest: &rest,
+                own_rest: self.tare.is_some(),
+            };
+            status |= trust.judge(found);
         }
         let force = features.and_then(|features| self.measure(&features, &mut status));
         Measurement {
@@ -153,7 +173,7 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
         }
     }
 
-    /// The blobs of the frame that was finished last, at least [`Settings::min_area`] each.
+    /// The blobs of the frame that was finished last, when it was pushed row by row, at least [`Settings::min_area`] each.
     pub fn blobs(&self) -> &[Blob] {
         self.scanner.blobs()
     }
@@ -190,7 +210,7 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
     fn find_markers(&mut self) -> Result<Found, Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
-        let scan = self.scanner.finish();
+        let scan = self.scanner.finish(&self.table);
         if scan.status != Status::OK {
             return Err(scan.status);
         }
@@ -200,7 +220,7 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
         if scan.set_pixels > pixels / SATURATED_PART {
             return Err(Status::IMAGE_SATURATED);
         }
-        Finder::new(geometry, self.settings.dilations).find(scan.blobs)
+        Finder::new(&self.settings).find(scan.blobs)
     }
 
     /// The force of a frame's features, unless `status` already forbids one.
@@ -220,7 +240,7 @@ impl<'m, const BLOBS: usize> Sensor<'m, BLOBS> {
     }
 }
 
-impl<const BLOBS: usize> Default for Sensor<'_, BLOBS> {
+impl<const BLOBS: usize, T: Table> Default for Sensor<'_, BLOBS, T> {
     fn default() -> Self {
         Sensor::new()
     }

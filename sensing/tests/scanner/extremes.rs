@@ -3,9 +3,10 @@
 use crate::reference::{Mask, scan, settings};
 use hivtac_sensing::{
     blob::Blob,
-    scanner::{MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, Scanner},
+    scanner::{MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, ScanSettings, Scanner},
     status::Status,
-    threshold::{ByteOrder, HsvBox, ThresholdTable},
+    tables::BitTable,
+    threshold::{ByteOrder, HsvBox},
     units::Px,
 };
 
@@ -30,6 +31,13 @@ fn full(width: u64, height: u64) -> Blob {
         sum_xx: squares(width) * height,
         sum_xy: sum(width) * sum(height),
         sum_yy: squares(height) * width,
+        sum_xxx: sum(width).pow(2) * height,
+        sum_xxy: squares(width) * sum(height),
+        sum_xyy: sum(width) * squares(height),
+        sum_yyy: sum(height).pow(2) * width,
+        weight: 0,
+        weight_x: 0,
+        weight_y: 0,
         x0: 0,
         y0: 0,
         x1: width as u16 - 1,
@@ -37,32 +45,48 @@ fn full(width: u64, height: u64) -> Blob {
     }
 }
 
+/// The same with pixels of the largest weight.
+fn heaviest(width: u64, height: u64) -> Blob {
+    let full = full(width, height);
+    Blob {
+        weight: 127 * full.area,
+        weight_x: 127 * full.sum_x,
+        weight_y: 127 * full.sum_y,
+        ..full
+    }
+}
+
 #[test]
 fn an_all_red_frame_is_one_exact_blob() {
-    let table = ThresholdTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap();
+    let table = BitTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap();
     let largest = (u64::from(MAX_WIDTH), u64::from(MAX_HEIGHT));
     for (width, height) in [(1, 1), (320, 240), (800, 600), largest] {
         for dilations in 0..=MAX_DILATIONS {
             let mut scanner = Scanner::<1>::new();
             let mask = Mask::from_fn(width as usize, height as usize, |_, _| true);
-            scanner.begin(settings(&mask, dilations, 1)).unwrap();
+            let settings = ScanSettings {
+                weighted: true,
+                ..settings(&mask, dilations, 1)
+            };
+            scanner.begin(settings).unwrap();
             for _ in 0..height {
                 scanner.push_row(&table, &vec![0x00f8; width as usize]);
             }
-            let scan = scanner.finish();
+            let scan = scanner.finish(&table);
             assert_eq!(
                 (scan.status, scan.set_pixels),
                 (Status::OK, (width * height) as u32)
             );
-            assert_eq!(scan.blobs, [full(width, height)]);
+            assert_eq!(scan.blobs, [heaviest(width, height)]);
         }
     }
 }
 
 #[test]
 fn the_largest_full_frame_has_exact_derived_moments() {
-    let blob = full(u64::from(MAX_WIDTH), u64::from(MAX_HEIGHT));
+    let blob = heaviest(u64::from(MAX_WIDTH), u64::from(MAX_HEIGHT));
     let (x, y) = blob.centroid();
+    assert_eq!(blob.weighted_centroid(), Some((x, y)));
     assert_eq!((x, y), (Px(Px::ONE.0 * 799 / 2), Px(Px::ONE.0 * 799 / 2)));
     // A w × h rectangle: Σ(x − x̄)² = area · (w² − 1) / 12.
     let area = i64::from(blob.area);
@@ -222,4 +246,33 @@ fn salt_does_not_fill_the_storage() {
     let mask = Mask::from_fn(800, 600, |x, y| salt(x, y) || disc(x, y));
     assert!(mask.blobs(1).len() > 5000);
     assert_eq!(checked::<4>(&mask, 200).len(), 4);
+}
+
+/// As many runs as a frame may have are all taken; one more ends it, and a frame after it knows nothing of that.
+#[test]
+fn a_frame_of_more_runs_than_it_may_have_is_left() {
+    let mask = Mask::from_fn(64, 20, |x, _| x % 2 == 0);
+    let mut scanner = Scanner::<64>::new();
+    for (max_runs, status) in [
+        (640, Status::OK),
+        (639, Status::BLOB_OVERFLOW),
+        (0, Status::BLOB_OVERFLOW),
+        (u32::MAX, Status::OK),
+    ] {
+        let settings = ScanSettings {
+            max_runs,
+            ..settings(&mask, 0, 1)
+        };
+        scanner.begin(settings).unwrap();
+        (0..20).for_each(|y| scanner.push_mask_row(&mask.words(y)));
+        let found = scanner.finish(&());
+        assert_eq!(
+            (found.status, found.set_pixels),
+            (status, 640),
+            "{max_runs}"
+        );
+        if status == Status::OK {
+            assert_eq!(found.blobs, mask.blobs(1));
+        }
+    }
 }

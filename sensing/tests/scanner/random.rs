@@ -2,14 +2,20 @@
 
 use crate::reference::{Mask, scan, settings};
 use hivtac_sensing::{
-    scanner::Scanner,
+    scanner::{ScanSettings, Scanner},
     status::Status,
-    threshold::{ByteOrder, HsvBox, ThresholdTable},
+    tables::{BitTable, ByteTable, Pixels, Table},
+    threshold::{ByteOrder, HsvBox},
 };
 use proptest::{collection::vec, prelude::*};
 
 /// Enough for every blob of the masks here: a blob needs a 2×2 cell of its own.
 const ALL: usize = 100 * 30 / 4 + 200;
+
+thread_local!(static TABLES: (BitTable, Box<ByteTable>) = (
+    BitTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap(),
+    Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap()),
+));
 
 /// Masks of any width around the borders of words, from sparse to dense. Near a density of 0.4, where blobs percolate,
 /// labels join in the most tangled ways.
@@ -97,13 +103,45 @@ proptest! {
         swapped in any::<bool>(),
     ) {
         let order = if swapped { ByteOrder::Swapped } else { ByteOrder::Native };
-        let table = ThresholdTable::new(&HsvBox::RED, order).unwrap();
+        let table = BitTable::new(&HsvBox::RED, order).unwrap();
         let rows: Vec<&[u16]> = pixels.chunks_exact(width).take(800).collect();
         let mask = Mask::from_fn(width, rows.len(), |x, y| table.accepts(rows[y][x]));
         let mut scanner = Scanner::<ALL>::new();
         scanner.begin(settings(&mask, 1, 1)).unwrap();
         rows.iter().for_each(|row| scanner.push_row(&table, row));
         let mut by_mask = Scanner::<ALL>::new();
-        prop_assert_eq!(scanner.finish(), scan(&mut by_mask, &mask, 1, 1));
+        prop_assert_eq!(scanner.finish(&table), scan(&mut by_mask, &mask, 1, 1));
+    }
+
+    /// Whatever the bands in which rows arrive.
+    #[test]
+    fn weights_are_those_of_the_blobs_pixels(
+        width in 1..=70_usize,
+        height in 1..=12_usize,
+        seeds in vec((any::<u16>(), prop::bool::weighted(0.3)), 70 * 12),
+        dilations in 0..=3_u8,
+        bands in vec(1..=5_usize, 12),
+    ) {
+        let pixels: Vec<u16> = seeds.iter().map(|(value, red)| if *red { 0x00d8 | value & 0x20e7 } else { *value }).collect();
+        let pixels = &pixels[..width * height];
+        let (bits, bytes) = TABLES.with(Clone::clone);
+        let mask = Mask::from_fn(width, height, |x, y| bits.accepts(pixels[y * width + x]));
+        let weight = |x, y| bits.weight(&pixels[y * width..], x as u16);
+        let expected = mask.dilated(dilations).weighted_blobs(1, weight);
+        let settings = ScanSettings { weighted: true, ..settings(&mask, dilations, 1) };
+        let mut scanner = Scanner::<ALL>::new();
+        scanner.begin(settings).unwrap();
+        pixels.chunks(width).for_each(|row| scanner.push_row(&bits, row));
+        prop_assert_eq!(scanner.finish(&bits).blobs, expected.as_slice());
+        scanner.begin(settings).unwrap();
+        let mut rest = pixels;
+        for band in bands.iter().map(|rows| rows * width) {
+            let (rows, below) = rest.split_at(band.min(rest.len()));
+            scanner.push_rows(&*bytes, rows);
+            rest = below;
+        }
+        let scan = scanner.finish(&*bytes);
+        prop_assert_eq!(scan.status, Status::OK);
+        prop_assert_eq!(scan.blobs, expected.as_slice());
     }
 }

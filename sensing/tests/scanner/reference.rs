@@ -61,12 +61,17 @@ impl Mask {
 
     /// The blobs in the scanner's order: by their lowest row, then by where they begin in it.
     pub fn blobs(&self, min_area: u32) -> Vec<Blob> {
+        self.weighted_blobs(min_area, |_, _| 0)
+    }
+
+    /// The same, their pixels weighed.
+    pub fn weighted_blobs(&self, min_area: u32, weight: impl Fn(usize, usize) -> u8) -> Vec<Blob> {
         let mut left = self.clone();
         let mut found = Vec::new();
         for i in 0..self.bits.len() {
             if left.bits[i] {
                 let pixels = left.flood(i % self.width, i / self.width);
-                found.push((order(&pixels), sum(&pixels)));
+                found.push((order(&pixels), sum(&pixels, &weight)));
             }
         }
         found.sort_by_key(|(order, _)| *order);
@@ -91,7 +96,7 @@ impl Mask {
     }
 
     /// Row `y` as words, bit i of word w for column 32·w + i.
-    fn words(&self, y: usize) -> Vec<u32> {
+    pub fn words(&self, y: usize) -> Vec<u32> {
         let mut words = vec![0; self.width.div_ceil(32)];
         for x in (0..self.width).filter(|x| self.get(*x, y)) {
             words[x / 32] |= 1 << (x % 32);
@@ -106,7 +111,13 @@ fn order(pixels: &[(usize, usize)]) -> (usize, usize) {
     (lowest, begins.min().unwrap())
 }
 
-fn sum(pixels: &[(usize, usize)]) -> Blob {
+fn sum(pixels: &[(usize, usize)], weight: impl Fn(usize, usize) -> u8) -> Blob {
+    let weighed = |f: fn(u64, u64) -> u64| {
+        let terms = pixels
+            .iter()
+            .map(|&(x, y)| u64::from(weight(x, y)) * f(x as u64, y as u64));
+        terms.sum::<u64>()
+    };
     let total = |f: fn(u64, u64) -> u64| pixels.iter().map(|&(x, y)| f(x as u64, y as u64)).sum();
     let columns = || pixels.iter().map(|(x, _)| *x as u16);
     let rows = || pixels.iter().map(|(_, y)| *y as u16);
@@ -117,6 +128,13 @@ fn sum(pixels: &[(usize, usize)]) -> Blob {
         sum_xx: total(|x, _| x * x),
         sum_xy: total(|x, y| x * y),
         sum_yy: total(|_, y| y * y),
+        sum_xxx: total(|x, _| x * x * x),
+        sum_xxy: total(|x, y| x * x * y),
+        sum_xyy: total(|x, y| x * y * y),
+        sum_yyy: total(|_, y| y * y * y),
+        weight: weighed(|_, _| 1) as u32,
+        weight_x: weighed(|x, _| x),
+        weight_y: weighed(|_, y| y),
         x0: columns().min().unwrap(),
         y0: rows().min().unwrap(),
         x1: columns().max().unwrap(),
@@ -131,6 +149,8 @@ pub fn settings(mask: &Mask, dilations: u8, min_area: u32) -> ScanSettings {
         height: mask.height as u16,
         dilations,
         min_area,
+        weighted: false,
+        max_runs: u32::MAX,
     }
 }
 
@@ -145,5 +165,5 @@ pub fn scan<'a, const BLOBS: usize>(
     for y in 0..mask.height {
         scanner.push_mask_row(&mask.words(y));
     }
-    scanner.finish()
+    scanner.finish(&())
 }

@@ -3,7 +3,8 @@
 use hivtac_sensing::{
     scanner::{ScanError, ScanSettings, Scanner},
     status::Status,
-    threshold::{ByteOrder, HsvBox, ThresholdError, ThresholdTable},
+    tables::{BitTable, Table},
+    threshold::{ByteOrder, HsvBox, ThresholdError},
 };
 
 use crate::reference::{Mask, scan, settings};
@@ -15,13 +16,15 @@ fn missing_extra_and_wrong_rows_make_a_frame_incomplete() {
         height: 4,
         dilations: 1,
         min_area: 1,
+        weighted: false,
+        max_runs: u32::MAX,
     };
     let status = |rows: &[usize]| {
         let mut scanner = Scanner::<4>::new();
         scanner.begin(settings).unwrap();
         rows.iter()
             .for_each(|words| scanner.push_mask_row(&vec![1; *words]));
-        scanner.finish().status
+        scanner.finish(&()).status
     };
     assert_eq!(status(&[2; 4]), Status::OK);
     for rows in [
@@ -38,13 +41,13 @@ fn missing_extra_and_wrong_rows_make_a_frame_incomplete() {
 
 #[test]
 fn pixel_rows_of_another_width_make_a_frame_incomplete() {
-    let table = ThresholdTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
+    let table = BitTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
     for width in [0, 39, 41, 801, 70_000] {
         let mut scanner = Scanner::<4>::new();
         let mask = Mask::from_fn(40, 1, |_, _| false);
         scanner.begin(settings(&mask, 0, 1)).unwrap();
         scanner.push_row(&table, &vec![0xf800; width]);
-        let scan = scanner.finish();
+        let scan = scanner.finish(&());
         assert_eq!(
             (scan.status, scan.set_pixels),
             (Status::FRAME_INCOMPLETE, 0)
@@ -58,13 +61,13 @@ fn rows_without_a_frame_are_refused() {
     let mut scanner = Scanner::<4>::new();
     scanner.push_mask_row(&[]);
     scanner.push_mask_row(&[1]);
-    assert_eq!(scanner.finish().status, Status::FRAME_INCOMPLETE);
+    assert_eq!(scanner.finish(&()).status, Status::FRAME_INCOMPLETE);
     let mask = Mask::from_fn(3, 1, |_, _| true);
     assert_eq!(scan(&mut scanner, &mask, 0, 1).status, Status::OK);
-    let again = scanner.finish();
+    let again = scanner.finish(&());
     assert_eq!((again.status, again.blobs.len()), (Status::OK, 1));
     scanner.push_mask_row(&[1]);
-    assert_eq!(scanner.finish().status, Status::FRAME_INCOMPLETE);
+    assert_eq!(scanner.finish(&()).status, Status::FRAME_INCOMPLETE);
 }
 
 #[test]
@@ -73,7 +76,7 @@ fn bits_beyond_the_width_are_ignored() {
     let mask = Mask::from_fn(33, 1, |_, _| true);
     scanner.begin(settings(&mask, 0, 1)).unwrap();
     scanner.push_mask_row(&[u32::MAX, u32::MAX]);
-    let scan = scanner.finish();
+    let scan = scanner.finish(&());
     assert_eq!((scan.status, scan.set_pixels), (Status::OK, 33));
     assert_eq!(scan.blobs, mask.blobs(1));
 }
@@ -85,6 +88,8 @@ fn settings_out_of_range_are_named() {
         height: 800,
         dilations: 3,
         min_area: 0,
+        weighted: false,
+        max_runs: u32::MAX,
     };
     let mut scanner = Scanner::<1>::new();
     assert_eq!(scanner.begin(good), Ok(()));
@@ -109,7 +114,7 @@ fn settings_out_of_range_are_named() {
     ] {
         assert_eq!(scanner.begin(bad), Err(error));
         scanner.push_mask_row(&[1; 25]);
-        let scan = scanner.finish();
+        let scan = scanner.finish(&());
         assert_eq!(
             (scan.status, scan.set_pixels),
             (Status::FRAME_INCOMPLETE, 0)
@@ -120,7 +125,7 @@ fn settings_out_of_range_are_named() {
 #[test]
 fn boxes_without_meaning_are_named_and_change_nothing() {
     let red = HsvBox::RED;
-    let mut table = ThresholdTable::new(&red, ByteOrder::Native).unwrap();
+    let mut table = BitTable::new(&red, ByteOrder::Native).unwrap();
     let before = table.clone();
     for (bad, error) in [
         (

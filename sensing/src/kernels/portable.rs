@@ -1,0 +1,76 @@
+//! The definition of every kernel, in portable Rust.
+
+use super::Sums;
+use crate::model::{Layer, MAX_WIDTH, ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
+use crate::rescale::rescale_sum;
+
+/// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::model::Model::parse) has proven that it fits, in
+/// any order of summation.
+pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
+    match layer.weight_width() {
+        WeightWidth::Int8 => sum_groups(layer, inputs, sums, unpack8),
+        WeightWidth::Int16 => sum_groups(layer, inputs, sums, unpack16),
+    }
+}
+
+/// `unpack` gives the N weights of a word.
+fn sum_groups<const N: usize>(
+    layer: &Layer<'_>,
+    inputs: &[i16; MAX_WIDTH],
+    sums: &mut Sums,
+    unpack: impl Fn([u8; 4]) -> [i16; N],
+) {
+    let (columns, _) = inputs.as_chunks::<N>();
+    let (sums, _) = sums.as_chunks_mut::<ROWS_TOGETHER>();
+    for (group, sums) in layer.groups().zip(sums) {
+        *sums = [0; ROWS_TOGETHER];
+        for (words, x) in group.iter().zip(columns) {
+            for (sum, word) in sums.iter_mut().zip(words) {
+                let products = unpack(*word).into_iter().zip(x);
+                *sum += products
+                    .map(|(w, &x)| i32::from(w) * i32::from(x))
+                    .sum::<i32>();
+            }
+        }
+    }
+}
+
+/// clamp(rescale(acc_j, m_j, s_j), 0, A) of every row j of a hidden layer, from row `first` on.
+pub fn activate(layer: &Layer<'_>, sums: &Sums, activations: &mut [i16; MAX_WIDTH], first: usize) {
+    let largest = i32::from(layer.largest_activation());
+    let rows = layer.rows().zip(sums).zip(activations).skip(first);
+    for ((row, sum), activation) in rows {
+        let value = rescale_sum(sum + row.bias, row.multiplier, row.shift);
+        *activation = value.clamp(0, largest) as i16;
+    }
+}
+
+/// The mask of a row: bit i of word w is bit 7 of the byte that `table` has for pixel 32·w + i. `mask` has
+/// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
+pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], first: usize) {
+    pack(row, mask, first, |bits, raw| {
+        bits >> 1 | u32::from(table[usize::from(raw)] & 0x80) << 24
+    });
+}
+
+/// The mask of a row: bit i of word w is bit p % 32 of word p / 32 of `table`, with p = pixel 32·w + i. `mask` has
+/// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
+pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32], first: usize) {
+    // An index of 11 bits needs no bounds check, and the rotation takes its count modulo 32 as the processor does.
+    let rotated = |raw: u16| table[usize::from(raw >> 5)].rotate_right(u32::from(raw));
+    pack(row, mask, first, |bits, raw| bits >> 1 | rotated(raw) << 31);
+}
+
+/// Makes each word of `mask`, from word `first` on, of 32 pixels by shifting them in from the top; a shorter last word is
+/// moved down.
+#[inline(always)]
+fn pack(row: &[u16], mask: &mut [u32], first: usize, shift_in: impl Fn(u32, u16) -> u32) {
+    let (full, rest) = row.as_chunks::<32>();
+    let word = |pixels: &[u16]| pixels.iter().fold(0, |bits, &raw| shift_in(bits, raw));
+    for (word_of_mask, pixels) in mask.iter_mut().zip(full).skip(first) {
+        *word_of_mask = word(pixels);
+    }
+    if let Some(last) = mask.get_mut(full.len()).filter(|_| !rest.is_empty()) {
+        *last = word(rest) >> (32 - rest.len());
+    }
+}
