@@ -1,0 +1,331 @@
+//! The world that a tracker and a follower live in: camera, DMA, memory and processor, in steps of one word.
+
+use crate::{Action, Edge, Event, Follower, Interface, Shape, Tally, Tracker, Window};
+use std::collections::VecDeque;
+use std::vec::Vec;
+
+pub const BAND: usize = 4;
+const BANDS: u16 = 3;
+const SLOTS: usize = 8;
+pub const FRAME: usize = BAND * BANDS as usize;
+/// Words of time from the last word to the VSYNC pulse, and that it lasts.
+const FRONT: usize = 4;
+const PULSE: usize = 6;
+/// Words of time from the end of the VSYNC pulse to the first word.
+const BACK: usize = 3;
+/// A row is one word.
+pub const SHAPE: Shape = Shape::new(BAND as u16, SLOTS as u16);
+pub const WHOLE: Window = Window::whole(16, FRAME as u16);
+/// More frames are never under way.
+const EVENTS: usize = SLOTS + 4;
+
+/// One frame of the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Sent {
+    pub words: usize,
+    /// The interface overruns at this word.
+    pub overrun_at: Option<usize>,
+}
+
+pub const GOOD: Sent = Sent {
+    words: FRAME,
+    overrun_at: None,
+};
+
+/// Camera interface, DMA and memory.
+#[derive(Debug)]
+pub struct Chip {
+    window: Window,
+    memory: [u32; SLOTS * BAND],
+    targets: [u16; 2],
+    pub second: bool,
+    position: usize,
+    running: bool,
+    pub capturing: bool,
+    pub band_flag: bool,
+    frame_flag: bool,
+    overrun_flag: bool,
+    pub edge: Edge,
+    pub restarts: usize,
+}
+
+impl Chip {
+    pub fn new() -> Self {
+        Chip {
+            window: WHOLE,
+            memory: [0; SLOTS * BAND],
+            targets: [0; 2],
+            second: false,
+            position: 0,
+            running: false,
+            capturing: false,
+            band_flag: false,
+            frame_flag: false,
+            overrun_flag: false,
+            edge: Edge::default(),
+            restarts: 0,
+        }
+    }
+
+    /// The camera sends a word, the one of this row.
+    pub fn word(&mut self, row: usize, value: u32) {
+        let Window { top, height, .. } = self.window;
+        let (top, bottom) = (usize::from(top), usize::from(top + height));
+        let cropped = self.window != WHOLE;
+        if !self.capturing || cropped && !(top..bottom).contains(&row) {
+            return;
+        }
+        let slot = usize::from(self.targets[usize::from(self.second)]);
+        self.memory[slot * BAND + self.position] = value;
+        self.position += 1;
+        if self.position == BAND {
+            self.position = 0;
+            self.second = !self.second;
+            self.band_flag = true;
+        }
+        if cropped && row + 1 == bottom {
+            self.capturing = false;
+            self.frame_flag = true;
+        }
+    }
+
+    fn slot(&self, slot: u16) -> [u32; BAND] {
+        let at = usize::from(slot) * BAND;
+        self.memory[at..at + BAND].try_into().unwrap()
+    }
+}
+
+impl Interface for Chip {
+    fn restart(&mut self, window: Window, first: u16, second: u16) {
+        self.stop();
+        self.window = window;
+        (self.targets, self.second, self.position) = ([first, second], false, 0);
+        self.running = true;
+        self.restarts += 1;
+    }
+
+    fn stop(&mut self) {
+        (self.running, self.capturing) = (false, false);
+        (self.band_flag, self.frame_flag, self.overrun_flag) = (false, false, false);
+    }
+
+    fn take_finished(&mut self) -> bool {
+        core::mem::take(&mut self.band_flag)
+    }
+
+    fn writes_second(&self) -> bool {
+        self.second
+    }
+
+    fn aim(&mut self, slot: u16) {
+        self.targets[usize::from(!self.second)] = slot;
+    }
+
+    fn has_begun_a_band(&self) -> bool {
+        self.position > 0
+    }
+
+    fn newest_edge(&self) -> Edge {
+        self.edge
+    }
+}
+
+/// How prompt everybody is.
+#[derive(Clone, Debug)]
+pub struct Pace {
+    /// Words of time until interrupts are served, in turns.
+    pub interrupts: Vec<usize>,
+    /// Words of time from one step of the follower to the next, in turns.
+    pub follower: Vec<usize>,
+}
+
+impl Pace {
+    pub fn prompt() -> Self {
+        Pace {
+            interrupts: std::vec![0],
+            follower: std::vec![0],
+        }
+    }
+}
+
+/// Everything together.
+pub struct World {
+    pub chip: Chip,
+    pub tracker: Tracker,
+    follower: Follower,
+    pub events: VecDeque<Event>,
+    pace: Pace,
+    now: usize,
+    interrupts_at: usize,
+    follower_at: usize,
+    turns: usize,
+    window: Window,
+    scanned: Vec<u32>,
+    pub delivered: Vec<(u32, Window, Vec<u32>)>,
+    pub after: Vec<(bool, bool)>,
+    pub tally: Tally,
+}
+
+impl World {
+    pub fn new(pace: Pace) -> Self {
+        let mut world = World {
+            chip: Chip::new(),
+            tracker: Tracker::new(SHAPE, WHOLE),
+            follower: Follower::new(SHAPE),
+            events: VecDeque::new(),
+            pace,
+            now: 0,
+            interrupts_at: 0,
+            follower_at: 0,
+            turns: 0,
+            window: WHOLE,
+            scanned: Vec::new(),
+            delivered: Vec::new(),
+            after: Vec::new(),
+            tally: Tally::default(),
+        };
+        world.tracker.start(&mut world.chip);
+        world
+    }
+
+    /// The camera sends a frame.
+    pub fn send(&mut self, frame: Sent) {
+        let number = self.chip.edge.number + 1;
+        self.chip.edge = Edge {
+            number,
+            time_us: self.now as u64,
+        };
+        self.chip.capturing = self.chip.running;
+        self.pass(BACK);
+        for word in 0..frame.words {
+            if frame.overrun_at == Some(word) && self.chip.capturing {
+                self.chip.capturing = false;
+                self.chip.overrun_flag = true;
+            }
+            self.chip.word(word, value(number, word));
+            self.pass(1);
+        }
+        self.pass(FRONT);
+        if core::mem::take(&mut self.chip.capturing) {
+            self.chip.frame_flag = true;
+        }
+        self.pass(PULSE);
+    }
+
+    /// Time passes.
+    pub fn pass(&mut self, words: usize) {
+        for _ in 0..words {
+            self.now += 1;
+            if self.now >= self.interrupts_at && self.serve() {
+                let delays = &self.pace.interrupts;
+                self.interrupts_at = self.now + 1 + delays[self.now % delays.len()];
+            }
+            if self.now >= self.follower_at {
+                let delays = &self.pace.follower;
+                self.follower_at = self.now + 1 + delays[self.turns % delays.len()];
+                self.turns += 1;
+                self.follow();
+            }
+        }
+    }
+
+    /// Handles what stands; answers whether anything did.
+    fn serve(&mut self) -> bool {
+        let Chip {
+            band_flag,
+            frame_flag,
+            overrun_flag,
+            ..
+        } = self.chip;
+        let events = &mut self.events;
+        let mut tell = |event| {
+            if events.len() < EVENTS {
+                events.push_back(event);
+            }
+        };
+        if band_flag {
+            self.tracker.band_finished(&mut self.chip, &mut tell);
+        }
+        if core::mem::take(&mut self.chip.overrun_flag) {
+            self.tracker.overrun(&mut self.chip, &mut tell);
+        } else if core::mem::take(&mut self.chip.frame_flag) {
+            self.tracker.frame_ended(&mut self.chip, &mut tell);
+        }
+        band_flag | frame_flag | overrun_flag
+    }
+
+    /// The processor's step: one event, or an early delivery.
+    fn follow(&mut self) {
+        let early =
+            self.events.is_empty() && self.follower.is_complete() && !self.chip.has_begun_a_band();
+        let action = match self.events.pop_front() {
+            Some(event) => self.follower.event(event),
+            None if early => self.follower.deliver(),
+            None => Action::None,
+        };
+        match action {
+            Action::None => {}
+            Action::Scan(band) => {
+                if band.index == 0 {
+                    self.scanned.clear();
+                    self.window = band.window;
+                }
+                self.scanned
+                    .extend(self.chip.slot(SHAPE.slot(band.sequence)));
+                let intact = SHAPE.intact(band.sequence, self.tracker.finished());
+                self.follower.scanned(intact);
+            }
+            Action::Deliver(delivery) => {
+                self.delivered
+                    .push((delivery.edge.number, self.window, self.scanned.clone()));
+                self.after
+                    .push((delivery.after_loss, delivery.after_overrun));
+            }
+        }
+        let Tally {
+            processed,
+            busy,
+            overrun,
+            size,
+        } = self.follower.take_tally();
+        self.tally.processed += processed;
+        self.tally.busy += busy;
+        self.tally.overrun += overrun;
+        self.tally.size += size;
+    }
+
+    pub fn numbers(&self) -> Vec<u32> {
+        self.delivered.iter().map(|(number, ..)| *number).collect()
+    }
+
+    /// Every delivered frame is the camera's, word by word, and none comes twice or late.
+    pub fn check_contents(&self) {
+        for (number, window, words) in &self.delivered {
+            let rows = usize::from(window.top)..usize::from(window.top + window.height);
+            let sent: Vec<u32> = rows.map(|row| value(*number, row)).collect();
+            assert_eq!(words, &sent, "frame {number}");
+        }
+        assert!(
+            self.numbers().is_sorted_by(|a, b| a < b),
+            "{:?}",
+            self.numbers()
+        );
+    }
+
+    /// A good frame after everything else, with time for all, so that every frame's end is known.
+    pub fn settle(&mut self) {
+        self.pace = Pace::prompt();
+        (self.interrupts_at, self.follower_at) = (0, 0);
+        self.pass(10 * FRAME);
+        self.send(GOOD);
+        self.pass(10 * FRAME);
+    }
+
+    pub fn counted(&self) -> u32 {
+        self.tally.processed + self.tally.busy + self.tally.overrun + self.tally.size
+    }
+}
+
+pub fn value(frame: u32, word: usize) -> u32 {
+    frame << 16 | word as u32
+}

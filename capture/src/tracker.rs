@@ -1,0 +1,202 @@
+//! The interrupts' side: steers the DMA, and finds out where frames begin and end.
+
+use crate::event::{Band, Edge, Ending, Event};
+use crate::shape::Shape;
+use crate::window::Window;
+
+/// The camera interface and its double-buffered DMA, as the tracker needs them.
+pub trait Interface {
+    /// Stops everything, throws away what is under way, and begins again: `window` of the next frame that begins goes
+    /// to slot `first`, then to slot `second`.
+    fn restart(&mut self, window: Window, first: u16, second: u16);
+
+    /// Stops everything.
+    fn stop(&mut self);
+
+    /// Whether the DMA has finished a band since this was asked last.
+    fn take_finished(&mut self) -> bool;
+
+    /// Whether the DMA writes to the second of its two targets now; the first after a restart, then in turns.
+    fn writes_second(&self) -> bool;
+
+    /// Makes `slot` the target that the DMA does not write to now: the next one.
+    fn aim(&mut self, slot: u16);
+
+    /// Whether anything has come since the newest band was finished.
+    fn has_begun_a_band(&self) -> bool;
+
+    /// The newest VSYNC edge that began a frame.
+    fn newest_edge(&self) -> Edge;
+}
+
+/// Follows one camera. Its methods are called in interrupts of one priority, so that none interrupts another.
+#[derive(Debug)]
+pub struct Tracker {
+    shape: Shape,
+    /// What is captured now.
+    window: Window,
+    /// What is to be captured.
+    wanted: Window,
+    running: bool,
+    /// No band has come since a frame ended or everything began again.
+    idle: bool,
+    finished: u32,
+    /// The DMA's target as far as it is known.
+    second: bool,
+    /// Band of the frame that comes next.
+    index: u16,
+    /// The frame that `index` belongs to, or the newest one when `index` is 0.
+    frame: Edge,
+}
+
+impl Tracker {
+    /// A tracker at rest, of whole frames `frame`.
+    pub const fn new(shape: Shape, frame: Window) -> Self {
+        Tracker {
+            shape,
+            window: frame,
+            wanted: frame,
+            running: false,
+            idle: false,
+            finished: 0,
+            second: false,
+            index: 0,
+            frame: Edge {
+                number: 0,
+                time_us: 0,
+            },
+        }
+    }
+
+    /// Bands finished since boot, modulo 2³².
+    pub fn finished(&self) -> u32 {
+        self.finished
+    }
+
+    /// Captures only `window`, which is [capturable](Window::capturable), from the next frame on; while one is under way,
+    /// from the next frame on after its end.
+    pub fn set_window(&mut self, window: Window, interface: &mut impl Interface) {
+        self.wanted = window;
+        let between_frames =
+            self.idle && interface.newest_edge() == self.frame && !interface.has_begun_a_band();
+        if self.running && between_frames && window != self.window {
+            self.restart(interface);
+        }
+    }
+
+    /// Begins with the next frame.
+    pub fn start(&mut self, interface: &mut impl Interface) {
+        self.running = true;
+        self.frame = interface.newest_edge();
+        self.restart(interface);
+    }
+
+    /// Stops. A frame under way is told as short.
+    pub fn stop(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
+        self.give_up_begun(interface, tell);
+        self.running = false;
+        interface.stop();
+    }
+
+    /// The DMA has finished a band.
+    pub fn band_finished(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
+        if !interface.take_finished() || !self.running {
+            return;
+        }
+        self.second = !self.second;
+        if interface.writes_second() != self.second {
+            // Another band was finished meanwhile, and the DMA is where it was before.
+            return self.broken(Ending::Late, interface, tell);
+        }
+        let edge = interface.newest_edge();
+        match (self.index, edge == self.frame) {
+            (0, true) => return self.broken(Ending::Long, interface, tell),
+            (0, false) => self.frame = edge,
+            (_, true) => {}
+            (_, false) => return self.broken(Ending::Late, interface, tell),
+        }
+        self.idle = false;
+        tell(Event::Band(Band {
+            sequence: self.finished,
+            index: self.index,
+            window: self.window,
+            edge,
+        }));
+        self.finished = self.finished.wrapping_add(1);
+        self.index = (self.index + 1) % self.window.bands(self.shape);
+        interface.aim(self.shape.slot(self.finished.wrapping_add(1)));
+    }
+
+    /// The camera interface says that a frame has ended.
+    pub fn frame_ended(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
+        self.band_finished(interface, tell);
+        if !self.running {
+            return;
+        }
+        let edge = interface.newest_edge();
+        let complete = self.index == 0 && edge == self.frame;
+        match (complete, interface.has_begun_a_band()) {
+            (true, false) => {
+                self.idle = true;
+                if self.wanted != self.window {
+                    self.restart(interface);
+                }
+                tell(Event::Ended {
+                    edge,
+                    how: Ending::Whole,
+                });
+            }
+            (true, true) => self.broken(Ending::Long, interface, tell),
+            (false, _) => self.broken(Ending::Short, interface, tell),
+        }
+    }
+
+    /// The camera interface, or the DMA, has lost data.
+    pub fn overrun(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
+        if self.running {
+            self.broken(Ending::Overrun, interface, tell);
+        }
+    }
+
+    /// Nothing has happened for too long.
+    pub fn silence(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
+        if self.running {
+            self.give_up_begun(interface, tell);
+            self.restart(interface);
+        }
+    }
+
+    /// Tells a frame that has begun and not ended as short.
+    fn give_up_begun(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
+        let edge = interface.newest_edge();
+        if self.running && (self.index > 0 || edge != self.frame) {
+            tell(Event::Ended {
+                edge,
+                how: Ending::Short,
+            });
+            self.frame = edge;
+        }
+    }
+
+    /// Gives the frame up, and begins again with the next.
+    fn broken(
+        &mut self,
+        how: Ending,
+        interface: &mut impl Interface,
+        tell: &mut impl FnMut(Event),
+    ) {
+        let edge = interface.newest_edge();
+        self.frame = edge;
+        self.restart(interface);
+        tell(Event::Ended { edge, how });
+    }
+
+    fn restart(&mut self, interface: &mut impl Interface) {
+        self.index = 0;
+        self.idle = true;
+        self.second = false;
+        self.window = self.wanted;
+        let next = self.shape.slot(self.finished.wrapping_add(1));
+        interface.restart(self.window, self.shape.slot(self.finished), next);
+    }
+}
