@@ -22,7 +22,7 @@ bits! {
     MARKERS_MISSING = 0, "markers_missing";
     /// More than one reading of the blobs as four markers is plausible, or none is: no force.
     MARKERS_AMBIGUOUS = 1, "markers_ambiguous";
-    /// More runs or blobs than the fixed storage holds: no force.
+    /// More blobs than the fixed storage holds, or more runs than noise is given time for: no force.
     BLOB_OVERFLOW = 2, "blob_overflow";
     /// Areas or shapes of the four markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
