@@ -11,7 +11,7 @@ use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
 use rayon::prelude::*;
 
-use crate::dataset::{Recipe, measure, reasons};
+use crate::dataset::{Loads, Recipe, measure, reasons};
 use crate::errors::{Errors, WEAK_N};
 use crate::weights::Range;
 
@@ -38,7 +38,7 @@ pub fn check(
 ) -> Result<Report> {
     let model = Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
     let recipe = recipe(&model, samples, seed);
-    let scene = recipe.scene()?;
+    let scene = recipe.scene(0)?;
     let eyes = || sensor(&model);
     let measured = (0..samples).into_par_iter().map_init(eyes, |sensor, row| {
         let sensor = sensor.as_mut().map_err(|error| anyhow!("{error}"))?;
@@ -78,9 +78,11 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Recipe {
         preset: model.conditions.preset,
         width,
         height,
-        samples,
+        centroid: model.conditions.centroid.into(),
+        loads: Loads::Random(samples),
         rest: 0,
         range,
+        sessions: 1,
         seed,
     }
 }
@@ -95,7 +97,7 @@ fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
 }
 
 /// The force's vector in N, rebuilt from its angles: this holds for every contact reading.
-fn vector_n(force: Force) -> [f64; 3] {
+pub(crate) fn vector_n(force: Force) -> [f64; 3] {
     let degrees = |angle: i32| (f64::from(angle) / 1e3).to_radians();
     let (sin_a, cos_a) = degrees(force.alpha.0).sin_cos();
     let (sin_b, cos_b) = degrees(force.beta.0).sin_cos();
@@ -130,7 +132,7 @@ impl fmt::Display for Report {
         writeln!(f, "model                 {model}")?;
         writeln!(
             f,
-            "frames                simulated: the same stand-in sensor as in training, other loads and noise"
+            "frames                simulated: the same simulated sensor as in training, other loads and noise"
         )?;
         writeln!(f, "forces                {}", errors.count())?;
         writeln!(

@@ -1,6 +1,7 @@
 //! Under which conditions data was taken and a model holds, in words that files can carry.
 
 use anyhow::{Context, Result};
+use clap::ValueEnum;
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin, PixelFormat};
 use hivtac_sensing::threshold::HsvBox;
@@ -39,11 +40,13 @@ pub enum PixelName {
 }
 
 /// Centroid estimators by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum CentroidName {
     /// The mean of a marker's pixels in the mask.
     BinaryMask,
+    /// The mean of the same pixels, weighted with their redness.
+    RednessWeighted,
 }
 
 /// Contact readings by name.
@@ -62,23 +65,34 @@ pub enum OriginName {
     Simulated,
 }
 
+impl CentroidName {
+    /// The same as the model file holds it.
+    pub fn to_model(self) -> CentroidEstimator {
+        match self {
+            CentroidName::BinaryMask => CentroidEstimator::BinaryMask,
+            CentroidName::RednessWeighted => CentroidEstimator::RednessWeighted,
+        }
+    }
+}
+
+impl From<CentroidEstimator> for CentroidName {
+    fn from(estimator: CentroidEstimator) -> Self {
+        match estimator {
+            CentroidEstimator::BinaryMask => CentroidName::BinaryMask,
+            CentroidEstimator::RednessWeighted => CentroidName::RednessWeighted,
+        }
+    }
+}
+
 impl Conditions {
     /// What the scene renders and the pipeline does by default, at a frame size.
     pub fn simulated(preset: Preset, width: u16, height: u16) -> Self {
-        let red = HsvBox::RED;
         Self {
             preset: preset.name().into(),
             width,
             height,
             pixel_format: PixelName::Rgb565,
-            threshold: [
-                red.hue_low,
-                red.hue_high,
-                red.saturation_low,
-                red.saturation_high,
-                red.value_low,
-                red.value_high,
-            ],
+            threshold: HsvBox::RED.limits(),
             dilations: 1,
             centroid: CentroidName::BinaryMask,
             contact: ContactName::Force,
@@ -92,32 +106,15 @@ impl Conditions {
     /// When there is no such preset.
     pub fn to_model(&self) -> Result<model::Conditions> {
         let preset = preset(&self.preset)?;
-        let [
-            hue_low,
-            hue_high,
-            saturation_low,
-            saturation_high,
-            value_low,
-            value_high,
-        ] = self.threshold;
         Ok(model::Conditions {
             preset,
             geometry: Geometry::preset(preset, self.width, self.height),
             pixel_format: match self.pixel_format {
                 PixelName::Rgb565 => PixelFormat::Rgb565,
             },
-            threshold: HsvBox {
-                hue_low,
-                hue_high,
-                saturation_low,
-                saturation_high,
-                value_low,
-                value_high,
-            },
+            threshold: HsvBox::of_limits(self.threshold),
             dilations: self.dilations,
-            centroid: match self.centroid {
-                CentroidName::BinaryMask => CentroidEstimator::BinaryMask,
-            },
+            centroid: self.centroid.to_model(),
             contact: match self.contact {
                 ContactName::Force => ContactReading::Force,
             },

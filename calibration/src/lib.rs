@@ -2,26 +2,33 @@
 //!
 //! ```text
 //! loads → scene → frames → sensing → data set (CSV) → train → weights (JSON, floats)
-//!    → quantize → model file (.hvtm, integers) → check, on frames that no training saw
+//!    → quantize → model file (.hvtm, integers) → evaluate, check, on frames that no training saw
 //! ```
 //!
 //! | file | subject |
 //! |---|---|
 //! | `loads`, `dataset` | which forces; frames seen by `sensing` itself; the CSV file |
-//! | `train`, `fit` | training with burn (feature `train`); from a data set to weights |
+//! | `train`, `closed_form`, `fit` | networks; closed forms; from a data set to weights |
+//! | `import` | networks trained in PyTorch |
 //! | `network`, `weights`, `conditions` | the network in floats, its file, and what it holds for |
 //! | `quantize` | weights to a model file, the same bytes on every machine |
-//! | `check`, `errors` | how far the model's forces are from the truth |
+//! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
+//! | `plot`, `loss_plot` | SVG |
+//! | `scene` | pictures and figures of the simulated sensor |
 
 pub mod check;
+pub mod closed_form;
 pub mod conditions;
 pub mod dataset;
 pub mod errors;
-#[cfg(feature = "train")]
+pub mod evaluate;
 pub mod fit;
+pub mod import;
 pub mod loads;
+pub mod loss_plot;
 pub mod network;
+pub mod plot;
 pub mod quantize;
-#[cfg(feature = "train")]
+pub mod scene;
 pub mod train;
 pub mod weights;

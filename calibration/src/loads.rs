@@ -12,8 +12,6 @@ use crate::weights::Range;
 pub struct RandomLoads {
     /// The limits.
     pub range: Range,
-    /// How many loads come first that are no load at all; they give the rest position.
-    pub rest: usize,
     /// Decides the loads.
     pub seed: u64,
 }
@@ -24,9 +22,6 @@ impl RandomLoads {
     /// # Errors
     /// When the limits are no limits of a force.
     pub fn load(&self, row: usize) -> Result<Load> {
-        if row < self.rest {
-            return Ok(Load::REST);
-        }
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(row as u64);
         let Range {
@@ -41,6 +36,75 @@ impl RandomLoads {
     }
 }
 
+/// The paper's poses (Section 6): α from −10° to 10°, β from −8° to 8°, in steps of 1°, with |F| uniform from nothing to
+/// its limit.
+#[derive(Clone, Copy, Debug)]
+pub struct PaperPoses {
+    /// The largest |F|, N.
+    pub force_n: f64,
+    /// Decides the forces.
+    pub seed: u64,
+}
+
+impl PaperPoses {
+    /// Largest |α| and |β|, whole degrees.
+    const ALPHA: usize = 10;
+    const BETA: usize = 8;
+    /// How many there are: 21 · 17.
+    pub const COUNT: usize = (2 * Self::ALPHA + 1) * (2 * Self::BETA + 1);
+
+    /// α and β of a pose in degrees; β changes first.
+    pub fn angles_deg(pose: usize) -> [f64; 2] {
+        let betas = 2 * Self::BETA + 1;
+        [
+            (pose / betas) as f64 - Self::ALPHA as f64,
+            (pose % betas) as f64 - Self::BETA as f64,
+        ]
+    }
+
+    /// The load of a row in a pose below [`Self::COUNT`].
+    ///
+    /// # Errors
+    /// When the limit is no force.
+    pub fn load(&self, pose: usize, row: usize) -> Result<Load> {
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(row as u64);
+        let [alpha, beta] = Self::angles_deg(pose);
+        Ok(Load::from_angles(
+            self.force_n * random.random_range(0.0..=1.0),
+            alpha,
+            beta,
+        )?)
+    }
+}
+
+/// Ten loads that are enough for a closed form: sizes from 4 to 100 % of the largest, each tilted by 8° another way.
+#[derive(Clone, Copy, Debug)]
+pub struct KnownLoads {
+    /// The largest |F|, N.
+    pub force_n: f64,
+}
+
+impl KnownLoads {
+    const PARTS: [f64; 10] = [0.04, 0.08, 0.15, 0.25, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0];
+    /// How many there are.
+    pub const COUNT: usize = Self::PARTS.len();
+
+    /// The load of that number, below [`Self::COUNT`].
+    ///
+    /// # Errors
+    /// When the limit is no force.
+    pub fn load(&self, number: usize) -> Result<Load> {
+        const TILTS: [[f64; 2]; 4] = [[8.0, 0.0], [0.0, 8.0], [-8.0, 0.0], [0.0, -8.0]];
+        let [alpha, beta] = TILTS[number % TILTS.len()];
+        Ok(Load::from_angles(
+            self.force_n * Self::PARTS[number],
+            alpha,
+            beta,
+        )?)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -49,13 +113,11 @@ mod tests {
     fn loads_fill_their_range_and_no_more() {
         let loads = RandomLoads {
             range: Range::default(),
-            rest: 3,
             seed: 5,
         };
         let drawn: Vec<Load> = (0..2000).map(|row| loads.load(row).unwrap()).collect();
-        assert!(drawn[..3].iter().all(|load| *load == Load::REST));
         let extent = |of: fn(&Load) -> f64| {
-            let values = drawn[3..].iter().map(of);
+            let values = drawn.iter().map(of);
             (
                 values.clone().fold(f64::MAX, f64::min),
                 values.fold(f64::MIN, f64::max),
@@ -79,10 +141,18 @@ mod tests {
     }
 
     #[test]
+    fn the_papers_poses_are_357() {
+        assert_eq!(PaperPoses::COUNT, 357);
+        assert_eq!(PaperPoses::angles_deg(0), [-10.0, -8.0]);
+        assert_eq!(PaperPoses::angles_deg(1), [-10.0, -7.0]);
+        assert_eq!(PaperPoses::angles_deg(178), [0.0, 0.0]);
+        assert_eq!(PaperPoses::angles_deg(356), [10.0, 8.0]);
+    }
+
+    #[test]
     fn a_row_depends_on_seed_and_number_only() {
         let loads = |seed| RandomLoads {
             range: Range::default(),
-            rest: 0,
             seed,
         };
         assert_eq!(loads(1).load(7).unwrap(), loads(1).load(7).unwrap());

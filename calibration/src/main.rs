@@ -1,6 +1,5 @@
 //! `hivtac-calibrate`: from data to a model on the chip.
 
-#[cfg(feature = "train")]
 mod training;
 
 use std::fs;
@@ -9,10 +8,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use hivtac_calibration::check::check;
-use hivtac_calibration::conditions::preset;
-use hivtac_calibration::dataset::{Dataset, Recipe, generate};
+use hivtac_calibration::conditions::{CentroidName, preset};
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate, generate_file};
+use hivtac_calibration::evaluate::Evaluation;
+use hivtac_calibration::fit::Kind;
+use hivtac_calibration::fit::quick::quick;
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::weights::Weights;
+use hivtac_calibration::scene::SceneCommand;
+use hivtac_calibration::weights::{Range, Weights};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// From data to a model on the chip: data sets, training, quantization, a check.
@@ -25,7 +28,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Render frames of random forces, let the pipeline look at them, write forces and features as CSV.
+    /// Render frames of known forces, let the pipeline look at them, write forces and features as CSV. An interrupted
+    /// run goes on where it was.
     Dataset {
         #[command(flatten)]
         recipe: RecipeArgs,
@@ -34,13 +38,52 @@ enum Command {
         out: PathBuf,
     },
     /// Train a network on a data set; writes a weights file.
-    #[cfg(feature = "train")]
     Train {
         /// The data set.
         #[arg(long)]
         data: PathBuf,
         #[command(flatten)]
         options: training::OptionArgs,
+        /// Fit a closed form first, and train the network on what it leaves.
+        #[arg(long)]
+        with_closed_form: bool,
+        /// The weights file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Fit a closed form (mean radius and mean shift of the markers to the force) to a data set; writes a weights file.
+    ClosedForm {
+        /// The data set.
+        #[arg(long)]
+        data: PathBuf,
+        /// What is held out together.
+        #[arg(long, value_enum, default_value_t)]
+        held_out: Split,
+        /// Decides what is held out.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// The weights file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Fit a closed form to a handful of known loads (4 to 10 and more, some of them tilted, several frames each), and say how
+    /// good it is; writes a weights file.
+    Quick {
+        /// The data set: frames without force, and frames of each load.
+        #[arg(long)]
+        data: PathBuf,
+        /// The weights file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Take a network trained in PyTorch, from a safetensors file; writes a weights file.
+    Import {
+        /// The safetensors file (layout: docs/calibration.md).
+        #[arg(long)]
+        tensors: PathBuf,
+        /// The data set that it was trained on.
+        #[arg(long)]
+        data: PathBuf,
         /// The weights file to write.
         #[arg(long)]
         out: PathBuf,
@@ -65,8 +108,25 @@ enum Command {
         #[command(flatten)]
         frames: CheckArgs,
     },
+    /// Judge a model file on a data set: the paper's figures and numbers as one HTML file.
+    Evaluate {
+        /// The model file.
+        #[arg(long)]
+        model: PathBuf,
+        /// A data set that it was not made from; best the paper's poses (`dataset --per-pose`).
+        #[arg(long)]
+        data: PathBuf,
+        /// Only what a training with this split did not see.
+        #[arg(long, value_enum)]
+        held_out: Option<Split>,
+        /// The seed of that training.
+        #[arg(long, default_value_t = 1, requires = "held_out")]
+        training_seed: u64,
+        /// The HTML file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
     /// All of this from scratch, for the model that firmware and host tool embed.
-    #[cfg(feature = "train")]
     DefaultModel {
         #[command(flatten)]
         recipe: RecipeArgs,
@@ -76,6 +136,9 @@ enum Command {
         #[arg(long, default_value = "calibration/models")]
         out_dir: PathBuf,
     },
+    /// Look at the simulated sensor: frames, its film, what each of its effects does.
+    #[command(subcommand)]
+    Scene(SceneCommand),
 }
 
 #[derive(Args)]
@@ -89,10 +152,28 @@ struct RecipeArgs {
     /// Rows of a frame.
     #[arg(long, default_value_t = 240)]
     height: u16,
-    /// Frames to render.
-    #[arg(long, default_value_t = Recipe::default().samples)]
+    /// How markers' positions are taken: from all pixels of the mask alike, or weighted with their redness.
+    #[arg(long, value_enum, default_value = "redness-weighted")]
+    centroid: CentroidName,
+    /// Random loads in each session, besides the frames of the untouched film.
+    #[arg(long, default_value_t = 40_000, conflicts_with_all = ["per_pose", "known_loads"])]
     samples: usize,
-    /// Decides forces and noise.
+    /// Instead: as many loads for each of the paper's 357 poses.
+    #[arg(long)]
+    per_pose: Option<usize>,
+    /// Instead: as many frames of each of ten tilted loads, for `quick`.
+    #[arg(long, conflicts_with = "per_pose")]
+    known_loads: Option<usize>,
+    /// Frames of the untouched film in each session.
+    #[arg(long, default_value_t = Recipe::default().rest)]
+    rest: usize,
+    /// Largest force, N.
+    #[arg(long, default_value_t = Recipe::default().range.force_n)]
+    force_n: f64,
+    /// Sessions: the first is nominal, the others are mounted, lit and focused a little differently.
+    #[arg(long, default_value_t = 1)]
+    sessions: usize,
+    /// Decides forces, sessions and noise.
     #[arg(long = "data-seed", visible_alias = "seed", default_value_t = 1)]
     data_seed: u64,
 }
@@ -113,35 +194,81 @@ impl RecipeArgs {
             preset: preset(&self.preset)?,
             width: self.width,
             height: self.height,
-            samples: self.samples,
+            centroid: self.centroid,
+            loads: match (self.per_pose, self.known_loads) {
+                (Some(each), _) => Loads::PaperPoses(each),
+                (None, Some(each)) => Loads::Known(each),
+                (None, None) => Loads::Random(self.samples),
+            },
+            rest: self.rest,
+            range: Range {
+                force_n: self.force_n,
+                ..Recipe::default().range
+            },
+            sessions: self.sessions,
             seed: self.data_seed,
-            ..Recipe::default()
         })
     }
 }
 
 fn main() -> Result<()> {
     match Cli::parse().command {
-        Command::Dataset { recipe, out } => make_dataset(&recipe)?.save(&out),
-        #[cfg(feature = "train")]
-        Command::Train { data, options, out } => {
-            training::run(&Dataset::load(&data)?, &options)?.save(&out)
+        Command::Dataset { recipe, out } => make_dataset(&recipe, Some(&out)).map(drop),
+        Command::Train {
+            data,
+            options,
+            with_closed_form,
+            out,
+        } => {
+            let kind = if with_closed_form {
+                Kind::Both
+            } else {
+                Kind::Network
+            };
+            training::run(&Dataset::load(&data)?, &options, kind)?.save(&out)
+        }
+        Command::ClosedForm {
+            data,
+            held_out,
+            seed,
+            out,
+        } => training::closed_form(&Dataset::load(&data)?, held_out, seed)?.save(&out),
+        Command::Quick { data, out } => {
+            let quick = quick(&Dataset::load(&data)?)?;
+            println!("{quick}");
+            quick.weights.save(&out)
+        }
+        Command::Import { tensors, data, out } => {
+            training::import(&Dataset::load(&data)?, &tensors)?.save(&out)
         }
         Command::Export { weights, rest, out } => export_file(&weights, rest.as_deref(), &out),
+        Command::Evaluate {
+            model,
+            data,
+            held_out,
+            training_seed,
+            out,
+        } => {
+            let split = held_out.map(|split| (split, training_seed));
+            evaluate_file(&model, &data, split, &out)
+        }
         Command::Check { model, frames } => check_file(&model, &frames),
-        #[cfg(feature = "train")]
         Command::DefaultModel {
             recipe,
             options,
             out_dir,
         } => default_model(&recipe, &options, &out_dir),
+        Command::Scene(command) => command.run(),
     }
 }
 
-fn make_dataset(args: &RecipeArgs) -> Result<Dataset> {
+fn make_dataset(args: &RecipeArgs, out: Option<&Path>) -> Result<Dataset> {
     let recipe = args.recipe()?;
-    let bar = bar("rendering", recipe.samples);
-    let dataset = generate(&recipe, || bar.inc(1))?;
+    let bar = bar("rendering", recipe.rows());
+    let dataset = match out {
+        Some(out) => generate_file(&recipe, out, |rows| bar.inc(rows))?,
+        None => generate(&recipe, || bar.inc(1))?,
+    };
     bar.finish_and_clear();
     let rejected = dataset.rejected();
     println!(
@@ -166,6 +293,21 @@ fn export_file(weights: &Path, rest: Option<&Path>, out: &Path) -> Result<()> {
     Ok(())
 }
 
+fn evaluate_file(
+    model: &Path,
+    data: &Path,
+    held_out: Option<(Split, u64)>,
+    out: &Path,
+) -> Result<()> {
+    let bytes = fs::read(model).with_context(|| format!("cannot read {}", model.display()))?;
+    let evaluation = Evaluation::of(&bytes, &Dataset::load(data)?, held_out)
+        .with_context(|| format!("cannot judge {} on {}", model.display(), data.display()))?;
+    fs::write(out, evaluation.to_html())
+        .with_context(|| format!("cannot write {}", out.display()))?;
+    println!("{evaluation}\nwrote {}", out.display());
+    Ok(())
+}
+
 fn check_file(model: &Path, args: &CheckArgs) -> Result<()> {
     let bytes = fs::read(model).with_context(|| format!("cannot read {}", model.display()))?;
     let bar = bar("checking", args.samples);
@@ -176,7 +318,6 @@ fn check_file(model: &Path, args: &CheckArgs) -> Result<()> {
     Ok(())
 }
 
-#[cfg(feature = "train")]
 fn default_model(
     recipe: &RecipeArgs,
     options: &training::OptionArgs,
@@ -186,7 +327,7 @@ fn default_model(
         out_dir.join("default.weights"),
         out_dir.join("default.hvtm"),
     );
-    training::run(&make_dataset(recipe)?, options)?.save(&weights)?;
+    training::run(&make_dataset(recipe, None)?, options, Kind::Both)?.save(&weights)?;
     export_file(&weights, None, &model)?;
     check_file(
         &model,

@@ -5,8 +5,68 @@ use serde::{Deserialize, Serialize};
 
 /// Features that enter the network (`sensing::features`).
 pub const INPUTS: usize = 11;
-/// Components of the force that leave it: F_x, F_y, F_z.
+/// Numbers that leave it ([`Meaning`]).
 pub const OUTPUTS: usize = 3;
+
+/// What the three outputs are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Meaning {
+    /// F_x, F_y, F_z in N, film frame.
+    #[default]
+    ForceVector,
+    /// α and β in degrees, |F| in N (the paper's).
+    AnglesMagnitude,
+}
+
+impl Meaning {
+    /// The outputs that mean this force (N); a force without size has the angles 0.
+    pub fn of_force(self, force_n: [f64; 3]) -> [f64; OUTPUTS] {
+        let [x, y, z] = force_n;
+        match self {
+            Meaning::ForceVector => force_n,
+            Meaning::AnglesMagnitude if force_n == [0.0; 3] => [0.0; 3],
+            Meaning::AnglesMagnitude => {
+                let alpha = libm::atan2(x, -z).to_degrees();
+                let beta = libm::atan2(y, (x * x + z * z).sqrt()).to_degrees();
+                [alpha, beta, (x * x + y * y + z * z).sqrt()]
+            }
+        }
+    }
+
+    /// The force (N) that these outputs mean.
+    pub fn to_force(self, outputs: [f64; OUTPUTS]) -> [f64; 3] {
+        match self {
+            Meaning::ForceVector => outputs,
+            Meaning::AnglesMagnitude => {
+                let (sin_a, cos_a) = libm::sincos(outputs[0].to_radians());
+                let (sin_b, cos_b) = libm::sincos(outputs[1].to_radians());
+                [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| part * outputs[2])
+            }
+        }
+    }
+
+    /// The chip's steps (µN, m°) in one unit of each output.
+    pub fn chip_units(self) -> [f64; OUTPUTS] {
+        match self {
+            Meaning::ForceVector => [1e6; 3],
+            Meaning::AnglesMagnitude => [1e3, 1e3, 1e6],
+        }
+    }
+}
+
+/// How the chip holds weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Arithmetic {
+    /// int8 weights with a scale for each output of a layer.
+    #[default]
+    Int8PerChannel,
+    /// int8 weights with one scale for a layer.
+    Int8PerTensor,
+    /// int16 weights with a scale for each output of a layer, and activations of twelve bits.
+    Int16,
+}
 
 /// One layer: y = W·x + b. Every layer but a network's last is followed by ReLU.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,7 +100,7 @@ impl Layer {
 }
 
 /// Mean and standard deviation, component by component.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Standardization {
     /// Means.
     pub mean: Vec<f64>,
@@ -96,14 +156,21 @@ impl Standardization {
     }
 }
 
-/// A network with its input and output scaling: features in pixels to a force in newtons.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// A network with its input and output scaling: features in pixels to a force in newtons. One without layers answers
+/// nothing: a closed form does then.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Network {
+    /// What its outputs are.
+    #[serde(default)]
+    pub meaning: Meaning,
+    /// How the chip holds its weights.
+    #[serde(default)]
+    pub arithmetic: Arithmetic,
     /// Features in px (the rectangle's area in px²).
     pub input: Standardization,
-    /// Force components in N.
+    /// The outputs, in the units of their meaning.
     pub output: Standardization,
-    /// For each hidden layer, the largest activation that its seven bits can carry (see `quantize`).
+    /// For each hidden layer, the largest activation that the chip can carry (see `quantize`).
     pub activation_max: Vec<f64>,
     /// The layers, in order.
     pub layers: Vec<Layer>,
@@ -115,7 +182,6 @@ impl Network {
     /// # Errors
     /// Says which part does not fit.
     pub fn validate(&self) -> Result<()> {
-        ensure!(!self.layers.is_empty(), "the network has no layers");
         let scaling = |s: &Standardization, n: usize| s.mean.len() == n && s.sigma.len() == n;
         ensure!(
             scaling(&self.input, INPUTS),
@@ -145,7 +211,7 @@ impl Network {
     }
 
     fn validate_layers(&self) -> Result<()> {
-        let hidden = self.layers.len() - 1;
+        let hidden = self.layers.len().saturating_sub(1);
         ensure!(
             self.activation_max.len() == hidden,
             "{hidden} hidden layers need {hidden} activation maxima"
@@ -168,18 +234,22 @@ impl Network {
             inputs = layer.outputs();
         }
         ensure!(
-            inputs == OUTPUTS,
+            inputs == OUTPUTS || self.layers.is_empty(),
             "the last layer has {inputs} outputs instead of {OUTPUTS}"
         );
         Ok(())
     }
 
     /// The float reference: features (px, px²) to a force (N).
+    pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
+        self.meaning.to_force(self.predict(features))
+    }
+
+    /// Features (px, px²) to the three outputs, in the units of their meaning.
     pub fn predict(&self, features: &[f64; INPUTS]) -> [f64; OUTPUTS] {
-        let (last, hidden) = self
-            .layers
-            .split_last()
-            .expect("validated: at least one layer");
+        let Some((last, hidden)) = self.layers.split_last() else {
+            return [0.0; OUTPUTS];
+        };
         let mut x = self.input.forward(features);
         for layer in hidden {
             x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
@@ -191,7 +261,7 @@ impl Network {
     /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so that a layer
     /// that never fires can still be scaled.
     pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
-        let mut maxima = vec![1e-6; self.layers.len() - 1];
+        let mut maxima = vec![1e-6; self.layers.len().saturating_sub(1)];
         for row in rows {
             let mut x = self.input.forward(row);
             for (layer, max) in self.layers.iter().zip(&mut maxima) {
@@ -235,6 +305,8 @@ mod tests {
             bias: vec![0.0, 1.0, -1.0],
         };
         Network {
+            meaning: Meaning::ForceVector,
+            arithmetic: Arithmetic::Int8PerChannel,
             input: ones(INPUTS),
             output: ones(OUTPUTS),
             activation_max: vec![1.0],
@@ -255,6 +327,30 @@ mod tests {
     }
 
     #[test]
+    fn angles_and_vector_mean_the_same_force() {
+        for force in [
+            [0.01, -0.02, -0.1],
+            [0.0, 0.0, -0.2],
+            [0.0; 3],
+            [-0.03, 0.0, -0.01],
+        ] {
+            for meaning in [Meaning::ForceVector, Meaning::AnglesMagnitude] {
+                let back = meaning.to_force(meaning.of_force(force));
+                let off = force
+                    .iter()
+                    .zip(back)
+                    .map(|(a, b)| (a - b).abs())
+                    .fold(0.0, f64::max);
+                assert!(off < 1e-15, "{meaning:?} {force:?} {back:?}");
+            }
+        }
+        let [alpha, beta, size] = Meaning::AnglesMagnitude.of_force([0.1, 0.0, -0.1]);
+        assert!(
+            (alpha - 45.0).abs() < 1e-12 && beta == 0.0 && (size - 0.02_f64.sqrt()).abs() < 1e-15
+        );
+    }
+
+    #[test]
     fn parts_that_do_not_fit_are_refused() {
         let refused = |change: fn(&mut Network), words: &str| {
             let mut network = tiny();
@@ -262,7 +358,7 @@ mod tests {
             let error = network.validate().unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         };
-        refused(|n| n.layers.clear(), "no layers");
+        refused(|n| n.layers.clear(), "activation maxima");
         refused(|n| n.layers[0].weights[1].truncate(3), "layer 0");
         refused(|n| n.layers[1].bias.truncate(2), "biases");
         refused(|n| n.layers[1].weights.truncate(2), "layer 1");

@@ -1,22 +1,19 @@
 //! Floats to the chip's integers (`docs/architecture.md`, model file).
 //!
-//! Weights become int8 with a scale for each output, activations seven bits, biases the accumulator's unit, and what
-//! is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in a fixed order: the same
+//! Weights become integers with a scale for each output (int8 and activations of seven bits, or int16 and twelve; the first
+//! layer is always int16), biases the accumulator's unit, and what is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in a fixed order: the same
 //! weights give the same bytes on every machine.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::FEATURES;
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
-use hivtac_sensing::model::{self, InputScaling, OutputKind};
+use hivtac_sensing::model::{self, InputScaling, MAX_ACTIVATION8, OutputKind, WeightWidth};
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
 
-use crate::network::{Layer, Network, Standardization};
+use crate::closed_form::ClosedForm;
+use crate::network::{Arithmetic, Layer, Meaning, Network, Standardization};
 use crate::weights::{Range, Rest, Uncertainty, Weights, features_from_q16};
 
-/// Weights are −127 to 127.
-pub const LARGEST_WEIGHT: u8 = 127;
-/// Activations are 0 to 127.
-pub const LARGEST_ACTIVATION: u8 = 127;
 /// Steps of the network's input in one standard deviation of a feature.
 const INPUT_STEPS: f64 = 4096.0;
 /// A pixel in Q16.16.
@@ -25,8 +22,13 @@ const PX: f64 = 65_536.0;
 const INPUT_MULTIPLIER_BITS: u32 = 24;
 const LAYER_MULTIPLIER_BITS: u32 = 31;
 const LARGEST_SHIFT: u8 = 62;
-/// Largest |bias|; leaves a quarter of the accumulator's range to the products.
-const LARGEST_BIAS: f64 = 1_610_612_736.0;
+/// Largest |accumulator|.
+const LARGEST_SUM: f64 = i32::MAX as f64;
+/// Largest input of the first layer, and of any other after int8 and after int16 arithmetic. Twelve bits of activation
+/// leave as many to weights at 512 inputs.
+const LARGEST_INPUT: u16 = 1 << 15;
+const LARGEST_ACTIVATION8: u16 = MAX_ACTIVATION8;
+const LARGEST_ACTIVATION16: u16 = 4095;
 
 /// The model file of a weights file.
 ///
@@ -43,13 +45,24 @@ pub fn export(weights: &Weights) -> Result<Vec<u8>> {
 /// # Errors
 /// When a number does not fit its field.
 pub fn spec(weights: &Weights) -> Result<ModelSpec> {
-    weights.network.validate()?;
+    weights.check()?;
     Ok(ModelSpec {
         conditions: weights.conditions.to_model()?,
         rest: rest(&weights.rest)?,
         input: input_scaling(&weights.network.input)?,
-        layers: layers(&weights.network)?,
-        output: OutputKind::ForceVector,
+        layers: layers(&weights.network)?
+            .into_iter()
+            .map(|layer| layer.spec)
+            .collect(),
+        closed_form: weights
+            .closed_form
+            .as_ref()
+            .map(ClosedForm::to_chip)
+            .transpose()?,
+        output: match weights.network.meaning {
+            Meaning::ForceVector => OutputKind::ForceVector,
+            Meaning::AnglesMagnitude => OutputKind::AnglesMagnitude,
+        },
         range: range(&weights.range),
         uncertainty: uncertainty(&weights.uncertainty),
     })
@@ -77,7 +90,8 @@ fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
     }
 }
 
-fn input_scaling(input: &Standardization) -> Result<InputScaling> {
+/// How the chip standardizes features.
+pub(crate) fn input_scaling(input: &Standardization) -> Result<InputScaling> {
     let mut mean_q16 = [0; FEATURES];
     let (mut multipliers, mut shifts) = ([0; FEATURES], [0; FEATURES]);
     for i in 0..FEATURES {
@@ -93,30 +107,74 @@ fn input_scaling(input: &Standardization) -> Result<InputScaling> {
     })
 }
 
-/// What one step of a value stands for: at the input, after each hidden layer, and at the output in µN.
-fn layers(network: &Network) -> Result<Vec<LayerSpec>> {
-    let last = network.layers.len() - 1;
-    let mut step = 1.0 / INPUT_STEPS;
-    let mut specs = Vec::with_capacity(network.layers.len());
+/// A layer of integers, and what they stand for.
+pub(crate) struct QuantizedLayer {
+    pub spec: LayerSpec,
+    /// What one step of a weight stands for, for each output.
+    pub scales: Vec<f64>,
+    /// What one step of the layer's input stands for.
+    pub step: f64,
+}
+
+/// The layers of a network as the chip holds them.
+pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
+    let last = network.layers.len().saturating_sub(1);
+    let mut form = Form {
+        step: 1.0 / INPUT_STEPS,
+        largest_input: LARGEST_INPUT,
+        // Its inputs have 16 bits, whatever the others have.
+        width: WeightWidth::Int16,
+        one_scale: network.arithmetic == Arithmetic::Int8PerTensor,
+    };
+    let (width, largest) = match network.arithmetic {
+        Arithmetic::Int8PerChannel | Arithmetic::Int8PerTensor => {
+            (WeightWidth::Int8, LARGEST_ACTIVATION8)
+        }
+        Arithmetic::Int16 => (WeightWidth::Int16, LARGEST_ACTIVATION16),
+    };
+    let mut layers = Vec::with_capacity(network.layers.len());
     for (i, layer) in network.layers.iter().enumerate() {
-        let spec = if i < last {
-            let next = network.activation_max[i] / f64::from(LARGEST_ACTIVATION);
-            let spec = quantize_layer(layer, step, |_| Output {
+        let quantized = if i < last {
+            let next = network.activation_max[i] / f64::from(largest);
+            let output = |_| Output {
                 factor: 1.0 / next,
                 offset: 0.0,
-            });
-            step = next;
-            spec
+            };
+            let mut quantized = quantize_layer(layer, &form, output);
+            form = Form {
+                step: next,
+                largest_input: largest,
+                width,
+                ..form
+            };
+            if let Ok(quantized) = &mut quantized {
+                quantized.spec.largest_activation = largest;
+            }
+            quantized
         } else {
             let (mean, sigma) = (&network.output.mean, &network.output.sigma);
-            quantize_layer(layer, step, |o| Output {
-                factor: sigma[o] * 1e6,
+            let units = network.meaning.chip_units();
+            let output = |o: usize| Output {
+                factor: sigma[o] * units[o],
                 offset: mean[o] / sigma[o],
-            })
+            };
+            quantize_layer(layer, &form, output)
         };
-        specs.push(spec.with_context(|| format!("layer {i}"))?);
+        layers.push(quantized.with_context(|| format!("layer {i}"))?);
     }
-    Ok(specs)
+    Ok(layers)
+}
+
+/// How a layer is to be held.
+#[derive(Clone, Copy)]
+struct Form {
+    /// What one step of the layer's input stands for.
+    step: f64,
+    /// Its input's largest magnitude, in steps.
+    largest_input: u16,
+    width: WeightWidth,
+    /// Whether all rows have the same scale.
+    one_scale: bool,
 }
 
 /// What becomes of y = W·x + b: (y + offset)·factor.
@@ -125,43 +183,67 @@ struct Output {
     offset: f64,
 }
 
-/// `step` is what one step of the layer's input stands for.
-fn quantize_layer(layer: &Layer, step: f64, output: impl Fn(usize) -> Output) -> Result<LayerSpec> {
+fn quantize_layer(
+    layer: &Layer,
+    form: &Form,
+    output: impl Fn(usize) -> Output,
+) -> Result<QuantizedLayer> {
     let mut spec = LayerSpec {
         inputs: u16::try_from(layer.inputs())?,
         outputs: u16::try_from(layer.outputs())?,
-        weights: Vec::new(),
+        weight_width: form.width,
+        largest_activation: 0,
+        weights: Vec::with_capacity(layer.inputs() * layer.outputs()),
         biases: Vec::new(),
         multipliers: Vec::new(),
         shifts: Vec::new(),
     };
-    for (o, (row, &bias)) in layer.weights.iter().zip(&layer.bias).enumerate() {
-        let Output { factor, offset } = output(o);
-        let bias = f64::from(bias) + offset;
-        let scale = weight_scale(row, bias, step);
+    let step = form.step;
+    let biases = || {
+        layer
+            .bias
+            .iter()
+            .enumerate()
+            .map(|(o, &b)| f64::from(b) + output(o).offset)
+    };
+    let rows = layer.weights.iter().zip(biases());
+    let mut scales: Vec<f64> = rows
+        .map(|(row, bias)| weight_scale(row, bias, form))
+        .collect();
+    if form.one_scale {
+        let largest = scales.iter().copied().fold(0.0, f64::max);
+        scales.fill(largest);
+    }
+    for (o, (row, bias)) in layer.weights.iter().zip(biases()).enumerate() {
+        // A row of zeros without bias is zero at any scale.
+        let scale = if scales[o] > 0.0 { scales[o] } else { 1.0 };
+        scales[o] = scale;
+        let limit = f64::from(form.width.largest_weight());
         spec.weights
-            .extend(row.iter().map(|&w| round_weight(w, scale)));
+            .extend(row.iter().map(|&w| round_weight(w, scale, limit)));
         spec.biases.push((bias / (scale * step)).round() as i32);
         let (multiplier, shift) =
-            multiplier_and_shift(scale * step * factor, LAYER_MULTIPLIER_BITS)
+            multiplier_and_shift(scale * step * output(o).factor, LAYER_MULTIPLIER_BITS)
                 .with_context(|| format!("scaling of output {o}"))?;
         spec.multipliers.push(multiplier);
         spec.shifts.push(shift);
     }
-    Ok(spec)
+    Ok(QuantizedLayer { spec, scales, step })
 }
 
-/// What one step of a row's int8 weights stands for: the largest weight becomes ±127, and the bias must fit.
-fn weight_scale(row: &[f32], bias: f64, step: f64) -> f64 {
-    let largest = row.iter().map(|&w| f64::from(w.abs())).fold(0.0, f64::max);
-    let scale = (largest / f64::from(LARGEST_WEIGHT)).max(bias.abs() / (step * LARGEST_BIAS));
-    // A row of zeros without bias is zero at any scale.
-    if scale > 0.0 { scale } else { 1.0 }
+/// What one step of a row's weights stands for: as little as the width of a weight and the proof that no sum can
+/// overflow allow, each weight being up to half a step larger than it should.
+fn weight_scale(row: &[f32], bias: f64, form: &Form) -> f64 {
+    let sizes = || row.iter().map(|&w| f64::from(w.abs()));
+    let largest = sizes().fold(0.0, f64::max);
+    let input = f64::from(form.largest_input);
+    let sum = sizes().sum::<f64>() * input + bias.abs() / form.step;
+    let room = LARGEST_SUM - 0.5 * row.len() as f64 * input - 1.0;
+    (largest / f64::from(form.width.largest_weight())).max(sum / room)
 }
 
-fn round_weight(weight: f32, scale: f64) -> i8 {
-    let limit = f64::from(LARGEST_WEIGHT);
-    (f64::from(weight) / scale).round().clamp(-limit, limit) as i8
+fn round_weight(weight: f32, scale: f64, limit: f64) -> i16 {
+    (f64::from(weight) / scale).round().clamp(-limit, limit) as i16
 }
 
 /// m and s with m / 2^s nearest to `factor`, m as large as `bits` allow and s at most 62.
@@ -204,19 +286,62 @@ mod tests {
         assert_eq!(multiplier_and_shift(1e-30, 24).unwrap(), (1, 62));
     }
 
+    fn form(width: WeightWidth, one_scale: bool) -> Form {
+        Form {
+            step: 1.0 / 4096.0,
+            largest_input: 127,
+            width,
+            one_scale,
+        }
+    }
+
+    const ONE: Output = Output {
+        factor: 1.0,
+        offset: 0.0,
+    };
+
     #[test]
     fn the_largest_weight_of_each_row_is_127() {
         let layer = Layer {
             weights: vec![vec![0.5, -1.0, 0.25], vec![0.125, 0.0, 0.25]],
             bias: vec![0.5, 0.0],
         };
-        let output = |_| Output {
-            factor: 1.0,
-            offset: 0.0,
-        };
-        let spec = quantize_layer(&layer, 1.0 / 4096.0, output).unwrap();
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int8, false), |_| ONE)
+            .unwrap()
+            .spec;
         assert_eq!(spec.weights, [64, -127, 32, 64, 0, 127]);
         assert_eq!(spec.biases, [260_096, 0]);
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int8, true), |_| ONE)
+            .unwrap()
+            .spec;
+        assert_eq!(
+            spec.weights,
+            [64, -127, 32, 16, 0, 32],
+            "one scale for all rows"
+        );
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int16, false), |_| ONE)
+            .unwrap()
+            .spec;
+        assert_eq!(spec.weights, [16_384, -32_767, 8192, 16_384, 0, 32_767]);
+    }
+
+    #[test]
+    fn wide_rows_keep_within_the_accumulator() {
+        let layer = Layer {
+            weights: vec![vec![0.3; 512]],
+            bias: vec![-3.0],
+        };
+        let form = Form {
+            largest_input: 4095,
+            ..form(WeightWidth::Int16, false)
+        };
+        let spec = quantize_layer(&layer, &form, |_| ONE).unwrap().spec;
+        let products: i64 = spec.weights.iter().map(|&w| i64::from(w) * 4095).sum();
+        let bound = products + i64::from(spec.biases[0]).abs();
+        assert!(
+            bound <= i64::from(i32::MAX) && bound > i64::from(i32::MAX) / 1000 * 998,
+            "{bound}"
+        );
     }
 
     #[test]
@@ -225,11 +350,13 @@ mod tests {
             weights: vec![vec![0.0; 3]; 2],
             bias: vec![0.0, 7.0],
         };
-        let spec = quantize_layer(&layer, 0.01, |_| Output {
+        let output = |_| Output {
             factor: 1000.0,
             offset: 0.0,
-        })
-        .unwrap();
+        };
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int8, false), output)
+            .unwrap()
+            .spec;
         assert_eq!(spec.biases[0], 0);
         let (m, s) = (f64::from(spec.multipliers[1]), i32::from(spec.shifts[1]));
         let y = f64::from(spec.biases[1]) * m / 2_f64.powi(s);

@@ -1,12 +1,18 @@
 //! The training commands.
 
-use anyhow::Result;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_calibration::dataset::Dataset;
+use hivtac_calibration::dataset::{Dataset, Split};
 use hivtac_calibration::errors::{Errors, WEAK_N};
-use hivtac_calibration::fit::fit;
+use hivtac_calibration::fit::{Fit, Kind, adopt, fit, fit_closed_form};
+use hivtac_calibration::loss_plot::LossPlot;
+use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::train::{Options, Progress};
 use hivtac_calibration::weights::Weights;
+use serde::de::DeserializeOwned;
 
 /// How to train.
 #[derive(Args)]
@@ -23,6 +29,24 @@ pub struct OptionArgs {
     /// Rows that share one step.
     #[arg(long, default_value_t = Options::default().batch)]
     batch: usize,
+    /// What the network answers: force-vector, or the paper's angles-magnitude.
+    #[arg(long, value_parser = named::<Meaning>, default_value = "force-vector")]
+    outputs: Meaning,
+    /// How the chip holds weights: int8-per-channel, int8-per-tensor or int16.
+    #[arg(long, value_parser = named::<Arithmetic>, default_value = "int8-per-channel")]
+    arithmetic: Arithmetic,
+    /// End a phase after this many passes without a better loss on held-out rows; 0 for never.
+    #[arg(long, default_value_t = Options::default().patience)]
+    patience: usize,
+    /// What is held out together.
+    #[arg(long, value_enum, default_value_t)]
+    held_out: Split,
+    /// Go on from the network of this weights file.
+    #[arg(long)]
+    start: Option<PathBuf>,
+    /// Draw the losses into this SVG file, again after every pass.
+    #[arg(long)]
+    loss_plot: Option<PathBuf>,
     /// Adam's first step size; it falls linearly.
     #[arg(long, default_value_t = Options::default().learning_rate)]
     learning_rate: f64,
@@ -32,35 +56,80 @@ pub struct OptionArgs {
 }
 
 impl OptionArgs {
-    fn options(&self) -> Options {
-        Options {
+    fn options(&self) -> Result<Options> {
+        let start = self.start.as_deref().map(Weights::load).transpose()?;
+        Ok(Options {
+            meaning: self.outputs,
+            arithmetic: self.arithmetic,
+            patience: self.patience,
+            start: start.map(|weights| weights.network),
             hidden: self.hidden.clone(),
             epochs: self.epochs,
             rounded_epochs: self.rounded_epochs,
             batch: self.batch,
             learning_rate: self.learning_rate,
             seed: self.training_seed,
-        }
+        })
     }
 }
 
+/// A value by the name that files give it.
+fn named<T: DeserializeOwned>(name: &str) -> Result<T, String> {
+    serde_json::from_value(name.into()).map_err(|error| error.to_string())
+}
+
 /// Trains and prints the errors on held-out rows.
-pub fn run(dataset: &Dataset, args: &OptionArgs) -> Result<Weights> {
-    let options = args.options();
+pub fn run(dataset: &Dataset, args: &OptionArgs, kind: Kind) -> Result<Weights> {
+    let options = args.options()?;
+    let mut plot = LossPlot::default();
     let bar = crate::bar("training", options.epochs + options.rounded_epochs);
-    let fitted = fit(dataset, &options, |progress: Progress| {
-        bar.inc(1);
-        let phase = if progress.rounded {
-            "with rounding"
-        } else {
-            "in floats"
-        };
-        bar.set_message(format!("loss {:.5} {phase}", progress.loss));
-    })?;
+    let fitted = fit(
+        dataset,
+        args.held_out,
+        kind,
+        &options,
+        |progress: Progress| {
+            bar.inc(1);
+            let phase = if progress.rounded {
+                "with rounding"
+            } else {
+                "in floats"
+            };
+            bar.set_message(format!("loss {:.5} {phase}", progress.loss));
+            plot.add(progress);
+            if let Some(path) = &args.loss_plot {
+                // The last write is checked below: a plot is no reason to lose a training.
+                let _ = fs::write(path, plot.to_svg());
+            }
+        },
+    )?;
     bar.finish_and_clear();
-    print_errors("held-out rows, floats", &fitted.float);
-    print_errors("held-out rows, quantized", &fitted.quantized);
-    Ok(fitted.weights)
+    if let Some(path) = &args.loss_plot {
+        fs::write(path, plot.to_svg())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(told(fitted, "held-out rows"))
+}
+
+/// Fits a closed form and prints the errors on held-out rows.
+pub fn closed_form(dataset: &Dataset, held_out: Split, seed: u64) -> Result<Weights> {
+    Ok(told(
+        fit_closed_form(dataset, held_out, seed)?,
+        "held-out rows",
+    ))
+}
+
+fn told(fitted: Fit, rows: &str) -> Weights {
+    print_errors(&format!("{rows}, floats"), &fitted.float);
+    print_errors(&format!("{rows}, quantized"), &fitted.quantized);
+    fitted.weights
+}
+
+/// Takes a network from a safetensors file and prints its errors on the data set.
+pub fn import(dataset: &Dataset, tensors: &Path) -> Result<Weights> {
+    let network = hivtac_calibration::import::load(tensors)?;
+    let fitted = adopt(dataset, network, &tensors.display().to_string())?;
+    Ok(told(fitted, "the data set"))
 }
 
 fn print_errors(what: &str, errors: &Errors) {

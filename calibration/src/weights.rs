@@ -7,8 +7,10 @@ use hivtac_sensing::features::{FEATURES, Features};
 use hivtac_sensing::units::Px;
 use serde::{Deserialize, Serialize};
 
+use crate::closed_form::ClosedForm;
 use crate::conditions::Conditions;
-use crate::network::Network;
+use crate::dataset::Split;
+use crate::network::{INPUTS, Network};
 
 /// What the file calls itself.
 const FORMAT: &str = "hivtac-weights 1";
@@ -29,7 +31,10 @@ pub struct Weights {
     pub uncertainty: Uncertainty,
     /// How it came to be, for the reader.
     pub training: Training,
-    /// The network.
+    /// What it gives without the network; the network's answer is added to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_form: Option<ClosedForm>,
+    /// The network; without layers when the closed form does it alone.
     pub network: Network,
 }
 
@@ -40,6 +45,13 @@ pub struct Rest {
     pub features_q16: [i64; FEATURES],
     /// Areas of markers 0–3 in the mask, px.
     pub areas_px: [u32; 4],
+}
+
+impl Rest {
+    /// The features in px (px²).
+    pub fn features_px(&self) -> [f64; FEATURES] {
+        self.features_q16.map(|q16| q16 as f64 / 65_536.0)
+    }
 }
 
 /// The calibrated range: 0 to `force_n`, angles to ± their limit.
@@ -82,12 +94,15 @@ pub struct Training {
     pub data_seed: u64,
     /// Rows trained on.
     pub rows: usize,
-    /// Seed of first weights, shuffling and the choice of held-out rows.
+    /// Seed of first weights, shuffling and the choice of what was held out.
     pub seed: u64,
     /// Passes over the data in floats.
     pub epochs: usize,
     /// Passes with the chip's rounding.
     pub rounded_epochs: usize,
+    /// What was held out together.
+    #[serde(default)]
+    pub split: Split,
 }
 
 impl Weights {
@@ -118,9 +133,36 @@ impl Weights {
             "its format is `{}`, this program reads `{FORMAT}`",
             weights.format
         );
-        weights.network.validate()?;
-        weights.check_numbers()?;
+        weights.check()?;
         Ok(weights)
+    }
+
+    /// Checks that the parts fit each other and that every number is in range.
+    ///
+    /// # Errors
+    /// Says which part is wrong.
+    pub fn check(&self) -> Result<()> {
+        self.network.validate()?;
+        ensure!(
+            self.closed_form.is_some() || !self.network.layers.is_empty(),
+            "it has neither layers nor a closed form"
+        );
+        if let Some(form) = &self.closed_form {
+            form.validate().context("closed_form")?;
+        }
+        self.check_numbers()
+    }
+
+    /// The force (N) of features (px) that were taken from the same rest position, without the chip's rounding.
+    pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
+        let network = self.network.force_n(features);
+        match &self.closed_form {
+            None => network,
+            Some(form) => {
+                let form = form.force_n(features, &self.rest.features_px());
+                std::array::from_fn(|i| form[i] + network[i])
+            }
+        }
     }
 
     fn check_numbers(&self) -> Result<()> {

@@ -12,7 +12,6 @@ fn run(directory: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-#[cfg(feature = "train")]
 fn stdout(output: &Output) -> String {
     assert!(
         output.status.success(),
@@ -28,7 +27,6 @@ fn stderr_of_failure(output: &Output) -> String {
 }
 
 #[test]
-#[cfg(feature = "train")]
 fn from_data_to_a_checked_model() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
@@ -37,7 +35,7 @@ fn from_data_to_a_checked_model() {
         &[
             "dataset",
             "--samples",
-            "200",
+            "136",
             "--seed",
             "4",
             "--out",

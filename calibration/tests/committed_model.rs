@@ -8,7 +8,7 @@ use hivtac_calibration::check::check;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::{ContactReading, Model, Origin, OutputKind};
+use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, Origin, OutputKind};
 use hivtac_sensing::threshold::HsvBox;
 
 fn models() -> PathBuf {
@@ -43,7 +43,8 @@ fn it_is_made_for_the_firmware() {
     assert_eq!(conditions.contact, ContactReading::Force);
     assert_eq!(conditions.origin, Origin::Simulated);
     assert_eq!(model.output, OutputKind::ForceVector);
-    assert_eq!(model.name().as_str(), "11-64-64-3 ov7725");
+    assert_eq!(conditions.centroid, CentroidEstimator::RednessWeighted);
+    assert_eq!(model.name().as_str(), "closed form + 11-64-64-3 ov7725");
 }
 
 #[test]
@@ -51,8 +52,9 @@ fn it_measures_frames_that_no_training_saw() {
     let report = check(&committed(), 400, 77, || ()).unwrap();
     let errors = &report.errors;
     assert_eq!(errors.count(), 400, "rejected: {:?}", report.rejected);
-    assert!(errors.mean_strong_direction_deg() < 0.8, "{report}");
-    assert!(errors.magnitude_rmse_n() < 1.5e-3, "{report}");
+    // A tilted force hardly moves the markers sideways: 0.2 px per degree at 0.2 N and 800×600.
+    assert!(errors.mean_strong_direction_deg() < 0.2, "{report}");
+    assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
 }
 
 #[test]

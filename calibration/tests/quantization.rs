@@ -1,7 +1,9 @@
 //! The exported network against the floats that it came from: never further than its roundings add up to.
 
 use hivtac_calibration::conditions::Conditions;
-use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
+use hivtac_calibration::network::{
+    Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization,
+};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
 use hivtac_sensing::geometry::Preset;
@@ -28,6 +30,8 @@ fn network() -> impl Strategy<Value = Network> {
         layer(6, OUTPUTS),
     )
         .prop_map(|(i, o, a, b, c)| Network {
+            meaning: Meaning::ForceVector,
+            arithmetic: Arithmetic::Int8PerChannel,
             input: Standardization {
                 mean: i.0,
                 sigma: i.1,
@@ -52,6 +56,7 @@ fn weights(network: Network) -> Weights {
         range: Range::default(),
         uncertainty: Uncertainty::default(),
         training: Training::default(),
+        closed_form: None,
         network,
     }
 }
@@ -154,6 +159,8 @@ fn networks_that_the_chip_cannot_hold_are_refused() {
         bias: vec![0.0; outputs],
     };
     let wide = Network {
+        meaning: Meaning::ForceVector,
+        arithmetic: Arithmetic::Int8PerChannel,
         input: ones(INPUTS),
         output: ones(OUTPUTS),
         activation_max: vec![1.0],

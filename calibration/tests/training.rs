@@ -1,14 +1,13 @@
 //! Training, small: it learns, it is repeatable, it says what it cannot learn from.
-#![cfg(feature = "train")]
 
-use hivtac_calibration::dataset::{Dataset, Recipe, generate};
-use hivtac_calibration::fit::fit;
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
+use hivtac_calibration::fit::{Kind, fit};
 use hivtac_calibration::network::{INPUTS, OUTPUTS};
 use hivtac_calibration::train::{Options, Samples, train};
 
 fn data() -> Dataset {
     let recipe = Recipe {
-        samples: 400,
+        loads: Loads::Random(392),
         rest: 8,
         ..Recipe::default()
     };
@@ -28,7 +27,14 @@ fn small() -> Options {
 #[test]
 fn a_few_hundred_frames_teach_the_force() {
     let mut losses = Vec::new();
-    let fitted = fit(&data(), &small(), |progress| losses.push(progress)).unwrap();
+    let fitted = fit(
+        &data(),
+        Split::WithinPose,
+        Kind::Network,
+        &small(),
+        |progress| losses.push(progress),
+    )
+    .unwrap();
     assert_eq!(losses.len(), 90);
     assert_eq!(losses.iter().filter(|p| p.rounded).count(), 30);
     // Standardized forces: always answering their mean has a loss of 1.
@@ -52,7 +58,11 @@ fn the_same_seed_gives_the_same_weights() {
         rounded_epochs: 1,
         ..small()
     };
-    let weights = |options: &Options| fit(&data, options, |_| ()).unwrap().weights;
+    let weights = |options: &Options| {
+        fit(&data, Split::WithinPose, Kind::Network, options, |_| ())
+            .unwrap()
+            .weights
+    };
     assert_eq!(weights(&options), weights(&options));
     let other = Options {
         seed: 2,
@@ -65,9 +75,9 @@ fn the_same_seed_gives_the_same_weights() {
 fn constant_data_trains_to_the_constant() {
     let samples = Samples {
         features: vec![[100.0; INPUTS]; 50],
-        forces: vec![[0.01, 0.0, -0.1]; 50],
+        answers: vec![[0.01, 0.0, -0.1]; 50],
     };
-    let network = train(&samples, &small(), |_| ()).unwrap();
+    let network = train(&samples, &Samples::default(), &small(), |_| ()).unwrap();
     let force = network.predict(&[100.0; INPUTS]);
     for (found, truth) in force.iter().zip([0.01, 0.0, -0.1]) {
         assert!((found - truth).abs() < 0.05, "{force:?}");
@@ -77,17 +87,20 @@ fn constant_data_trains_to_the_constant() {
 #[test]
 fn what_cannot_be_trained_on_is_said() {
     let refused = |samples: &Samples, options: &Options, words: &str| {
-        let error = train(samples, options, |_| ()).unwrap_err().to_string();
+        let error = format!(
+            "{:#}",
+            train(samples, &Samples::default(), options, |_| ()).unwrap_err()
+        );
         assert!(error.contains(words), "{error}");
     };
     let some = Samples {
         features: (0..5).map(|i| [f64::from(i); INPUTS]).collect(),
-        forces: (0..5).map(|i| [f64::from(i); OUTPUTS]).collect(),
+        answers: (0..5).map(|i| [f64::from(i); OUTPUTS]).collect(),
     };
     refused(&Samples::default(), &small(), "no usable row");
     refused(
         &Samples {
-            forces: Vec::new(),
+            answers: Vec::new(),
             ..some.clone()
         },
         &small(),
@@ -128,8 +141,14 @@ fn what_cannot_be_trained_on_is_said() {
 
     let mut untouched_missing = data();
     untouched_missing.rows.drain(..8);
-    let error = fit(&untouched_missing, &small(), |_| ())
-        .unwrap_err()
-        .to_string();
+    let error = fit(
+        &untouched_missing,
+        Split::WithinPose,
+        Kind::Network,
+        &small(),
+        |_| (),
+    )
+    .unwrap_err()
+    .to_string();
     assert!(error.contains("without force"), "{error}");
 }

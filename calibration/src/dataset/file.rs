@@ -3,19 +3,22 @@
 //! The first line names the format, the second holds [`About`] as JSON; both begin with `#`. Features are written as
 //! exact decimals, so that reading gives the very integers that the pipeline produced.
 
-use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::fs;
+use std::num::ParseIntError;
 use std::path::Path;
+use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use csv::StringRecord;
 use hivtac_sensing::features::FEATURES;
 
-use super::{About, Dataset, Observation, PX, Row};
+use super::{About, Dataset, Observation, PX, Place, Row};
 
 const FORMAT: &str =
-    "# hivtac-dataset 1; forces in N in the film frame, features in px (area in px²), areas in px";
-const COLUMNS: [&str; 19] = [
+    "# hivtac-dataset 2; forces in N in the film frame, features in px (area in px²), areas in px";
+const COLUMNS: [&str; 21] = [
+    "session",
+    "pose",
     "fx_n",
     "fy_n",
     "fz_n",
@@ -36,7 +39,8 @@ const COLUMNS: [&str; 19] = [
     "area3_px",
     "status",
 ];
-const FEATURES_AT: usize = 3;
+const FORCE_AT: usize = 2;
+const FEATURES_AT: usize = FORCE_AT + 3;
 const AREAS_AT: usize = FEATURES_AT + FEATURES;
 const STATUS_AT: usize = AREAS_AT + 4;
 
@@ -46,17 +50,9 @@ impl Dataset {
     /// # Errors
     /// When the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
-        let write = || -> Result<()> {
-            let mut file = BufWriter::new(File::create(path)?);
-            writeln!(file, "{FORMAT}\n# {}", serde_json::to_string(&self.about)?)?;
-            let mut table = csv::Writer::from_writer(file);
-            table.write_record(COLUMNS)?;
-            for row in &self.rows {
-                table.write_record(fields(row))?;
-            }
-            Ok(table.flush()?)
-        };
-        write().with_context(|| format!("cannot write {}", path.display()))
+        let mut text = opening(&self.about)?.into_bytes();
+        text.extend(lines(&self.rows)?);
+        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 
     /// Reads a data set.
@@ -98,8 +94,31 @@ impl Dataset {
     }
 }
 
+/// Everything before the rows.
+pub(super) fn opening(about: &About) -> Result<String> {
+    Ok(format!(
+        "{FORMAT}\n# {}\n{}\n",
+        serde_json::to_string(about)?,
+        COLUMNS.join(",")
+    ))
+}
+
+/// The lines of rows.
+pub(super) fn lines(rows: &[Row]) -> Result<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        table.write_record(fields(row))?;
+    }
+    Ok(table.into_inner()?)
+}
+
 fn fields(row: &Row) -> Vec<String> {
-    let mut fields: Vec<String> = row.force_n.iter().map(f64::to_string).collect();
+    let Place { session, pose } = row.place;
+    let mut fields = vec![
+        session.to_string(),
+        pose.map_or(String::new(), |pose| pose.to_string()),
+    ];
+    fields.extend(row.force_n.iter().map(f64::to_string));
     match &row.seen {
         Ok(seen) => {
             fields.extend(seen.features_px().iter().map(f64::to_string));
@@ -115,12 +134,25 @@ fn fields(row: &Row) -> Vec<String> {
 }
 
 fn row(record: &StringRecord) -> Result<Row> {
-    let force_n = [number(record, 0)?, number(record, 1)?, number(record, 2)?];
+    let place = Place {
+        session: whole(record, 0)?,
+        pose: (!record[1].is_empty())
+            .then(|| whole(record, 1))
+            .transpose()?,
+    };
+    let mut force_n = [0.0; 3];
+    for (i, component) in force_n.iter_mut().enumerate() {
+        *component = number(record, FORCE_AT + i)?;
+    }
     let seen = match &record[STATUS_AT] {
         "" => Ok(observation(record)?),
         status => Err(status.to_owned()),
     };
-    Ok(Row { force_n, seen })
+    Ok(Row {
+        place,
+        force_n,
+        seen,
+    })
 }
 
 fn observation(record: &StringRecord) -> Result<Observation> {
@@ -132,12 +164,15 @@ fn observation(record: &StringRecord) -> Result<Observation> {
         *feature = (number(record, FEATURES_AT + i)? * PX).round() as i64;
     }
     for (i, area) in seen.areas_px.iter_mut().enumerate() {
-        let text = &record[AREAS_AT + i];
-        *area = text
-            .parse()
-            .with_context(|| format!("column {}: `{text}`", COLUMNS[AREAS_AT + i]))?;
+        *area = whole(record, AREAS_AT + i)?;
     }
     Ok(seen)
+}
+
+fn whole<T: FromStr<Err = ParseIntError>>(record: &StringRecord, column: usize) -> Result<T> {
+    let text = &record[column];
+    text.parse()
+        .with_context(|| format!("column {}: `{text}`", COLUMNS[column]))
 }
 
 fn number(record: &StringRecord, column: usize) -> Result<f64> {
@@ -188,14 +223,22 @@ mod tests {
             assert!(error.contains(words), "{error}");
         };
         refused(String::new(), "line 1");
-        refused(text.replace("dataset 1", "dataset 9"), "line 1");
+        refused(text.replace("dataset 2", "dataset 9"), "line 1");
         refused(text.replace("\"seed\":3", "\"sead\":3"), "line 2");
         refused(text.replace("area3_px", "area4_px"), "columns");
         refused(
-            text.replace("0,0,0,", "0,zero,0,"),
+            text.replace("0,,0,0,0,", "0,,0,zero,0,"),
             "line 4: column fy_n: `zero`",
         );
-        refused(text.replace("0,0,0,", "0,inf,0,"), "column fy_n");
+        refused(text.replace("0,,0,0,0,", "0,,0,inf,0,"), "column fy_n");
+        refused(
+            text.replace("0,,0,0,0,", "x,,0,0,0,"),
+            "column session: `x`",
+        );
+        refused(
+            text.replace("0,,0,0,0,", "0,-1,0,0,0,"),
+            "column pose: `-1`",
+        );
         refused(text.replace(",200,200,", ",200,2.5,"), "column area");
         refused(text.replace("markers_missing", "a,b"), "line: 7");
     }

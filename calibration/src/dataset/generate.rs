@@ -1,104 +1,18 @@
 //! Data sets from the scene: render a frame, let `sensing` look at it.
 
-use anyhow::{Result, anyhow, ensure};
-use hivtac_scene::{Frame, Preset as ScenePreset, Scene};
+use std::ops::Range;
+
+use anyhow::{Result, anyhow};
+use hivtac_scene::{Frame, Scene};
 use hivtac_sensing::features::Features;
-use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::geometry::Geometry;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::threshold::ByteOrder;
 use rayon::prelude::*;
 
-use super::{About, Dataset, Observation, Row};
-use crate::conditions::Conditions;
-use crate::loads::RandomLoads;
-use crate::weights::Range;
-
-/// What to generate.
-#[derive(Clone, Copy, Debug)]
-pub struct Recipe {
-    /// Lens and camera.
-    pub preset: Preset,
-    /// Columns of a frame.
-    pub width: u16,
-    /// Rows of a frame.
-    pub height: u16,
-    /// Frames in all.
-    pub samples: usize,
-    /// How many of them show the untouched film.
-    pub rest: usize,
-    /// The limits of the forces.
-    pub range: Range,
-    /// Decides loads and noise.
-    pub seed: u64,
-}
-
-impl Default for Recipe {
-    /// The sensor's camera at the firmware's frame size; forces a tenth beyond the calibrated range, so that its
-    /// ends are inside the data.
-    fn default() -> Self {
-        Self {
-            preset: Preset::Ov7725,
-            width: 320,
-            height: 240,
-            samples: 40_000,
-            rest: 64,
-            range: Range {
-                force_n: 0.22,
-                alpha_deg: 11.0,
-                beta_deg: 8.8,
-            },
-            seed: 1,
-        }
-    }
-}
-
-impl Recipe {
-    /// The scene that it renders.
-    ///
-    /// # Errors
-    /// When the scene has no such preset or frame size.
-    pub fn scene(&self) -> Result<Scene> {
-        let preset = match self.preset {
-            Preset::Paper => ScenePreset::Paper,
-            Preset::Ov7725 => ScenePreset::Ov7725,
-        };
-        Ok(Scene::preset(
-            "rest",
-            preset,
-            self.width.into(),
-            self.height.into(),
-            self.seed,
-        )?)
-    }
-
-    /// The load of a row.
-    ///
-    /// # Errors
-    /// When the limits are no limits of a force.
-    pub fn load(&self, row: usize) -> Result<hivtac_scene::Load> {
-        RandomLoads {
-            range: self.range,
-            rest: self.rest,
-            seed: self.seed,
-        }
-        .load(row)
-    }
-
-    fn about(&self, scene: &Scene) -> About {
-        let options = scene.options();
-        About {
-            conditions: Conditions::simulated(self.preset, self.width, self.height),
-            scene: format!(
-                "stand-in film, gain {}, falloff {}, noise {} of 255 levels",
-                options.gain, options.falloff, options.noise
-            ),
-            seed: self.seed,
-            range: self.range,
-        }
-    }
-}
+use super::{Dataset, Observation, Recipe, Row};
 
 /// Renders the frames of a recipe on all cores and looks at each with the pipeline. `progress` is called once for
 /// each frame, from any thread.
@@ -106,36 +20,55 @@ impl Recipe {
 /// # Errors
 /// When the recipe asks for what the scene or the pipeline cannot do.
 pub fn generate(recipe: &Recipe, progress: impl Fn() + Sync) -> Result<Dataset> {
-    ensure!(
-        recipe.rest <= recipe.samples,
-        "{} frames at rest are more than all {}",
-        recipe.rest,
-        recipe.samples
-    );
-    let scene = recipe.scene()?;
-    let eyes = || unmodelled_sensor(recipe);
-    let rows = (0..recipe.samples)
-        .into_par_iter()
-        .map_init(eyes, |sensor, row| {
+    Ok(Dataset {
+        rows: Renderer::new(recipe)?.rows(0..recipe.rows(), progress)?,
+        about: recipe.about()?,
+    })
+}
+
+/// Rows of a recipe, each by itself.
+pub(super) struct Renderer<'a> {
+    recipe: &'a Recipe,
+    scenes: Vec<Scene>,
+}
+
+impl<'a> Renderer<'a> {
+    pub fn new(recipe: &'a Recipe) -> Result<Self> {
+        recipe.check()?;
+        let scenes = (0..recipe.sessions).map(|session| recipe.scene(session));
+        Ok(Self {
+            recipe,
+            scenes: scenes.collect::<Result<_>>()?,
+        })
+    }
+
+    /// Some of the rows, in order.
+    pub fn rows(&self, rows: Range<usize>, progress: impl Fn() + Sync) -> Result<Vec<Row>> {
+        let eyes = || unmodelled_sensor(self.recipe);
+        let rendered = rows.into_par_iter().map_init(eyes, |sensor, row| {
             let sensor = sensor.as_mut().map_err(|error| anyhow!("{error}"))?;
-            let frame = scene.render_load(&recipe.load(row)?, row as u64)?;
+            let place = self.recipe.place(row);
+            let frame =
+                self.scenes[place.session].render_load(&self.recipe.load(row)?, row as u64)?;
             progress();
             Ok(Row {
+                place,
                 force_n: frame.truth.force.vector_n(),
                 seen: observe(sensor, &frame),
             })
         });
-    Ok(Dataset {
-        rows: rows.collect::<Result<Vec<Row>>>()?,
-        about: recipe.about(&scene),
-    })
+        rendered.collect()
+    }
 }
 
 /// A sensor that finds markers and features but knows no model yet.
 fn unmodelled_sensor(recipe: &Recipe) -> Result<Box<Sensor<'static>>> {
     let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
     let mut sensor = Box::new(Sensor::new());
-    let settings = Settings::usual(geometry, ByteOrder::Native);
+    let settings = Settings {
+        centroid: recipe.centroid.to_model(),
+        ..Settings::usual(geometry, ByteOrder::Native)
+    };
     sensor
         .configure(settings, None)
         .map_err(|error| anyhow!("{error}"))?;
@@ -178,13 +111,37 @@ pub(crate) fn reasons(status: Status) -> String {
 mod tests {
     use super::*;
 
+    use super::super::Loads;
+
     fn small(seed: u64) -> Recipe {
         Recipe {
-            samples: 24,
+            loads: Loads::Random(20),
             rest: 4,
             seed,
             ..Recipe::default()
         }
+    }
+
+    #[test]
+    fn the_papers_poses_are_all_there() {
+        let recipe = Recipe {
+            loads: Loads::PaperPoses(1),
+            rest: 1,
+            sessions: 2,
+            ..small(1)
+        };
+        let dataset = generate(&recipe, || ()).unwrap();
+        assert_eq!(dataset.rows.len(), 2 * 358);
+        let row = &dataset.rows[358 + 1 + 356];
+        assert_eq!((row.place.session, row.place.pose), (1, Some(356)));
+        let [x, y, z] = row.force_n;
+        assert!((x.atan2(-z).to_degrees() - 10.0).abs() < 1e-9);
+        assert!((y.atan2(x.hypot(z)).to_degrees() - 8.0).abs() < 1e-9);
+        assert!(
+            dataset.accepted().count() >= 710,
+            "{:?}",
+            dataset.rejected()
+        );
     }
 
     #[test]
@@ -206,7 +163,7 @@ mod tests {
     #[test]
     fn features_are_near_the_true_centroids() {
         let recipe = small(9);
-        let scene = recipe.scene().unwrap();
+        let scene = recipe.scene(0).unwrap();
         let dataset = generate(&recipe, || ()).unwrap();
         for (row, (seen, _)) in dataset.accepted().enumerate() {
             let truth = scene
@@ -224,25 +181,38 @@ mod tests {
 
     #[test]
     fn what_cannot_be_generated_is_said() {
-        let too_many = generate(
-            &Recipe {
-                rest: 30,
+        let refused = |recipe: Recipe, words: &str| {
+            let error = format!("{:#}", generate(&recipe, || ()).unwrap_err());
+            assert!(error.contains(words), "{error}");
+        };
+        refused(
+            Recipe {
+                sessions: 0,
                 ..small(1)
             },
-            || (),
-        )
-        .unwrap_err()
-        .to_string();
-        assert!(too_many.contains("30 frames at rest"), "{too_many}");
-        assert!(
-            generate(
-                &Recipe {
-                    width: 321,
-                    ..small(1)
-                },
-                || ()
-            )
-            .is_err()
+            "session",
+        );
+        refused(
+            Recipe {
+                loads: Loads::Random(0),
+                rest: 0,
+                ..small(1)
+            },
+            "frame",
+        );
+        refused(
+            Recipe {
+                loads: Loads::PaperPoses(usize::MAX),
+                ..small(1)
+            },
+            "more than",
+        );
+        refused(
+            Recipe {
+                width: 321,
+                ..small(1)
+            },
+            "321",
         );
     }
 

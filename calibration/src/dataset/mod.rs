@@ -2,6 +2,10 @@
 
 mod file;
 mod generate;
+mod recipe;
+mod resume;
+mod session;
+mod split;
 
 use std::collections::BTreeMap;
 
@@ -12,8 +16,11 @@ use serde::{Deserialize, Serialize};
 use crate::conditions::Conditions;
 use crate::weights::{Range, Rest};
 
-pub use generate::{Recipe, generate};
+pub use generate::generate;
 pub(crate) use generate::{measure, reasons};
+pub use recipe::{Loads, Recipe};
+pub use resume::generate_file;
+pub use split::Split;
 
 /// A pixel in Q16.16.
 const PX: f64 = 65_536.0;
@@ -35,15 +42,32 @@ pub struct About {
     pub conditions: Conditions,
     /// What the frames show, in words.
     pub scene: String,
-    /// Decides loads and noise.
+    /// The loads of each session.
+    pub loads: Loads,
+    /// Frames of the untouched film in each session.
+    pub rest: usize,
+    /// How many times the sensor was set up anew.
+    pub sessions: usize,
+    /// Decides loads, sessions and noise.
     pub seed: u64,
     /// The limits of its forces.
     pub range: Range,
 }
 
+/// Where a row stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Place {
+    /// Its session, from 0.
+    pub session: usize,
+    /// Its pose among the paper's ([`crate::loads::PaperPoses`]), if it is in one.
+    pub pose: Option<usize>,
+}
+
 /// One frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
+    /// Where it stands.
+    pub place: Place,
     /// The force on the film in N, film frame.
     pub force_n: [f64; 3],
     /// What was seen, or the status names that say why nothing was.
@@ -74,6 +98,14 @@ impl Dataset {
             .filter_map(|row| Some((row.seen.as_ref().ok()?, row.force_n)))
     }
 
+    /// Accepted rows by their numbers; rejected ones are left out.
+    pub fn pick(&self, rows: &[usize]) -> Vec<(&Observation, [f64; 3])> {
+        let picked = rows.iter().map(|&i| &self.rows[i]);
+        picked
+            .filter_map(|row| Some((row.seen.as_ref().ok()?, row.force_n)))
+            .collect()
+    }
+
     /// How many rows were rejected, by status.
     pub fn rejected(&self) -> BTreeMap<&str, usize> {
         let mut counts = BTreeMap::new();
@@ -83,13 +115,42 @@ impl Dataset {
         counts
     }
 
-    /// The rest position: the mean of all accepted rows without force, rounded half up.
+    /// The rest position of the first session: what every other session is compared with.
     ///
     /// # Errors
-    /// When there is no such row.
+    /// When there is no accepted row without force in it.
     pub fn rest(&self) -> Result<Rest> {
-        let untouched = self.accepted().filter(|(_, force)| *force == [0.0; 3]);
-        let seen: Vec<&Observation> = untouched.map(|(seen, _)| seen).collect();
+        self.session_rest(0)
+    }
+
+    /// Rewrites every session's features as if it had the first one's rest position: what a tare does on the chip.
+    ///
+    /// # Errors
+    /// When a session has no accepted row without force.
+    pub fn tared(mut self) -> Result<Self> {
+        let common = self.rest()?;
+        for session in 1..self.about.sessions {
+            let rest = self
+                .session_rest(session)
+                .with_context(|| format!("session {session}"))?;
+            let rows = self
+                .rows
+                .iter_mut()
+                .filter(|row| row.place.session == session);
+            for seen in rows.filter_map(|row| row.seen.as_mut().ok()) {
+                for (i, feature) in seen.features_q16.iter_mut().enumerate() {
+                    *feature += common.features_q16[i] - rest.features_q16[i];
+                }
+            }
+        }
+        Ok(self)
+    }
+
+    /// The rest position of a session: the mean of its accepted rows without force, rounded half up.
+    fn session_rest(&self, session: usize) -> Result<Rest> {
+        let untouched = |row: &&Row| row.place.session == session && row.force_n == [0.0; 3];
+        let rows = self.rows.iter().filter(untouched);
+        let seen: Vec<&Observation> = rows.filter_map(|row| row.seen.as_ref().ok()).collect();
         let count = i64::try_from(seen.len()).ok().filter(|&n| n > 0);
         let count =
             count.context("the data set has no accepted row without force, so no rest position")?;
@@ -118,28 +179,71 @@ mod tests {
         let about = About {
             conditions: Conditions::simulated(Preset::Ov7725, 320, 240),
             scene: "made up".into(),
+            loads: Loads::Random(2),
+            rest: 2,
+            sessions: 1,
             seed: 3,
             range: Range::default(),
         };
         let rows = vec![
             Row {
+                place: Place::default(),
                 force_n: [0.0; 3],
                 seen: Ok(seen(10)),
             },
             Row {
+                place: Place::default(),
                 force_n: [0.0; 3],
                 seen: Ok(seen(11)),
             },
             Row {
+                place: Place::default(),
                 force_n: [0.0, 0.1, -0.1],
                 seen: Ok(seen(1 << 32)),
             },
             Row {
+                place: Place::default(),
                 force_n: [0.0, 0.0, -0.1],
                 seen: Err("markers_missing".into()),
             },
         ];
         Dataset { about, rows }
+    }
+
+    /// As many sessions of one rest row each and poses of `each` rows.
+    pub(super) fn many(sessions: usize, poses: usize, each: usize) -> Dataset {
+        let row = |session: usize, pose: Option<usize>, i: usize| Row {
+            place: Place { session, pose },
+            force_n: [0.0, 0.0, pose.map_or(0.0, |_| -0.01 * (i + 1) as f64)],
+            seen: Ok(Observation {
+                features_q16: std::array::from_fn(|f| (1000 * session + 10 * i + f) as i64),
+                areas_px: [200; 4],
+            }),
+        };
+        let session = |s: usize| {
+            let pressed = (0..poses * each).map(move |i| row(s, Some(i / each), i));
+            std::iter::once(row(s, None, 0)).chain(pressed)
+        };
+        let mut about = example().about;
+        (about.sessions, about.rest, about.loads) = (sessions, 1, Loads::PaperPoses(each));
+        Dataset {
+            about,
+            rows: (0..sessions).flat_map(session).collect(),
+        }
+    }
+
+    #[test]
+    fn a_tare_makes_sessions_comparable() {
+        let tared = many(3, 2, 2).tared().unwrap();
+        let of = |session: usize| -> Vec<_> {
+            let rows = tared.rows.iter().filter(|row| row.place.session == session);
+            rows.map(|row| (row.force_n, row.seen.clone())).collect()
+        };
+        assert_eq!(of(0), of(1));
+        assert_eq!(of(0), of(2));
+        let mut untouched_missing = many(2, 2, 2);
+        untouched_missing.rows.remove(5);
+        assert!(format!("{:#}", untouched_missing.tared().unwrap_err()).contains("session 1"));
     }
 
     #[test]

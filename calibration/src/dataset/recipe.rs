@@ -1,0 +1,170 @@
+//! What a data set shows: camera, sessions, loads.
+
+use anyhow::{Context, Result, ensure};
+use hivtac_scene::{Load, Options, Preset as ScenePreset, Scene};
+use hivtac_sensing::geometry::Preset;
+use serde::{Deserialize, Serialize};
+
+use super::session::Session;
+use super::{About, Place};
+use crate::conditions::{CentroidName, Conditions};
+use crate::loads::{KnownLoads, PaperPoses, RandomLoads};
+use crate::weights::Range;
+
+/// Which loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Loads {
+    /// As many, with force and angles uniform within the range.
+    Random(usize),
+    /// As many for each of the paper's 357 poses, with the force uniform within the range.
+    PaperPoses(usize),
+    /// As many frames of each of ten loads that are enough for a closed form.
+    Known(usize),
+}
+
+/// What to generate.
+#[derive(Clone, Copy, Debug)]
+pub struct Recipe {
+    /// Lens and camera.
+    pub preset: Preset,
+    /// Columns of a frame.
+    pub width: u16,
+    /// Rows of a frame.
+    pub height: u16,
+    /// How markers' positions are taken.
+    pub centroid: CentroidName,
+    /// The loads of each session.
+    pub loads: Loads,
+    /// Frames of the untouched film, first in each session.
+    pub rest: usize,
+    /// The limits of the forces; the paper's poses have limits of their own for angles.
+    pub range: Range,
+    /// Sessions: the first is the nominal sensor, the others are mounted, lit and focused a little differently.
+    pub sessions: usize,
+    /// Decides loads, sessions and noise.
+    pub seed: u64,
+}
+
+impl Default for Recipe {
+    /// The sensor's camera at the firmware's frame size; forces a tenth beyond the calibrated range, so that its
+    /// ends are inside the data.
+    fn default() -> Self {
+        Self {
+            preset: Preset::Ov7725,
+            width: 320,
+            height: 240,
+            centroid: CentroidName::RednessWeighted,
+            loads: Loads::Random(40_000),
+            rest: 64,
+            range: Range {
+                force_n: 0.22,
+                alpha_deg: 11.0,
+                beta_deg: 8.8,
+            },
+            sessions: 1,
+            seed: 1,
+        }
+    }
+}
+
+impl Recipe {
+    /// Frames of each session.
+    pub fn session_rows(&self) -> usize {
+        let loads = match self.loads {
+            Loads::Random(count) => count,
+            Loads::PaperPoses(each) => each.saturating_mul(PaperPoses::COUNT),
+            Loads::Known(each) => each.saturating_mul(KnownLoads::COUNT),
+        };
+        loads.saturating_add(self.rest)
+    }
+
+    /// Frames in all.
+    pub fn rows(&self) -> usize {
+        self.session_rows().saturating_mul(self.sessions)
+    }
+
+    /// # Errors
+    /// When there would be no frame, or more than a file is good for.
+    pub(super) fn check(&self) -> Result<()> {
+        ensure!(self.sessions > 0, "a data set needs at least one session");
+        ensure!(self.rows() > 0, "a data set needs at least one frame");
+        ensure!(
+            self.rows() <= 100_000_000,
+            "{} frames are more than a data set holds",
+            self.rows()
+        );
+        Ok(())
+    }
+
+    /// The scene of a session.
+    ///
+    /// # Errors
+    /// When the scene has no such preset or frame size.
+    pub fn scene(&self, session: usize) -> Result<Scene> {
+        let preset = match self.preset {
+            Preset::Paper => ScenePreset::Paper,
+            Preset::Ov7725 => ScenePreset::Ov7725,
+        };
+        let scene = Scene::preset(
+            "rest",
+            preset,
+            self.width.into(),
+            self.height.into(),
+            self.seed,
+        )?;
+        let options = Session::numbered(session, self.seed).options(self.width);
+        Ok(scene.with_options(options)?)
+    }
+
+    /// Where a row stands: its session and, among the paper's poses, its pose.
+    pub fn place(&self, row: usize) -> Place {
+        let (session, within) = (row / self.session_rows(), row % self.session_rows());
+        let pose = match self.loads {
+            Loads::PaperPoses(each) if within >= self.rest => Some((within - self.rest) / each),
+            _ => None,
+        };
+        Place { session, pose }
+    }
+
+    /// The load of a row.
+    ///
+    /// # Errors
+    /// When the limits are no limits of a force.
+    pub fn load(&self, row: usize) -> Result<Load> {
+        let within = row % self.session_rows();
+        if within < self.rest {
+            return Ok(Load::REST);
+        }
+        let (range, seed) = (self.range, self.seed);
+        let force_n = range.force_n;
+        match self.loads {
+            Loads::Random(_) => RandomLoads { range, seed }.load(row),
+            Loads::PaperPoses(each) => {
+                PaperPoses { force_n, seed }.load((within - self.rest) / each, row)
+            }
+            Loads::Known(each) => KnownLoads { force_n }.load((within - self.rest) / each),
+        }
+        .with_context(|| format!("row {row}"))
+    }
+
+    pub(super) fn about(&self) -> Result<About> {
+        let scene = self.scene(0)?;
+        let options: &Options = scene.options();
+        Ok(About {
+            conditions: Conditions {
+                centroid: self.centroid,
+                ..Conditions::simulated(self.preset, self.width, self.height)
+            },
+            scene: format!(
+                "reduced film, gain {}, falloff {}, noise {} of 255 levels",
+                options.gain, options.falloff, options.noise
+            ),
+            loads: self.loads,
+            rest: self.rest,
+            sessions: self.sessions,
+            seed: self.seed,
+            range: self.range,
+        })
+    }
+}

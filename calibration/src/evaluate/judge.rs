@@ -1,0 +1,133 @@
+//! The model's answers beside the truth.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, anyhow, ensure};
+use hivtac_sensing::force::Force;
+use hivtac_sensing::model::Model;
+use hivtac_sensing::network::Network;
+
+use crate::dataset::{Dataset, Split};
+use crate::weights::features_from_q16;
+
+/// One answer with its truth. Angles in degrees, forces in N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judged {
+    /// (F_x, F_y, F_z) that pressed.
+    pub truth: [f64; 3],
+    /// α, β and |F| that pressed.
+    pub truth_polar: [f64; 3],
+    /// α, β and |F| that the model gives.
+    pub found_polar: [f64; 3],
+    /// The angle between both forces.
+    pub direction_deg: f64,
+    /// The standard uncertainty of the direction that came with the force, degrees.
+    pub direction_sigma_deg: f64,
+    /// The pose among the paper's.
+    pub pose: Option<usize>,
+}
+
+/// All answers to a data set.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    /// The model's name and identity.
+    pub model: String,
+    /// What the frames are, in words.
+    pub frames: String,
+    /// The contact reading, by name.
+    pub contact: String,
+    /// Which rows were taken, in words.
+    pub rows: String,
+    /// Frames with a force and an answer, warnings included.
+    pub judged: Vec<Judged>,
+    /// Frames without an answer, by status.
+    pub rejected: BTreeMap<String, usize>,
+}
+
+impl Evaluation {
+    /// Runs a model on the rows of a data set that show a force, as the chip would, each session tared. `held_out` takes
+    /// only the rows that a training with this split and seed did not see.
+    ///
+    /// # Errors
+    /// When the bytes are no model, it is for other conditions than the data's, or there is no such row.
+    pub fn of(model: &[u8], dataset: &Dataset, held_out: Option<(Split, u64)>) -> Result<Self> {
+        let model =
+            Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
+        let about = &dataset.about;
+        ensure!(
+            about.conditions.to_model()? == model.conditions,
+            "the model is for other conditions than the data set's: {:?} and {:?}",
+            model.conditions,
+            about.conditions
+        );
+        let rejected = dataset
+            .rejected()
+            .into_iter()
+            .map(|(status, count)| (status.to_owned(), count))
+            .collect();
+        let dataset = dataset.clone().tared()?;
+        let chosen: Vec<usize> = match held_out {
+            Some((split, seed)) => split.of(&dataset, seed)?[1].clone(),
+            None => (0..dataset.rows.len()).collect(),
+        };
+        let judged = judge(&model, &dataset, &chosen)?;
+        ensure!(
+            !judged.is_empty(),
+            "the data set has no accepted frame with a force"
+        );
+        Ok(Self {
+            model: format!("{} (CRC {:08x})", model.name(), model.crc()),
+            frames: format!(
+                "{}; {} session(s), data seed {}",
+                about.scene, about.sessions, about.seed
+            ),
+            contact: serde_json::to_value(about.conditions.contact)?
+                .as_str()
+                .unwrap_or_default()
+                .to_owned(),
+            rows: match held_out {
+                Some((split, seed)) => format!("{} (seed {seed})", split.words()),
+                None => "all rows of a data set of its own".to_owned(),
+            },
+            judged,
+            rejected,
+        })
+    }
+}
+
+fn judge(model: &Model<'_>, dataset: &Dataset, rows: &[usize]) -> Result<Vec<Judged>> {
+    // Data and model may rest at different places: the chip's tare is the data's.
+    let tare = features_from_q16(&dataset.rest()?.features_q16)?;
+    let mut network = Network::new();
+    let mut judged = Vec::new();
+    for row in rows.iter().map(|&i| &dataset.rows[i]) {
+        let Ok(seen) = &row.seen else { continue };
+        if row.force_n == [0.0; 3] {
+            continue;
+        }
+        let output = network.run(model, &features_from_q16(&seen.features_q16)?, &tare);
+        let (force, _) = Force::of_outputs(model, output.values);
+        judged.push(compare(row.force_n, &force, row.place.pose));
+    }
+    Ok(judged)
+}
+
+fn compare(truth: [f64; 3], force: &Force, pose: Option<usize>) -> Judged {
+    use crate::network::Meaning::AnglesMagnitude as Polar;
+    let found_polar = [
+        f64::from(force.alpha.0) / 1e3,
+        f64::from(force.beta.0) / 1e3,
+        f64::from(force.magnitude.0) / 1e6,
+    ];
+    // An answer without size has no direction: it is as far off as one can be on average.
+    let direction_deg =
+        crate::errors::angle_deg(Polar.to_force(found_polar), truth).unwrap_or(90.0);
+    Judged {
+        truth,
+        truth_polar: Polar.of_force(truth),
+        found_polar,
+        direction_deg,
+        direction_sigma_deg: f64::from(force.direction_sigma.0) / 1e3,
+        pose,
+    }
+}

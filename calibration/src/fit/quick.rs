@@ -1,0 +1,164 @@
+//! A closed form from a handful of known loads, and how good it is.
+
+use std::fmt;
+
+use anyhow::{Result, ensure};
+
+use super::no_network;
+use crate::closed_form::{self, Effort};
+use crate::dataset::{Dataset, Observation};
+use crate::errors::{angle_deg, norm};
+use crate::network::INPUTS;
+use crate::weights::{Range, Training, Uncertainty, Weights};
+
+/// The fewest loads.
+const FEWEST: usize = 4;
+
+/// A closed form from a few loads.
+#[derive(Clone, Debug)]
+pub struct Quick {
+    /// Ready to be saved or exported.
+    pub weights: Weights,
+    /// Each load, with what a closed form from the others says of it.
+    pub loads: Vec<Checked>,
+}
+
+/// A load that was left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Checked {
+    /// The force, N.
+    pub force_n: [f64; 3],
+    /// Frames of it.
+    pub frames: usize,
+    /// What the others say of it, N.
+    pub found_n: [f64; 3],
+}
+
+/// A load: its force, and its features averaged over its frames.
+struct Load {
+    force_n: [f64; 3],
+    frames: usize,
+    features: [f64; INPUTS],
+}
+
+/// Fits a closed form to the loads of a data set, its sessions tared; rows of the same force are one load.
+///
+/// # Errors
+/// When there are fewer than four loads, no frames at rest, or the loads are too alike.
+pub fn quick(dataset: &Dataset) -> Result<Quick> {
+    let dataset = dataset.clone().tared()?;
+    let (rest, loads) = (dataset.rest()?, loads(&dataset));
+    ensure!(
+        loads.len() >= FEWEST,
+        "{} loads are too few: {FEWEST} at least",
+        loads.len()
+    );
+    let rows: Vec<_> = loads
+        .iter()
+        .map(|load| (load.features, load.force_n))
+        .collect();
+    let form = closed_form::fit(&rest.features_px(), &rows, Effort::Few)?;
+    let found = closed_form::left_out(&rest.features_px(), &rows, &form)?;
+    let checked = |(load, found_n): (&Load, [f64; 3])| Checked {
+        force_n: load.force_n,
+        frames: load.frames,
+        found_n,
+    };
+    let loads: Vec<Checked> = loads.iter().zip(found).map(checked).collect();
+    let pressed: Vec<(&Observation, [f64; 3])> = dataset.accepted().collect();
+    let weights = Weights {
+        format: Weights::format(),
+        conditions: dataset.about.conditions.clone(),
+        rest,
+        range: range(&loads),
+        uncertainty: uncertainty(&loads),
+        training: Training {
+            scene: dataset.about.scene.clone(),
+            data_seed: dataset.about.seed,
+            rows: pressed.len(),
+            ..Training::default()
+        },
+        closed_form: Some(form),
+        network: no_network(&pressed)?,
+    };
+    Ok(Quick { weights, loads })
+}
+
+fn loads(dataset: &Dataset) -> Vec<Load> {
+    let mut loads: Vec<Load> = Vec::new();
+    for (seen, force_n) in dataset.accepted().filter(|(_, force)| *force != [0.0; 3]) {
+        let features = seen.features_px();
+        match loads.iter_mut().find(|load| load.force_n == force_n) {
+            Some(load) => {
+                load.frames += 1;
+                load.features
+                    .iter_mut()
+                    .zip(features)
+                    .for_each(|(sum, f)| *sum += f);
+            }
+            None => loads.push(Load {
+                force_n,
+                frames: 1,
+                features,
+            }),
+        }
+    }
+    for load in &mut loads {
+        load.features = load.features.map(|sum| sum / load.frames as f64);
+    }
+    loads
+}
+
+/// The usual range, but no larger a force than was shown.
+fn range(loads: &[Checked]) -> Range {
+    let largest = loads
+        .iter()
+        .map(|load| norm(load.force_n))
+        .fold(0.0, f64::max);
+    let usual = Range::default();
+    Range {
+        force_n: usual.force_n.min(largest),
+        ..usual
+    }
+}
+
+/// Root mean squares of what left-out loads were off by.
+fn uncertainty(loads: &[Checked]) -> Uncertainty {
+    let mean_square = |axes: &[usize]| {
+        let squares = loads.iter().flat_map(|load| {
+            axes.iter()
+                .map(|&i| (load.found_n[i] - load.force_n[i]).powi(2))
+        });
+        (squares.sum::<f64>() / (loads.len() * axes.len()) as f64).sqrt()
+    };
+    Uncertainty {
+        lateral_n: mean_square(&[0, 1]),
+        normal_n: mean_square(&[2]),
+    }
+}
+
+impl fmt::Display for Quick {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "each load as the others predict it:")?;
+        for load in &self.loads {
+            let off_mn = 1e3 * (norm(load.found_n) - norm(load.force_n));
+            let angle = angle_deg(load.found_n, load.force_n).unwrap_or(f64::NAN);
+            let size_mn = 1e3 * norm(load.force_n);
+            writeln!(
+                f,
+                "  {size_mn:6.1} mN, {} frames: |F| {off_mn:+.2} mN, direction {angle:.2}° off",
+                load.frames
+            )?;
+        }
+        let Uncertainty {
+            lateral_n,
+            normal_n,
+        } = self.weights.uncertainty;
+        let (lateral_mn, normal_mn) = (lateral_n * 1e3, normal_n * 1e3);
+        write!(
+            f,
+            "expect F_x and F_y within {lateral_mn:.2} mN and F_z within {normal_mn:.2} mN (one standard deviation; loads \
+             between these do better than the smallest and the largest, which were extrapolated here)"
+        )
+    }
+}

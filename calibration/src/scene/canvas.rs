@@ -1,0 +1,194 @@
+//! A picture to draw in.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
+use hivtac_scene::Frame;
+
+/// Red, green and blue.
+pub type Colour = [u8; 3];
+
+pub const BLACK: Colour = [0, 0, 0];
+pub const WHITE: Colour = [255, 255, 255];
+/// Plain to see on the film's grey and on the markers' red.
+pub const CYAN: Colour = [0, 255, 255];
+
+/// Side of a character, px.
+pub const CHARACTER: u32 = 8;
+
+/// A picture in 8-bit red, green and blue. What is drawn outside of it is left out.
+pub struct Canvas {
+    width: u32,
+    height: u32,
+    rgb: Vec<u8>,
+}
+
+impl Canvas {
+    /// A picture of one colour.
+    pub fn new(width: u32, height: u32, colour: Colour) -> Canvas {
+        Canvas {
+            width,
+            height,
+            rgb: colour.repeat(width as usize * height as usize),
+        }
+    }
+
+    /// A frame, each of its pixels a square of `scale` × `scale`.
+    pub fn of_frame(frame: &Frame, scale: u32) -> Canvas {
+        let small = Canvas {
+            width: frame.width,
+            height: frame.height,
+            rgb: frame.to_rgb888(),
+        };
+        let mut canvas = Canvas::new(scale * frame.width, scale * frame.height, BLACK);
+        for y in 0..canvas.height {
+            for x in 0..canvas.width {
+                let colour = small.pixel(x / scale, y / scale);
+                canvas.set(x.into(), y.into(), colour);
+            }
+        }
+        canvas
+    }
+
+    /// Half as wide and high: each pixel the mean of four, in steps of 4 of 255, which noise hardly leaves: the file is
+    /// then a third as large.
+    pub fn halved(&self) -> Canvas {
+        let mut small = Canvas::new(self.width / 2, self.height / 2, BLACK);
+        for y in 0..small.height {
+            for x in 0..small.width {
+                let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
+                let four = four.map(|(dx, dy)| self.pixel(2 * x + dx, 2 * y + dy));
+                let sum = |c: usize| four.iter().map(|pixel| u32::from(pixel[c])).sum::<u32>();
+                let mean = std::array::from_fn(|c| ((sum(c) + 8) / 16 * 4).min(255) as u8);
+                small.set(x.into(), y.into(), mean);
+            }
+        }
+        small
+    }
+
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    fn pixel(&self, x: u32, y: u32) -> Colour {
+        let at = 3 * (y as usize * self.width as usize + x as usize);
+        [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
+    }
+
+    pub fn set(&mut self, x: i64, y: i64, colour: Colour) {
+        if (0..i64::from(self.width)).contains(&x) && (0..i64::from(self.height)).contains(&y) {
+            let at = 3 * (y as usize * self.width as usize + x as usize);
+            self.rgb[at..at + 3].copy_from_slice(&colour);
+        }
+    }
+
+    /// A filled rectangle from its upper left pixel.
+    pub fn fill(&mut self, [x, y]: [i64; 2], [width, height]: [i64; 2], colour: Colour) {
+        for row in y..y + height {
+            for column in x..x + width {
+                self.set(column, row, colour);
+            }
+        }
+    }
+
+    /// Another picture, its upper left pixel at (x, y).
+    pub fn paste(&mut self, [x, y]: [i64; 2], other: &Canvas) {
+        for row in 0..other.height {
+            for column in 0..other.width {
+                let colour = other.pixel(column, row);
+                self.set(x + i64::from(column), y + i64::from(row), colour);
+            }
+        }
+    }
+
+    /// Text from the upper left pixel of its first character; every pixel of a character is a square of `scale`.
+    /// Characters that the font has not become question marks.
+    pub fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
+        let side = i64::from(scale);
+        let advance = side * i64::from(CHARACTER);
+        let mut left = x;
+        for character in text.chars() {
+            for (row, bits) in (0..).zip(glyph(character)) {
+                for column in (0..8).filter(|column| bits >> column & 1 == 1) {
+                    self.fill([left + side * column, y + side * row], [side, side], colour);
+                }
+            }
+            left += advance;
+        }
+    }
+
+    /// Text with an edge in another colour, so that it shows on anything.
+    pub fn edged_text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
+        let edge = i64::from(scale);
+        for (dx, dy) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+            self.text([x + edge * dx, y + edge * dy], scale, text, BLACK);
+        }
+        self.text([x, y], scale, text, colour);
+    }
+
+    /// Writes it as a PNG file.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let said = || format!("cannot write {}", path.display());
+        let file = File::create(path).with_context(said)?;
+        let mut encoder = png::Encoder::new(BufWriter::new(file), self.width, self.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::High);
+        let mut writer = encoder.write_header().with_context(said)?;
+        writer.write_image_data(&self.rgb).with_context(said)?;
+        writer.finish().with_context(said)
+    }
+}
+
+/// A character's eight rows, the leftmost pixel in bit 0.
+fn glyph(character: char) -> [u8; 8] {
+    let fonts = [
+        BASIC_FONTS.get(character),
+        LATIN_FONTS.get(character),
+        GREEK_FONTS.get(character),
+        BASIC_FONTS.get('?'),
+    ];
+    fonts.into_iter().flatten().next().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_drawn_where_it_is_asked_for_and_nothing_outside() {
+        let mut canvas = Canvas::new(40, 20, WHITE);
+        canvas.text([8, 4], 1, "iW", BLACK);
+        let dark = |canvas: &Canvas| -> Vec<[u32; 2]> {
+            let all = (0..canvas.height).flat_map(|y| (0..canvas.width).map(move |x| [x, y]));
+            all.filter(|&[x, y]| canvas.pixel(x, y) == BLACK).collect()
+        };
+        let drawn = dark(&canvas);
+        assert!(drawn.len() > 20);
+        for [x, y] in drawn {
+            assert!((8..24).contains(&x) && (4..12).contains(&y), "{x} {y}");
+        }
+        canvas.text([-4, -4], 9, "W", BLACK);
+        canvas.text([36, 18], 9, "W", BLACK);
+    }
+
+    #[test]
+    fn letters_are_not_mirrored() {
+        // An L has its bar at the left.
+        let rows = glyph('L');
+        let left: u32 = rows.iter().map(|row| (row & 0x0f).count_ones()).sum();
+        let right: u32 = rows.iter().map(|row| (row >> 4).count_ones()).sum();
+        assert!(left > right);
+        assert_eq!(glyph('\u{1f600}'), glyph('?'));
+    }
+}

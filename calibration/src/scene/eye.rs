@@ -1,0 +1,121 @@
+//! The pipeline that looks at simulated frames, with the default model where that is made for them.
+
+use anyhow::{Context, Result, anyhow, bail};
+use hivtac_scene::{Camera, Frame, Load, Preset as ScenePreset, Scene, Truth};
+use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::markers::Marker;
+use hivtac_sensing::model::Model;
+use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::threshold::ByteOrder;
+
+use crate::dataset::reasons;
+
+/// The model that firmware and host tool embed.
+static MODEL: &[u8] = include_bytes!("../../models/default.hvtm");
+/// Frames of a tare.
+const TARE_FRAMES: u16 = 16;
+/// A pixel in Q16.16.
+const PX: f64 = 65_536.0;
+
+/// A sensor that looks at frames.
+pub struct Eye {
+    sensor: Box<Sensor<'static>>,
+}
+
+/// What it made of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sight {
+    /// Centroids by identity, px, when four markers were found, trusted or not.
+    pub centroids_px: Option<[[f64; 2]; 4]>,
+    /// N, film frame, when there is a model and nothing forbids a force.
+    pub force_n: Option<[f64; 3]>,
+    /// The names of the status bits that forbid a force; empty when none does.
+    pub rejected: String,
+}
+
+impl Eye {
+    /// One for a camera, without a tare.
+    ///
+    /// # Errors
+    /// When the default model cannot be read, or the pipeline does not take such frames.
+    pub fn new(camera: &Camera) -> Result<Eye> {
+        let size = |count: u32| u16::try_from(count).context("the frame is too large");
+        let preset = match camera.preset() {
+            ScenePreset::Paper => Preset::Paper,
+            ScenePreset::Ov7725 => Preset::Ov7725,
+        };
+        let (width, height) = (size(camera.width())?, size(camera.height())?);
+        let geometry = Geometry::preset(preset, width, height);
+        let model = Model::parse(MODEL).map_err(|error| anyhow!("the default model: {error}"))?;
+        let model = (model.conditions.geometry == geometry).then_some(model);
+        let settings = match &model {
+            Some(model) => Settings::of_model(model, ByteOrder::Native),
+            None => Settings::usual(geometry, ByteOrder::Native),
+        };
+        let mut sensor = Box::new(Sensor::new());
+        let configured = sensor.configure(settings, model);
+        configured.map_err(|error| anyhow!("{error}"))?;
+        Ok(Eye { sensor })
+    }
+
+    /// One that was tared on the untouched film of a scene.
+    ///
+    /// # Errors
+    /// As [`Eye::new`], and when the markers of the untouched film are not found.
+    pub fn tared(scene: &Scene) -> Result<Eye> {
+        let mut eye = Eye::new(scene.camera())?;
+        let mut builder = TareBuilder::new(TARE_FRAMES).context("not a number of frames")?;
+        // Numbers that no test frame has: their noise is the tare's alone.
+        for number in (1 << 40).. {
+            let frame = scene.render_load(&Load::REST, number)?;
+            let measured = eye.measure(&frame);
+            let (Some(markers), Some(features)) = (measured.markers, measured.features) else {
+                bail!("no tare: {}", reasons(measured.status));
+            };
+            if let Some(rest) = builder.add(&markers, &features) {
+                eye.sensor.set_tare(Some(rest));
+                break;
+            }
+        }
+        Ok(eye)
+    }
+
+    /// Looks at a frame, whatever its format.
+    pub fn look(&mut self, frame: &Frame) -> Sight {
+        let Measurement {
+            status,
+            markers,
+            force,
+            ..
+        } = self.measure(frame);
+        Sight {
+            centroids_px: markers.map(|markers| markers.map(centroid_px)),
+            force_n: force.map(crate::check::vector_n),
+            rejected: reasons(status),
+        }
+    }
+
+    fn measure(&mut self, frame: &Frame) -> Measurement {
+        self.sensor.begin_frame();
+        for row in frame.to_rgb565().chunks(frame.width as usize) {
+            self.sensor.push_row(row);
+        }
+        self.sensor.finish_frame()
+    }
+}
+
+fn centroid_px(marker: Marker) -> [f64; 2] {
+    [marker.x, marker.y].map(|part| f64::from(part.0) / PX)
+}
+
+/// The largest distance of a found marker from the truth, px; endless when the truth has no such marker.
+pub fn worst_px(centroids_px: &[[f64; 2]; 4], truth: &Truth) -> f64 {
+    let pairs = centroids_px.iter().zip(&truth.markers);
+    let distances = pairs.map(|([x, y], marker)| match marker {
+        Some(marker) => (x - marker.centroid_px[0]).hypot(y - marker.centroid_px[1]),
+        None => f64::INFINITY,
+    });
+    distances.fold(0.0, f64::max)
+}

@@ -1,0 +1,81 @@
+//! One frame of a scene as a picture.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use hivtac_scene::{Preset, Scene, hard_cases};
+
+use super::canvas::Canvas;
+use super::{cases, overlay};
+
+/// Arguments of `scene render`.
+#[derive(Args)]
+pub struct RenderArgs {
+    /// A scene file (docs/scene-file.md), or a name: of a motion of the usual sensor (rest, static, demo, …), or of a
+    /// hard case (see `scene cases`).
+    scene: String,
+    /// The PNG file to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// Draw a cross at the true centroid of every marker, and its identity.
+    #[arg(long)]
+    overlay: bool,
+    /// Seconds from the beginning of the scene; if not given 0, and for hard cases what their sheet shows.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    at: Option<f64>,
+    /// The frame's number: it selects the noise.
+    #[arg(long, default_value_t = 0)]
+    number: u64,
+    /// Side of the square that each pixel becomes.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
+    scale: u32,
+}
+
+impl RenderArgs {
+    pub(super) fn run(&self) -> Result<()> {
+        if let Some(at) = self.at.filter(|at| !at.is_finite() || *at < 0.0) {
+            bail!("--at {at}: use seconds from 0 on");
+        }
+        let (scene, usual_s) = scene(&self.scene)?;
+        let frame = scene.frame(self.number, self.at.unwrap_or(usual_s));
+        let mut canvas = Canvas::of_frame(&frame, self.scale);
+        if self.overlay {
+            overlay::draw(&mut canvas, &frame.truth, self.scale);
+        }
+        canvas.save(&self.out)?;
+        let (out, load) = (self.out.display(), frame.truth.force);
+        println!(
+            "wrote {out}: {}×{} {}, |F| {:.1} mN, α {:.2}°, β {:.2}°",
+            frame.width,
+            frame.height,
+            frame.format,
+            load.magnitude_n() * 1e3,
+            load.alpha_deg(),
+            load.beta_deg()
+        );
+        Ok(())
+    }
+}
+
+/// The scene of a file or a name, and the moment to show.
+fn scene(source: &str) -> Result<(Scene, f64)> {
+    let path = Path::new(source);
+    if path.extension().is_some_and(|end| end == "toml") || path.is_file() {
+        let text = fs::read_to_string(path).with_context(|| format!("cannot read {source}"))?;
+        let scene = Scene::from_toml(&text);
+        return Ok((
+            scene.with_context(|| format!("{source} is not a usable scene"))?,
+            0.0,
+        ));
+    }
+    let [width, height] = cases::SIZE;
+    if let Some(case) = hard_cases().iter().find(|case| case.name == source) {
+        let scene = case.scene(Preset::Ov7725, width, height, 1)?;
+        return Ok((scene, cases::SHOWN_S));
+    }
+    let scene = Scene::preset(source, Preset::Ov7725, width, height, 1);
+    let said = || format!("{source} is no scene file (*.toml), no motion and no hard case");
+    Ok((scene.with_context(said)?, 0.0))
+}

@@ -1,0 +1,268 @@
+//! A training as it goes on: weights, optimizer, data and the best weights so far.
+
+use anyhow::Result;
+use hivtac_sensing::network::scale_inputs;
+use rand::{SeedableRng, seq::SliceRandom};
+use rand_chacha::ChaCha8Rng;
+
+use super::adam::Adam;
+use super::mlp::Mlp;
+use super::{Options, Samples, rounded, scaling};
+use crate::network::{INPUTS, Network, OUTPUTS, Standardization};
+use crate::quantize::input_scaling;
+use crate::weights::features_from_q16;
+
+/// Rows that are measured at a time.
+const MEASURED_ROWS: usize = 256;
+/// A loss counts as better from this much below the best one on.
+const BETTER: f64 = 1e-3;
+
+/// One half of a training.
+pub(super) struct Phase {
+    /// Whether the chip's rounding is on.
+    pub rounded: bool,
+    pub epochs: usize,
+    /// The first step size.
+    pub rate: f64,
+}
+
+pub(super) struct State {
+    mlp: Mlp,
+    adam: Adam,
+    random: ChaCha8Rng,
+    batch: usize,
+    order: Vec<usize>,
+    training: Rows,
+    held_out: Rows,
+    /// Everything but the layers, which are in `mlp`.
+    network: Network,
+    best: Option<Best>,
+}
+
+struct Best {
+    layers: Mlp,
+    loss: f64,
+    /// Passes since a clearly better loss.
+    age: usize,
+    /// The last clearly better loss.
+    mark: f64,
+}
+
+/// Data as the network takes it.
+struct Rows {
+    /// Standardized features.
+    floats: Vec<[f32; INPUTS]>,
+    /// The same as the chip has them.
+    steps: Vec<[i16; INPUTS]>,
+    /// Standardized answers.
+    answers: Vec<[f32; OUTPUTS]>,
+}
+
+impl Rows {
+    fn new(samples: &Samples, input: &Standardization, output: &Standardization) -> Result<Self> {
+        let scaling = input_scaling(input)?;
+        let steps = samples.features.iter().map(|row| {
+            let features = features_from_q16(&row.map(|px| (px * 65_536.0).round() as i64))?;
+            Ok(scale_inputs(
+                &scaling,
+                &features,
+                &features_from_q16(&[0; INPUTS])?,
+                &features_from_q16(&[0; INPUTS])?,
+            ))
+        });
+        Ok(Self {
+            floats: standardized(&samples.features, input),
+            steps: steps.collect::<Result<_>>()?,
+            answers: standardized(&samples.answers, output),
+        })
+    }
+}
+
+fn standardized<const N: usize>(rows: &[[f64; N]], scaling: &Standardization) -> Vec<[f32; N]> {
+    let one = |row: &[f64; N]| {
+        let scaled = scaling.forward(row);
+        std::array::from_fn(|i| scaled[i] as f32)
+    };
+    rows.iter().map(one).collect()
+}
+
+/// The chosen rows, feature by feature.
+fn gathered<T: Copy, U: From<T>, const N: usize>(data: &[[T; N]], rows: &[usize]) -> Vec<U> {
+    let feature = |i: usize| rows.iter().map(move |&row| U::from(data[row][i]));
+    (0..N).flat_map(feature).collect()
+}
+
+impl State {
+    pub fn new(training: &Samples, held_out: &Samples, options: &Options) -> Result<Self> {
+        let mut random = ChaCha8Rng::seed_from_u64(options.seed);
+        let (mlp, network) = match &options.start {
+            Some(start) => (Mlp::of_layers(&start.layers), start.clone()),
+            None => {
+                let widths = [&[INPUTS], &options.hidden[..], &[OUTPUTS]].concat();
+                (Mlp::random(&widths, &mut random), blank(training, options)?)
+            }
+        };
+        let network = Network {
+            arithmetic: options.arithmetic,
+            ..network
+        };
+        Ok(Self {
+            adam: Adam::new(&mlp),
+            mlp,
+            random,
+            batch: options.batch,
+            order: (0..training.features.len()).collect(),
+            training: Rows::new(training, &network.input, &network.output)?,
+            held_out: Rows::new(held_out, &network.input, &network.output)?,
+            network,
+            best: None,
+        })
+    }
+
+    /// Starts a phase. The first fixes how much each hidden layer of the chip can carry for the second.
+    pub fn begin(&mut self, phase: &Phase, training: &Samples) -> Result<()> {
+        self.adam = Adam::new(&self.mlp);
+        self.best = None;
+        if phase.rounded {
+            self.network.layers = self.mlp.to_layers();
+            self.network.activation_max = self.network.activation_maxima(&training.features);
+        }
+        Ok(())
+    }
+
+    /// One pass over the shuffled data; the mean loss over it, and on the held-out data after it.
+    pub fn pass(&mut self, phase: &Phase, epoch: usize) -> Result<[f64; 2]> {
+        let mut order = std::mem::take(&mut self.order);
+        order.shuffle(&mut self.random);
+        let batches = order.len().div_ceil(self.batch);
+        let mut sum = 0.0;
+        for (i, rows) in order.chunks(self.batch).enumerate() {
+            let done = (epoch * batches + i) as f64 / (phase.epochs * batches) as f64;
+            sum += self.step(rows, phase.rate * (1.0 - done), phase.rounded)? * rows.len() as f64;
+        }
+        self.order = order;
+        let held_out = self.held_out_loss(phase.rounded)?;
+        self.remember(held_out);
+        Ok([sum / self.order.len() as f64, held_out])
+    }
+
+    fn step(&mut self, rows: &[usize], rate: f64, rounded: bool) -> Result<f64> {
+        let targets: Vec<f32> = gathered(&self.training.answers, rows);
+        let gradient = |outputs: &[f32]| -> Vec<f32> {
+            let scale = 2.0 / outputs.len() as f32;
+            outputs
+                .iter()
+                .zip(&targets)
+                .map(|(y, t)| scale * (y - t))
+                .collect()
+        };
+        let (outputs, gradients) = if rounded {
+            self.network.layers = self.mlp.to_layers();
+            let inputs = gathered(&self.training.steps, rows);
+            let seen = rounded::forward(&self.network, inputs, rows.len())?;
+            let gradients =
+                seen.mlp
+                    .backward(&seen.trace, gradient(&seen.trace.outputs), rows.len());
+            (seen.trace.outputs, gradients)
+        } else {
+            let trace = self
+                .mlp
+                .forward(gathered(&self.training.floats, rows), rows.len());
+            let gradients = self
+                .mlp
+                .backward(&trace, gradient(&trace.outputs), rows.len());
+            (trace.outputs, gradients)
+        };
+        self.adam.step(&mut self.mlp, &gradients, rate);
+        Ok(mean_square(&outputs, &targets))
+    }
+
+    fn held_out_loss(&mut self, rounded: bool) -> Result<f64> {
+        let all: Vec<usize> = (0..self.held_out.answers.len()).collect();
+        self.network.layers = if rounded {
+            self.mlp.to_layers()
+        } else {
+            Vec::new()
+        };
+        let mut sum = 0.0;
+        for rows in all.chunks(MEASURED_ROWS) {
+            let targets: Vec<f32> = gathered(&self.held_out.answers, rows);
+            let outputs = if rounded {
+                let inputs = gathered(&self.held_out.steps, rows);
+                rounded::forward(&self.network, inputs, rows.len())?
+                    .trace
+                    .outputs
+            } else {
+                self.mlp
+                    .forward(gathered(&self.held_out.floats, rows), rows.len())
+                    .outputs
+            };
+            sum += mean_square(&outputs, &targets) * rows.len() as f64;
+        }
+        Ok(sum / all.len() as f64)
+    }
+
+    fn remember(&mut self, loss: f64) {
+        let best = self.best.get_or_insert_with(|| Best {
+            layers: self.mlp.clone(),
+            loss,
+            age: 0,
+            mark: loss,
+        });
+        best.age += 1;
+        if loss < best.mark * (1.0 - BETTER) {
+            (best.mark, best.age) = (loss, 0);
+        }
+        // A loss that is no number never is the best: without held-out samples the last pass is.
+        if loss <= best.loss || loss.is_nan() {
+            (best.layers, best.loss) = (self.mlp.clone(), loss);
+        }
+    }
+
+    /// The training data as the chip takes it.
+    #[cfg(test)]
+    pub fn chip_inputs(&self) -> Vec<f64> {
+        let all: Vec<usize> = (0..self.training.steps.len()).collect();
+        gathered(&self.training.steps, &all)
+    }
+
+    /// Whether nothing has got better for `patience` passes.
+    pub fn stale(&self, patience: usize) -> bool {
+        patience > 0 && self.best.as_ref().is_some_and(|best| best.age >= patience)
+    }
+
+    /// Goes back to the best weights of the phase.
+    pub fn take_best(&mut self) {
+        if let Some(best) = self.best.take() {
+            self.mlp = best.layers;
+        }
+    }
+
+    /// The trained network.
+    pub fn network(mut self) -> Result<Network> {
+        self.network.layers = self.mlp.to_layers();
+        self.network.validate()?;
+        Ok(self.network)
+    }
+}
+
+fn mean_square(outputs: &[f32], targets: &[f32]) -> f64 {
+    let squares = outputs
+        .iter()
+        .zip(targets)
+        .map(|(&y, &t)| f64::from(y - t).powi(2));
+    squares.sum::<f64>() / outputs.len() as f64
+}
+
+/// A network without layers: scaling from the data.
+fn blank(training: &Samples, options: &Options) -> Result<Network> {
+    let [input, output] = scaling(training)?;
+    Ok(Network {
+        meaning: options.meaning,
+        arithmetic: options.arithmetic,
+        input,
+        output,
+        activation_max: Vec::new(),
+        layers: Vec::new(),
+    })
+}

@@ -1,0 +1,88 @@
+//! From the paper's poses to its figures.
+
+use std::sync::LazyLock;
+
+use hivtac_calibration::conditions::CentroidName;
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
+use hivtac_calibration::evaluate::Evaluation;
+use hivtac_calibration::fit::fit_closed_form;
+use hivtac_calibration::quantize::export;
+
+fn data(loads: Loads, seed: u64) -> Dataset {
+    let recipe = Recipe {
+        loads,
+        rest: 8,
+        seed,
+        ..Recipe::default()
+    };
+    generate(&recipe, || ()).unwrap()
+}
+
+fn model() -> &'static [u8] {
+    static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let fitted = fit_closed_form(&data(Loads::Random(1500), 1), Split::WithinPose, 1).unwrap();
+        export(&fitted.weights).unwrap()
+    });
+    &MODEL
+}
+
+#[test]
+fn the_report_says_what_it_is_and_needs_nothing_else() {
+    let poses = data(Loads::PaperPoses(2), 2);
+    let evaluation = Evaluation::of(model(), &poses, None).unwrap();
+    let [(_, all), (_, weak), (_, strong)] = evaluation.groups();
+    let (all, weak, strong) = (all.unwrap(), weak.unwrap(), strong.unwrap());
+    assert_eq!((all.frames, weak.frames + strong.frames), (714, 714));
+    assert!(strong.direction_deg.value < 0.25, "{evaluation}");
+    assert!(strong.direction_deg.value < weak.direction_deg.value);
+    assert!(all.force_rmse_n.value < 0.5e-3, "{evaluation}");
+
+    let html = evaluation.to_html();
+    for words in [
+        "Simulated frames",
+        "contact reading `force`",
+        "all rows of a data set of its own",
+        "paper, real sensor",
+    ] {
+        assert!(html.contains(words), "no `{words}`");
+    }
+    // Three of Figure 11, six of Figure 12, five of Figure 13.
+    assert_eq!(html.matches("<svg").count(), 14);
+    let outside = html.replace("http://www.w3.org/2000/svg", "");
+    assert!(
+        ["http", "src=", "<script", "NaN"]
+            .iter()
+            .all(|words| !outside.contains(words))
+    );
+
+    let held_out = Evaluation::of(model(), &poses, Some((Split::Poses, 1))).unwrap();
+    assert_eq!(held_out.judged.len(), 70);
+    assert!(held_out.to_html().contains("whole poses held out (seed 1)"));
+    let random = Evaluation::of(model(), &data(Loads::Random(60), 3), None).unwrap();
+    assert_eq!(random.to_html().matches("<svg").count(), 7);
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let recipe = Recipe {
+        loads: Loads::Random(30),
+        rest: 2,
+        centroid: CentroidName::BinaryMask,
+        ..Recipe::default()
+    };
+    let other = generate(&recipe, || ()).unwrap();
+    let error = Evaluation::of(model(), &other, None)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("other conditions"), "{error}");
+    let error = Evaluation::of(b"HVTM", &other, None)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("not a usable model file"), "{error}");
+    let mut untouched = data(Loads::Random(1), 4);
+    untouched.rows.truncate(8);
+    let error = Evaluation::of(model(), &untouched, None)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("no accepted frame with a force"), "{error}");
+}
