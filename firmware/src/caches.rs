@@ -17,10 +17,12 @@ struct Region {
     access: u32,
     /// TEX, S, C, B.
     memory_type: u32,
+    execute: bool,
 }
 
 const NO_ACCESS: u32 = 0b000 << 24;
 const FULL_ACCESS: u32 = 0b011 << 24;
+const READ_ONLY: u32 = 0b110 << 24;
 const STRONGLY_ORDERED: u32 = 0;
 /// TEX = 1, C = 0, B = 0; shareable, as two bus masters use it.
 const NORMAL_NON_CACHEABLE: u32 = 1 << 19 | 1 << 18;
@@ -34,6 +36,7 @@ const EXTERNAL_MEMORY: Region = Region {
     disabled_eighths: 0b1000_0111,
     access: NO_ACCESS,
     memory_type: STRONGLY_ORDERED,
+    execute: false,
 };
 
 /// AXI SRAM: the DMA buffers.
@@ -43,6 +46,17 @@ const DMA_BUFFERS: Region = Region {
     disabled_eighths: 0,
     access: FULL_ACCESS,
     memory_type: NORMAL_NON_CACHEABLE,
+    execute: false,
+};
+
+/// ITCM, once its code is loaded: a stray write, as through a null pointer, faults instead of changing the program.
+const NEAR_CODE: Region = Region {
+    base: 0,
+    size_log2: 16,
+    disabled_eighths: 0,
+    access: READ_ONLY,
+    memory_type: NORMAL_NON_CACHEABLE,
+    execute: true,
 };
 
 /// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA buffer.
@@ -57,10 +71,10 @@ fn set_regions(mpu: &mut MPU) {
     /// Everywhere else the architecture's default memory map holds.
     const PRIVILEGED_DEFAULT: u32 = 1 << 2;
     cortex_m::asm::dmb();
-    // SAFETY: the program has not yet used either region, and everything it does use keeps its default attributes.
+    // SAFETY: the program has not yet written to a region, and everything it does use keeps its default attributes.
     unsafe {
         mpu.ctrl.write(0);
-        for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS]) {
+        for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS, NEAR_CODE]) {
             mpu.rnr.write(number);
             mpu.rbar.write(region.base);
             mpu.rasr.write(region.attributes());
@@ -74,7 +88,8 @@ fn set_regions(mpu: &mut MPU) {
 impl Region {
     fn attributes(&self) -> u32 {
         const ENABLE: u32 = 1;
-        NEVER_EXECUTE
+        let execute = if self.execute { 0 } else { NEVER_EXECUTE };
+        execute
             | self.access
             | self.memory_type
             | self.disabled_eighths << 8

@@ -1,162 +1,263 @@
-//! The camera interface (DCMI): one frame at a time into a buffer, whatever the camera does.
+//! The camera interface (DCMI) in continuous mode: every frame, whatever the camera does.
 //!
 //! # Design
-//! Snapshot mode. [`Capture::frame`] arms DMA and DCMI; DCMI waits for the end of the vertical blanking, passes the
-//! frame's words to the DMA, and raises one interrupt: frame complete (at the next blanking) or overrun. The handler
-//! takes down which VSYNC edge began the frame, and masks further interrupts until the next arming. A frame is good
-//! when the DMA got exactly its number of words and DCMI's FIFO is empty. After anything else the peripheral is
-//! reset and set up anew, because an overrun leaves a snapshot hanging for ever.
+//! DCMI and its DMA run without a pause. The DMA writes *bands* of 4 rows into a ring of 64 slots in AXI SRAM
+//! (`bands`), at 320 × 240 a little more than a frame, at 800 × 600 four tenths of one. Each finished band is one
+//! interrupt; so are the end of a frame (the VSYNC pulse, or the last row of a crop window) and an overrun. The handlers
+//! do what `hivtac_capture::Tracker` says, and pass its events to the pipeline, which has finished bands copied to DTCM
+//! (`band_copy`) and scans one while the next ones arrive. A frame is measured as soon as its last band is scanned. When
+//! more comes after that, it counts as too long, and the next sample says that a frame was lost.
+//!
+//! After anything unforeseen, DCMI is reset and set up anew, and the DMA begins a new band: the next frame is captured
+//! from its beginning. Between two good frames nothing is touched.
 //!
 //! # Note
-//! Deadlines, for 39 frames a second (line 92 µs):
-//! - *Re-arming*: within the VSYNC pulse that ends a frame, 4 lines or 370 µs. When missed, the next frame is not
-//!   captured; it shows as a gap in the frame numbers and in `dropped_busy`.
-//! - *The DCMI handler*: within the same pulse. When missed, a frame would carry the number of its successor. Nothing
-//!   below it in priority can delay it; critical sections last some µs.
+//! Coherence: the core never reads the ring (see `band_copy`).
+//!
+//! Deadlines, for 39 frames a second (line 92 µs, band 369 µs, frame 25.6 ms; at 150 frames a second all but the FIFO's
+//! are four times shorter):
 //! - *The DMA*: DCMI's FIFO holds 4 words, 1.3 µs at 12.5 MB/s. When missed, DCMI reports an overrun: the frame is
 //!   dropped and counted.
+//! - *The handler of a band*: until the end of the next band, 369 µs. When missed, the DMA writes over a band; the
+//!   handler sees that it has changed its target twice, or the frame's number of bands is wrong: the frame is dropped.
+//! - *The handler of a frame's end*: within the VSYNC pulse, 370 µs. When missed after a good frame, the frame counts as
+//!   dropped; when missed after a bad one, the next frame is not captured either.
+//! - *The pipeline*: a band is overwritten 62 bands after it was finished, 23 ms. When missed, its frame is dropped and
+//!   counted as `dropped_busy`; the camera never waits.
 //!
 //! # Limitations
-//! One frame is one DMA transfer (see `frame_dma`). The CPU must be woken between frames. A frame in which the camera
-//! lost bytes and gained as many is not noticed.
+//! A frame in which the camera lost bytes and gained as many is not noticed. Nor is it noticed that the handler of a
+//! band was late by exactly two bands in a frame that was too long by two bands. With a crop window, what the camera
+//! sends after the window is not seen.
 
-use crate::camera::{self, FRAME_TIME};
-use crate::frame::Frame;
-use crate::frame_dma::{FrameDma, Running};
+use crate::band_dma::BandDma;
+use crate::bands::{FRAME, SHAPE};
+use crate::camera;
 use crate::seeded_bugs::INVERTED_POLARITIES;
-use crate::vsync::{self, Edge};
-use embassy_stm32::interrupt::{self, InterruptExt};
-use embassy_stm32::pac::dcmi::regs::Ier;
+use crate::{stats, vsync};
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::pac::{DCMI, RCC};
 use embassy_stm32::{Peri, peripherals, rcc};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
-use embassy_time::{Duration, with_timeout};
+use embassy_sync::channel::Channel;
+use hivtac_capture::{Edge, Event, Interface, Tracker, Window};
 
-/// With no event for so long the camera counts as silent: no frame takes longer than two frame times from arming.
-const SILENCE: Duration = Duration::from_micros(4 * FRAME_TIME.as_micros());
+/// Events that wait for the pipeline: more than bands that are still whole.
+const EVENTS_WAITING: usize = 72;
 
-/// Why there is no frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
-pub enum Failure {
-    /// The DMA was too slow for DCMI's FIFO.
-    Overrun,
-    /// The camera sent fewer or more bytes than a frame has.
-    Size,
-    /// The camera sent nothing, or no end of frame, for four frame times.
-    Silence,
+/// What happens, in order. When there is no room an event is lost; the pipeline notices that by the next one.
+pub static EVENTS: Channel<CriticalSectionRawMutex, Event, EVENTS_WAITING> = Channel::new();
+
+static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
+    CriticalSectionMutex::new(RefCell::new(None));
+/// [`Tracker::finished`].
+static FINISHED: AtomicU32 = AtomicU32::new(0);
+/// Events so far, lost ones too.
+static ACTIVITY: AtomicU32 = AtomicU32::new(0);
+
+struct Running {
+    tracker: Tracker,
+    hardware: Hardware,
 }
 
-/// What the interrupt handler saw.
-enum Event {
-    FrameEnd(Edge),
-    Overrun(Edge),
-}
-
-static EVENT: Signal<CriticalSectionRawMutex, Event> = Signal::new();
-
-/// DCMI and its DMA stream.
-pub struct Capture {
-    dma: FrameDma,
+/// DCMI and its DMA.
+struct Hardware {
+    dma: BandDma,
     _dcmi: Peri<'static, peripherals::DCMI>,
 }
 
+/// The camera interface, set up. Its owner starts and stops it.
+pub struct Capture(());
+
 impl Capture {
-    /// Clocks and sets up the peripheral.
-    pub fn new(dcmi: Peri<'static, peripherals::DCMI>, dma: FrameDma) -> Self {
+    /// Clocks the peripheral and enables its interrupts at `priority`, which the DMA's has, too. Call once.
+    pub fn new(dcmi: Peri<'static, peripherals::DCMI>, dma: BandDma, priority: Priority) -> Self {
         rcc::enable_and_reset::<peripherals::DCMI>();
-        set_up();
-        interrupt::DCMI.unpend();
-        // SAFETY: the handler below shares only `EVENT` and DCMI's flags.
-        unsafe { interrupt::DCMI.enable() };
-        Self { dma, _dcmi: dcmi }
-    }
-
-    /// Captures the next frame that begins into `frame`. Returns the VSYNC edge that began it; on failure, the edge
-    /// of the frame that was lost, if one had begun.
-    pub async fn frame(&mut self, frame: &mut Frame) -> Result<Edge, (Failure, Edge)> {
-        let transfer = self.dma.start(DCMI.dr().as_ptr().cast(), frame);
-        arm();
-        let result = match with_timeout(SILENCE, EVENT.wait()).await {
-            Ok(Event::FrameEnd(edge)) => whole(&transfer, edge),
-            Ok(Event::Overrun(edge)) if transfer.missing() == 0 => Err((Failure::Size, edge)),
-            Ok(Event::Overrun(edge)) => Err((Failure::Overrun, edge)),
-            Err(_) => Err((Failure::Silence, vsync::newest())),
+        let running = Running {
+            tracker: Tracker::new(SHAPE, FRAME),
+            hardware: Hardware { dma, _dcmi: dcmi },
         };
-        drop(transfer);
-        if result.is_err() {
-            restore();
+        CAPTURE.lock(|capture| capture.replace(Some(running)));
+        for interrupt in [interrupt::DCMI, interrupt::DMA1_STREAM0] {
+            interrupt.set_priority(priority);
+            interrupt.unpend();
+            // SAFETY: the handlers below share only `CAPTURE`, behind a mutex, and atomics.
+            unsafe { interrupt.enable() };
         }
-        result
+        Self(())
+    }
+
+    /// Captures from the next frame on.
+    pub fn start(&mut self) {
+        act(|running, _| running.tracker.start(&mut running.hardware));
+    }
+
+    /// Captures no more.
+    pub fn stop(&mut self) {
+        act(|running, mut tell| running.tracker.stop(&mut running.hardware, &mut tell));
+    }
+
+    /// Begins again after a silence.
+    pub fn start_again(&mut self) {
+        act(|running, mut tell| running.tracker.silence(&mut running.hardware, &mut tell));
+    }
+
+    /// A number that changes whenever something comes from the camera: at least once a frame.
+    pub fn activity(&self) -> u32 {
+        ACTIVITY.load(Ordering::Relaxed)
     }
 }
 
-/// Judges a frame that DCMI calls complete.
-fn whole(transfer: &Running, edge: Edge) -> Result<Edge, (Failure, Edge)> {
-    /// Polls for the frame's last words, which may still be under way. They need some bus cycles.
-    const PATIENCE: u32 = 64;
-    for _ in 0..PATIENCE {
-        if transfer.missing() == 0 || !DCMI.sr().read().fne() {
-            break;
+/// Bands finished since boot, modulo 2³².
+pub fn finished() -> u32 {
+    FINISHED.load(Ordering::Acquire)
+}
+
+/// Captures only `window` from the next frame on, or the one after that. It must be capturable out of [`FRAME`].
+pub fn set_window(window: Window) {
+    act(|running, _| running.tracker.set_window(window, &mut running.hardware));
+}
+
+/// Whether anything has come since the newest band that an event told of.
+pub fn has_begun_a_band() -> bool {
+    let mut begun = true;
+    act(|running, _| begun = running.hardware.has_begun_a_band());
+    begun
+}
+
+/// Does something with the tracker, alone.
+fn act(what: impl FnOnce(&mut Running, fn(Event))) {
+    CAPTURE.lock(|capture| {
+        // Nothing in here comes back here, so it is never borrowed already.
+        if let Ok(mut capture) = capture.try_borrow_mut()
+            && let Some(running) = capture.as_mut()
+        {
+            what(running, tell);
+            FINISHED.store(running.tracker.finished(), Ordering::Release);
         }
+    });
+}
+
+fn tell(event: Event) {
+    ACTIVITY.fetch_add(1, Ordering::Relaxed);
+    // Documented at `EVENTS`.
+    let _ = EVENTS.try_send(event);
+}
+
+impl Interface for Hardware {
+    fn restart(&mut self, window: Window, first: u16, second: u16) {
+        reset();
+        self.dma
+            .start(DCMI.dr().as_ptr().cast(), window, first, second);
+        configure();
+        if window != FRAME {
+            crop(window);
+        }
+        DCMI.ier().write(|w| {
+            w.set_frame_ie(true);
+            w.set_ovr_ie(true);
+        });
+        DCMI.cr().modify(|w| w.set_enable(true));
+        DCMI.cr().modify(|w| w.set_capture(true));
     }
-    let surplus = DCMI.sr().read().fne() || DCMI.ris().read().ovr_ris();
-    if transfer.missing() == 0 && !surplus {
-        Ok(edge)
-    } else {
-        Err((Failure::Size, edge))
+
+    fn stop(&mut self) {
+        reset();
+        self.dma.halt();
+    }
+
+    fn take_finished(&mut self) -> bool {
+        self.dma.take_finished()
+    }
+
+    fn writes_second(&self) -> bool {
+        self.dma.fills_second()
+    }
+
+    fn aim(&mut self, slot: u16) {
+        self.dma.aim(slot);
+    }
+
+    fn has_begun_a_band(&self) -> bool {
+        self.dma.has_begun_a_band() || DCMI.sr().read().fne()
+    }
+
+    fn newest_edge(&self) -> Edge {
+        vsync::newest()
     }
 }
 
-/// Configures DCMI to what the camera's registers were set to: 8 bits, hardware synchronization, snapshot.
-fn set_up() {
+/// Brings DCMI to its state after a reset, whatever it was doing.
+fn reset() {
+    RCC.ahb2rstr().modify(|w| w.set_dcmirst(true));
+    RCC.ahb2rstr().modify(|w| w.set_dcmirst(false));
+}
+
+/// Configures DCMI to what the camera's registers were set to: 8 bits, hardware synchronization, continuous.
+fn configure() {
     DCMI.cr().write(|w| {
-        w.set_cm(true);
         w.set_pckpol(camera::SAMPLE_ON_RISING_EDGE != INVERTED_POLARITIES);
         w.set_vspol(camera::VSYNC_BLANKING_IS_HIGH != INVERTED_POLARITIES);
         w.set_hspol(camera::HREF_BLANKING_IS_HIGH != INVERTED_POLARITIES);
     });
 }
 
-/// Lets DCMI wait for the next frame.
-fn arm() {
-    EVENT.reset();
-    clear_flags();
-    DCMI.ier().write(|w| {
-        w.set_frame_ie(true);
-        w.set_ovr_ie(true);
+/// Lets DCMI pass only `window`: two bytes a pixel, and sizes less one (RM0433, DCMI_CWSTRT and DCMI_CWSIZE).
+fn crop(window: Window) {
+    DCMI.cwstrt().write(|w| {
+        w.set_hoffcnt(window.left * 2);
+        w.set_vst(window.top);
     });
-    DCMI.cr().modify(|w| w.set_enable(true));
-    DCMI.cr().modify(|w| w.set_capture(true));
+    DCMI.cwsize().write(|w| {
+        w.set_capcnt(window.width * 2 - 1);
+        w.set_vline(window.height - 1);
+    });
+    DCMI.cr().modify(|w| w.set_crop(true));
 }
 
-/// Brings DCMI back from any state.
-fn restore() {
-    DCMI.ier().write_value(Ier(0));
-    RCC.ahb2rstr().modify(|w| w.set_dcmirst(true));
-    RCC.ahb2rstr().modify(|w| w.set_dcmirst(false));
-    set_up();
+/// Waits until the DMA has written a frame's last words, some bus cycles; no longer, as they may never come.
+fn drain(dma: &BandDma) {
+    const PATIENCE: u32 = 64;
+    for _ in 0..PATIENCE {
+        if !DCMI.sr().read().fne() && dma.is_between_bands() {
+            break;
+        }
+    }
 }
 
-fn clear_flags() {
-    DCMI.icr().write(|w| {
-        w.set_frame_isc(true);
-        w.set_ovr_isc(true);
-        w.set_err_isc(true);
-        w.set_vsync_isc(true);
-        w.set_line_isc(true);
+#[embassy_stm32::interrupt]
+fn DMA1_STREAM0() {
+    act(|running, mut tell| {
+        if running.hardware.dma.failed() {
+            stats::CAPTURE_OVERRUNS.count();
+            running.tracker.overrun(&mut running.hardware, &mut tell);
+        } else {
+            running
+                .tracker
+                .band_finished(&mut running.hardware, &mut tell);
+        }
     });
 }
 
 #[embassy_stm32::interrupt]
 fn DCMI() {
-    let edge = vsync::newest();
-    let overrun = DCMI.mis().read().ovr_mis();
-    // One event for each arming.
-    DCMI.ier().write_value(Ier(0));
-    EVENT.signal(if overrun {
-        Event::Overrun(edge)
-    } else {
-        Event::FrameEnd(edge)
+    act(|running, mut tell| {
+        let flags = DCMI.mis().read();
+        DCMI.icr().write(|w| {
+            w.set_frame_isc(flags.frame_mis());
+            w.set_ovr_isc(flags.ovr_mis());
+        });
+        if flags.ovr_mis() {
+            stats::CAPTURE_OVERRUNS.count();
+            running.tracker.overrun(&mut running.hardware, &mut tell);
+        } else if flags.frame_mis() {
+            drain(&running.hardware.dma);
+            running
+                .tracker
+                .frame_ended(&mut running.hardware, &mut tell);
+        }
     });
 }

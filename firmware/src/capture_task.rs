@@ -1,14 +1,16 @@
-//! Keeps frames coming: hands out buffers, drops what is broken, restarts a camera that fell silent.
+//! Keeps the camera going: sets it up, and starts it again when it falls silent.
 
-use crate::camera::Camera;
-use crate::capture::{Capture, Failure};
-use crate::frame::{CAPTURED, Captured, FREE, Frame};
+use crate::camera::{self, Camera, FRAME_TIME};
+use crate::capture::{Capture, EVENTS};
 use crate::health::{self, Condition};
-use crate::vsync::{self, Edge};
-use crate::{camera, log, stats};
+use crate::{log, stats, vsync};
 use embassy_time::{Duration, Timer};
+use hivtac_capture::Event;
 use hivtac_wire::message::LogLevel;
 
+/// So many frame times without a band or the end of a frame are a silence. Bands come all the time but for the vertical
+/// blanking, a seventh of a frame, or what a crop window leaves out.
+const SILENCE: u32 = 2;
 /// So many silences in a row, and the camera is set up again.
 const SILENCES: u32 = 3;
 /// Pause before the next attempt when the camera does not answer.
@@ -21,15 +23,14 @@ pub async fn run(camera: Camera, capture: Capture) {
         camera,
         capture,
         numbering: false,
-        last: Edge::default(),
+        activity: 0,
+        quiet: 0,
         silences: 0,
-        after_overrun: false,
-        after_restart: false,
     };
     task.start_camera().await;
     loop {
-        let frame = FREE.receive().await;
-        task.step(frame).await;
+        Timer::after(FRAME_TIME).await;
+        task.listen().await;
     }
 }
 
@@ -38,68 +39,28 @@ struct CaptureTask {
     capture: Capture,
     /// VSYNC edges count since the first register reset.
     numbering: bool,
-    /// Edge of the newest frame that was captured or counted as lost.
-    last: Edge,
+    /// [`Capture::activity`] when it was looked at last.
+    activity: u32,
+    /// Frame times without activity.
+    quiet: u32,
     /// In a row.
     silences: u32,
-    after_overrun: bool,
-    after_restart: bool,
 }
 
 impl CaptureTask {
-    /// Captures into `frame` and passes it on, or counts why not.
-    async fn step(&mut self, frame: &'static mut Frame) {
-        match self.capture.frame(frame).await {
-            Ok(edge) => self.deliver(frame, edge).await,
-            Err((failure, edge)) => {
-                FREE.send(frame).await;
-                self.lost(failure, edge).await;
-            }
+    /// Looks whether something has come during the last frame time.
+    async fn listen(&mut self) {
+        let activity = self.capture.activity();
+        if activity != self.activity {
+            (self.quiet, self.silences) = (0, 0);
+        } else {
+            self.quiet += 1;
         }
-    }
-
-    async fn deliver(&mut self, frame: &'static mut Frame, edge: Edge) {
-        self.frames_missed_before(edge);
-        self.silences = 0;
-        let captured = Captured {
-            frame,
-            edge,
-            after_overrun: core::mem::take(&mut self.after_overrun),
-            after_restart: core::mem::take(&mut self.after_restart),
-        };
-        CAPTURED.send(captured).await;
-    }
-
-    async fn lost(&mut self, failure: Failure, edge: Edge) {
-        defmt::warn!("frame {=u32} lost: {}", edge.number, failure);
-        let begun = edge.number != self.last.number;
-        self.frames_missed_before(edge);
-        match failure {
-            Failure::Overrun => self.overrun(),
-            Failure::Size => stats::DROPPED_SIZE.count(),
-            Failure::Silence if begun => stats::DROPPED_SIZE.count(),
-            Failure::Silence => {}
+        self.activity = activity;
+        if self.quiet >= SILENCE {
+            self.quiet = 0;
+            self.silent().await;
         }
-        match failure {
-            Failure::Silence => self.silent().await,
-            Failure::Overrun | Failure::Size => {
-                self.silences = 0;
-                health::set(Condition::NoForce);
-            }
-        }
-    }
-
-    fn overrun(&mut self) {
-        stats::DROPPED_OVERRUN.count();
-        stats::CAPTURE_OVERRUNS.count();
-        self.after_overrun = true;
-    }
-
-    /// Counts the frames between the last one and the one that `edge` began: nothing was armed for them.
-    fn frames_missed_before(&mut self, edge: Edge) {
-        let passed = edge.number.saturating_sub(self.last.number);
-        stats::DROPPED_BUSY.add(passed.saturating_sub(1));
-        self.last = edge;
     }
 
     async fn silent(&mut self) {
@@ -108,22 +69,30 @@ impl CaptureTask {
         if self.silences >= SILENCES {
             health::set(Condition::NoCamera);
             self.silences = 0;
-            self.after_restart = true;
             log::say(
                 LogLevel::Warning,
                 format_args!("camera silent, restarting it"),
             );
             self.start_camera().await;
             stats::CAMERA_RESTARTS.count();
+        } else {
+            self.capture.start_again();
+            // What that told is no sign of life.
+            self.activity = self.capture.activity();
         }
     }
 
     /// Sets the camera up; tries until it answers. Frames that pass meanwhile count as dropped at once.
     async fn start_camera(&mut self) {
-        stats::pass_over_frames_after(self.last.number);
+        self.capture.stop();
+        let restart = self.numbering;
+        let from = if restart { vsync::newest().number } else { 0 };
+        stats::pass_over_frames_after(from);
         self.try_until_it_answers().await;
-        self.last = vsync::newest();
-        stats::end_passing_over(self.last.number);
+        let to = vsync::newest().number;
+        stats::end_passing_over(to);
+        EVENTS.send(Event::Passed { from, to, restart }).await;
+        self.capture.start();
     }
 
     async fn try_until_it_answers(&mut self) {

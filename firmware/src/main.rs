@@ -2,15 +2,18 @@
 //!
 //! ```text
 //! vsync ─┐
-//! camera ┴→ capture → frame buffers → pipeline → outbox → usb → host
-//!                                        ↑                 │
-//!                                     orders ← commands ←──┘
+//! camera ┴→ capture → bands → pipeline → outbox → usb → host
+//!                                ↑                 │
+//!                             orders ← commands ←──┘
 //! ```
 //!
 //! Who interrupts whom: [`priorities`]. What lies where: `memory.x`, [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
 
+mod band_copy;
+mod band_dma;
+mod bands;
 mod board;
 mod caches;
 mod camera;
@@ -19,12 +22,12 @@ mod capture_task;
 mod commands;
 mod convert;
 mod faults;
-mod frame;
-mod frame_dma;
+mod follow;
 mod health;
 mod info;
 mod log;
 mod model;
+mod near_table;
 mod outbox;
 mod pipeline_task;
 mod priorities;
@@ -42,24 +45,28 @@ use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::Model;
-use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
+use pipeline_task::Sensor;
 use static_cell::{ConstStaticCell, StaticCell};
+
+core::arch::global_asm!(include_str!("start.s"));
 
 static CAPTURE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static USB_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
-static SENSOR: ConstStaticCell<Sensor<'static>> = ConstStaticCell::new(Sensor::new());
+/// Too large for DTCM beside the tables; frames use small parts of it at a time, which the data cache holds.
+#[unsafe(link_section = ".sram.sensor")]
+static SENSOR: ConstStaticCell<Sensor> = ConstStaticCell::new(Sensor::new());
 
 #[entry]
 fn main() -> ! {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
     caches::enable(&mut core);
+    bands::clear();
     priorities::set();
     let board = Board::start();
     faults::report_reset();
-    frame::provide_buffers();
     vsync::start();
     let model = model::embedded();
     let sensor = SENSOR.take();
@@ -73,13 +80,13 @@ fn main() -> ! {
     THREAD_EXECUTOR
         .init(Executor::new())
         .run(|spawner: Spawner| {
-            spawner.spawn(token(pipeline_task::run(sensor)));
+            spawner.spawn(token(pipeline_task::run(sensor, board.bands)));
             spawner.spawn(token(faults::feed_watchdog(board.watchdog)));
         })
 }
 
 /// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers.
-fn configure(sensor: &mut Sensor<'static>, model: Option<Model<'static>>) {
+fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) {
     let order = ByteOrder::Swapped;
     let geometry = Geometry::preset(Preset::Ov7725, camera::WIDTH, camera::HEIGHT);
     let settings = match &model {

@@ -1,15 +1,20 @@
-//! Frames into samples: runs the sensing pipeline in thread mode, below everything else.
+//! Bands into samples: runs the sensing pipeline in thread mode, below everything else.
 
+use crate::band_copy::BandCopy;
+use crate::bands::SHAPE;
+use crate::capture::{self, EVENTS};
 use crate::convert;
-use crate::frame::{CAPTURED, Captured, FREE};
+use crate::follow::Follow;
 use crate::health::{self, Condition};
+use crate::near_table::NearTable;
 use crate::tare::Taring;
 use crate::{info, outbox, session, stats};
 use embassy_futures::select::{Either3, select3};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_time::{Instant, Timer};
-use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
+use hivtac_sensing::pipeline::{self, Measurement};
 use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Sample};
 use hivtac_wire::status::Status;
 
@@ -31,17 +36,24 @@ pub enum Order {
     },
 }
 
+/// The pipeline, its table in DTCM.
+pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
+
 /// Orders that wait.
 pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
-pub async fn run(sensor: &'static mut Sensor<'static>) {
+pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
     info::set_threshold(convert::threshold_to_wire(sensor.threshold()));
     let mut task = PipelineTask {
         sensor,
+        bands,
+        follower: Follower::new(SHAPE),
+        follow: Follow::new(),
+        busy_us: 0,
         sequence: 0,
-        last_frame: None,
+        first: true,
         taring: None,
     };
     loop {
@@ -50,25 +62,85 @@ pub async fn run(sensor: &'static mut Sensor<'static>) {
 }
 
 struct PipelineTask {
-    sensor: &'static mut Sensor<'static>,
+    sensor: &'static mut Sensor,
+    bands: BandCopy,
+    follower: Follower,
+    follow: Follow,
+    /// Spent on the frame under way, µs.
+    busy_us: u32,
     /// Samples produced.
     sequence: u32,
-    /// Number of the frame processed last.
-    last_frame: Option<u32>,
+    /// No frame was measured yet.
+    first: bool,
     /// A tare under way.
     taring: Option<Taring>,
 }
 
 impl PipelineTask {
-    /// Does the next thing there is to do.
+    /// Does the next thing there is to do. Orders wait for the end of a frame.
     async fn step(&mut self) {
+        if self.follower.is_scanning() {
+            return self.go_on().await;
+        }
         self.taring.take_if(|taring| !taring.is_wanted());
         let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
-        match select3(ORDERS.receive(), CAPTURED.receive(), Timer::at(deadline)).await {
+        match select3(ORDERS.receive(), EVENTS.receive(), Timer::at(deadline)).await {
             Either3::First(order) => self.obey(order),
-            Either3::Second(captured) => self.process(captured).await,
+            Either3::Second(event) => self.follow(event),
             Either3::Third(()) => self.give_up_tare(),
         }
+    }
+
+    /// Goes on with the frame under way. One that has all its rows need not wait for its end.
+    async fn go_on(&mut self) {
+        let complete = self.follower.is_complete();
+        if complete && EVENTS.is_empty() && !capture::has_begun_a_band() {
+            let action = self.follower.deliver();
+            self.act(action);
+        } else {
+            let event = EVENTS.receive().await;
+            self.follow(event);
+        }
+    }
+
+    fn follow(&mut self, event: Event) {
+        if let Event::Ended { edge, how } = event
+            && how != Ending::Whole
+        {
+            defmt::warn!("frame {=u32}: {}", edge.number, defmt::Debug2Format(&how));
+        }
+        let action = self.follower.event(event);
+        self.act(action);
+    }
+
+    fn act(&mut self, action: Action) {
+        match action {
+            Action::None => {}
+            Action::Scan(band) => self.scan(&band),
+            Action::Deliver(delivery) => self.deliver(&delivery),
+        }
+        let tally = self.follower.take_tally();
+        stats::FRAMES_PROCESSED.add(tally.processed);
+        stats::DROPPED_BUSY.add(tally.busy);
+        stats::DROPPED_OVERRUN.add(tally.overrun);
+        stats::DROPPED_SIZE.add(tally.size);
+        if tally.overrun + tally.size > 0 {
+            health::set(Condition::NoForce);
+        }
+    }
+
+    /// Scans the rows of a band.
+    fn scan(&mut self, band: &Band) {
+        let begun = Instant::now();
+        if band.index == 0 {
+            self.busy_us = 0;
+            self.follow.begin(self.sensor, band.window);
+        }
+        let pixels = self.bands.fetch(band, capture::finished);
+        self.sensor.push_rows(pixels.unwrap_or_default());
+        let intact = pixels.is_some();
+        self.follower.scanned(intact);
+        self.busy_us += begun.elapsed().as_micros() as u32;
     }
 
     fn obey(&mut self, order: Order) {
@@ -93,13 +165,13 @@ impl PipelineTask {
         }
     }
 
-    async fn process(&mut self, captured: Captured) {
+    /// Measures the frame whose rows were scanned.
+    fn deliver(&mut self, delivery: &Delivery) {
         let begun = Instant::now();
-        let measurement = self.measure(&captured);
-        stats::PROCESSING_US.set(begun.elapsed().as_micros() as u32);
-        stats::FRAMES_PROCESSED.count();
-        let sample = self.sample(&captured, &measurement);
-        FREE.send(captured.frame).await;
+        let measurement = self.follow.finish(self.sensor);
+        let sample = self.sample(delivery, &measurement);
+        self.busy_us += begun.elapsed().as_micros() as u32;
+        stats::PROCESSING_US.set(self.busy_us);
         self.tare_with(&measurement);
         health::set(match measurement.force {
             Some(_) => Condition::Good,
@@ -111,34 +183,22 @@ impl PipelineTask {
         }
     }
 
-    fn measure(&mut self, captured: &Captured) -> Measurement {
-        self.sensor.begin_frame();
-        for row in captured.frame.rows() {
-            self.sensor.push_row(row);
-        }
-        self.sensor.finish_frame()
-    }
-
-    fn sample(&mut self, captured: &Captured, measurement: &Measurement) -> Sample {
-        let number = captured.edge.number;
+    fn sample(&mut self, delivery: &Delivery, measurement: &Measurement) -> Sample {
         let mut status = Status(measurement.status.bits());
-        let follows = self
-            .last_frame
-            .is_none_or(|last| last.wrapping_add(1) == number);
+        let first = core::mem::replace(&mut self.first, false);
         for (set, bit) in [
-            (!follows, Status::FRAME_DROPPED),
-            (captured.after_overrun, Status::CAPTURE_OVERRUN),
-            (captured.after_restart, Status::CAMERA_RESTARTED),
+            (delivery.after_loss && !first, Status::FRAME_DROPPED),
+            (delivery.after_overrun, Status::CAPTURE_OVERRUN),
+            (delivery.after_restart, Status::CAMERA_RESTARTED),
         ] {
             if set {
                 status |= bit;
             }
         }
-        self.last_frame = Some(number);
         Sample {
             sequence: self.sequence,
-            frame: number,
-            time_us: captured.edge.time_us,
+            frame: delivery.edge.number,
+            time_us: delivery.edge.time_us,
             status,
             force: measurement.force.map(convert::force_to_wire),
         }

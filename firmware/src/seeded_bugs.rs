@@ -16,8 +16,8 @@ pub const INVERTED_POLARITIES: bool = cfg!(feature = "bug-polarity");
 /// True when the camera's format register is left at YUV.
 pub const YUV_FORMAT: bool = cfg!(feature = "bug-camera-register");
 
-/// The part of a frame that the DMA is told to transfer: one frame in this many.
-pub const FRAME_DIVISOR: usize = if cfg!(feature = "bug-half-buffer") {
+/// The part of a band that the DMA is told to transfer: one in this many.
+pub const BAND_DIVISOR: u16 = if cfg!(feature = "bug-half-buffer") {
     2
 } else {
     1

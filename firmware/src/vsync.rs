@@ -1,8 +1,8 @@
 //! Counts and time-stamps the camera's VSYNC edges.
 //!
 //! The counted edge is the one that ends the vertical blanking: DCMI begins a frame at the same edge. It says that
-//! a frame is finished at the *other* edge, when blanking begins. So at that moment the newest counted edge is the
-//! one that began the finished frame, and stays so for the whole blanking, however late the handler runs within it.
+//! a frame is finished at the *other* edge, when blanking begins. So from a frame's first row until then the newest
+//! counted edge is the one that began it, however late a handler looks within that time.
 
 use crate::camera;
 use core::cell::Cell;
@@ -10,19 +10,11 @@ use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::{self, EXTI, SYSCFG};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::Instant;
+use hivtac_capture::Edge;
 
 /// The VSYNC pin is PB7 on every board with this camera connector.
 const LINE: usize = 7;
 const PORT_B: u8 = 1;
-
-/// One VSYNC edge.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Edge {
-    /// 1 for the first edge after the camera's first register reset.
-    pub number: u32,
-    /// Device time, µs since boot.
-    pub time_us: u64,
-}
 
 static NEWEST: CriticalSectionMutex<Cell<Edge>> = CriticalSectionMutex::new(Cell::new(Edge {
     number: 0,

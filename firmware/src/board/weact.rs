@@ -11,10 +11,11 @@
 //! | LED | PE3, high = on |
 //! | crystal | 25 MHz |
 
+use crate::band_copy::BandCopy;
+use crate::band_dma::BandDma;
 use crate::camera::Camera;
 use crate::capture::Capture;
-use crate::frame_dma::FrameDma;
-use crate::seeded_bugs;
+use crate::{priorities, seeded_bugs};
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull, Speed};
 use embassy_stm32::i2c::{self, I2c};
 use embassy_stm32::pac::CRS;
@@ -42,6 +43,8 @@ pub struct Board {
     pub camera: Camera,
     /// The camera's data side.
     pub capture: Capture,
+    /// Where the pipeline gets its rows from.
+    pub bands: BandCopy,
     /// What the USB task needs to make its driver.
     pub usb: UsbPort,
     /// The status LED, off.
@@ -83,7 +86,8 @@ impl Board {
         let power_down = Output::new(p.PA7, Level::High, Speed::Low);
         Board {
             camera: Camera::new(sccb, power_down),
-            capture: Capture::new(p.DCMI, FrameDma::new(p.DMA1_CH0)),
+            capture: Capture::new(p.DCMI, BandDma::new(p.DMA1_CH0), priorities::CAPTURE),
+            bands: BandCopy::new(p.MDMA_CH0),
             usb: UsbPort {
                 core: p.USB_OTG_FS,
                 plus: p.PA12,

@@ -1,0 +1,49 @@
+//! The ring of bands in AXI SRAM that the camera's DMA fills, and its numbers.
+//!
+//! The DMA writes it and the MDMA reads it; the core touches it once, at boot.
+
+use crate::camera::{HEIGHT, WIDTH};
+use core::mem::MaybeUninit;
+use hivtac_capture::{Shape, Window};
+
+/// Rows of a band.
+pub const ROWS: u16 = 4;
+/// Bands in the ring: at 320 × 240 a little more than a frame.
+pub const SLOTS: u16 = 64;
+/// Both.
+pub const SHAPE: Shape = Shape::new(ROWS, SLOTS);
+/// A whole frame.
+pub const FRAME: Window = Window::whole(WIDTH, HEIGHT);
+/// Pixels of a band of a whole frame: the size of a slot.
+pub const BAND_PIXELS: usize = WIDTH as usize * ROWS as usize;
+
+const _: () = {
+    assert!(
+        matches!(FRAME.capturable(FRAME, SHAPE), Some(window) if window.height == HEIGHT && window.width == WIDTH)
+    );
+    // The widest rows that the pipeline takes fit, too.
+    assert!(ring_bytes(800) <= 512 * 1024);
+};
+
+/// Size of the ring for rows of so many pixels, bytes.
+const fn ring_bytes(width: usize) -> usize {
+    SLOTS as usize * ROWS as usize * width * size_of::<u16>()
+}
+
+#[repr(C, align(128))]
+struct Ring(MaybeUninit<[[u16; BAND_PIXELS]; SLOTS as usize]>);
+
+#[unsafe(link_section = ".axisram.bands")]
+static mut RING: Ring = Ring(MaybeUninit::uninit());
+
+/// Address of a slot.
+pub fn address(slot: u16) -> u32 {
+    let base = &raw const RING as u32;
+    base + u32::from(slot % SLOTS) * (BAND_PIXELS * size_of::<u16>()) as u32
+}
+
+/// Writes every word once, which gives the memory's error correction codes a defined start. Call before the DMA runs.
+pub fn clear() {
+    // SAFETY: no reference to the ring is ever made, and nothing else writes to it yet.
+    unsafe { (&raw mut RING).write_bytes(0, 1) };
+}

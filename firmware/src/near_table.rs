@@ -1,0 +1,53 @@
+//! The threshold's table of 64 KiB, in DTCM whatever else the pipeline holds lies in.
+
+use hivtac_sensing::tables::{ByteTable, Pixels, Run, Table, Weights};
+use hivtac_sensing::threshold::{ByteOrder, HsvBox, ThresholdError};
+use static_cell::ConstStaticCell;
+
+/// `.bss`, which is in DTCM.
+static TABLE: ConstStaticCell<ByteTable> = ConstStaticCell::new(ByteTable::CLOSED);
+
+/// The one that was set first has the table; every other accepts nothing.
+pub struct NearTable(Option<&'static mut ByteTable>);
+
+impl Table for NearTable {
+    const CLOSED: Self = NearTable(None);
+
+    fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
+        if self.0.is_none() {
+            self.0 = TABLE.try_take();
+        }
+        match &mut self.0 {
+            Some(table) => table.set(hsv_box, order),
+            None => hsv_box.check(),
+        }
+    }
+
+    fn accepts(&self, raw: u16) -> bool {
+        self.0.as_ref().is_some_and(|table| table.accepts(raw))
+    }
+}
+
+impl Pixels for NearTable {
+    fn row_length(&self, width: u16) -> usize {
+        usize::from(width)
+    }
+
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
+        match &self.0 {
+            Some(table) => table.mask_row(row, mask),
+            None => mask.fill(0),
+        }
+    }
+
+    fn weight(&self, row: &[u16], column: u16) -> u8 {
+        self.0.as_ref().map_or(0, |table| table.weight(row, column))
+    }
+
+    fn weigh(&self, row: &[u16], run: Run) -> Weights {
+        match &self.0 {
+            Some(table) => table.weigh(row, run),
+            None => Weights::NONE,
+        }
+    }
+}

@@ -1,0 +1,39 @@
+// Runs right after a reset, before any memory is initialized, and so uses registers only: switches on the clocks of
+// SRAM1 to 3, and loads .itcm and .sram (memory.x) from flash in double words, as ITCM's error correction has them.
+
+    .syntax unified
+    .section .text.__pre_init, "ax", %progbits
+    .global __pre_init
+    .type __pre_init, %function
+    .thumb_func
+__pre_init:
+    ldr     r0, =0x580244DC         // RCC_AHB2ENR
+    ldr     r1, [r0]
+    orr     r1, r1, #0xE0000000     // SRAM3EN, SRAM2EN, SRAM1EN
+    str     r1, [r0]
+    ldr     r1, [r0]                // the clocks run after this (RM0433, section 8.5.10)
+    dsb
+
+    ldr     r0, =__sitcm
+    ldr     r1, =__eitcm
+    ldr     r2, =__itcm_load
+1:  cmp     r0, r1
+    bhs     2f
+    ldrd    r3, r12, [r2], #8
+    strd    r3, r12, [r0], #8
+    b       1b
+
+2:  ldr     r0, =__ssram
+    ldr     r1, =__esram
+    ldr     r2, =__sram_load
+3:  cmp     r0, r1
+    bhs     4f
+    ldrd    r3, r12, [r2], #8
+    strd    r3, r12, [r0], #8
+    b       3b
+
+4:  dsb
+    isb
+    bx      lr
+    .ltorg
+    .size __pre_init, . - __pre_init
