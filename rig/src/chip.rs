@@ -1,9 +1,10 @@
-//! The microcontroller: the emulator's STM32H743 with the camera interface and the USB core it lacks.
+//! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
+//! core that it lacks.
 //!
-//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for five slots itself: DCMI, and the three
-//! blocks of OTG2; everything else goes to the part's own models.
+//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for five slots itself: DCMI, MDMA, and the
+//! three blocks of OTG2; everything else goes to the part's own models.
 
-use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
 use rigless::soc::{Bus, Error};
@@ -14,6 +15,7 @@ use crate::camera::{Sccb, SharedCamera};
 use crate::dcmi::Dcmi;
 use crate::dormant::Dormant;
 use crate::faults::Faults;
+use crate::mdma::Mdma;
 use crate::otg::{Blocks, SharedCore};
 use crate::rules::Rules;
 use crate::usb_host::SharedHost;
@@ -28,6 +30,8 @@ pub struct Chip {
     pub part: Stm32h743,
     /// The camera interface.
     pub dcmi: Dcmi,
+    /// The controller that reaches DTCM.
+    pub mdma: Mdma,
     camera: SharedCamera,
     otg: Blocks,
     core: SharedCore,
@@ -35,6 +39,7 @@ pub struct Chip {
     dormant: Dormant,
     slots: board::Slots,
     dcmi_slot: usize,
+    mdma_slot: usize,
     vsync: Level,
     wiring: Wiring,
 }
@@ -60,9 +65,11 @@ impl Chip {
         otg.wake_host(part.bus_mut(), VirtualNanos(0));
         let slots = board::Slots::of(part.bus())?;
         let dcmi_slot = part.bus().slot("DCMI")?;
+        let mdma_slot = part.bus().slot("MDMA")?;
         Ok(Self {
             dormant: Dormant::new(part.bus()),
-            dcmi: Dcmi::new(camera.clone(), faults, rules),
+            dcmi: Dcmi::new(camera.clone(), faults, rules.clone()),
+            mdma: Mdma::new(rules),
             part,
             camera,
             otg,
@@ -70,6 +77,7 @@ impl Chip {
             host,
             slots,
             dcmi_slot,
+            mdma_slot,
             vsync: Level::Low,
             wiring: Wiring::default(),
         })
@@ -126,6 +134,7 @@ impl Mcu for Chip {
             .expect("a part that was fitted once");
         self.otg.wake_host(self.part.bus_mut(), at);
         self.dormant = Dormant::new(self.part.bus());
+        Device::reset(&mut self.mdma);
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);
@@ -142,6 +151,9 @@ impl Mcu for Chip {
         }
         if slot == self.dcmi_slot {
             return (self.part.bus_mut(), Some(&mut self.dcmi));
+        }
+        if slot == self.mdma_slot {
+            return (self.part.bus_mut(), Some(&mut self.mdma));
         }
         if slot == self.slots.vsync_port() {
             self.drive_vsync(self.dcmi.vsync_at());

@@ -12,6 +12,10 @@ pub enum Kind {
     CameraWrongId,
     /// The camera's clock tree stops: no VSYNC, no pixels; its registers still answer.
     CameraSilent,
+    /// The camera sends half of its rows in frames that begin while this lasts.
+    FrameShort,
+    /// The camera sends five rows more than it should in frames that begin while this lasts.
+    FrameLong,
     /// The DMA gets no access to the bus, so that the camera interface overruns.
     DcmiOverrun,
     /// The host has the port open but does not ask for data.
@@ -20,10 +24,12 @@ pub enum Kind {
     CablePulled,
 }
 
-const NAMES: [(&str, Kind); 6] = [
+const NAMES: [(&str, Kind); 8] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-silent", Kind::CameraSilent),
+    ("frame-short", Kind::FrameShort),
+    ("frame-long", Kind::FrameLong),
     ("dcmi-overrun", Kind::DcmiOverrun),
     ("host-not-reading", Kind::HostNotReading),
     ("cable-pulled", Kind::CablePulled),
@@ -87,12 +93,13 @@ fn milliseconds(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A DMA stall lasts a millisecond unless told otherwise; everything else lasts for the rest of the run.
+/// A DMA stall lasts a millisecond unless told otherwise, a wrong size a frame or two, and everything else for the rest of
+/// the run.
 fn default_end(kind: Kind, from_ns: u64) -> u64 {
-    if kind == Kind::DcmiOverrun {
-        from_ns + 1_000_000
-    } else {
-        u64::MAX
+    match kind {
+        Kind::DcmiOverrun => from_ns + 1_000_000,
+        Kind::FrameShort | Kind::FrameLong => from_ns + 26_000_000,
+        _ => u64::MAX,
     }
 }
 

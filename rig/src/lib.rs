@@ -13,6 +13,7 @@
 //! | [`run`], [`report`] | one run from options to outcome |
 //! | [`chip`], [`board`], `machine`, `dormant` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`dcmi`], [`camera`], [`frame_source`] | the camera interface; the sensor; what it looks at |
+//! | [`mdma`] | the DMA controller that reaches DTCM |
 //! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
 //! | [`faults`], [`rules`], [`dma_reach`], [`truth`] | what goes wrong on request; what firmware must not do; what is true |
 
@@ -26,6 +27,7 @@ pub mod faults;
 pub mod frame_source;
 pub mod link;
 mod machine;
+pub mod mdma;
 pub mod otg;
 pub mod report;
 pub mod rules;

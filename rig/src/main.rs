@@ -26,7 +26,7 @@ use hivtac_rig::truth::TruthLog;
 struct Arguments {
     /// The firmware, as it is flashed.
     elf: PathBuf,
-    /// What presses the film: rest, static, demo, sweep; or test-picture.
+    /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or test-picture.
     #[arg(long, default_value = "demo")]
     scene: String,
     /// Decides the noise, and where the demo starts.
@@ -66,7 +66,7 @@ struct Arguments {
     #[arg(long, value_name = "FILE", requires = "script")]
     out: Option<PathBuf>,
     /// Something that goes wrong, KIND[@MS[-MS]] in virtual time: camera-absent, camera-wrong-id, camera-silent,
-    /// dcmi-overrun, host-not-reading, cable-pulled. May be repeated.
+    /// frame-short, frame-long, dcmi-overrun, host-not-reading, cable-pulled. May be repeated.
     #[arg(long, value_name = "KIND[@MS[-MS]]")]
     fault: Vec<Fault>,
     /// Instructions per second of virtual time that the core is assumed to execute.

@@ -30,6 +30,8 @@ pub struct Report {
     pub truth_failure: Option<String>,
     /// The camera interface.
     pub dcmi: dcmi::Counters,
+    /// Bytes that the MDMA moved.
+    pub mdma_bytes: u64,
     /// The USB port at the end.
     pub port: Port,
     /// The USB host.
@@ -72,6 +74,7 @@ impl Report {
             camera_fault: camera.faulty_output().map(str::to_owned),
             truth_failure: camera.truth_failure().map(str::to_owned),
             dcmi: chip.dcmi.counters(),
+            mdma_bytes: chip.mdma.bytes(),
             port: host.port(),
             usb: host.counters(),
             usb_log: host.log().to_vec(),
@@ -107,6 +110,7 @@ impl Report {
                 "words": self.dcmi.words,
                 "overruns": self.dcmi.overruns,
             },
+            "mdma": { "bytes": self.mdma_bytes },
             "usb": {
                 "port": format!("{:?}", self.port),
                 "enumerations": self.usb.enumerations,

@@ -72,6 +72,39 @@ fn an_overrun_costs_a_frame_and_is_told() {
         .collect();
     assert_eq!(told.iter().filter(|told| **told).count(), 1, "{told:?}");
     assert!(told.len() >= 5 && told.last() == Some(&false), "{told:?}");
+    let missing = run.missing_frames();
+    assert_eq!(missing.len(), 1, "no other frame is lost: {missing:?}");
+    assert_eq!(run.frames_after_a_loss(), [missing[0] + 1]);
+}
+
+/// The camera sends half a frame: it is dropped and counted, and the next one is captured.
+#[test]
+fn a_short_frame_costs_itself_and_no_other() {
+    let run = Setup::new(firmware(), 480).fault("frame-short@250").run();
+    let (stats, missing) = (run.stats(), run.missing_frames());
+    assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
+    assert_eq!(missing.len(), stats.dropped_size as usize, "{missing:?}");
+    assert_eq!(run.frames_after_a_loss(), [missing.last().unwrap() + 1]);
+    let last = run.samples().last().map(|sample| sample.frame);
+    assert!(last > missing.last().map(|frame| frame + 3), "{last:?}");
+    assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
+}
+
+/// The camera sends rows after the last one: the frame counts as too long, whether it was measured by then or, on a slow
+/// core, not yet; the next sample says so. That one is whole.
+#[test]
+fn a_long_frame_is_told_and_costs_no_other() {
+    let run = Setup::new(firmware(), 480).fault("frame-long@250").run();
+    let stats = run.stats();
+    assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
+    let told = run.frames_after_a_loss();
+    let missing = run.missing_frames();
+    assert_eq!(told.len(), stats.dropped_size as usize, "{told:?}");
+    assert!(
+        missing.iter().all(|frame| told.contains(&(frame + 1))),
+        "{missing:?} {told:?}"
+    );
+    assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
 /// The host leaves the port open and does not read: samples are dropped and counted, the camera goes on, and the

@@ -53,7 +53,8 @@ fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
         column
     };
     let row = if output.com3 & FLIP != 0 {
-        rows - 1 - row
+        // A faulty sensor sends rows beyond the last one; they are black.
+        (rows - 1).checked_sub(row).unwrap_or(rows)
     } else {
         row
     };

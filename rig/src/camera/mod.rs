@@ -21,6 +21,9 @@ use output::Output;
 use registers::Registers;
 pub use sccb::Sccb;
 
+/// Rows that a frame has too many under [`Kind::FrameLong`]; there is room for eight before the next VSYNC.
+const SURPLUS_ROWS: u32 = 5;
+
 /// What the board gives the sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Supply {
@@ -124,7 +127,14 @@ impl Camera {
         if self.silenced(now_ns) || !self.supply.powered {
             return None;
         }
-        Output::new(&self.registers, self.supply.clock_hz)
+        let mut output = Output::new(&self.registers, self.supply.clock_hz)?;
+        if self.faults.on(Kind::FrameShort, now_ns) {
+            output.rows /= 2;
+        }
+        if self.faults.on(Kind::FrameLong, now_ns) {
+            output.rows += SURPLUS_ROWS;
+        }
+        Some(output)
     }
 
     /// The next instant at which a fault starts or stops the sensor.
@@ -265,18 +275,25 @@ mod tests {
     }
 
     #[test]
-    fn faults_silence_and_disguise_the_sensor() {
-        let mut camera = camera(&[
-            "camera-silent@1-2",
-            "camera-absent@3-4",
-            "camera-wrong-id@5",
-        ]);
+    fn faults_silence_the_sensor_and_change_its_frames() {
+        let mut camera = camera(&["camera-silent@1-2", "camera-absent@3-4"]);
         camera.supply(SUPPLY);
         let at = |ms: u64| ms * 1_000_000;
         assert!(camera.output(at(0)).is_some() && camera.answers(at(0)));
         assert!(camera.output(at(1)).is_none() && camera.answers(at(1)));
         assert!(camera.output(at(3)).is_none() && !camera.answers(at(3)));
         assert_eq!(camera.next_fault(at(1)), Some(at(2)));
+        let mut camera = self::camera(&["frame-short@1-2", "frame-long@3-4"]);
+        camera.supply(SUPPLY);
+        let rows = [0, 1, 3].map(|ms| camera.output(at(ms)).unwrap().rows);
+        assert_eq!(rows, [480, 240, 485]);
+    }
+
+    #[test]
+    fn a_wrong_id_is_only_that() {
+        let mut camera = camera(&["camera-wrong-id@5"]);
+        camera.supply(SUPPLY);
+        let at = |ms: u64| ms * 1_000_000;
         let ids = [0, 5].map(|ms| camera.read_register(registers::PID, at(ms)));
         assert_eq!(ids, [0x77, 0x76]);
     }

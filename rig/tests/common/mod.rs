@@ -1,6 +1,7 @@
 //! Runs the firmware under a scripted host, and decodes what it sends.
 //!
-//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug.
+//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug, and
+//! `tracking.elf`.
 //! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
@@ -21,6 +22,7 @@ use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     Command, DeviceHello, DeviceMessage, HostMessage, Request, Sample, Stats,
 };
+use hivtac_wire::status::Status;
 use hivtac_wire::version::HelloPrefix;
 use serde_json::Value;
 
@@ -32,7 +34,7 @@ pub fn firmware() -> PathBuf {
     path_from("HIVTAC_ELF", "the firmware ELF")
 }
 
-/// The firmware with a seeded bug.
+/// The firmware with a seeded bug, or with another feature.
 pub fn bug(name: &str) -> PathBuf {
     let path = path_from(
         "HIVTAC_BUG_ELFS",
@@ -259,6 +261,24 @@ impl Run {
             }
         });
         lines.collect::<Vec<_>>().join("\n")
+    }
+
+    /// The frames between the first and the last sample that have none.
+    pub fn missing_frames(&self) -> Vec<u32> {
+        let frames: Vec<u32> = self.samples().iter().map(|sample| sample.frame).collect();
+        let between = |pair: &[u32]| pair[0] + 1..pair[1];
+        frames.windows(2).flat_map(between).collect()
+    }
+
+    /// The frames whose samples say that a frame before them was lost.
+    pub fn frames_after_a_loss(&self) -> Vec<u32> {
+        let told = |sample: &&&Sample| sample.status.contains(Status::FRAME_DROPPED);
+        let samples = self.samples();
+        samples
+            .iter()
+            .filter(told)
+            .map(|sample| sample.frame)
+            .collect()
     }
 
     /// Asserts that every sample names an exposure, and that the device's clock and the true one differ by one and the

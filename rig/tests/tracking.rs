@@ -1,0 +1,80 @@
+//! The firmware with the feature `tracking`: only the rectangle around the markers is captured, and the forces are those
+//! of whole frames.
+
+mod common;
+
+use common::{Run, Setup, bug, firmware};
+
+/// Words of a whole frame.
+const WHOLE: u64 = 320 * 240 / 2;
+
+/// Frames of two runs on the same scene, as (in both, with equal results in both).
+fn equal_samples(run: &Run, other: &Run) -> (usize, usize) {
+    let (samples, others) = (run.samples(), other.samples());
+    let pairs = samples.iter().filter_map(|sample| {
+        let same_frame = others.iter().find(|other| other.frame == sample.frame);
+        same_frame.map(|other| (sample, other))
+    });
+    pairs.fold((0, 0), |(both, equal), (sample, other)| {
+        let is_equal = (sample.force, sample.status) == (other.force, other.status);
+        (both + 1, equal + usize::from(is_equal))
+    })
+}
+
+#[test]
+fn cropped_frames_give_the_forces_of_whole_ones() {
+    // Nothing moves: the two programs reset the camera some microseconds apart, so that their exposures are not of the
+    // same instants. The noise is the same.
+    let still = |elf| Setup {
+        scene: "static",
+        ..Setup::new(elf, 600)
+    };
+    let whole = still(firmware()).run();
+    let cropped = still(bug("tracking")).run();
+    assert_eq!(cropped.missing_frames(), Vec::<u32>::new());
+    let (both, equal) = equal_samples(&cropped, &whole);
+    assert!(both >= 12, "{both} frames in both runs");
+    assert_eq!(equal, both);
+    let dcmi = cropped.report.dcmi;
+    assert!(dcmi.words < dcmi.frames * WHOLE * 7 / 10, "{dcmi:?}");
+    assert_eq!(cropped.report.refused, [] as [String; 0]);
+}
+
+#[test]
+fn a_moving_tip_is_followed() {
+    let run = Setup::new(bug("tracking"), 600).run();
+    assert_eq!(run.missing_frames(), Vec::<u32>::new());
+    let samples = run.samples();
+    let with_force = samples.iter().filter(|sample| sample.force.is_some());
+    assert_eq!(with_force.count(), samples.len());
+    run.assert_times();
+}
+
+/// Half a frame does not reach down to all markers: it is counted, and the next one is captured whole or cropped.
+#[test]
+fn a_short_frame_costs_itself_and_no_other() {
+    let run = Setup::new(bug("tracking"), 480)
+        .fault("frame-short@250")
+        .run();
+    let (stats, missing) = (run.stats(), run.missing_frames());
+    assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
+    assert_eq!(missing.len(), stats.dropped_size as usize, "{missing:?}");
+    let last = run.samples().last().map(|sample| sample.frame);
+    assert!(last > missing.last().map(|frame| frame + 3), "{last:?}");
+    let with_force = run
+        .samples()
+        .iter()
+        .filter(|sample| sample.force.is_some())
+        .count();
+    assert!(with_force + 1 >= run.samples().len(), "{with_force}");
+}
+
+#[test]
+fn an_overrun_costs_a_frame_and_no_other() {
+    let run = Setup::new(bug("tracking"), 480)
+        .fault("dcmi-overrun@258")
+        .run();
+    let (stats, missing) = (run.stats(), run.missing_frames());
+    assert!(stats.capture_overruns <= 1, "{stats:?}");
+    assert_eq!(missing.len(), stats.dropped_overrun as usize, "{missing:?}");
+}
