@@ -12,6 +12,10 @@ pub mod golden;
 #[cfg(feature = "host")]
 pub mod artifact;
 #[cfg(feature = "host")]
+pub mod hard;
+#[cfg(feature = "host")]
+pub mod looking;
+#[cfg(feature = "host")]
 pub mod models;
 #[cfg(feature = "host")]
 pub mod pictures;

@@ -1,6 +1,5 @@
 //! Models with made-up numbers, for tests of the arithmetic.
 
-use std::vec;
 use std::vec::Vec;
 
 use hivtac_sensing::features::{FEATURES, Features};
@@ -8,7 +7,7 @@ use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, OUTPUTS, Origin,
-    OutputKind, PixelFormat, Rest, Uncertainty,
+    OutputKind, PixelFormat, Rest, Uncertainty, WeightWidth,
 };
 use hivtac_sensing::threshold::HsvBox;
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
@@ -23,7 +22,20 @@ pub enum Weights {
     Random,
     /// All at one of the two ends, by the neuron: odd ones −127, even ones 127.
     Extreme,
+    /// Any int16 value that the proof of the sums allows, with activations of 12 bits.
+    Wide,
+    /// All at one of the two ends that the proof of the sums allows, with activations of 12 bits.
+    WideExtreme,
 }
+
+impl Weights {
+    fn are_extreme(self) -> bool {
+        matches!(self, Weights::Extreme | Weights::WideExtreme)
+    }
+}
+
+/// Largest activation of a model with int16 weights.
+const WIDE_ACTIVATION: i64 = 4095;
 
 /// Pixels of a marker at rest, dilated, as the rendered sensor shows it.
 const REST_AREA: u32 = 245;
@@ -42,18 +54,62 @@ pub fn rest() -> Features {
 
 /// The file of a model with these layer widths (first 11, last 3), for QVGA frames of the default preset.
 pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> Vec<u8> {
+    encoded(&spec(qvga(), qvga_rest(), widths, weights, output, seed))
+}
+
+/// The same for redness-weighted centroids.
+pub fn weighted_file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> Vec<u8> {
+    let mut spec = spec(qvga(), qvga_rest(), widths, weights, output, seed);
+    spec.conditions.centroid = CentroidEstimator::RednessWeighted;
+    encoded(&spec)
+}
+
+/// The same as [`file`] for frames of another geometry, with the rest position that they show.
+pub fn file_for(
+    geometry: Geometry,
+    rest: Rest,
+    widths: &[u16],
+    weights: Weights,
+    output: OutputKind,
+    seed: u64,
+) -> Vec<u8> {
+    encoded(&spec(geometry, rest, widths, weights, output, seed))
+}
+
+fn qvga() -> Geometry {
+    Geometry::preset(Preset::Ov7725, 320, 240)
+}
+
+fn qvga_rest() -> Rest {
+    Rest {
+        features: rest(),
+        areas: [REST_AREA; 4],
+    }
+}
+
+fn encoded(spec: &ModelSpec) -> Vec<u8> {
+    spec.encode()
+        .expect("the numbers lie within the format's ranges")
+}
+
+fn spec(
+    geometry: Geometry,
+    rest: Rest,
+    widths: &[u16],
+    weights: Weights,
+    output: OutputKind,
+    seed: u64,
+) -> ModelSpec {
     let mut random = Random::new(seed);
     let layers = widths
         .windows(2)
         .map(|pair| layer(pair[0], pair[1], weights, &mut random));
-    let spec = ModelSpec {
-        conditions: conditions(),
-        rest: Rest {
-            features: rest(),
-            areas: [REST_AREA; 4],
-        },
-        input: input_scaling(),
+    ModelSpec {
+        conditions: conditions(geometry),
+        input: input_scaling(rest.features),
+        rest,
         layers: layers.collect(),
+        closed_form: None,
         output,
         range: CalibratedRange {
             magnitude: MicroNewtons(200_000),
@@ -64,15 +120,13 @@ pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> 
             lateral: MicroNewtons(900),
             normal: MicroNewtons(800),
         },
-    };
-    spec.encode()
-        .expect("the numbers lie within the format's ranges")
+    }
 }
 
-fn conditions() -> Conditions {
+fn conditions(geometry: Geometry) -> Conditions {
     Conditions {
         preset: Preset::Ov7725,
-        geometry: Geometry::preset(Preset::Ov7725, 320, 240),
+        geometry,
         pixel_format: PixelFormat::Rgb565,
         threshold: HsvBox::RED,
         dilations: 1,
@@ -83,38 +137,42 @@ fn conditions() -> Conditions {
 }
 
 /// One standard deviation, 4096 steps, is four pixels for a coordinate and 512 px² for the area.
-fn input_scaling() -> InputScaling {
+fn input_scaling(mean: Features) -> InputScaling {
     let mut multipliers = [1 << 20; FEATURES];
     multipliers[FEATURES - 1] = 1 << 13;
     InputScaling {
-        mean: rest(),
+        mean,
         multipliers,
         shifts: [26; FEATURES],
     }
 }
 
 fn layer(inputs: u16, outputs: u16, weights: Weights, random: &mut Random) -> LayerSpec {
-    let neurons = usize::from(outputs);
-    let row = |neuron: usize, random: &mut Random| -> Vec<i8> {
-        (0..inputs)
-            .map(|_| weight(weights, neuron, random))
-            .collect()
-    };
-    // Keeps activations within 0–127 and outputs within a newton for most inputs: a sum has about √inputs · 70 · 4096
-    // as its size in the first layer, √inputs · 70 · 60 in others.
     let first = usize::from(inputs) == FEATURES;
     let last = usize::from(outputs) == OUTPUTS;
-    let shift = match (first, last) {
-        (true, false) => 40,
-        (false, false) => 37,
-        (true, true) => 31,
-        (false, true) => 25,
+    let wide = matches!(weights, Weights::Wide | Weights::WideExtreme);
+    let activation = if wide { WIDE_ACTIVATION } else { 127 };
+    let largest_input = if first { 32_768 } else { activation };
+    let largest = match wide {
+        true => ((1 << 31) - (1 << 16)) / i64::from(inputs) / largest_input,
+        false => 127,
+    };
+    let (extreme, neurons) = (weights.are_extreme(), usize::from(outputs));
+    let weight = |neuron: usize, random: &mut Random| match (extreme, neuron % 2) {
+        (false, _) => random.between(-largest, largest),
+        (true, 1) => -largest,
+        (true, _) => largest,
     };
     LayerSpec {
         inputs,
         outputs,
-        weights: (0..neurons)
-            .flat_map(|neuron| row(neuron, random))
+        weight_width: match first || wide {
+            true => WeightWidth::Int16,
+            false => WeightWidth::Int8,
+        },
+        largest_activation: if last { 0 } else { activation as u16 },
+        weights: (0..neurons * usize::from(inputs))
+            .map(|i| weight(i / usize::from(inputs), random).clamp(-32_767, 32_767) as i16)
             .collect(),
         biases: (0..neurons)
             .map(|_| random.between(-20_000, 20_000) as i32)
@@ -122,14 +180,26 @@ fn layer(inputs: u16, outputs: u16, weights: Weights, random: &mut Random) -> La
         multipliers: (0..neurons)
             .map(|_| random.between(1 << 26, 1 << 28) as u32)
             .collect(),
-        shifts: vec![shift; neurons],
+        // Extreme sums meet every limit, and shifts on both sides of 32.
+        shifts: (0..neurons)
+            .map(|neuron| {
+                shift(first, last, largest, activation) - if extreme { neuron as u8 % 8 } else { 0 }
+            })
+            .collect(),
     }
 }
 
-fn weight(weights: Weights, neuron: usize, random: &mut Random) -> i8 {
-    match weights {
-        Weights::Random => random.between(-127, 127) as i8,
-        Weights::Extreme if neuron % 2 == 1 => -127,
-        Weights::Extreme => 127,
-    }
+/// Keeps activations within their range and outputs within a newton for most inputs: a sum has about √inputs · 70 · 4096
+/// as its size in the first layer, √inputs · 70 · 60 in others, and more with wider numbers.
+fn shift(first: bool, last: bool, largest_weight: i64, activation: i64) -> u8 {
+    let usual = match (first, last) {
+        (true, false) => 40,
+        (false, false) => 37,
+        (true, true) => 31,
+        (false, true) => 25,
+    };
+    let wider = |number: i64| number.ilog2() - 127_i64.ilog2();
+    let fed = if first { 0 } else { wider(activation) };
+    let gives = if last { 0 } else { wider(activation) };
+    (usual + wider(largest_weight) + fed - gives) as u8
 }

@@ -67,6 +67,21 @@ pub fn salted(mut pixels: Vec<u16>, percent: u64, seed: u64) -> Vec<u16> {
     pixels
 }
 
+/// The picture with so many single red pixels, none next to another.
+pub fn specked(mut pixels: Vec<u16>, width: u16, specks: usize, seed: u64) -> Vec<u16> {
+    let columns = usize::from(width) / 3;
+    let cells = columns * (pixels.len() / usize::from(width) / 3);
+    assert!(specks <= cells, "the picture holds {cells} specks");
+    let mut free: Vec<usize> = (0..cells).collect();
+    let mut random = Random::new(seed);
+    for _ in 0..specks {
+        let cell = free.swap_remove(random.next() as usize % free.len());
+        let (x, y) = (3 * (cell % columns) + 1, 3 * (cell / columns) + 1);
+        pixels[y * usize::from(width) + x] = RED;
+    }
+    pixels
+}
+
 /// SplitMix64: small, and the same everywhere.
 #[derive(Clone, Debug)]
 pub struct Random(u64);

@@ -7,7 +7,9 @@ use std::{fs, vec::Vec};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::{artifact, golden::Runner, script::Script};
+use crate::artifact;
+use crate::golden::{Buffers, MAX_FRAME_PIXELS, MAX_ROW_PIXELS, NO_MODEL, Runner};
+use crate::script::Script;
 
 /// Runs a script on the emulated Cortex-M7 (`HIVTAC_QEMU_IMAGE`) and gives the text it printed.
 ///
@@ -34,7 +36,16 @@ pub fn run(script: &Script) -> Result<String> {
 /// # Errors
 /// When the script is not sound.
 pub fn run_on_host(script: &Script) -> Result<String> {
-    let mut runner = std::boxed::Box::new(Runner::new());
+    let mut frame = std::vec![0; MAX_FRAME_PIXELS];
+    let buffers = Buffers {
+        model: &mut std::boxed::Box::new(NO_MODEL),
+        row: &mut [0; MAX_ROW_PIXELS],
+        frame: frame
+            .as_mut_slice()
+            .try_into()
+            .context("room for a frame")?,
+    };
+    let mut runner = std::boxed::Box::new(Runner::new(buffers));
     let mut results = String::new();
     runner
         .run(&mut script.bytes(), &mut results)

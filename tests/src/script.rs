@@ -30,8 +30,13 @@ impl Script {
 
     /// Uses this model file from here on.
     pub fn model(&mut self, file: &[u8]) -> &mut Script {
+        self.model_at(0, file)
+    }
+
+    /// Uses this model file, laid `offset` bytes after a multiple of four.
+    pub fn model_at(&mut self, offset: u8, file: &[u8]) -> &mut Script {
         let length = u32::try_from(file.len()).expect("a model file is smaller than 4 GiB");
-        self.bytes.push(Kind::Model as u8);
+        self.bytes.extend([Kind::Model as u8, offset]);
         self.bytes.extend(length.to_le_bytes());
         self.bytes.extend(file);
         self
@@ -39,17 +44,25 @@ impl Script {
 
     /// Uses this threshold and byte order from here on.
     pub fn threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
+        self.push_threshold(hsv_box, order, false)
+    }
+
+    /// The same; from here on the pixels of scans are weighed, and so are those of frames sensed without a model.
+    pub fn weighted_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
+        self.push_threshold(hsv_box, order, true)
+    }
+
+    fn push_threshold(
+        &mut self,
+        hsv_box: &HsvBox,
+        order: ByteOrder,
+        weighted: bool,
+    ) -> &mut Script {
         self.order = order;
         self.bytes.push(Kind::Threshold as u8);
-        self.bytes.extend([
-            u8::from(order == ByteOrder::Swapped),
-            hsv_box.hue_low,
-            hsv_box.hue_high,
-            hsv_box.saturation_low,
-            hsv_box.saturation_high,
-            hsv_box.value_low,
-            hsv_box.value_high,
-        ]);
+        self.bytes
+            .push(u8::from(order == ByteOrder::Swapped) | u8::from(weighted) << 1);
+        self.bytes.extend(hsv_box.limits());
         self
     }
 
@@ -68,6 +81,21 @@ impl Script {
         let count = u16::try_from(frames.len()).expect("at most 65,535 frames");
         self.bytes.push(Kind::Sense as u8);
         self.put(&[width, height, count]);
+        for pixels in frames {
+            assert_eq!(rows(width, pixels), height, "frames of one size");
+            self.frame(pixels);
+        }
+        self
+    }
+
+    /// Runs frames of one size through the pipeline as they lie in memory, in windows; `tracked`: those that follow the
+    /// markers. Pixels as in [`scan`](Self::scan).
+    pub fn windows(&mut self, width: u16, frames: &[&[u16]], tracked: bool) -> &mut Script {
+        let height = frames.first().map_or(0, |pixels| rows(width, pixels));
+        let count = u16::try_from(frames.len()).expect("at most 65,535 frames");
+        self.bytes.push(Kind::Windows as u8);
+        self.put(&[width, height, count]);
+        self.bytes.push(u8::from(tracked));
         for pixels in frames {
             assert_eq!(rows(width, pixels), height, "frames of one size");
             self.frame(pixels);

@@ -49,12 +49,19 @@ fn frames_of_the_scene_give_the_same_forces() {
             script.sense(320, &frames);
         }
     }
+    script.model(&models::weighted_file(
+        &[11, 64, 64, 3],
+        Weights::Random,
+        OutputKind::ForceVector,
+        3,
+    ));
+    script.sense(320, &frames);
     let text = same_on_both(&script);
     let forces = text
         .lines()
         .filter(|line| line.contains("force: Some"))
         .count();
-    assert_eq!(forces, 4 * frames.len(), "every frame has a force:\n{text}");
+    assert_eq!(forces, 5 * frames.len(), "every frame has a force:\n{text}");
 }
 
 #[test]
@@ -99,7 +106,7 @@ fn frames_without_a_force_give_the_same_reasons() {
 #[test]
 fn blobs_of_extreme_pictures_are_the_same() {
     let mut script = Script::new();
-    red(&mut script, ByteOrder::Native);
+    script.weighted_threshold(&HsvBox::RED, ByteOrder::Native);
     for (width, height) in [
         (320, 240),
         (800, 600),
@@ -154,13 +161,23 @@ fn networks_give_the_same_outputs() {
     let mut script = Script::new();
     let mut random = Random::new(17);
     let kinds = [OutputKind::ForceVector, OutputKind::AnglesMagnitude];
-    for widths in [
+    let small = [
         &[11, 3][..],
         &[11, 64, 64, 3],
-        &[11, 512, 512, 512, 3],
         &[11, 1, 37, 3],
-    ] {
-        for weights in [Weights::Random, Weights::Extreme] {
+        &[11, 512, 512, 3],
+        // A block of columns, one less and one more, and groups of rows that are not full.
+        &[11, 31, 32, 33, 15, 16, 17, 3],
+    ];
+    let papers = &[11, 512, 512, 512, 3][..];
+    let int8 = [Weights::Random, Weights::Extreme];
+    let int16 = [Weights::Wide, Weights::WideExtreme];
+    let sets = [(&int8, &small[..]), (&int16, &small), (&int8, &[papers])];
+    for (weights, widths) in sets {
+        for (&weights, &widths) in weights
+            .iter()
+            .flat_map(|w| widths.iter().map(move |widths| (w, widths)))
+        {
             script.model(&models::file(widths, weights, kinds[widths.len() % 2], 23));
             for _ in 0..8 {
                 script.network(&moved(&mut random, 1 << 18), &models::rest());
@@ -178,6 +195,21 @@ fn networks_give_the_same_outputs() {
         text.contains("input_saturated: false"),
         "every input met its limit:\n{text}"
     );
+}
+
+/// A model that kernels cannot read runs all the same.
+#[test]
+fn networks_of_files_at_any_place_give_the_same_outputs() {
+    let mut script = Script::new();
+    let mut random = Random::new(31);
+    for weights in [Weights::Random, Weights::Wide] {
+        let file = models::file(&[11, 40, 21, 3], weights, OutputKind::ForceVector, 5);
+        for offset in 0..4 {
+            script.model_at(offset, &file);
+            script.network(&moved(&mut random, 1 << 18), &models::rest());
+        }
+    }
+    same_on_both(&script);
 }
 
 #[test]
@@ -203,4 +235,31 @@ fn moved(random: &mut Random, distance: i64) -> hivtac_sensing::features::Featur
     let rest = models::rest().to_array();
     let limit = |number: i64| number.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     features(rest.map(|number| limit(number + random.between(-distance, distance))))
+}
+
+#[test]
+fn windows_give_the_measurements_of_the_full_scan() {
+    let scene = Scene::preset("static", Preset::Ov7725, 320, 240, 5).unwrap();
+    let frames: Vec<_> = (0..3)
+        .map(|number| scene.frame(number, 1.0).pixels)
+        .collect();
+    let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
+    let mut script = Script::new();
+    red(&mut script, ByteOrder::Swapped);
+    script.sense(320, &frames);
+    script.windows(320, &frames, false);
+    script.windows(320, &frames, true);
+    let text = same_on_both(&script);
+    let measurements = |case: &str| -> Vec<String> {
+        let lines = text.lines().filter_map(|line| line.strip_prefix(case));
+        let lines = lines.filter(|line| line.starts_with(": Measurement"));
+        lines.map(str::to_owned).collect()
+    };
+    let full = measurements("1");
+    assert_eq!(full.len(), frames.len(), "{text}");
+    assert_eq!([measurements("2"), measurements("3")], [full.clone(), full]);
+    assert!(
+        text.contains("tracked: 2, fallen_back: 0, searched: 1"),
+        "{text}"
+    );
 }

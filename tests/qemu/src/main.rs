@@ -11,7 +11,9 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use cortex_m_semihosting::{debug, hio};
-use hivtac_tests::golden::Runner;
+use hivtac_tests::golden::{
+    Buffers, MAX_FRAME_PIXELS, MAX_ROW_PIXELS, ModelBuffer, NO_MODEL, Runner,
+};
 
 use file::{Reader, Writer};
 
@@ -29,8 +31,10 @@ fn main() -> ! {
 }
 
 fn run() -> Result<(), &'static str> {
-    let runner: &mut Runner =
-        cortex_m::singleton!(: Runner = Runner::new()).ok_or("the runner is taken")?;
+    let buffers = buffers()?;
+    let runner: &mut Runner<'static> =
+        cortex_m::singleton!(: Runner<'static> = Runner::new(buffers))
+            .ok_or("the runner is taken")?;
     let mut line = [0; 512];
     let mut words = file::command_line(&mut line)?.split(' ').skip(1);
     let script = words.next().ok_or("the command line names no script")?;
@@ -44,6 +48,26 @@ fn run() -> Result<(), &'static str> {
         complain(format_args!("{error:?}"));
         "the script cannot be run"
     })
+}
+
+/// Storage in the memories that the benchmark tells apart (`memory.x`), which QEMU fills with zeros.
+fn buffers() -> Result<Buffers<'static>, &'static str> {
+    let model = cortex_m::singleton!(
+        #[unsafe(link_section = ".weights")]
+        MODEL: ModelBuffer = NO_MODEL
+    );
+    let row = cortex_m::singleton!(
+        #[unsafe(link_section = ".rows")]
+        ROW: [u16; MAX_ROW_PIXELS] = [0; MAX_ROW_PIXELS]
+    );
+    let frame = cortex_m::singleton!(
+        #[unsafe(link_section = ".rows")]
+        FRAME: [u16; MAX_FRAME_PIXELS] = [0; MAX_FRAME_PIXELS]
+    );
+    match (model, row, frame) {
+        (Some(model), Some(row), Some(frame)) => Ok(Buffers { model, row, frame }),
+        _ => Err("the buffers are taken"),
+    }
 }
 
 fn complain(text: core::fmt::Arguments<'_>) {

@@ -1,86 +1,278 @@
-//! `benchmark-cases FOLDER`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
-//! one JSON object a line: `{"name":…,"file":…,"pixels":…}`.
+//! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
+//! one JSON object a line: `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
+//! what is special about the frame, `{"Windows":{"tracked":…}}` or `{"Network":[widths]}`. What a board can hold of them it writes as `board.rs`, too,
+//! for `tests/board`. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use hivtac_scene::{Preset, Scene};
-use hivtac_sensing::model::OutputKind;
+use hivtac_sensing::geometry::{self, Geometry};
+use hivtac_sensing::model::{OutputKind, Rest};
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{ByteOrder, HsvBox};
 use hivtac_tests::models::{self, Weights};
-use hivtac_tests::pictures;
 use hivtac_tests::script::Script;
+use hivtac_tests::{pictures, qemu};
+use serde_json::{Value, json};
 
 /// The model that the sensor runs.
 const SMALL: [u16; 4] = [11, 64, 64, 3];
 /// The paper's model.
 const PAPER: [u16; 5] = [11, 512, 512, 512, 3];
+/// Columns and rows of the reference frames.
+const SIZES: [[u16; 2]; 4] = [[160, 120], [320, 240], [640, 480], [800, 600]];
+/// How many frames may be without a force before one has one.
+const ATTEMPTS: u64 = 16;
+/// The sizes whose worst cases are measured: the firmware's and the paper's.
+const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
+
+/// Columns of the largest frames that fit a board's flash beside everything else.
+const WIDEST_ON_BOARD: u16 = 320;
 
 fn main() -> Result<()> {
     let folder = env::args_os().nth(1).map(PathBuf::from);
-    let folder = folder.context("usage: benchmark-cases FOLDER")?;
-    for (number, (name, script, pixels)) in cases()?.into_iter().enumerate() {
+    let folder = folder.context("usage: benchmark-cases FOLDER [MICROSECONDS …]")?;
+    let times: Vec<u64> = env::args()
+        .skip(2)
+        .map(|word| word.parse().with_context(|| format!("the time `{word}`")))
+        .collect::<Result<_>>()?;
+    let mut board = Board::default();
+    let cases = if times.is_empty() {
+        cases()?
+    } else {
+        demo(&times)?
+    };
+    for (number, case) in cases.iter().enumerate() {
         let file = folder.join(format!("{number}.script"));
-        write(&file, script.bytes())?;
-        let line = serde_json::json!({ "name": name, "file": file, "pixels": pixels });
+        write(&file, case.script().bytes())?;
+        board.add(&folder, number, case)?;
+        let (work, size) = (case.work.description(), case.size);
+        let line = json!({ "work": work, "file": file, "size": size, "format": "rgb565" });
         println!("{line}");
     }
-    Ok(())
+    write(&folder.join("board.rs"), board.source().as_bytes())
 }
 
-type Case = (&'static str, Script, usize);
+struct Case {
+    work: Work,
+    /// A model file for such frames.
+    model: Vec<u8>,
+    /// Columns and rows.
+    size: [u16; 2],
+}
+
+enum Work {
+    /// One frame through the whole pipeline, as the firmware runs it.
+    Frame {
+        /// What is special about it; empty for the usual one.
+        special: &'static str,
+        pixels: Vec<u16>,
+    },
+    /// One frame in memory, looked at in windows.
+    Windows {
+        /// Windows follow the markers, which lay somewhat elsewhere in the frame before.
+        tracked: bool,
+        before: Vec<u16>,
+        pixels: Vec<u16>,
+    },
+    /// One inference of a model with these layer widths.
+    Network(&'static [u16]),
+}
+
+impl Case {
+    fn script(&self) -> Script {
+        let mut script = Script::new();
+        script.model(&self.model);
+        match &self.work {
+            Work::Frame { pixels, .. } => script
+                .threshold(&HsvBox::RED, ByteOrder::Swapped)
+                .sense(self.size[0], &[pixels]),
+            Work::Windows {
+                tracked,
+                before,
+                pixels,
+            } => {
+                let frames = [before.as_slice(), pixels];
+                let frames = if *tracked { &frames[..] } else { &frames[1..] };
+                script.threshold(&HsvBox::RED, ByteOrder::Swapped).windows(
+                    self.size[0],
+                    frames,
+                    *tracked,
+                )
+            }
+            Work::Network(_) => script.network(&models::rest(), &models::rest()),
+        };
+        script
+    }
+}
+
+impl Work {
+    fn description(&self) -> Value {
+        match self {
+            Work::Frame { special, .. } => json!({ "Frame": special }),
+            Work::Windows { tracked, .. } => json!({ "Windows": { "tracked": tracked } }),
+            Work::Network(widths) => json!({ "Network": widths }),
+        }
+    }
+}
 
 fn cases() -> Result<Vec<Case>> {
-    let qvga = reference(320, 240)?;
-    let large = reference(800, 600)?;
-    let salted = pictures::salted(qvga.clone(), 5, 1);
-    Ok(vec![
-        ("QVGA, reference", frame(320, &qvga), qvga.len()),
-        ("QVGA, 5 % red salt", frame(320, &salted), salted.len()),
-        (
-            "QVGA, all black",
-            frame(320, &pictures::plain(320, 240, 0)),
-            qvga.len(),
-        ),
-        (
-            "QVGA, checkerboard",
-            frame(320, &pictures::checkerboard(320, 240)),
-            qvga.len(),
-        ),
-        ("800×600, reference", frame(800, &large), large.len()),
-        ("inference 11-64-64-3", inference(&SMALL), 0),
-        ("inference 11-512-512-512-3", inference(&PAPER), 0),
-    ])
-}
-
-/// The reference frame: the simulated sensor under 0.1 N at α = 4°, β = −3°, with its usual light and noise.
-fn reference(width: u32, height: u32) -> Result<Vec<u16>> {
-    let scene = Scene::preset("static", Preset::Ov7725, width, height, 1)?;
-    Ok(scene.frame(0, 1.0).pixels)
-}
-
-/// One frame through the whole pipeline, as the firmware runs it. The model is for QVGA; other sizes go without.
-fn frame(width: u16, pixels: &[u16]) -> Script {
-    let mut script = Script::new();
-    script.threshold(&HsvBox::RED, ByteOrder::Swapped);
-    if width == 320 {
-        script.model(&model(&SMALL));
+    let mut cases = Vec::new();
+    for size in SIZES {
+        let model = model(size)?;
+        let usual = usual_frame(&model, size)?;
+        let case = |(special, pixels)| Case {
+            work: Work::Frame { special, pixels },
+            model: model.clone(),
+            size,
+        };
+        cases.push(case(("", usual.clone())));
+        let before = scene("static", size)?.frame(ATTEMPTS, 1.0).pixels;
+        for tracked in [false, true] {
+            cases.push(Case {
+                work: Work::Windows {
+                    tracked,
+                    before: before.clone(),
+                    pixels: usual.clone(),
+                },
+                model: model.clone(),
+                size,
+            });
+        }
+        if STRAINED.contains(&size) {
+            cases.extend(strained(size, &usual).map(case));
+        }
     }
-    script.sense(width, &[pixels]);
-    script
+    cases.extend([&SMALL[..], &PAPER].map(|widths| Case {
+        work: Work::Network(widths),
+        model: models::file(widths, Weights::Random, OutputKind::ForceVector, 1),
+        size: [320, 240],
+    }));
+    Ok(cases)
 }
 
-fn inference(widths: &[u16]) -> Script {
-    let mut script = Script::new();
-    script
-        .model(&model(widths))
-        .network(&models::rest(), &models::rest());
-    script
+/// Frames of the demo's scene, of the firmware's size.
+fn demo(times: &[u64]) -> Result<Vec<Case>> {
+    let size = [320, 240];
+    let (model, scene) = (model(size)?, scene("demo", size)?);
+    let case = |(number, &time): (u64, &u64)| Case {
+        work: Work::Frame {
+            special: "demo",
+            pixels: scene.frame(number, time as f64 * 1e-6).pixels,
+        },
+        model: model.clone(),
+        size,
+    };
+    Ok((0..).zip(times).map(case).collect())
 }
 
-fn model(widths: &[u16]) -> Vec<u8> {
-    models::file(widths, Weights::Random, OutputKind::ForceVector, 1)
+/// Rust source that includes what a board can hold, and the files that it includes.
+#[derive(Default)]
+struct Board {
+    frames: String,
+    networks: String,
+}
+
+impl Board {
+    fn add(&mut self, folder: &Path, number: usize, case: &Case) -> Result<()> {
+        let file = |name: &str| folder.join(format!("{number}.{name}"));
+        let (model, pixels) = (file("model"), file("rgb565"));
+        match &case.work {
+            Work::Windows { .. } => return Ok(()),
+            Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
+            Work::Frame {
+                special,
+                pixels: frame,
+            } => {
+                let swapped = frame.iter().flat_map(|pixel| pixel.to_be_bytes());
+                write(&pixels, &swapped.collect::<Vec<_>>())?;
+                let size = case.size;
+                self.frames += &format!(
+                    "Frame {{ size: {size:?}, special: {special:?}, pixels: include_bytes!({pixels:?}), model: &AlignedFile(*include_bytes!({model:?})).0 }},\n"
+                );
+            }
+            Work::Network(widths) => {
+                let widths: Vec<String> = widths.iter().map(u16::to_string).collect();
+                let name = widths.join("-");
+                self.networks += &format!(
+                    "Network {{ name: {name:?}, model: &AlignedFile(*include_bytes!({model:?})).0 }},\n"
+                );
+            }
+        }
+        write(&model, &case.model)
+    }
+
+    fn source(&self) -> String {
+        let Board { frames, networks } = self;
+        format!(
+            "/// What is measured.\npub static FRAMES: &[Frame] = &[\n{frames}];\n\n\
+             /// What is measured by itself.\npub static NETWORKS: &[Network] = &[\n{networks}];\n"
+        )
+    }
+}
+
+/// Worst cases beside the usual frame.
+fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16>); 4] {
+    [
+        ("5 % salt", pictures::salted(usual.to_vec(), 5, 1)),
+        ("checkerboard", pictures::checkerboard(width, height)),
+        (
+            "2,000 specks",
+            pictures::specked(usual.to_vec(), width, 2_000, 1),
+        ),
+        ("black", pictures::plain(width, height, pictures::BLACK)),
+    ]
+}
+
+/// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first frame that goes all the
+/// way to a force, so that all of it is measured. In the smallest frames noise can make a marker implausible.
+fn usual_frame(model: &[u8], [width, height]: [u16; 2]) -> Result<Vec<u16>> {
+    let scene = scene("static", [width, height])?;
+    for number in 0..ATTEMPTS {
+        let pixels = scene.frame(number, 1.0).pixels;
+        let mut script = Script::new();
+        script
+            .model(model)
+            .threshold(&HsvBox::RED, ByteOrder::Native)
+            .sense(width, &[&pixels]);
+        if qemu::run_on_host(&script)?.contains("force: Some") {
+            return Ok(pixels);
+        }
+    }
+    bail!("none of {ATTEMPTS} frames of {width}x{height} has a force")
+}
+
+fn scene(name: &str, [width, height]: [u16; 2]) -> Result<Scene> {
+    let (width, height) = (u32::from(width), u32::from(height));
+    Ok(Scene::preset(name, Preset::Ov7725, width, height, 1)?)
+}
+
+/// The small model, for frames of a size.
+fn model(size: [u16; 2]) -> Result<Vec<u8>> {
+    let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
+    let rest = rest(geometry, &scene("rest", size)?.frame(0, 0.0).pixels)?;
+    let (weights, output) = (Weights::Random, OutputKind::ForceVector);
+    Ok(models::file_for(geometry, rest, &SMALL, weights, output, 1))
+}
+
+/// The rest position that a frame shows.
+fn rest(geometry: Geometry, pixels: &[u16]) -> Result<Rest> {
+    let mut sensor = Box::new(Sensor::<64>::new());
+    sensor.configure(Settings::usual(geometry, ByteOrder::Native), None)?;
+    sensor.begin_frame();
+    for row in pixels.chunks(usize::from(geometry.width)) {
+        sensor.push_row(row);
+    }
+    let measurement = sensor.finish_frame();
+    let found = measurement.features.zip(measurement.markers);
+    let (features, markers) = found.context("the frame at rest has no markers")?;
+    Ok(Rest {
+        features,
+        areas: markers.map(|marker| marker.area),
+    })
 }
 
 fn write(file: &Path, bytes: &[u8]) -> Result<()> {

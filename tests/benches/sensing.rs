@@ -1,0 +1,146 @@
+//! `cargo bench --package hivtac-tests`: throughput of the sensing's stages on this computer, so that a regression shows
+//! without an emulator.
+
+use std::hint::black_box;
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use hivtac_scene::{Preset, Scene};
+use hivtac_sensing::geometry::{self, Geometry};
+use hivtac_sensing::model::{Model, OutputKind};
+use hivtac_sensing::network::Network;
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::scanner::{ScanSettings, Scanner};
+use hivtac_sensing::screen::ScreenedTable;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::tables::Table;
+use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_tests::models::{self, Weights};
+use hivtac_tests::pictures;
+
+/// Columns and rows of the frames.
+const SIZES: [[u16; 2]; 2] = [[320, 240], [800, 600]];
+
+struct Frame {
+    name: String,
+    size: [u16; 2],
+    pixels: Vec<u16>,
+}
+
+impl Frame {
+    fn all() -> Vec<Frame> {
+        let frames = SIZES.iter().flat_map(|&[width, height]| {
+            let (columns, rows) = (u32::from(width), u32::from(height));
+            let scene = Scene::preset("static", Preset::Ov7725, columns, rows, 1);
+            let usual = scene.expect("a sound scene").frame(0, 1.0).pixels;
+            let salted = pictures::salted(usual.clone(), 5, 1);
+            [("", usual), (", 5 % salt", salted)].map(|(special, pixels)| Frame {
+                name: format!("{width}x{height}{special}"),
+                size: [width, height],
+                pixels,
+            })
+        });
+        frames.collect()
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &[u16]> {
+        black_box(&self.pixels).chunks_exact(usize::from(self.size[0]))
+    }
+
+    /// What the threshold makes of it.
+    fn masks(&self, table: &ScreenedTable) -> Vec<Vec<u32>> {
+        let word = |pixels: &[u16]| {
+            let bits = pixels.iter().map(|&raw| u32::from(table.accepts(raw)));
+            (0..).zip(bits).fold(0, |word, (i, bit)| word | bit << i)
+        };
+        let rows = self.rows();
+        rows.map(|row| row.chunks(32).map(word).collect()).collect()
+    }
+}
+
+fn table() -> Box<ScreenedTable> {
+    let mut table = Box::new(ScreenedTable::CLOSED);
+    let set = table.set(&HsvBox::RED, ByteOrder::Native);
+    set.expect("the usual box is a threshold");
+    table
+}
+
+/// The scanner alone: from pixels, and from masks, which leaves the threshold out.
+fn scanner(criterion: &mut Criterion) {
+    let (table, mut scanner) = (table(), Box::new(Scanner::<64>::new()));
+    for frame in Frame::all() {
+        let [width, height] = frame.size;
+        let settings = ScanSettings {
+            width,
+            height,
+            dilations: 1,
+            min_area: 1,
+            weighted: false,
+            max_runs: u32::MAX,
+        };
+        let mut group = criterion.benchmark_group("scanner");
+        group.throughput(Throughput::Elements(frame.pixels.len() as u64));
+        group.bench_function(BenchmarkId::new("pixels", &frame.name), |bencher| {
+            bencher.iter(|| {
+                scanner.begin(settings).expect("a size that it takes");
+                frame.rows().for_each(|row| scanner.push_row(&*table, row));
+                scanner.finish(&*table).set_pixels
+            });
+        });
+        let masks = frame.masks(&table);
+        group.bench_function(BenchmarkId::new("masks", &frame.name), |bencher| {
+            bencher.iter(|| {
+                scanner.begin(settings).expect("a size that it takes");
+                black_box(&masks)
+                    .iter()
+                    .for_each(|mask| scanner.push_mask_row(mask));
+                scanner.finish(&*table).set_pixels
+            });
+        });
+    }
+}
+
+/// From pixels to features.
+fn frame(criterion: &mut Criterion) {
+    let mut sensor = Box::new(Sensor::<64, ScreenedTable>::new());
+    let mut group = criterion.benchmark_group("frame");
+    for frame in Frame::all() {
+        let [width, height] = frame.size;
+        let geometry = Geometry::preset(geometry::Preset::Ov7725, width, height);
+        sensor
+            .configure(Settings::usual(geometry, ByteOrder::Native), None)
+            .expect("usual settings");
+        group.throughput(Throughput::Elements(frame.pixels.len() as u64));
+        group.bench_function(&frame.name, |bencher| {
+            bencher.iter(|| {
+                sensor.begin_frame();
+                frame.rows().for_each(|row| sensor.push_row(row));
+                sensor.finish_frame()
+            });
+        });
+    }
+}
+
+/// One inference; its elements are multiplications.
+fn network(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("network");
+    for widths in [&[11, 64, 64, 3][..], &[11, 512, 512, 512, 3]] {
+        let file = models::file(widths, Weights::Random, OutputKind::ForceVector, 1);
+        let model = Model::parse(&file).expect("a sound model");
+        let (mut network, rest) = (Network::new(), models::rest());
+        let products = widths
+            .windows(2)
+            .map(|pair| u64::from(pair[0]) * u64::from(pair[1]));
+        group.throughput(Throughput::Elements(products.sum()));
+        let name = widths
+            .iter()
+            .map(u16::to_string)
+            .collect::<Vec<_>>()
+            .join("-");
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| network.run(&model, black_box(&rest), &rest));
+        });
+    }
+}
+
+criterion_group!(benches, scanner, frame, network);
+criterion_main!(benches);

@@ -1,0 +1,219 @@
+//! What is timed.
+
+use hivtac_sensing::features::Features;
+use hivtac_sensing::model::Model;
+use hivtac_sensing::network::Network as Inference;
+use hivtac_sensing::pipeline;
+use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::tables::{BitTable, Table};
+use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+
+use crate::data::{Frame, Network};
+use crate::meter::Meter;
+
+/// As in the firmware.
+type Sensor = pipeline::Sensor<'static, 64, BitTable>;
+
+/// Widest row, in pixels.
+const ROW: usize = MAX_WIDTH as usize;
+/// Rows that arrive at once: those of the firmware's bands.
+const BAND_ROWS: usize = 4;
+/// Room for a model in DTCM.
+const MODEL: usize = 16 * 1024;
+/// The first time caches are cold.
+const REPETITIONS: usize = 2;
+
+/// A model file where the kernels can read whole words.
+#[repr(align(8))]
+struct ModelFile([u8; MODEL]);
+
+/// Everything that is worked on, in DTCM as all statics are.
+pub struct Workplace {
+    worker: Worker,
+    inference: Inference,
+    row: [u16; ROW],
+    model: ModelFile,
+}
+
+/// DTCM holds one of the two at a time.
+#[allow(clippy::large_enum_variant)]
+enum Worker {
+    Sensor(Sensor),
+    Scanner(Scanner<64>, BitTable),
+}
+
+impl Worker {
+    /// Constants, so that they are copied from flash to their place and never lie on the stack.
+    const SENSOR: Worker = Worker::Sensor(Sensor::new());
+    const SCANNER: Worker = Worker::Scanner(Scanner::new(), BitTable::CLOSED);
+}
+
+impl Workplace {
+    /// Ready for the first frame.
+    pub const fn new() -> Workplace {
+        Workplace {
+            worker: Worker::SENSOR,
+            inference: Inference::new(),
+            row: [0; ROW],
+            model: ModelFile([0; MODEL]),
+        }
+    }
+
+    fn sensor(&mut self) -> (&mut Sensor, &mut [u16; ROW]) {
+        if !matches!(self.worker, Worker::Sensor(_)) {
+            self.worker = Worker::SENSOR;
+        }
+        match &mut self.worker {
+            Worker::Sensor(sensor) => (sensor, &mut self.row),
+            Worker::Scanner(..) => defmt::unreachable!(),
+        }
+    }
+
+    fn scanner(&mut self) -> (&mut Scanner<64>, &mut BitTable, &mut [u16; ROW]) {
+        if !matches!(self.worker, Worker::Scanner(..)) {
+            self.worker = Worker::SCANNER;
+        }
+        match &mut self.worker {
+            Worker::Scanner(scanner, table) => (scanner, table, &mut self.row),
+            Worker::Sensor(_) => defmt::unreachable!(),
+        }
+    }
+}
+
+/// Times the parts of one frame and prints them.
+pub fn frame(place: &mut Workplace, frame: &Frame, meter: &Meter) {
+    let [width, height] = frame.size;
+    let print = |item: &str, cycles: u32| {
+        let (comma, special) = (
+            if frame.special.is_empty() { "" } else { ", " },
+            frame.special,
+        );
+        defmt::println!(
+            "{}{}{}|{}x{}|rgb565|{}",
+            item,
+            comma,
+            special,
+            width,
+            height,
+            cycles
+        );
+    };
+    let (mut whole, mut last_band) = (0, 0);
+    for _ in 0..REPETITIONS {
+        (whole, last_band) = sense(place, frame, meter);
+    }
+    let (mut rows, mut masks) = (0, 0);
+    for _ in 0..REPETITIONS {
+        rows = scan(place, frame, meter, Entry::Pixels);
+        masks = scan(place, frame, meter, Entry::Mask);
+    }
+    print("threshold", rows.saturating_sub(masks));
+    print("blobs", masks);
+    print("frame full", whole);
+    print("latency", last_band);
+}
+
+/// Times one inference and prints it.
+pub fn network(place: &mut Workplace, network: &Network, meter: &Meter) {
+    let model = load(&mut place.model, network.model);
+    let inference = &mut place.inference;
+    let rest: Features = model.rest.features;
+    let mut cycles = 0;
+    for _ in 0..REPETITIONS {
+        (_, cycles) = meter.time(|| inference.run(&model, &rest, &rest));
+    }
+    defmt::println!("network {}|320x240|rgb565|{}", network.name, cycles);
+}
+
+/// Cycles of a frame from its first row to the force, and from its last band on.
+fn sense(place: &mut Workplace, frame: &Frame, meter: &Meter) -> (u32, u32) {
+    let model = parse(frame.model);
+    let settings = Settings::of_model(&model, ByteOrder::Swapped);
+    let (sensor, buffer) = place.sensor();
+    let configured = sensor.configure(settings, Some(model));
+    defmt::assert!(configured.is_ok(), "the model does not fit the frame");
+    let (_, mut whole) = meter.time(|| sensor.begin_frame());
+    let mut last_band = 0;
+    let rows = usize::from(frame.size[1]);
+    for y in 0..rows {
+        let row = copy_row(buffer, frame, y);
+        let (_, cycles) = meter.time(|| sensor.push_row(row));
+        whole += cycles;
+        if y + BAND_ROWS >= rows {
+            last_band += cycles;
+        }
+    }
+    let (_, finish) = meter.time(|| sensor.finish_frame());
+    (whole + finish, last_band + finish)
+}
+
+/// Where a frame enters the scanner.
+#[derive(Clone, Copy)]
+enum Entry {
+    Pixels,
+    Mask,
+}
+
+/// Cycles of the scanner alone.
+fn scan(place: &mut Workplace, frame: &Frame, meter: &Meter, entry: Entry) -> u32 {
+    let [width, height] = frame.size;
+    let settings = ScanSettings {
+        width,
+        height,
+        dilations: 1,
+        min_area: 1,
+        weighted: false,
+        max_runs: u32::MAX,
+    };
+    let (scanner, table, buffer) = place.scanner();
+    let set = table.set(&HsvBox::RED, ByteOrder::Swapped);
+    defmt::assert!(set.is_ok(), "the usual box is a threshold");
+    let begun = scanner.begin(settings);
+    defmt::assert!(begun.is_ok(), "the frame can be scanned");
+    let mut cycles = 0;
+    for y in 0..height {
+        let row = copy_row(buffer, frame, usize::from(y));
+        cycles += match entry {
+            Entry::Pixels => meter.time(|| scanner.push_row(table, row)).1,
+            Entry::Mask => {
+                let mut mask = [0; ROW.div_ceil(32)];
+                let mask = &mut mask[..row.len().div_ceil(32)];
+                for (x, &raw) in row.iter().enumerate() {
+                    mask[x / 32] |= u32::from(table.accepts(raw)) << (x % 32);
+                }
+                meter.time(|| scanner.push_mask_row(mask)).1
+            }
+        };
+    }
+    let table: &BitTable = table;
+    cycles + meter.time(|| scanner.finish(table).blobs.len()).1
+}
+
+/// Row `y` in DTCM.
+fn copy_row<'r>(row: &'r mut [u16; ROW], frame: &Frame, y: usize) -> &'r [u16] {
+    let width = usize::from(frame.size[0]);
+    let bytes = frame.pixels.chunks_exact(2 * width).nth(y).unwrap_or(&[]);
+    for (pixel, pair) in row.iter_mut().zip(bytes.chunks_exact(2)) {
+        *pixel = u16::from_le_bytes([pair[0], pair[1]]);
+    }
+    &row[..width]
+}
+
+/// The model, in DTCM where it fits.
+fn load<'m>(room: &'m mut ModelFile, file: &'static [u8]) -> Model<'m> {
+    match room.0.get_mut(..file.len()) {
+        Some(room) => {
+            room.copy_from_slice(file);
+            parse(room)
+        }
+        None => parse(file),
+    }
+}
+
+fn parse(file: &[u8]) -> Model<'_> {
+    match Model::parse(file) {
+        Ok(model) => model,
+        Err(error) => defmt::panic!("a model: {}", defmt::Display2Format(&error)),
+    }
+}

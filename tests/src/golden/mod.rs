@@ -1,0 +1,373 @@
+//! Golden cases: a script of frames and numbers goes in, a text that says every bit of the results comes out.
+//!
+//! A script is a sequence of records, each a kind in one byte and what [`Kind`] says, little-endian, until its end.
+//! Every result is one line, printed by `Debug`: all numbers are integers, so equal text means equal bits.
+
+mod marks;
+mod record;
+
+use core::fmt::{self, Write};
+use core::ops::Range;
+
+use hivtac_sensing::features::{FEATURES, Features};
+use hivtac_sensing::force::Polar;
+use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::model::{AlignedFile, CentroidEstimator, Model};
+use hivtac_sensing::network::Network;
+use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::tables::{BitTable, ByteTable, Pixels, Table};
+use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::units::{MicroNewtons, MilliDegrees, Px};
+use hivtac_sensing::windows::Tracks;
+
+use marks::{counting_begins, counting_ends, last_band_begins};
+pub use record::{Kind, ScriptError, Source};
+use record::{bytes, fill, number};
+
+/// Room for a model of 11-512-512-512-3, or of one wide layer less with int16 weights.
+pub const MAX_MODEL_BYTES: usize = 600 * 1024;
+/// Storage for a model file, at a multiple of four.
+pub type ModelBuffer = AlignedFile<[u8; MAX_MODEL_BYTES]>;
+/// Storage without a model.
+pub const NO_MODEL: ModelBuffer = AlignedFile([0; MAX_MODEL_BYTES]);
+/// Room for the widest row of pixels.
+pub const MAX_ROW_PIXELS: usize = MAX_WIDTH as usize;
+/// Room for the largest frame that is looked at in windows.
+pub const MAX_FRAME_PIXELS: usize = 800 * 600;
+/// Rows that arrive at once: those of the firmware's bands.
+pub const BAND_ROWS: u16 = 4;
+/// Blobs that a scan keeps.
+pub const BLOBS: usize = 64;
+
+/// Storage for what comes from a script. It is handed in, so that a microcontroller decides which memory it lies in.
+pub struct Buffers<'b> {
+    /// The model file.
+    pub model: &'b mut ModelBuffer,
+    /// The row of pixels that is pushed.
+    pub row: &'b mut [u16; MAX_ROW_PIXELS],
+    /// A frame that lies in memory.
+    pub frame: &'b mut [u16; MAX_FRAME_PIXELS],
+}
+
+/// How later frames are looked at.
+#[derive(Clone, Copy)]
+struct Look {
+    order: ByteOrder,
+    hsv_box: HsvBox,
+    weighted: bool,
+}
+
+/// Everything that runs cases. Large: on a microcontroller it lives in a `static`.
+pub struct Runner<'b> {
+    buffers: Buffers<'b>,
+    /// Where in its buffer the model file lies.
+    model_place: Range<usize>,
+    look: Look,
+    table: ByteTable,
+    small_table: BitTable,
+    scanner: Scanner<BLOBS>,
+    cases: u32,
+}
+
+impl<'b> Runner<'b> {
+    /// Without a model, and with a threshold that accepts nothing.
+    pub const fn new(buffers: Buffers<'b>) -> Runner<'b> {
+        Runner {
+            buffers,
+            model_place: 0..0,
+            look: Look {
+                order: ByteOrder::Native,
+                hsv_box: HsvBox::RED,
+                weighted: false,
+            },
+            table: ByteTable::CLOSED,
+            small_table: BitTable::CLOSED,
+            scanner: Scanner::new(),
+            cases: 0,
+        }
+    }
+
+    /// Runs a whole script.
+    ///
+    /// # Errors
+    /// [`ScriptError`] at the first record that cannot be run.
+    pub fn run(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let mut kind = [0];
+        while source.read(&mut kind) == 1 {
+            let known = Kind::ALL.into_iter().find(|known| *known as u8 == kind[0]);
+            match known.ok_or(ScriptError::UnknownKind(kind[0]))? {
+                Kind::Model => self.load_model(source)?,
+                Kind::Threshold => self.set_threshold(source)?,
+                Kind::Scan => self.scan(source, results)?,
+                Kind::Sense => self.sense(source, results)?,
+                Kind::Network => self.network(source, results)?,
+                Kind::Force => self.force(source, results)?,
+                Kind::Windows => self.windows(source, results)?,
+            }
+            self.cases += 1;
+        }
+        Ok(())
+    }
+
+    fn load_model(&mut self, source: &mut impl Source) -> Result<(), ScriptError> {
+        let [offset] = bytes(source)?;
+        let length = u32::from_le_bytes(bytes(source)?) as usize;
+        self.model_place = usize::from(offset)..usize::from(offset) + length;
+        let room = self.buffers.model.0.get_mut(self.model_place.clone());
+        fill(source, room.ok_or(ScriptError::ModelTooLarge(length))?)
+    }
+
+    fn set_threshold(&mut self, source: &mut impl Source) -> Result<(), ScriptError> {
+        let [flags, limits @ ..] = bytes::<7>(source)?;
+        self.look.weighted = flags & 2 != 0;
+        self.look.order = if flags & 1 != 0 {
+            ByteOrder::Swapped
+        } else {
+            ByteOrder::Native
+        };
+        self.look.hsv_box = HsvBox::of_limits(limits);
+        let (bytes, bits) = (&mut self.table, &mut self.small_table);
+        bytes
+            .set(&self.look.hsv_box, self.look.order)
+            .and_then(|()| bits.set(&self.look.hsv_box, self.look.order))
+            .map_err(ScriptError::Threshold)
+    }
+
+    fn scan(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let (width, height) = (number(source)?, number(source)?);
+        let [dilations, min_area] = bytes(source)?;
+        let min_area = u32::from(min_area);
+        let settings = ScanSettings {
+            width,
+            height,
+            dilations,
+            min_area,
+            weighted: self.look.weighted,
+            max_runs: u32::MAX,
+        };
+        self.scanner.begin(settings).map_err(ScriptError::Scan)?;
+        let (scanner, table) = (&mut self.scanner, &self.table);
+        let mut tables_agree = true;
+        for_each_row(source, self.buffers.row, [width, height], |row| {
+            counting_begins();
+            scanner.push_row(table, row);
+            counting_ends();
+            tables_agree &= masks_agree(row, (table, &self.small_table));
+        })?;
+        if !tables_agree {
+            return Err(ScriptError::TablesDiffer);
+        }
+        counting_begins();
+        let scan = scanner.finish(table);
+        counting_ends();
+        say(results, self.cases, format_args!("{scan:?}"))
+    }
+
+    fn sense(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let (width, height, frames) = (number(source)?, number(source)?, number(source)?);
+        let file = &self.buffers.model.0[self.model_place.clone()];
+        let mut sensor = sensor(file, self.look, [width, height])?;
+        for _ in 0..frames {
+            let row = &mut *self.buffers.row;
+            let measurement = sense_frame(&mut sensor, source, row, [width, height])?;
+            say(results, self.cases, format_args!("{measurement:?}"))?;
+            say(results, self.cases, format_args!("{:?}", sensor.blobs()))?;
+        }
+        Ok(())
+    }
+
+    /// Only the last frame is counted: those before it show where the markers were.
+    fn windows(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let (width, height, frames) = (number(source)?, number(source)?, number(source)?);
+        let [tracked] = bytes(source)?;
+        let file = &self.buffers.model.0[self.model_place.clone()];
+        let mut sensor = sensor(file, self.look, [width, height])?;
+        let mut tracks = Tracks::new();
+        for number in 0..frames {
+            let (row, frame) = (&mut *self.buffers.row, &mut *self.buffers.frame);
+            let frame = read_frame(source, row, frame, [width, height])?;
+            if number + 1 == frames {
+                counting_begins();
+            }
+            let measurement = match tracked {
+                0 => sensor.measure_frame(frame),
+                _ => sensor.measure_tracked(&mut tracks, frame),
+            };
+            counting_ends();
+            say(results, self.cases, format_args!("{measurement:?}"))?;
+        }
+        say(results, self.cases, format_args!("{:?}", tracks.tally()))
+    }
+
+    fn network(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let (features, tare) = (features(source)?, features(source)?);
+        let model = model(&self.buffers.model.0[self.model_place.clone()])?;
+        let model = model.ok_or(ScriptError::NoModel)?;
+        let mut network = Network::new();
+        counting_begins();
+        let output = network.run(&model, &features, &tare);
+        counting_ends();
+        say(results, self.cases, format_args!("{output:?}"))
+    }
+
+    fn force(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let mut numbers = [0; 3];
+        for value in &mut numbers {
+            *value = i32::from_le_bytes(bytes(source)?);
+        }
+        let [alpha, beta, magnitude] = numbers;
+        let polar = Polar {
+            alpha: MilliDegrees(alpha),
+            beta: MilliDegrees(beta),
+            magnitude: MicroNewtons(magnitude),
+        };
+        let (angles, vector) = (
+            Polar::of_vector(numbers.map(MicroNewtons)),
+            polar.to_vector(),
+        );
+        say(results, self.cases, format_args!("{angles:?} {vector:?}"))
+    }
+}
+
+fn sensor(
+    file: &[u8],
+    look: Look,
+    [width, height]: [u16; 2],
+) -> Result<Sensor<'_, BLOBS>, ScriptError> {
+    let model = model(file)?;
+    let mut settings = match &model {
+        Some(model) => Settings::of_model(model, look.order),
+        None => Settings::usual(Geometry::preset(Preset::Ov7725, width, height), look.order),
+    };
+    settings.threshold = look.hsv_box;
+    if model.is_none() && look.weighted {
+        settings.centroid = CentroidEstimator::RednessWeighted;
+    }
+    let mut sensor = Sensor::new();
+    let configured = sensor.configure(settings, model);
+    configured.map_err(ScriptError::Settings)?;
+    Ok(sensor)
+}
+
+/// Reads a frame into memory, row by row.
+fn read_frame<'f>(
+    source: &mut impl Source,
+    row: &mut [u16],
+    frame: &'f mut [u16],
+    [width, height]: [u16; 2],
+) -> Result<&'f [u16], ScriptError> {
+    let pixels = usize::from(width) * usize::from(height);
+    let frame = frame.get_mut(..pixels);
+    let frame = frame.ok_or(ScriptError::TooLarge([width, height]))?;
+    let mut rows = frame.chunks_exact_mut(usize::from(width).max(1));
+    for_each_row(source, row, [width, height], |row| {
+        if let Some(place) = rows.next() {
+            place.copy_from_slice(row);
+        }
+    })?;
+    Ok(frame)
+}
+
+fn model(file: &[u8]) -> Result<Option<Model<'_>>, ScriptError> {
+    match file {
+        [] => Ok(None),
+        file => Model::parse(file).map(Some).map_err(ScriptError::Model),
+    }
+}
+
+fn say(results: &mut impl Write, case: u32, result: fmt::Arguments<'_>) -> Result<(), ScriptError> {
+    writeln!(results, "{case}: {result}").map_err(ScriptError::Output)
+}
+
+fn sense_frame(
+    sensor: &mut Sensor<'_, BLOBS>,
+    source: &mut impl Source,
+    row: &mut [u16],
+    size: [u16; 2],
+) -> Result<Measurement, ScriptError> {
+    counting_begins();
+    sensor.begin_frame();
+    counting_ends();
+    for_each_row(source, row, size, |row| {
+        counting_begins();
+        sensor.push_row(row);
+        counting_ends();
+    })?;
+    counting_begins();
+    let measurement = sensor.finish_frame();
+    counting_ends();
+    Ok(measurement)
+}
+
+/// Whether both tables give a row the same mask.
+fn masks_agree(row: &[u16], tables: (&ByteTable, &BitTable)) -> bool {
+    let mut masks = [[0; MAX_ROW_PIXELS / 32]; 2];
+    let words = row.len().div_ceil(32);
+    let [by_bytes, by_bits] = &mut masks;
+    tables.0.mask_row(row, &mut by_bytes[..words]);
+    tables.1.mask_row(row, &mut by_bits[..words]);
+    by_bytes == by_bits
+}
+
+/// Reads rows one after the other into `row`, and hands out each.
+fn for_each_row(
+    source: &mut impl Source,
+    row: &mut [u16],
+    [width, height]: [u16; 2],
+    mut each: impl FnMut(&[u16]),
+) -> Result<(), ScriptError> {
+    let mut raw = [0; 2 * MAX_ROW_PIXELS];
+    let raw = raw
+        .get_mut(..2 * usize::from(width))
+        .ok_or(ScriptError::TooWide(width))?;
+    for y in 0..height {
+        fill(source, raw)?;
+        for (pixel, pair) in row.iter_mut().zip(raw.chunks_exact(2)) {
+            *pixel = u16::from_le_bytes([pair[0], pair[1]]);
+        }
+        if y + BAND_ROWS == height {
+            last_band_begins();
+        }
+        each(&row[..usize::from(width)]);
+    }
+    Ok(())
+}
+
+fn features(source: &mut impl Source) -> Result<Features, ScriptError> {
+    let mut numbers = [0; FEATURES];
+    for value in &mut numbers {
+        *value = i64::from_le_bytes(bytes(source)?);
+    }
+    let px = |i: usize| Px(numbers[i] as i32);
+    Ok(Features {
+        centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
+        rect_center: (px(8), px(9)),
+        rect_area: numbers[10],
+    })
+}

@@ -1,0 +1,105 @@
+//! What a script is made of, and why it may not run.
+
+use core::fmt;
+
+use hivtac_sensing::model::ModelError;
+use hivtac_sensing::scanner::ScanError;
+use hivtac_sensing::settings::SettingsError;
+use hivtac_sensing::threshold::ThresholdError;
+
+/// What a record holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model file that later records
+    /// use.
+    Model = 1,
+    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan), then a threshold box (6 × u8) for later frames.
+    Threshold = 2,
+    /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16): blobs.
+    Scan = 3,
+    /// Width, height, number of frames (u16), then their pixels (u16): the whole pipeline, blobs included.
+    Sense = 4,
+    /// Eleven features, then eleven of the rest position (i64): network outputs.
+    Network = 5,
+    /// Three numbers (i32), taken as a force vector in µN and as α, β in m° and |F| in µN.
+    Force = 6,
+    /// Width, height, number of frames (u16), whether windows follow the markers (u8), then the pixels (u16): the pipeline
+    /// on frames that lie in memory.
+    Windows = 7,
+}
+
+impl Kind {
+    pub(super) const ALL: [Kind; 7] = [
+        Kind::Model,
+        Kind::Threshold,
+        Kind::Scan,
+        Kind::Sense,
+        Kind::Network,
+        Kind::Force,
+        Kind::Windows,
+    ];
+}
+
+/// Where a script comes from.
+pub trait Source {
+    /// Fills as much of the buffer as there is, and says how much: less than all only at the end of the script.
+    fn read(&mut self, buffer: &mut [u8]) -> usize;
+}
+
+impl Source for &[u8] {
+    fn read(&mut self, buffer: &mut [u8]) -> usize {
+        let length = buffer.len().min(self.len());
+        let (head, tail) = self.split_at(length);
+        buffer[..length].copy_from_slice(head);
+        *self = tail;
+        length
+    }
+}
+
+/// Why a script cannot be run.
+#[derive(Debug)]
+pub enum ScriptError {
+    /// It ends inside a record.
+    Cut,
+    /// No record begins with this byte.
+    UnknownKind(u8),
+    /// A frame is wider than the widest row.
+    TooWide(u16),
+    /// A frame of these columns and rows has more pixels than there is room for.
+    TooLarge([u16; 2]),
+    /// A model needs more room than there is.
+    ModelTooLarge(usize),
+    /// A record needs a model, and none came before.
+    NoModel,
+    /// The model is not sound.
+    Model(ModelError),
+    /// The threshold box means nothing.
+    Threshold(ThresholdError),
+    /// The frame cannot be scanned.
+    Scan(ScanError),
+    /// The sensor cannot be set so.
+    Settings(SettingsError),
+    /// The two threshold tables say different things of a pixel.
+    TablesDiffer,
+    /// The results could not be written.
+    Output(fmt::Error),
+}
+
+pub(super) fn number(source: &mut impl Source) -> Result<u16, ScriptError> {
+    Ok(u16::from_le_bytes(bytes(source)?))
+}
+
+pub(super) fn bytes<const N: usize>(source: &mut impl Source) -> Result<[u8; N], ScriptError> {
+    let mut bytes = [0; N];
+    fill(source, &mut bytes)?;
+    Ok(bytes)
+}
+
+pub(super) fn fill(source: &mut impl Source, buffer: &mut [u8]) -> Result<(), ScriptError> {
+    if source.read(buffer) == buffer.len() {
+        Ok(())
+    } else {
+        Err(ScriptError::Cut)
+    }
+}

@@ -1,0 +1,147 @@
+//! Rendered frames, looked at by the pipeline without a model: where it finds the markers, and whether it would trust
+//! them with a force.
+
+use std::boxed::Box;
+
+use anyhow::{Context, Result, anyhow};
+use hivtac_scene::{Frame, Load, Preset, Scene};
+use hivtac_sensing::geometry::{self, Geometry};
+use hivtac_sensing::model::CentroidEstimator;
+use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::status::Status;
+use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::threshold::ByteOrder;
+
+/// Both ways to take a position from pixels.
+pub const ESTIMATORS: [CentroidEstimator; 2] = [
+    CentroidEstimator::BinaryMask,
+    CentroidEstimator::RednessWeighted,
+];
+
+/// Frames that make a rest position, as many as `hivtac tare` takes at least.
+const TARE_FRAMES: u16 = 8;
+
+/// What is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// Lens and camera.
+    pub preset: Preset,
+    /// Columns and rows of a frame.
+    pub size: [u32; 2],
+    /// How positions are taken.
+    pub estimator: CentroidEstimator,
+}
+
+/// What was made of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Seen {
+    /// A force would be given.
+    Trusted {
+        /// The largest distance of a marker from its true place, px; infinite when there is no such marker.
+        worst_px: f64,
+        /// The distance of the markers' mean from the true one, px.
+        mean_px: f64,
+    },
+    /// There is no force, for these reasons.
+    Refused(Status),
+}
+
+/// A sensor without a model that was tared on the nominal scene at rest.
+pub struct Looker {
+    sensor: Box<Sensor<'static>>,
+}
+
+impl View {
+    /// How far a marker may be from the truth, px: 0.3 up to QVGA, 0.15 at 800×600, linear between them. Binary centroids
+    /// are themselves off by up to 0.35 px at QVGA and 0.25 px at 800×600 on nominal frames, so that 0.15 px
+    /// more are allowed to them.
+    pub fn tolerance_px(&self) -> f64 {
+        let part = (f64::from(self.size[0]) - 320.0) / (800.0 - 320.0);
+        let weighted = 0.3 - 0.15 * part.clamp(0.0, 1.0);
+        match self.estimator {
+            CentroidEstimator::RednessWeighted => weighted,
+            CentroidEstimator::BinaryMask => weighted + 0.15,
+        }
+    }
+
+    /// The nominal scene.
+    ///
+    /// # Errors
+    /// When the frame size is not one.
+    pub fn nominal(&self) -> Result<Scene> {
+        let [width, height] = self.size;
+        Ok(Scene::preset("rest", self.preset, width, height, 7)?)
+    }
+
+    /// A sensor that looks so.
+    ///
+    /// # Errors
+    /// When the frame size is not one, or the nominal scene is not found.
+    pub fn looker(&self) -> Result<Looker> {
+        let lens = match self.preset {
+            Preset::Paper => geometry::Preset::Paper,
+            Preset::Ov7725 => geometry::Preset::Ov7725,
+        };
+        let [width, height] = self.size;
+        let geometry = Geometry::preset(lens, width as u16, height as u16);
+        let settings = Settings {
+            centroid: self.estimator,
+            ..Settings::usual(geometry, ByteOrder::Native)
+        };
+        let mut sensor = Box::new(Sensor::new());
+        let configured = sensor.configure(settings, None);
+        configured.map_err(|error| anyhow!("{error}"))?;
+        let mut looker = Looker { sensor };
+        let scene = self.nominal()?;
+        let mut builder = TareBuilder::new(TARE_FRAMES).context("a number of frames")?;
+        let mut rest = None;
+        for number in 0..u64::from(TARE_FRAMES) {
+            let seen = looker.sense(&scene.render_load(&Load::REST, number)?);
+            let markers = seen.markers.context("no markers at rest")?;
+            let features = seen.features.context("no features at rest")?;
+            rest = builder.add(&markers, &features);
+        }
+        looker.sensor.set_tare(rest);
+        Ok(looker)
+    }
+}
+
+impl Looker {
+    /// The whole pipeline on a frame of 16-bit pixels.
+    pub fn sense(&mut self, frame: &Frame) -> Measurement {
+        self.sensor.begin_frame();
+        self.sensor.push_rows(&frame.pixels);
+        self.sensor.finish_frame()
+    }
+
+    /// What the pipeline makes of a frame.
+    pub fn look(&mut self, frame: &Frame) -> Seen {
+        let seen = self.sense(frame);
+        // There is no model, so that this one bit is always set.
+        let forbidden = seen.status.bits() & Status::NO_FORCE.bits();
+        let markers = match seen.markers {
+            Some(markers) if forbidden == Status::MODEL_MISSING.bits() => markers,
+            _ => return Seen::Refused(seen.status),
+        };
+        let (mut worst_px, mut sum) = (0.0f64, [0.0, 0.0]);
+        for (marker, truth) in markers.iter().zip(&frame.truth.markers) {
+            let [x, y] = truth.map_or([f64::INFINITY; 2], |truth| truth.centroid_px);
+            let (dx, dy) = (marker.x.to_f64() - x, marker.y.to_f64() - y);
+            worst_px = worst_px.max(dx.hypot(dy));
+            sum = [sum[0] + dx, sum[1] + dy];
+        }
+        let mean_px = f64::hypot(sum[0], sum[1]) / 4.0;
+        Seen::Trusted { worst_px, mean_px }
+    }
+}
+
+impl Seen {
+    /// The largest distance of a marker from its true place, px; `None` without a force.
+    pub fn worst_px(&self) -> Option<f64> {
+        match self {
+            Seen::Trusted { worst_px, .. } => Some(*worst_px),
+            Seen::Refused(_) => None,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Where the firmware's code and data lie, read from the very ELF that is flashed: what `memory.x` promises.
+
+use std::fs;
+use std::ops::Range;
+
+use hivtac_tests::artifact;
+use object::{Object, ObjectSymbol, SymbolKind};
+
+const ITCM: Range<u64> = 0..0x1_0000;
+const STACK: Range<u64> = 0x2000_0000..0x2000_6000;
+const DTCM: Range<u64> = 0x2000_6000..0x2002_0000;
+const SRAM: Range<u64> = 0x3000_0000..0x3004_8000;
+const AXI_SRAM: Range<u64> = 0x2400_0000..0x2408_0000;
+
+struct Symbol {
+    name: String,
+    address: u64,
+    size: u64,
+    is_code: bool,
+}
+
+impl Symbol {
+    fn lies_in(&self, memory: &Range<u64>) -> bool {
+        memory.contains(&self.address) && self.address + self.size <= memory.end
+    }
+}
+
+/// Functions and variables of the firmware, under their mangled names.
+fn symbols() -> Vec<Symbol> {
+    let bytes = fs::read(artifact::named_by("HIVTAC_ELF")).unwrap();
+    let file = object::File::parse(&*bytes).unwrap();
+    let symbols = file.symbols().filter(|symbol| symbol.size() > 0);
+    symbols
+        .map(|symbol| Symbol {
+            name: symbol.name().unwrap().to_owned(),
+            // Bit 0 of a function's address says that it is Thumb code.
+            address: symbol.address() & !1,
+            size: symbol.size(),
+            is_code: symbol.kind() == SymbolKind::Text,
+        })
+        .collect()
+}
+
+/// Those variables whose name has all of these words.
+fn variables<'a>(symbols: &'a [Symbol], words: &[&str]) -> Vec<&'a Symbol> {
+    let named = |symbol: &&Symbol| words.iter().all(|word| symbol.name.contains(word));
+    let found: Vec<_> = symbols
+        .iter()
+        .filter(|symbol| !symbol.is_code)
+        .filter(named)
+        .collect();
+    assert!(!found.is_empty(), "the firmware has no {words:?}");
+    found
+}
+
+#[test]
+fn the_sensing_runs_from_itcm() {
+    let symbols = symbols();
+    let code = symbols.iter().filter(|symbol| symbol.is_code);
+    // Bridges of the linker between the memories are no code of the project.
+    let code = code.filter(|symbol| !symbol.name.contains("Thunk"));
+    let is_sensing = |symbol: &&Symbol| {
+        symbol.name.contains("hivtac_sensing") || symbol.name.starts_with("hivtac_")
+    };
+    let sensing: Vec<_> = code.filter(is_sensing).collect();
+    assert!(sensing.len() > 20, "the ELF has its symbols");
+    for symbol in sensing {
+        let Symbol { name, address, .. } = symbol;
+        assert!(symbol.lies_in(&ITCM), "{name} lies at {address:#x}");
+        assert_ne!(*address, 0, "{name} would be no pointer");
+    }
+}
+
+#[test]
+fn what_every_pixel_and_weight_needs_lies_in_dtcm() {
+    let symbols = symbols();
+    let rows = variables(&symbols, &["band_copy", "BUFFERS"]);
+    let model = variables(&symbols, &["model", "COPY"]);
+    let table = variables(&symbols, &["near_table", "TABLE"]);
+    for symbol in rows.into_iter().chain(model).chain(table) {
+        assert!(symbol.lies_in(&DTCM), "{}", symbol.name);
+    }
+}
+
+#[test]
+fn the_ring_of_bands_has_axi_sram_for_itself() {
+    let symbols = symbols();
+    for symbol in variables(&symbols, &["bands", "RING"]) {
+        assert!(symbol.lies_in(&AXI_SRAM), "{}", symbol.name);
+    }
+    for symbol in &symbols {
+        let is_ring = symbol.name.contains("bands") && symbol.name.contains("RING");
+        assert!(
+            is_ring || !AXI_SRAM.contains(&symbol.address),
+            "{}",
+            symbol.name
+        );
+    }
+}
+
+#[test]
+fn nothing_lies_below_the_stack_and_every_variable_in_a_memory() {
+    let symbols = symbols();
+    let is_variable = |symbol: &&Symbol| !symbol.is_code && symbol.address >= STACK.start;
+    for symbol in symbols.iter().filter(is_variable) {
+        let Symbol { name, address, .. } = symbol;
+        let memories = [DTCM, SRAM, AXI_SRAM];
+        let known = memories.iter().any(|memory| symbol.lies_in(memory));
+        let is_peripheral = (0x4000_0000..0x6000_0000).contains(address);
+        assert!(known || is_peripheral, "{name} lies at {address:#x}");
+    }
+}
