@@ -6,10 +6,14 @@ use crate::output::{Reader, note, print};
 use crate::picture::Picture;
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{Model, Rest};
-use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::pipeline;
+use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
 use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+
+/// The sensing, with the table that is fastest on a computer.
+type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
 
 /// The model that the firmware has, too.
 static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
@@ -160,6 +164,7 @@ impl<'a> Bench<'a> {
             settings = Settings {
                 threshold: settings.threshold,
                 dilations: settings.dilations,
+                centroid: settings.centroid,
                 ..usual
             };
         }
@@ -169,7 +174,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-fn measure(sensor: &mut Sensor, picture: &Picture) -> hivtac_sensing::pipeline::Measurement {
+fn measure(sensor: &mut Sensor, picture: &Picture) -> pipeline::Measurement {
     sensor.begin_frame();
     picture.rows().for_each(|row| sensor.push_row(row));
     sensor.finish_frame()

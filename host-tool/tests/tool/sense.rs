@@ -45,9 +45,9 @@ fn at_rest() -> Vec<Disc> {
 fn pressed() -> Vec<Disc> {
     let push = |(x, y, radius): Disc| {
         (
-            159.5 + (x - 159.5) * 1.05 + 1.0,
-            119.5 + (y - 119.5) * 1.05,
-            radius + 0.3,
+            159.5 + (x - 159.5) * 1.1 + 1.0,
+            119.5 + (y - 119.5) * 1.1,
+            radius * 1.1,
         )
     };
     at_rest().into_iter().map(push).collect()
