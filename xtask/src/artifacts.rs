@@ -17,15 +17,18 @@ pub const SEEDED_BUGS: [&str; 5] = [
     "bug-no-hsi48",
 ];
 
+/// The feature that lets the firmware follow the markers, which the rig tries, too.
+pub const TRACKING: &str = "tracking";
+
 /// The firmware, as it is flashed.
 pub fn firmware(toolchain: &Toolchain) -> Result<PathBuf> {
     build(&mut firmware_command(toolchain), "hivtac-firmware")
 }
 
-/// The firmware with one seeded bug.
-pub fn firmware_with_bug(toolchain: &Toolchain, bug: &str) -> Result<PathBuf> {
+/// The firmware with one feature, such as a seeded bug.
+pub fn firmware_with(toolchain: &Toolchain, feature: &str) -> Result<PathBuf> {
     let mut command = firmware_command(toolchain);
-    build(command.args(["--features", bug]), "hivtac-firmware")
+    build(command.args(["--features", feature]), "hivtac-firmware")
 }
 
 fn firmware_command(toolchain: &Toolchain) -> Command {
@@ -71,7 +74,10 @@ pub fn instruction_counter(version: u32) -> Result<PathBuf> {
 }
 
 /// Runs `cargo build` and gives the file it made for the target of this name.
-fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
+///
+/// # Errors
+/// When it fails, or makes no such file.
+pub fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
     command.arg("--message-format=json-render-diagnostics");
     let mut file = None;
     process::for_each_line(command, |line| {

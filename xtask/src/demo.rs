@@ -58,20 +58,25 @@ impl Demo {
     }
 
     fn monitor(&self, stage: &Stage, port: &str) -> Command {
-        let mut command = Command::new(&stage.tool);
-        command
-            .args([
-                "monitor",
-                "--port",
-                port,
-                "--frames",
-                &self.frames.to_string(),
-            ])
-            // The emulated board boots slower than a real one.
-            .args(["--timeout", "120", "--truth"])
-            .arg(&stage.truth);
+        let mut command = stage.monitor_command(port, self.frames);
+        command.arg("--truth").arg(&stage.truth);
         command
     }
+}
+
+/// The host tool's JSON lines for the first frames of the demo.
+///
+/// # Errors
+/// As the demo.
+pub fn json_lines(toolchain: &Toolchain, frames: u64) -> Result<String> {
+    let stage = Stage::build(toolchain)?;
+    let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
+    let mut monitor = stage.monitor_command(rig.port(), frames);
+    process::show(monitor.arg("--json"));
+    let lines = process::output(&mut monitor);
+    let lines = lines.with_context(|| format!("the rig's log is {}", stage.log.display()))?;
+    rig.finish()?;
+    Ok(lines)
 }
 
 impl Stage {
@@ -92,6 +97,15 @@ impl Stage {
             .args(["--scene", "demo", "--pty", "--exit-on-hangup", "--truth"])
             .arg(&self.truth)
             .arg(&self.firmware);
+        command
+    }
+
+    fn monitor_command(&self, port: &str, frames: u64) -> Command {
+        let mut command = Command::new(&self.tool);
+        command
+            .args(["monitor", "--port", port, "--frames", &frames.to_string()])
+            // The emulated board boots slower than a real one.
+            .args(["--timeout", "120"]);
         command
     }
 

@@ -3,12 +3,12 @@
 mod artifacts;
 mod bench;
 mod demo;
+mod numbers;
 mod packages;
 mod process;
 mod report;
 mod rig;
 mod size;
-mod stages;
 mod test;
 mod toolchain;
 mod workspace;
@@ -43,7 +43,7 @@ enum Task {
     Demo(demo::Demo),
     /// Run every test, and print a table of how they went.
     Test(test::Test),
-    /// Count the instructions per frame and per inference, in QEMU.
+    /// What a frame and an inference cost on the microcontroller, measured in QEMU.
     Bench(bench::Bench),
     /// Show what the firmware takes of each memory.
     Size(size::Size),

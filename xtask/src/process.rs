@@ -50,6 +50,11 @@ pub fn show(command: &Command) {
 /// Shows and runs the command with this program's own input and output.
 pub fn run(command: &mut Command) -> Result<()> {
     show(command);
+    run_quietly(command)
+}
+
+/// Runs the command with this program's own input and output, without showing it.
+pub fn run_quietly(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| cannot_start(command))?;
     check(status, command)
 }

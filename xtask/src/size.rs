@@ -7,7 +7,7 @@ use clap::Args;
 use object::{Object, ObjectSection, SectionFlags, elf};
 use serde::Serialize;
 
-use crate::bench::grouped;
+use crate::numbers::grouped;
 use crate::toolchain::Toolchain;
 use crate::{artifacts, workspace};
 

@@ -6,7 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result};
 use clap::Args;
 
-use crate::report::{Report, Tally, run_tests};
+use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
 use crate::{artifacts, bench, packages, process, workspace};
 
@@ -19,10 +19,12 @@ const WORKSPACES: [(&str, bool); 4] = [
 ];
 
 /// What runs on this computer without any image.
-const HOST: [&str; 5] = [
+const HOST: [&str; 7] = [
     "--workspace",
     "--exclude",
     "hivtac-firmware",
+    "--exclude",
+    "hivtac-board",
     "--exclude",
     "hivtac-tests",
 ];
@@ -32,6 +34,9 @@ const HOST: [&str; 5] = [
 pub struct Test {
     /// Run only the steps whose names contain one of these words, and the builds that they need.
     steps: Vec<String>,
+    /// Run the slow tests, too: some minutes more.
+    #[arg(long)]
+    all: bool,
 }
 
 /// The programs that the tests of the rig and those across rooms run.
@@ -57,6 +62,12 @@ impl Test {
         }
         if self.wants("benchmark") {
             report.step("benchmark", |_| bench::Bench::default().run(toolchain));
+        }
+        if self.wants("build: board benchmark") {
+            report.step("build: board benchmark", |_| {
+                bench::board::build(toolchain)?;
+                bench::board::lint(toolchain)
+            });
         }
         report.finish()
     }
@@ -96,7 +107,8 @@ impl Test {
         if self.wants("tests: host") {
             report.step("tests: host", |tally| {
                 let mut command = cargo("test", workspace::root());
-                run_tests(command.args(HOST).arg("--no-fail-fast"), tally)
+                command.args(HOST).arg("--no-fail-fast");
+                run_tests(self.slow_ones(&mut command), tally)
             });
         }
     }
@@ -128,18 +140,30 @@ impl Test {
         if self.wants("tests: across rooms") {
             report.step("tests: across rooms", |tally| {
                 let programs = programs.context("not run: the firmware could not be built")?;
-                cross_room_tests(toolchain, programs, tally)
+                let mut command = cross_room_tests(toolchain, programs)?;
+                run_tests(self.slow_ones(&mut command), tally)
             });
         }
+    }
+
+    /// Has a test runner run what it would leave out for its time, if asked to.
+    fn slow_ones<'c>(&self, command: &'c mut Command) -> &'c mut Command {
+        if self.all {
+            command.args(["--", "--include-ignored"]);
+        }
+        command
     }
 }
 
 impl Programs {
     fn build(toolchain: &Toolchain) -> Result<Programs> {
         let bugs = workspace::work_folder("bugs")?;
-        for bug in artifacts::SEEDED_BUGS {
-            let elf = artifacts::firmware_with_bug(toolchain, bug)?;
-            artifacts::copy(&elf, &bugs.join(format!("{bug}.elf")))?;
+        for feature in artifacts::SEEDED_BUGS
+            .into_iter()
+            .chain([artifacts::TRACKING])
+        {
+            let elf = artifacts::firmware_with(toolchain, feature)?;
+            artifacts::copy(&elf, &bugs.join(format!("{feature}.elf")))?;
         }
         // Last, so that what cargo leaves behind is the firmware without a bug.
         Ok(Programs {
@@ -175,6 +199,8 @@ fn host_lints() -> Result<()> {
         "--workspace",
         "--exclude",
         "hivtac-firmware",
+        "--exclude",
+        "hivtac-board",
         "--all-targets",
     ]);
     let mut rig = artifacts::rig_cargo("clippy");
@@ -197,7 +223,7 @@ fn target_lints(toolchain: &Toolchain) -> Result<()> {
     Ok(())
 }
 
-fn cross_room_tests(toolchain: &Toolchain, programs: &Programs, tally: &mut Tally) -> Result<()> {
+fn cross_room_tests(toolchain: &Toolchain, programs: &Programs) -> Result<Command> {
     packages::ensure_qemu()?;
     let mut command = cargo("test", workspace::root());
     command.args(["--package", "hivtac-tests", "--no-fail-fast"]);
@@ -206,7 +232,7 @@ fn cross_room_tests(toolchain: &Toolchain, programs: &Programs, tally: &mut Tall
         .env("HIVTAC_TOOL", artifacts::host_tool()?)
         .env("HIVTAC_RIG", artifacts::rig()?)
         .env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image(toolchain)?);
-    run_tests(&mut command, tally)
+    Ok(command)
 }
 
 #[cfg(test)]
@@ -216,6 +242,7 @@ mod tests {
     fn test(steps: &[&str]) -> Test {
         Test {
             steps: steps.iter().map(|&step| step.to_owned()).collect(),
+            all: false,
         }
     }
 

@@ -1,5 +1,6 @@
 //! The Rust toolchain for the microcontroller, found or installed without touching the version the user has.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -54,6 +55,22 @@ impl Toolchain {
             eprintln!("the toolchain in use cannot get {TARGET}: trying Debian's own packages");
         }
         debian().with_context(advice)
+    }
+
+    /// What the compiler for the target calls itself: `rustc 1.95.0 (59807616e 2026-04-14)`.
+    ///
+    /// # Errors
+    /// When it cannot be run.
+    pub fn compiler(&self) -> Result<String> {
+        let mut command = match self {
+            Toolchain::Own => Command::new(own_rustc()),
+            Toolchain::Debian { .. } => {
+                let mut command = Command::new(DEBIAN_RUSTC);
+                without_rustup(&mut command);
+                command
+            }
+        };
+        Ok(process::output(command.arg("-V"))?.trim().to_owned())
     }
 
     /// `cargo build` for the target, run in `folder`.
@@ -115,9 +132,12 @@ pub fn ensure_components(folder: &Path) -> Result<()> {
     Ok(())
 }
 
+fn own_rustc() -> OsString {
+    std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into())
+}
+
 fn own_has_target() -> bool {
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let mut command = Command::new(rustc);
+    let mut command = Command::new(own_rustc());
     command.args(["--print", "target-libdir", "--target", TARGET]);
     process::output(&mut command).is_ok_and(|folder| has_core(Path::new(folder.trim())))
 }

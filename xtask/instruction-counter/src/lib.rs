@@ -1,39 +1,36 @@
-//! A QEMU plugin that counts executed instructions, exactly and repeatably, by address.
+//! A QEMU plugin that records what a program executes, exactly and repeatably: which blocks of instructions run, in which
+//! order they follow each other, and what memory they load from.
 //!
-//! Counting begins when the program calls a function named `counting_begins` and ends when it calls `counting_ends`, as
-//! often as it likes. At the end of the run the plugin writes one line per instruction to QEMU's log: its
-//! address in hexadecimal and how often it ran. An address may have several lines, which add up.
+//! Recording begins when the program calls a function named `counting_begins` and ends when it calls `counting_ends`, as
+//! often as it likes; what runs after a call of `last_band_begins` is told apart from what ran before. At the end of the
+//! run the plugin writes to QEMU's log, all numbers but counts in hexadecimal:
 //!
-//! Counts are kept per translated block: QEMU tells of each one that it runs. A program that takes no interrupt and no
-//! fault leaves a block only at its end, so the counts are exact.
+//! ```text
+//! block NUMBER ADDRESS …              the addresses of a block's instructions, in order
+//! run PART FROM TO COUNT              block TO ran so often right after block FROM (`-`: first after a call)
+//! load PART ADDRESS COUNT             so many loads from the 32 bytes that begin there
+//! ```
+//!
+//! PART is 0, and 1 from the last band of rows on. Several blocks may hold the same addresses; their counts add up.
+//! A program that takes no interrupt and no fault leaves a block only at its end, so the counts are exact.
 
 mod qemu;
+mod record;
 
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
-use std::fmt::Write;
 use std::ptr;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Mutex, PoisonError};
 
 use qemu::{BlockHandle, PluginId};
+use record::{Mark, Record};
 
 /// The version of the plugin interface that this is written against; QEMU reads it before anything else.
 #[unsafe(no_mangle)]
 #[allow(non_upper_case_globals)]
 pub static qemu_plugin_version: c_int = if cfg!(feature = "plugin-api-2") { 2 } else { 1 };
 
-/// A translated block.
-struct Block {
-    addresses: Vec<u64>,
-    /// Whether counting begins or ends with this block; `None` for nearly all.
-    switch: Option<bool>,
-    /// How often it ran while counting.
-    runs: AtomicU64,
-}
-
-/// Every block that was ever translated. They are never freed: QEMU keeps their addresses.
-static BLOCKS: Mutex<Vec<&'static Block>> = Mutex::new(Vec::new());
-static COUNTING: AtomicBool = AtomicBool::new(false);
+/// What was recorded so far. There is one processor, so nobody waits for the lock.
+static RECORD: Mutex<Record> = Mutex::new(Record::new());
 
 /// QEMU calls this once, when it loads the plugin.
 #[unsafe(no_mangle)]
@@ -53,49 +50,47 @@ pub extern "C" fn qemu_plugin_install(
 
 /// QEMU has translated a block.
 extern "C" fn translated(_id: PluginId, handle: BlockHandle) {
-    let block: &'static Block = Box::leak(Box::new(Block {
-        addresses: addresses(handle),
-        switch: switch(handle),
-        runs: AtomicU64::new(0),
-    }));
-    let mut blocks = BLOCKS.lock().unwrap_or_else(PoisonError::into_inner);
-    blocks.push(block);
-    let data = ptr::from_ref(block).cast_mut().cast();
-    // SAFETY: the handle is valid during this call; the block is never freed and only read through shared references.
+    let number = with_record(|record| record.add_block(addresses(handle), mark(handle)));
+    // The number travels in place of a pointer; nothing is ever read through it.
+    let data = ptr::without_provenance_mut(number);
+    // SAFETY: the handle is valid during this call, and the indices are inside the block.
     unsafe {
-        qemu::qemu_plugin_register_vcpu_tb_exec_cb(handle, executed, qemu::NO_REGISTERS, data)
-    };
+        qemu::qemu_plugin_register_vcpu_tb_exec_cb(handle, executed, qemu::NO_REGISTERS, data);
+        for i in 0..qemu::qemu_plugin_tb_n_insns(handle) {
+            let instruction = qemu::qemu_plugin_tb_get_insn(handle, i);
+            qemu::qemu_plugin_register_vcpu_mem_cb(
+                instruction,
+                accessed,
+                qemu::NO_REGISTERS,
+                qemu::LOADS_AND_STORES,
+                ptr::null_mut(),
+            );
+        }
+    }
 }
 
 /// QEMU is about to run a block.
 extern "C" fn executed(_cpu: c_uint, data: *mut c_void) {
-    // SAFETY: `translated` gave the address of a block that is never freed.
-    let block = unsafe { &*data.cast_const().cast::<Block>() };
-    if let Some(counting) = block.switch {
-        // The two functions themselves, their return included, do not count.
-        COUNTING.store(counting, Relaxed);
-    } else if COUNTING.load(Relaxed) {
-        block.runs.fetch_add(1, Relaxed);
+    with_record(|record| record.run(data.addr()));
+}
+
+/// An instruction loads or stores.
+extern "C" fn accessed(_cpu: c_uint, info: u32, address: u64, _data: *mut c_void) {
+    // SAFETY: reads a number that QEMU gave.
+    if !unsafe { qemu::qemu_plugin_mem_is_store(info) } {
+        with_record(|record| record.load(address));
     }
 }
 
 /// QEMU ends.
 extern "C" fn ended(_id: PluginId, _data: *mut c_void) {
-    let blocks = BLOCKS.lock().unwrap_or_else(PoisonError::into_inner);
-    let text = CString::new(report(&blocks)).unwrap_or_default();
+    let text = CString::new(with_record(|record| record.report())).unwrap_or_default();
     // SAFETY: a string that ends with a zero byte.
     unsafe { qemu::qemu_plugin_outs(text.as_ptr()) };
 }
 
-fn report(blocks: &[&Block]) -> String {
-    let mut text = String::new();
-    for block in blocks {
-        let runs = block.runs.load(Relaxed);
-        for address in block.addresses.iter().filter(|_| runs > 0) {
-            let _ = writeln!(text, "{address:x} {runs}");
-        }
-    }
-    text
+fn with_record<T>(work: impl FnOnce(&mut Record) -> T) -> T {
+    work(&mut RECORD.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
 fn addresses(handle: BlockHandle) -> Vec<u64> {
@@ -107,8 +102,8 @@ fn addresses(handle: BlockHandle) -> Vec<u64> {
     }
 }
 
-/// Whether the block belongs to one of the two functions that begin and end counting.
-fn switch(handle: BlockHandle) -> Option<bool> {
+/// What the block tells this plugin: its function's name, when that has a meaning here.
+fn mark(handle: BlockHandle) -> Option<Mark> {
     // SAFETY: as above, and a block has at least one instruction.
     let symbol = unsafe { qemu::qemu_plugin_insn_symbol(qemu::qemu_plugin_tb_get_insn(handle, 0)) };
     if symbol.is_null() {
@@ -116,8 +111,9 @@ fn switch(handle: BlockHandle) -> Option<bool> {
     }
     // SAFETY: not null, so it is a string of QEMU's that ends with a zero byte.
     match unsafe { CStr::from_ptr(symbol) }.to_bytes() {
-        b"counting_begins" => Some(true),
-        b"counting_ends" => Some(false),
+        b"counting_begins" => Some(Mark::Begin),
+        b"counting_ends" => Some(Mark::End),
+        b"last_band_begins" => Some(Mark::LastBand),
         _ => None,
     }
 }

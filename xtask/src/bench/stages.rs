@@ -1,6 +1,6 @@
 //! Which stage of the sensing an instruction belongs to, told by the source file that it was made from.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 use std::path::Path;
 
 use addr2line::Loader;
@@ -19,46 +19,70 @@ pub const ORDER: [&str; 9] = [
     "library",
 ];
 
-/// Instructions by the stage's name, one of [`ORDER`].
-pub type Stages = BTreeMap<&'static str, u64>;
-
-/// Sorts counted addresses into stages.
+/// The stages of an image's instructions.
 ///
 /// An instruction belongs to the innermost function of the sensing that it was inlined from, so that what the compiler
 /// made one function of is still told apart, and what comes from a library counts for the stage that uses it. Library
 /// functions that were not inlined, such as `memset`, are a stage of their own. What belongs to the harness is left out.
-///
-/// # Errors
-/// When the image cannot be read or has no line table.
-pub fn sort(image: &Path, counts: &BTreeMap<u64, u64>) -> Result<Stages> {
-    let loader = Loader::new(image)
-        .map_err(|error| anyhow!("{error}"))
-        .with_context(|| format!("reading the line table of {}", image.display()))?;
-    let mut stages = Stages::new();
-    for (&address, &count) in counts {
-        if let Some(stage) = stage(&files(&loader, address)?) {
-            *stages.entry(stage).or_default() += count;
-        }
-    }
-    Ok(stages)
+pub struct Stages {
+    loader: Loader,
+    known: HashMap<u64, Option<&'static str>>,
 }
 
-/// The source files of the functions that an instruction was inlined through, innermost first.
-fn files(loader: &Loader, address: u64) -> Result<Vec<String>> {
-    let problem = |error| anyhow!("looking up {address:#x}: {error}");
-    let mut frames = loader
-        .find_frames(address)
-        .map_err(|error| anyhow!("looking up {address:#x}: {error}"))?;
-    let mut files = Vec::new();
-    while let Some(frame) = frames.next().map_err(|error| problem(error.to_string()))? {
-        files.extend(
-            frame
-                .location
-                .and_then(|location| location.file)
-                .map(str::to_owned),
-        );
+impl Stages {
+    /// Of the image in this file.
+    ///
+    /// # Errors
+    /// When the image cannot be read or has no line table.
+    pub fn of_image(image: &Path) -> Result<Stages> {
+        let loader = Loader::new(image)
+            .map_err(|error| anyhow!("{error}"))
+            .with_context(|| format!("reading the line table of {}", image.display()))?;
+        Ok(Stages {
+            loader,
+            known: HashMap::new(),
+        })
     }
-    Ok(files)
+
+    /// The stage of the instruction at an address, one of [`ORDER`], or `None` for the harness.
+    ///
+    /// # Errors
+    /// When the line table is not sound there.
+    pub fn stage(&mut self, address: u64) -> Result<Option<&'static str>> {
+        if let Some(known) = self.known.get(&address) {
+            return Ok(*known);
+        }
+        let stage = match stage(&self.files(address)?) {
+            Some("library") => self.stage_of_symbol(address).or(Some("library")),
+            stage => stage,
+        };
+        self.known.insert(address, stage);
+        Ok(stage)
+    }
+
+    /// The source files of the functions that an instruction was inlined through, innermost first.
+    fn files(&self, address: u64) -> Result<Vec<String>> {
+        let problem = |error: String| anyhow!("looking up {address:#x}: {error}");
+        let mut frames = self
+            .loader
+            .find_frames(address)
+            .map_err(|error| problem(error.to_string()))?;
+        let mut files = Vec::new();
+        while let Some(frame) = frames.next().map_err(|error| problem(error.to_string()))? {
+            files.extend(
+                frame
+                    .location
+                    .and_then(|location| location.file)
+                    .map(str::to_owned),
+            );
+        }
+        Ok(files)
+    }
+
+    /// Assembly has no line table; its names say what it is.
+    fn stage_of_symbol(&self, address: u64) -> Option<&'static str> {
+        stage_of_name(self.loader.find_symbol(address)?)
+    }
 }
 
 /// The stage, or `None` for the harness.
@@ -72,7 +96,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
     let (_, module) = file.rsplit_once("sensing/src/")?;
     let module = module.split(['/', '.']).next()?;
     match module {
-        "threshold" | "mask" | "hsv" => Some("threshold"),
+        "threshold" | "tables" | "mask" | "hsv" => Some("threshold"),
         "dilate" => Some("dilation"),
         "runs" | "label" | "blob" => Some("runs, labels, moments"),
         "markers" | "geometry" => Some("markers"),
@@ -80,9 +104,23 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         "network" | "model" => Some("network"),
         "force" | "cordic" => Some("angles, force"),
         // Small things that belong to whoever uses them.
-        "units" | "status" => None,
+        "units" | "status" | "kernels" => None,
         _ => Some("pipeline"),
     }
+}
+
+/// Functions in assembly are called `hivtac_` and what they do.
+fn stage_of_name(name: &str) -> Option<&'static str> {
+    let work = name.strip_prefix("hivtac_")?;
+    let stages = [
+        ("threshold", "threshold"),
+        ("dilate", "dilation"),
+        ("dot", "network"),
+        ("expand", "network"),
+        ("activate", "network"),
+    ];
+    let found = stages.iter().find(|(part, _)| work.contains(part));
+    found.map(|(_, stage)| *stage)
 }
 
 #[cfg(test)]
@@ -125,5 +163,11 @@ mod tests {
             Some("library")
         );
         assert_eq!(stage_of(&["/p/tests/src/golden.rs"]), None);
+    }
+
+    #[test]
+    fn assembly_is_known_by_its_name() {
+        assert_eq!(stage_of_name("hivtac_threshold_row"), Some("threshold"));
+        assert_eq!(stage_of_name("memset"), None);
     }
 }
