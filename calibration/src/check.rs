@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use anyhow::{Result, anyhow};
+use hivtac_scene::Contact;
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::{ContactReading, Model};
 use hivtac_sensing::pipeline::Sensor;
@@ -11,6 +12,7 @@ use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
 use rayon::prelude::*;
 
+use crate::conditions::ContactName;
 use crate::dataset::{Loads, Recipe, measure, reasons};
 use crate::errors::{Errors, WEAK_N};
 use crate::weights::Range;
@@ -20,6 +22,8 @@ use crate::weights::Range;
 pub struct Report {
     /// The model: its widths and preset, and what its numbers mean.
     pub model: String,
+    /// What the frames' labels mean.
+    pub contact: ContactName,
     /// Errors of all frames that gave a force, those that carry a warning included.
     pub errors: Errors,
     /// Frames that gave no force, by status.
@@ -27,6 +31,7 @@ pub struct Report {
 }
 
 /// Renders `samples` frames of random loads inside the model's calibrated range and lets the pipeline measure them.
+/// `friction` is the friction ratio of the loads when the model's contact reading is `slip`.
 ///
 /// # Errors
 /// When the bytes are no model, or the model is for conditions that cannot be rendered.
@@ -34,10 +39,11 @@ pub fn check(
     model: &[u8],
     samples: usize,
     seed: u64,
+    friction: f64,
     progress: impl Fn() + Sync,
 ) -> Result<Report> {
     let model = Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
-    let recipe = recipe(&model, samples, seed);
+    let recipe = recipe(&model, samples, seed, friction);
     let scene = recipe.scene(0)?;
     let eyes = || sensor(&model);
     let measured = (0..samples).into_par_iter().map_init(eyes, |sensor, row| {
@@ -53,6 +59,7 @@ pub fn check(
     });
     let mut report = Report {
         model: describe(&model),
+        contact: ContactName(recipe.contact),
         errors: Errors::default(),
         rejected: BTreeMap::new(),
     };
@@ -66,7 +73,7 @@ pub fn check(
 }
 
 /// Random loads inside what the model says it can do.
-fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Recipe {
+fn recipe(model: &Model<'_>, samples: usize, seed: u64, friction: f64) -> Recipe {
     let geometry = model.conditions.geometry;
     let range = Range {
         force_n: f64::from(model.range.magnitude.0) / 1e6,
@@ -79,6 +86,11 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Recipe {
         width,
         height,
         centroid: model.conditions.centroid.into(),
+        contact: match model.conditions.contact {
+            ContactReading::Force => Contact::Force,
+            ContactReading::Stick => Contact::Stick,
+            ContactReading::Slip => Contact::Slip { mu: friction },
+        },
         loads: Loads::Random(samples),
         rest: 0,
         range,
@@ -110,22 +122,14 @@ fn describe(model: &Model<'_>) -> String {
     } else {
         "calibrated on a unit"
     };
-    let contact = match model.conditions.contact {
-        ContactReading::Force => "force",
-        ContactReading::Stick => "stick",
-        ContactReading::Slip => "slip",
-    };
-    format!(
-        "{} (CRC {:08x}), {origin}, contact reading `{contact}`",
-        model.name(),
-        model.crc()
-    )
+    format!("{} (CRC {:08x}), {origin}", model.name(), model.crc())
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             model,
+            contact,
             errors,
             rejected,
         } = self;
@@ -133,6 +137,11 @@ impl fmt::Display for Report {
         writeln!(
             f,
             "frames                simulated: the same simulated sensor as in training, other loads and noise"
+        )?;
+        writeln!(
+            f,
+            "labels                contact reading `{contact}`: {}",
+            contact.meaning()
         )?;
         writeln!(f, "forces                {}", errors.count())?;
         writeln!(

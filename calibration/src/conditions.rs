@@ -1,14 +1,17 @@
 //! Under which conditions data was taken and a model holds, in words that files can carry.
 
+use std::fmt;
+
 use anyhow::{Context, Result};
 use clap::ValueEnum;
+use hivtac_scene::{Contact, SceneError};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin, PixelFormat};
 use hivtac_sensing::threshold::HsvBox;
 use serde::{Deserialize, Serialize};
 
 /// Everything about frames and labels that a model depends on (`docs/model-file.md`, conditions).
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conditions {
     /// Geometry preset: `paper` or `ov7725`.
@@ -49,13 +52,10 @@ pub enum CentroidName {
     RednessWeighted,
 }
 
-/// Contact readings by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ContactName {
-    /// Labels are the force on the film.
-    Force,
-}
+/// A contact reading by name: `force`, `stick`, or `slip:0.6` with its friction ratio, which model files leave out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ContactName(pub Contact);
 
 /// Origins by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,6 +72,51 @@ impl CentroidName {
             CentroidName::BinaryMask => CentroidEstimator::BinaryMask,
             CentroidName::RednessWeighted => CentroidEstimator::RednessWeighted,
         }
+    }
+}
+
+impl ContactName {
+    /// The same as the model file holds it.
+    pub fn to_model(self) -> ContactReading {
+        match self.0 {
+            Contact::Force => ContactReading::Force,
+            Contact::Stick => ContactReading::Stick,
+            Contact::Slip { .. } => ContactReading::Slip,
+        }
+    }
+
+    /// What α, β and |F| mean, for reports.
+    pub fn meaning(self) -> &'static str {
+        match self.0 {
+            Contact::Force => "α, β and |F| are the force on the film",
+            Contact::Stick => {
+                "α and β are the pressing direction of a tip that sticks to the film, |F| is the force along it"
+            }
+            Contact::Slip { .. } => {
+                "α and β are the pressing direction of a tip that sticks to the film until it slips, |F| is the force \
+                 along it"
+            }
+        }
+    }
+}
+
+impl fmt::Display for ContactName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl TryFrom<String> for ContactName {
+    type Error = SceneError;
+
+    fn try_from(text: String) -> Result<Self, SceneError> {
+        text.parse().map(Self)
+    }
+}
+
+impl From<ContactName> for String {
+    fn from(name: ContactName) -> String {
+        name.to_string()
     }
 }
 
@@ -95,7 +140,7 @@ impl Conditions {
             threshold: HsvBox::RED.limits(),
             dilations: 1,
             centroid: CentroidName::BinaryMask,
-            contact: ContactName::Force,
+            contact: ContactName::default(),
             origin: OriginName::Simulated,
         }
     }
@@ -115,9 +160,7 @@ impl Conditions {
             threshold: HsvBox::of_limits(self.threshold),
             dilations: self.dilations,
             centroid: self.centroid.to_model(),
-            contact: match self.contact {
-                ContactName::Force => ContactReading::Force,
-            },
+            contact: self.contact.to_model(),
             origin: match self.origin {
                 OriginName::Simulated => Origin::Simulated,
             },
@@ -146,6 +189,28 @@ mod tests {
         assert_eq!(model.dilations, 1);
         assert_eq!(model.geometry, Geometry::preset(Preset::Ov7725, 320, 240));
         assert_eq!(model.origin, Origin::Simulated);
+    }
+
+    #[test]
+    fn contact_readings_go_through_files() {
+        for (name, reading) in [
+            ("force", ContactReading::Force),
+            ("stick", ContactReading::Stick),
+            ("slip:0.6", ContactReading::Slip),
+        ] {
+            let mut conditions = Conditions::simulated(Preset::Ov7725, 320, 240);
+            conditions.contact = ContactName(name.parse().unwrap());
+            assert_eq!(conditions.to_model().unwrap().contact, reading);
+            let text = serde_json::to_string(&conditions).unwrap();
+            assert!(text.contains(&format!("\"contact\":\"{name}\"")), "{text}");
+            assert_eq!(
+                serde_json::from_str::<Conditions>(&text).unwrap(),
+                conditions
+            );
+            let bad = text.replace(name, "slip:7");
+            let error = serde_json::from_str::<Conditions>(&bad).unwrap_err();
+            assert!(error.to_string().contains("friction ratio is 7"), "{error}");
+        }
     }
 
     #[test]

@@ -16,6 +16,7 @@ use hivtac_calibration::fit::quick::quick;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::scene::SceneCommand;
 use hivtac_calibration::weights::{Range, Weights};
+use hivtac_scene::Contact;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// From data to a model on the chip: data sets, training, quantization, a check.
@@ -155,6 +156,10 @@ struct RecipeArgs {
     /// How markers' positions are taken: from all pixels of the mask alike, or weighted with their redness.
     #[arg(long, value_enum, default_value = "redness-weighted")]
     centroid: CentroidName,
+    /// What α, β and |F| mean: force (the force on the film), stick (the way of a tip that sticks, and the force along it) or
+    /// slip:0.6 (the same, until it slides at that ratio of friction).
+    #[arg(long, default_value_t)]
+    contact: Contact,
     /// Random loads in each session, besides the frames of the untouched film.
     #[arg(long, default_value_t = 40_000, conflicts_with_all = ["per_pose", "known_loads"])]
     samples: usize,
@@ -186,6 +191,9 @@ struct CheckArgs {
     /// Decides forces and noise; use another seed than the training data's.
     #[arg(long, default_value_t = 1_000_001)]
     seed: u64,
+    /// Friction ratio of the frames for a model of the contact reading `slip`, whose file does not hold it.
+    #[arg(long, default_value_t = 0.6)]
+    friction: f64,
 }
 
 impl RecipeArgs {
@@ -195,6 +203,7 @@ impl RecipeArgs {
             width: self.width,
             height: self.height,
             centroid: self.centroid,
+            contact: self.contact,
             loads: match (self.per_pose, self.known_loads) {
                 (Some(each), _) => Loads::PaperPoses(each),
                 (None, Some(each)) => Loads::Known(each),
@@ -272,9 +281,10 @@ fn make_dataset(args: &RecipeArgs, out: Option<&Path>) -> Result<Dataset> {
     bar.finish_and_clear();
     let rejected = dataset.rejected();
     println!(
-        "data set: {} frames, {} rejected",
+        "data set: {} frames, {} rejected; contact reading `{}`",
         dataset.rows.len(),
-        rejected.values().sum::<usize>()
+        rejected.values().sum::<usize>(),
+        dataset.about.conditions.contact
     );
     rejected
         .iter()
@@ -311,8 +321,10 @@ fn evaluate_file(
 fn check_file(model: &Path, args: &CheckArgs) -> Result<()> {
     let bytes = fs::read(model).with_context(|| format!("cannot read {}", model.display()))?;
     let bar = bar("checking", args.samples);
-    let report = check(&bytes, args.samples, args.seed, || bar.inc(1))
-        .with_context(|| format!("cannot check {}", model.display()))?;
+    let report = check(&bytes, args.samples, args.seed, args.friction, || {
+        bar.inc(1)
+    })
+    .with_context(|| format!("cannot check {}", model.display()))?;
     bar.finish_and_clear();
     println!("{report}");
     Ok(())
@@ -334,6 +346,7 @@ fn default_model(
         &CheckArgs {
             samples: 4000,
             seed: 1_000_001,
+            friction: 0.6,
         },
     )
 }

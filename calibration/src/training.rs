@@ -120,6 +120,7 @@ pub fn closed_form(dataset: &Dataset, held_out: Split, seed: u64) -> Result<Weig
 }
 
 fn told(fitted: Fit, rows: &str) -> Weights {
+    println!("contact reading `{}`", fitted.weights.conditions.contact);
     print_errors(&format!("{rows}, floats"), &fitted.float);
     print_errors(&format!("{rows}, quantized"), &fitted.quantized);
     fitted.weights

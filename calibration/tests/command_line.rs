@@ -82,6 +82,47 @@ fn from_data_to_a_checked_model() {
     assert_eq!(bytes("a.hvtm"), bytes("b.hvtm"));
 }
 
+/// What the labels mean goes from the data set into the model and every report.
+#[test]
+fn the_contact_reading_is_carried_through() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let words = |arguments: &[&str], reading: &str| {
+        let said = stdout(&run(here, arguments));
+        assert!(
+            said.contains(&format!("contact reading `{reading}`")),
+            "no {reading} in:\n{said}"
+        );
+        said
+    };
+    let data = ["dataset", "--contact", "slip:0.7", "--out", "slip.csv"];
+    let few = ["--per-pose", "1", "--rest", "9", "--force-n", "0.2"];
+    words(&[&data[..], &few].concat(), "slip:0.7");
+    let form = ["closed-form", "--data", "slip.csv", "--out", "slip.weights"];
+    words(&form, "slip:0.7");
+    let export = ["export", "--weights", "slip.weights", "--out", "slip.hvtm"];
+    stdout(&run(here, &export));
+    let judge = ["evaluate", "--model", "slip.hvtm", "--data", "slip.csv"];
+    let said = words(&[&judge[..], &["--out", "slip.html"]].concat(), "slip:0.7");
+    assert!(said.contains("pressing direction"), "{said}");
+    let check = ["check", "--model", "slip.hvtm", "--samples", "10"];
+    words(&[&check[..], &["--friction", "0.7"]].concat(), "slip:0.7");
+
+    let force = ["dataset", "--samples", "30", "--out", "force.csv"];
+    words(&force, "force");
+    let judge = [
+        "evaluate",
+        "--model",
+        "slip.hvtm",
+        "--data",
+        "force.csv",
+        "--out",
+        "x.html",
+    ];
+    let error = stderr_of_failure(&run(here, &judge));
+    assert!(error.contains("other conditions"), "{error}");
+}
+
 #[test]
 fn mistakes_are_named() {
     let directory = tempfile::tempdir().unwrap();
@@ -106,6 +147,10 @@ fn mistakes_are_named() {
     fails(
         &["dataset", "--width", "321", "--out", "a.csv"],
         &["321×240"],
+    );
+    fails(
+        &["dataset", "--contact", "glue", "--out", "a.csv"],
+        &["`glue`", "stick"],
     );
     std::fs::write(directory.path().join("a.weights"), "{}").unwrap();
     fails(

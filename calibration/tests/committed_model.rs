@@ -49,7 +49,7 @@ fn it_is_made_for_the_firmware() {
 
 #[test]
 fn it_measures_frames_that_no_training_saw() {
-    let report = check(&committed(), 400, 77, || ()).unwrap();
+    let report = check(&committed(), 400, 77, 0.6, || ()).unwrap();
     let errors = &report.errors;
     assert_eq!(errors.count(), 400, "rejected: {:?}", report.rejected);
     // A tilted force hardly moves the markers sideways: 0.2 px per degree at 0.2 N and 800×600.
@@ -61,7 +61,7 @@ fn it_measures_frames_that_no_training_saw() {
 fn its_uncertainties_are_the_errors_that_it_makes() {
     let bytes = committed();
     let said = Model::parse(&bytes).unwrap().uncertainty;
-    let errors = check(&bytes, 1000, 78, || ()).unwrap().errors;
+    let errors = check(&bytes, 1000, 78, 0.6, || ()).unwrap().errors;
     let near = |un: i32, rmse_n: f64| (0.75..1.33).contains(&(rmse_n * 1e6 / f64::from(un)));
     assert!(
         near(said.lateral.0, errors.lateral_rmse_n()),
@@ -79,7 +79,7 @@ fn its_uncertainties_are_the_errors_that_it_makes() {
 fn damaged_models_are_not_checked() {
     let mut bytes = committed();
     bytes[300] ^= 1;
-    let error = check(&bytes, 10, 1, || ()).unwrap_err().to_string();
+    let error = check(&bytes, 10, 1, 0.6, || ()).unwrap_err().to_string();
     assert!(error.contains("not a usable model file"), "{error}");
 }
 

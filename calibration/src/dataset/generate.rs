@@ -112,6 +112,7 @@ mod tests {
     use super::*;
 
     use super::super::Loads;
+    use hivtac_scene::Contact;
 
     fn small(seed: u64) -> Recipe {
         Recipe {
@@ -177,6 +178,34 @@ mod tests {
                 assert!(error < 0.4, "row {row}, marker {id}: {error} px off");
             }
         }
+    }
+
+    /// The label is the tip's way: a tip that sticks moves the markers much further sideways than a force so tilted.
+    #[test]
+    fn labels_mean_what_the_contact_reading_says() {
+        let shift = |contact: Contact| {
+            let recipe = Recipe {
+                loads: Loads::PaperPoses(1),
+                contact,
+                ..small(6)
+            };
+            let dataset = generate(&recipe, || ()).unwrap();
+            assert_eq!(dataset.about.conditions.contact.0, contact);
+            let rest = dataset.rest().unwrap().features_px();
+            let strong = dataset.rows.iter().filter(|row| row.force_n[2] < -0.05);
+            let sideways = strong.filter_map(|row| {
+                let seen = row.seen.as_ref().ok()?.features_px();
+                let x = (0..4).map(|k| seen[2 * k] - rest[2 * k]).sum::<f64>() / 4.0;
+                Some((row.force_n, x / (row.force_n[0] / -row.force_n[2])))
+            });
+            let tilted = sideways.filter(|(force, _)| force[0] < -0.15 * force[2].abs());
+            let shifts: Vec<f64> = tilted.map(|(_, shift)| shift).collect();
+            assert!(shifts.len() > 15);
+            shifts.iter().sum::<f64>() / shifts.len() as f64
+        };
+        let (force, stick) = (shift(Contact::Force), shift(Contact::Stick));
+        let slip = shift(Contact::Slip { mu: 0.6 });
+        assert!(force > 0.0 && slip > 2.0 * force && stick > 1.2 * slip);
     }
 
     #[test]

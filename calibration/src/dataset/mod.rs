@@ -68,7 +68,8 @@ pub struct Place {
 pub struct Row {
     /// Where it stands.
     pub place: Place,
-    /// The force on the film in N, film frame.
+    /// The force as it is labelled, N, film frame: the force on the film in the contact reading `force`, otherwise |F| along
+    /// the pressing direction.
     pub force_n: [f64; 3],
     /// What was seen, or the status names that say why nothing was.
     pub seen: Result<Observation, String>,

@@ -1,13 +1,13 @@
 //! What a data set shows: camera, sessions, loads.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_scene::{Load, Options, Preset as ScenePreset, Scene};
+use hivtac_scene::{Contact, Load, Options, Preset as ScenePreset, Scene};
 use hivtac_sensing::geometry::Preset;
 use serde::{Deserialize, Serialize};
 
 use super::session::Session;
 use super::{About, Place};
-use crate::conditions::{CentroidName, Conditions};
+use crate::conditions::{CentroidName, Conditions, ContactName};
 use crate::loads::{KnownLoads, PaperPoses, RandomLoads};
 use crate::weights::Range;
 
@@ -34,6 +34,8 @@ pub struct Recipe {
     pub height: u16,
     /// How markers' positions are taken.
     pub centroid: CentroidName,
+    /// What the loads' labels mean.
+    pub contact: Contact,
     /// The loads of each session.
     pub loads: Loads,
     /// Frames of the untouched film, first in each session.
@@ -55,6 +57,7 @@ impl Default for Recipe {
             width: 320,
             height: 240,
             centroid: CentroidName::RednessWeighted,
+            contact: Contact::Force,
             loads: Loads::Random(40_000),
             rest: 64,
             range: Range {
@@ -113,7 +116,8 @@ impl Recipe {
             self.height.into(),
             self.seed,
         )?;
-        let options = Session::numbered(session, self.seed).options(self.width);
+        let mut options = Session::numbered(session, self.seed).options(self.width);
+        options.film.contact = self.contact;
         Ok(scene.with_options(options)?)
     }
 
@@ -154,6 +158,7 @@ impl Recipe {
         Ok(About {
             conditions: Conditions {
                 centroid: self.centroid,
+                contact: ContactName(self.contact),
                 ..Conditions::simulated(self.preset, self.width, self.height)
             },
             scene: format!(

@@ -7,13 +7,14 @@ use hivtac_sensing::force::Force;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
 
+use crate::conditions::ContactName;
 use crate::dataset::{Dataset, Split};
 use crate::weights::features_from_q16;
 
 /// One answer with its truth. Angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// (F_x, F_y, F_z) that pressed.
+    /// (F_x, F_y, F_z) that pressed, as labelled.
     pub truth: [f64; 3],
     /// α, β and |F| that pressed.
     pub truth_polar: [f64; 3],
@@ -34,8 +35,8 @@ pub struct Evaluation {
     pub model: String,
     /// What the frames are, in words.
     pub frames: String,
-    /// The contact reading, by name.
-    pub contact: String,
+    /// The contact reading.
+    pub contact: ContactName,
     /// Which rows were taken, in words.
     pub rows: String,
     /// Frames with a force and an answer, warnings included.
@@ -81,10 +82,7 @@ impl Evaluation {
                 "{}; {} session(s), data seed {}",
                 about.scene, about.sessions, about.seed
             ),
-            contact: serde_json::to_value(about.conditions.contact)?
-                .as_str()
-                .unwrap_or_default()
-                .to_owned(),
+            contact: about.conditions.contact,
             rows: match held_out {
                 Some((split, seed)) => format!("{} (seed {seed})", split.words()),
                 None => "all rows of a data set of its own".to_owned(),

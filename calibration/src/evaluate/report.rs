@@ -30,9 +30,12 @@ impl Evaluation {
     /// What this is and is not.
     pub fn sentence(&self) -> String {
         format!(
-            "Simulated frames ({}), contact reading `{}`, {}. Nothing here was measured on a real sensor, and the paper's \
-             numbers hold its gauge, its stage and its film's hysteresis, too: they are beside ours, not below.",
-            self.frames, self.contact, self.rows
+            "Simulated frames ({}), contact reading `{}` ({}), {}. Nothing here was measured on a real sensor, and the \
+             paper's numbers hold its gauge, its stage and its film's hysteresis, too: they are beside ours, not below.",
+            self.frames,
+            self.contact,
+            self.contact.meaning(),
+            self.rows
         )
     }
 
