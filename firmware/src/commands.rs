@@ -39,7 +39,8 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
             outbox::answer(DeviceMessage::Stats(stats::snapshot())).await;
             Outcome::Done
         }
-        Request::Start => {
+        Request::Start | Request::StartWithMarkers => {
+            session::send_markers(request == Request::StartWithMarkers);
             session::stream(true);
             Outcome::Done
         }

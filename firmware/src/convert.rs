@@ -1,6 +1,6 @@
 //! Between the sensing pipeline's types and those of the wire.
 
-use hivtac_sensing::{force::Force, threshold};
+use hivtac_sensing::{force::Force, markers::Marker, model::CentroidEstimator, threshold};
 use hivtac_wire::message;
 
 /// A force for the wire. Uncertainties are never negative.
@@ -12,6 +12,23 @@ pub fn force_to_wire(force: Force) -> message::Force {
         cartesian_un: force.cartesian.map(|vector| vector.map(|f| f.0)),
         direction_sigma_mdeg: force.direction_sigma.0.unsigned_abs(),
         magnitude_sigma_un: force.magnitude_sigma.0.unsigned_abs(),
+    }
+}
+
+/// A marker for the wire.
+pub fn marker_to_wire(marker: Marker) -> message::Marker {
+    message::Marker {
+        x_q16: marker.x.0,
+        y_q16: marker.y.0,
+        area_px: marker.area,
+    }
+}
+
+/// A centroid estimator for the wire.
+pub fn centroid_to_wire(from: CentroidEstimator) -> message::Centroid {
+    match from {
+        CentroidEstimator::BinaryMask => message::Centroid::BinaryMask,
+        CentroidEstimator::RednessWeighted => message::Centroid::RednessWeighted,
     }
 }
 

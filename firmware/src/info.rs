@@ -1,31 +1,30 @@
 //! What the device says about itself.
 
-use crate::{board, camera};
+use crate::{board, camera, convert};
 use core::cell::Cell;
 use core::fmt::Write;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use heapless::String;
 use hivtac_sensing::model::Model;
-use hivtac_wire::message::{DeviceHello, HsvBox, ModelIdentity};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::threshold::ByteOrder;
+use hivtac_wire::message::{DeviceHello, ModelIdentity};
 use hivtac_wire::version::HelloPrefix;
 
-static THRESHOLD: CriticalSectionMutex<Cell<HsvBox>> =
-    CriticalSectionMutex::new(Cell::new(HsvBox {
-        hue_low: 0,
-        hue_high: 0,
-        saturation_low: 0,
-        saturation_high: 0,
-        value_low: 0,
-        value_high: 0,
-    }));
+/// How the pipeline looks at frames; nothing before it is configured.
+static LOOKING: CriticalSectionMutex<Cell<Option<Settings>>> =
+    CriticalSectionMutex::new(Cell::new(None));
 
-/// The pipeline tells which threshold it uses.
-pub fn set_threshold(threshold: HsvBox) {
-    THRESHOLD.lock(|cell| cell.set(threshold));
+/// The pipeline tells how it looks at frames.
+pub fn set_looking(settings: &Settings) {
+    LOOKING.lock(|cell| cell.set(Some(*settings)));
 }
 
 /// The device's hello.
 pub fn hello(model: Option<&Model>) -> DeviceHello {
+    let settings = LOOKING
+        .lock(Cell::get)
+        .unwrap_or_else(|| Settings::usual(camera::GEOMETRY, ByteOrder::Swapped));
     DeviceHello {
         protocol: HelloPrefix::OURS.protocol,
         schema: HelloPrefix::OURS.schema,
@@ -35,7 +34,10 @@ pub fn hello(model: Option<&Model>) -> DeviceHello {
         model: model.map(identity),
         width: camera::WIDTH,
         height: camera::HEIGHT,
-        threshold: THRESHOLD.lock(Cell::get),
+        threshold: convert::threshold_to_wire(settings.threshold),
+        preset: text(format_args!("{}", camera::PRESET.name())),
+        dilations: settings.dilations,
+        centroid: convert::centroid_to_wire(settings.centroid),
     }
 }
 
@@ -48,7 +50,7 @@ fn identity(model: &Model) -> ModelIdentity {
 }
 
 /// Text that is known to fit; what does not is left out.
-fn text(words: core::fmt::Arguments) -> String<32> {
+fn text<const N: usize>(words: core::fmt::Arguments) -> String<N> {
     let mut text = String::new();
     let _ = text.write_fmt(words);
     text

@@ -43,7 +43,6 @@ use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
-use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
@@ -88,7 +87,7 @@ fn main() -> ! {
 /// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers.
 fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) {
     let order = ByteOrder::Swapped;
-    let geometry = Geometry::preset(Preset::Ov7725, camera::WIDTH, camera::HEIGHT);
+    let geometry = camera::GEOMETRY;
     let settings = match &model {
         Some(model) => Settings {
             geometry,
@@ -99,6 +98,7 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) {
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
     }
+    info::set_looking(sensor.settings());
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

@@ -45,7 +45,6 @@ pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
 pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
-    info::set_threshold(convert::threshold_to_wire(sensor.threshold()));
     let mut task = PipelineTask {
         sensor,
         bands,
@@ -158,7 +157,7 @@ impl PipelineTask {
         let wanted = convert::threshold_from_wire(threshold);
         match self.sensor.set_threshold(wanted) {
             Ok(()) => {
-                info::set_threshold(threshold);
+                info::set_looking(self.sensor.settings());
                 Outcome::Done
             }
             Err(_) => Outcome::InvalidArgument,
@@ -201,6 +200,10 @@ impl PipelineTask {
             time_us: delivery.edge.time_us,
             status,
             force: measurement.force.map(convert::force_to_wire),
+            markers: measurement
+                .markers
+                .filter(|_| session::wants_markers())
+                .map(|markers| markers.map(convert::marker_to_wire)),
         }
     }
 

@@ -4,6 +4,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 static OPEN: AtomicBool = AtomicBool::new(false);
 static STREAMING: AtomicBool = AtomicBool::new(false);
+static MARKERS: AtomicBool = AtomicBool::new(false);
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 /// A hello began a new conversation; `understood` when host and device speak the same version.
@@ -31,6 +32,16 @@ pub fn number() -> u32 {
 /// Starts or stops the flow of samples and stats.
 pub fn stream(on: bool) {
     STREAMING.store(on, Ordering::Relaxed);
+}
+
+/// From the next sample on, with markers or without.
+pub fn send_markers(on: bool) {
+    MARKERS.store(on, Ordering::Relaxed);
+}
+
+/// True while samples shall carry the markers.
+pub fn wants_markers() -> bool {
+    MARKERS.load(Ordering::Relaxed)
 }
 
 /// True while samples and stats flow.

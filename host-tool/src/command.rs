@@ -1,9 +1,9 @@
 //! `hivtac tare` and `hivtac threshold`: one command each.
 
-use crate::failure::Failure;
-use crate::link::{Link, log_text};
 use crate::output::{note, print};
-use crate::port::Address;
+use hivtac_host::failure::Failure;
+use hivtac_host::link::{Link, log_text};
+use hivtac_host::port::Address;
 use hivtac_wire::message::{DeviceMessage, HsvBox, Request};
 use std::time::Duration;
 

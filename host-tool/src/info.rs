@@ -1,11 +1,11 @@
 //! `hivtac info`: what the device is and how it fares.
 
-use crate::failure::Failure;
 use crate::lines::to_json;
-use crate::link::{Link, log_text};
 use crate::output::{note, print};
-use crate::port::Address;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, HsvBox, Request, Stats};
+use hivtac_host::failure::Failure;
+use hivtac_host::link::{Link, log_text};
+use hivtac_host::port::Address;
+use hivtac_wire::message::{Centroid, DeviceHello, DeviceMessage, HsvBox, Request, Stats};
 use serde::Serialize;
 use std::time::Duration;
 
@@ -49,6 +49,9 @@ struct Info<'a> {
     width: u16,
     height: u16,
     threshold: HsvBox,
+    preset: &'a str,
+    dilations: u8,
+    centroid: &'static str,
     stats: Option<Stats>,
 }
 
@@ -80,6 +83,12 @@ impl<'a> Info<'a> {
             width: hello.width,
             height: hello.height,
             threshold: hello.threshold,
+            preset: &hello.preset,
+            dilations: hello.dilations,
+            centroid: match hello.centroid {
+                Centroid::BinaryMask => "binary-mask",
+                Centroid::RednessWeighted => "redness-weighted",
+            },
             stats,
         }
     }
@@ -102,6 +111,10 @@ impl<'a> Info<'a> {
                 threshold.saturation_high,
                 threshold.value_low,
                 threshold.value_high
+            ),
+            format!(
+                "markers    preset {}, dilations {}, centroids {}",
+                self.preset, self.dilations, self.centroid
             ),
         ];
         lines.extend(self.stats.iter().flat_map(stats_lines));

@@ -76,6 +76,7 @@ fn human_row(row: &Row) -> String {
         time_us,
         status,
         force,
+        ..
     } = row.sample;
     let time = Millionths::from_u64(*time_us);
     let mut line = format!("{sequence:>8}{frame:>8}{time:>13}");
@@ -219,6 +220,7 @@ mod tests {
             time_us: 1_400_000,
             status,
             force,
+            markers: None,
         }
     }
 

@@ -229,6 +229,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::Stop => "stop",
         Request::SetThreshold(_) => "set threshold",
         Request::Tare { .. } => "tare",
+        Request::StartWithMarkers => "start with markers",
     }
 }
 

@@ -2,28 +2,25 @@
 
 mod command;
 mod decimal;
-mod failure;
 mod finding;
 mod force_json;
 mod hsv;
 mod info;
 mod lines;
-mod link;
 mod monitor;
 mod output;
 mod picture;
-mod port;
 mod sense;
-mod stop;
 mod tally;
 mod truth;
 
 use clap::{Args, Parser, Subcommand};
-use failure::{Failure, Kind};
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::port::Address;
+use hivtac_host::stop;
 use hivtac_sensing::geometry::Preset;
 use hivtac_wire::message::HsvBox;
 use lines::Format;
-use port::Address;
 use std::process::ExitCode;
 use std::time::Duration;
 

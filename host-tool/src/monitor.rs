@@ -1,13 +1,13 @@
 //! `hivtac monitor`: the forces as they come, and a summary at the end.
 
-use crate::failure::{Failure, Kind};
 use crate::lines::{Format, Row};
-use crate::link::{Link, log_text};
 use crate::output::{Reader, note, print};
-use crate::port::Address;
-use crate::stop;
 use crate::tally::Tally;
 use crate::truth::TruthFile;
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::link::{Link, log_text};
+use hivtac_host::port::Address;
+use hivtac_host::stop;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use std::time::{Duration, Instant};
 

@@ -1,6 +1,6 @@
 //! Writing to standard output and standard error so that a closed pipe is an end, not a crash.
 
-use crate::failure::{Failure, Kind};
+use hivtac_host::failure::{Failure, Kind};
 use std::io::{self, ErrorKind, Write};
 
 /// Whether there is still a reader.

@@ -1,6 +1,6 @@
 //! Pictures as a camera would deliver them: rows of RGB565.
 
-use crate::failure::{Failure, Kind};
+use hivtac_host::failure::{Failure, Kind};
 use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use image::{ImageReader, RgbImage};
 use std::fs::File;

@@ -1,9 +1,9 @@
 //! `hivtac sense`: the sensor's own code on pictures, with everything it finds on the way.
 
-use crate::failure::{Failure, Kind};
 use crate::finding::Finding;
 use crate::output::{Reader, note, print};
 use crate::picture::Picture;
+use hivtac_host::failure::{Failure, Kind};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{Model, Rest};
 use hivtac_sensing::pipeline;

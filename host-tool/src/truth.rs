@@ -1,6 +1,6 @@
 //! The true force of each frame, from the log of a simulated sensor, joined by frame number.
 
-use crate::failure::{Failure, Kind};
+use hivtac_host::failure::{Failure, Kind};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;

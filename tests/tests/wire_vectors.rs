@@ -60,6 +60,9 @@ fn hello(model: Option<ModelIdentity>) -> DeviceMessage {
         width: 320,
         height: 240,
         threshold: RED,
+        preset: "ov7725".try_into().unwrap(),
+        dilations: 1,
+        centroid: Centroid::RednessWeighted,
     })
 }
 
@@ -86,6 +89,7 @@ fn sample(status: Status, cartesian_un: Option<[i32; 3]>) -> DeviceMessage {
         time_us: 1_400_000,
         status,
         force: Some(force),
+        markers: None,
     })
 }
 
@@ -96,6 +100,28 @@ fn sample_without_force() -> DeviceMessage {
         time_us: 10_000_000,
         status: Status::MARKERS_MISSING | Status::FRAME_DROPPED,
         force: None,
+        markers: None,
+    })
+}
+
+fn sample_with_markers() -> DeviceMessage {
+    let marker = |x_q16, y_q16, area_px| Marker {
+        x_q16,
+        y_q16,
+        area_px,
+    };
+    DeviceMessage::Sample(Sample {
+        sequence: 7,
+        frame: 8,
+        time_us: 300_000,
+        status: Status::MODEL_MISSING,
+        force: None,
+        markers: Some([
+            marker(6_553_600, 3_932_160, 190),
+            marker(14_417_921, 3_932_159, 191),
+            marker(14_417_920, 11_796_480, 189),
+            marker(6_553_600, 11_796_480, 190),
+        ]),
     })
 }
 
@@ -138,6 +164,7 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ),
         ("sample-without-cartesian", sample(Status::default(), None)),
         ("sample-without-force", sample_without_force()),
+        ("sample-with-markers", sample_with_markers()),
         ("stats", stats()),
         ("log", log()),
         ("reply-done", reply(7, Outcome::Done)),
@@ -159,6 +186,7 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("stop", command(3, Request::Stop)),
         ("set-threshold", command(200, Request::SetThreshold(RED))),
         ("tare", command(7, Request::Tare { frames: 128 })),
+        ("start-with-markers", command(2, Request::StartWithMarkers)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -219,7 +247,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 5);
+    assert_eq!(requests.len(), 6);
 }
 
 #[test]

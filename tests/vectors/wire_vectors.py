@@ -11,7 +11,7 @@ import pathlib
 import sys
 import zlib
 
-SCHEMA = 0xCC4ABA547086D851
+SCHEMA = 0xC407FE30E8C6B909
 
 
 def varint(value):
@@ -79,7 +79,14 @@ HELLO = [
     string("board", "weact-h743 + ov7725"),
     string("firmware", "hivtac 0.1.0"),
 ]
-HELLO_END = [unsigned("width", 320), unsigned("height", 240), BOX_FIELD]
+HELLO_END = [
+    unsigned("width", 320),
+    unsigned("height", 240),
+    BOX_FIELD,
+    string("preset", "ov7725"),
+    raw("dilations 1", [1]),
+    raw("centroid: RednessWeighted", [1]),
+]
 MODEL = [
     raw("model: Some", [1]),
     (varint(0xCAFEF00D), "model.crc 0xcafef00d"),
@@ -112,6 +119,18 @@ CARTESIAN = [
     signed("z", -99_525),
 ]
 SIGMAS = [unsigned("direction_sigma_mdeg", 480), unsigned("magnitude_sigma_un", 900)]
+NO_FORCE = [raw("force: None", [0])]
+NO_MARKERS = [raw("markers: None", [0])]
+MARKERS = [raw("markers: Some", [1])] + [
+    field
+    for marker, (x, y, area) in enumerate(
+        [(6_553_600, 3_932_160, 190), (14_417_921, 3_932_159, 191),
+         (14_417_920, 11_796_480, 189), (6_553_600, 11_796_480, 190)]
+    )
+    for field in [
+        signed(f"marker {marker}: x_q16", x), signed("y_q16", y), unsigned("area_px", area),
+    ]
+]
 
 STATS = [
     ("frames_exposed", 1000),
@@ -131,11 +150,13 @@ STATS = [
 DEVICE = {
     "device-hello": HELLO + MODEL + HELLO_END,
     "device-hello-without-model": HELLO + [raw("model: None", [0])] + HELLO_END,
-    "sample-force": sample(41, 42, 1_400_000, 0x2000, "model_simulated") + ANGLES + CARTESIAN + SIGMAS,
+    "sample-force": sample(41, 42, 1_400_000, 0x2000, "model_simulated") + ANGLES + CARTESIAN + SIGMAS
+    + NO_MARKERS,
     "sample-without-cartesian": sample(41, 42, 1_400_000, 0, "") + ANGLES
-    + [raw("cartesian_un: None", [0])] + SIGMAS,
+    + [raw("cartesian_un: None", [0])] + SIGMAS + NO_MARKERS,
     "sample-without-force": sample(300, 305, 10_000_000, 0x201, "markers_missing, frame_dropped")
-    + [raw("force: None", [0])],
+    + NO_FORCE + NO_MARKERS,
+    "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing") + NO_FORCE + MARKERS,
     "stats": [raw("Stats", [2])] + [unsigned(name, value) for name, value in STATS],
     "log": [
         raw("Log", [3]),
@@ -154,6 +175,7 @@ HOST = {
     "stop": COMMAND + [unsigned("id", 3), raw("Stop", [2])],
     "set-threshold": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3]), BOX_FIELD],
     "tare": COMMAND + [unsigned("id", 7), raw("Tare", [4]), unsigned("frames", 128)],
+    "start-with-markers": COMMAND + [unsigned("id", 2), raw("StartWithMarkers", [5])],
 }
 
 FOREIGN = [
@@ -217,9 +239,9 @@ def annotate(name, fields, whole=None):
 
 
 def print_documentation():
-    for name in ["host-hello", "start", "set-threshold", "tare"]:
+    for name in ["host-hello", "start", "set-threshold", "tare", "start-with-markers"]:
         annotate(name, HOST[name])
-    for name in ["device-hello", "sample-force", "sample-without-force", "stats", "log", "reply-done"]:
+    for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers", "stats", "log", "reply-done"]:
         annotate(name, DEVICE[name])
     annotate("foreign-hello", FOREIGN)
     print(f"```text frame bad-crc\n{bad_crc().hex(' ')}\n```")

@@ -31,6 +31,9 @@ pub fn device_hello() -> DeviceHello {
             value_low: 45,
             value_high: 255,
         },
+        preset: String::try_from("ov7725").unwrap(),
+        dilations: 1,
+        centroid: Centroid::RednessWeighted,
     }
 }
 
@@ -49,6 +52,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             }),
             width: u16::MAX,
             height: u16::MAX,
+            preset: full(),
             ..device_hello()
         }),
         DeviceMessage::Sample(longest_sample()),
@@ -79,6 +83,13 @@ fn longest_sample() -> Sample {
             direction_sigma_mdeg: u32::MAX,
             magnitude_sigma_un: u32::MAX,
         }),
+        markers: Some(
+            [Marker {
+                x_q16: i32::MIN,
+                y_q16: i32::MIN,
+                area_px: u32::MAX,
+            }; 4],
+        ),
     }
 }
 
@@ -108,6 +119,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::Stop,
         Request::SetThreshold(threshold),
         Request::Tare { frames: u16::MAX },
+        Request::StartWithMarkers,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -141,6 +153,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         Just(Request::Stop),
         any_threshold().prop_map(Request::SetThreshold),
         any::<u16>().prop_map(|frames| Request::Tare { frames }),
+        Just(Request::StartWithMarkers),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -152,11 +165,13 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
 }
 
 fn any_hello() -> impl Strategy<Value = DeviceHello> {
-    let names = (any_string(), any_string());
+    let names = (any_string(), any_string(), any_string());
+    let centroid = prop_oneof![Just(Centroid::BinaryMask), Just(Centroid::RednessWeighted)];
+    let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
     let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>()));
-    (any::<[u8; 12]>(), names, size, model, any_threshold()).prop_map(
-        |(device_id, (board, firmware), (width, height), model, threshold)| DeviceHello {
+    (any::<[u8; 12]>(), names, size, model, seen).prop_map(
+        |(device_id, (board, firmware, preset), (width, height), model, seen)| DeviceHello {
             device_id,
             board,
             firmware,
@@ -167,7 +182,10 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
                 name,
                 simulated,
             }),
-            threshold,
+            threshold: seen.0,
+            preset,
+            dilations: seen.1,
+            centroid: seen.2,
             ..device_hello()
         },
     )
@@ -175,15 +193,25 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
 
 fn any_sample() -> impl Strategy<Value = Sample> {
     let force = proptest::option::of(any_force());
-    (any::<(u32, u32, u64, u32)>(), force).prop_map(
-        |((sequence, frame, time_us, status), force)| Sample {
+    let markers = proptest::option::of([any_marker(), any_marker(), any_marker(), any_marker()]);
+    (any::<(u32, u32, u64, u32)>(), force, markers).prop_map(
+        |((sequence, frame, time_us, status), force, markers)| Sample {
             sequence,
             frame,
             time_us,
             status: Status(status),
             force,
+            markers,
         },
     )
+}
+
+fn any_marker() -> impl Strategy<Value = Marker> {
+    any::<(i32, i32, u32)>().prop_map(|(x_q16, y_q16, area_px)| Marker {
+        x_q16,
+        y_q16,
+        area_px,
+    })
 }
 
 fn any_force() -> impl Strategy<Value = Force> {

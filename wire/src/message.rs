@@ -63,6 +63,21 @@ pub struct DeviceHello {
     pub height: u16,
     /// The threshold in use.
     pub threshold: HsvBox,
+    /// Lens and pixels: the name of a geometry preset, e.g. `ov7725`.
+    pub preset: String<16>,
+    /// 3×3 dilations of the mask, 0–3.
+    pub dilations: u8,
+    /// How a marker's position is taken from its pixels.
+    pub centroid: Centroid,
+}
+
+/// How a marker's position is taken from its pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Centroid {
+    /// The mean of its pixels in the mask.
+    BinaryMask,
+    /// The mean of the same pixels, weighted with their redness.
+    RednessWeighted,
 }
 
 /// Which model makes the forces.
@@ -107,6 +122,19 @@ pub struct Sample {
     pub status: Status,
     /// The force; `None` exactly when `status` has a bit that says "no force".
     pub force: Option<Force>,
+    /// The four markers, when they were asked for ([`Request::StartWithMarkers`]) and found.
+    pub markers: Option<[Marker; 4]>,
+}
+
+/// One of the four markers of a frame, 0–3 from the upper left, clockwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Marker {
+    /// Centroid's column, 1/65,536 px.
+    pub x_q16: i32,
+    /// Centroid's row, 1/65,536 px.
+    pub y_q16: i32,
+    /// Pixels in the mask.
+    pub area_px: u32,
 }
 
 /// A force on the film. Conventions: `docs/wire.md`.
@@ -202,6 +230,8 @@ pub enum Request {
         /// How many frames to average.
         frames: u16,
     },
+    /// Start streaming samples with their markers, and stats.
+    StartWithMarkers,
 }
 
 /// The answer to a command.

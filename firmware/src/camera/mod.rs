@@ -3,3 +3,8 @@
 mod ov7725;
 mod ov7725_registers;
 pub use ov7725::*;
+
+use hivtac_sensing::geometry::Geometry;
+
+/// Lens, frame and markers of the sensor with this camera.
+pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);

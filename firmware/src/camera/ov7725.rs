@@ -7,9 +7,12 @@ use embassy_stm32::gpio::Output;
 use embassy_stm32::i2c::{self, I2c, Master};
 use embassy_stm32::mode::Blocking;
 use embassy_time::{Duration, Timer};
+use hivtac_sensing::geometry::Preset;
 
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";
+/// Its lens and pixels.
+pub const PRESET: Preset = Preset::Ov7725;
 /// Columns of a frame, px.
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.

@@ -33,6 +33,7 @@ fn info_for_a_person() {
              model      11-64-64-3 ov7725, CRC 0000cafe, trained on: simulated sensor\n\
              frame      320 × 240 px\n\
              threshold  H 170–10, S 100–255, V 45–255\n\
+             markers    preset ov7725, dilations 1, centroids redness-weighted\n\
              frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0\n\
              camera     0 timeouts, 0 restarts, 0 overruns\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\

@@ -132,6 +132,9 @@ pub fn hello() -> DeviceHello {
             value_low: 45,
             value_high: 255,
         },
+        preset: "ov7725".try_into().unwrap(),
+        dilations: 1,
+        centroid: Centroid::RednessWeighted,
     }
 }
 
@@ -149,6 +152,7 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
             direction_sigma_mdeg: 480,
             magnitude_sigma_un: 900,
         }),
+        markers: None,
     })
 }
 

@@ -15,6 +15,7 @@ fn without_force(sequence: u32, frame: u32) -> DeviceMessage {
         time_us: 7,
         status: Status::MARKERS_MISSING | Status::FRAME_DROPPED,
         force: None,
+        markers: None,
     })
 }
 
