@@ -1,229 +1,192 @@
-//! 3×3 dilation, zero to three times, row by row.
+//! 3×3 dilation, zero to three times, as rows come in.
 //!
 //! n dilations by 3×3 are one by a square of 2n + 1: the last 2n + 1 rows one over the other, then along the row. As with
 //! OpenCV's default border, what lies outside the frame counts as unset.
 //!
-//! Most rows of a frame are empty, and most words of the others: every row remembers where its set bits begin and end,
-//! and only what lies between is looked at again.
+//! Most rows of a frame are empty, and most words of the others: rows come several at a time, and what is looked at again are the
+//! words near one that is set in any of them.
 
-use crate::mask::{EMPTY_ROW, MaskRow, last_word_bits, words_of};
+use core::ops::Range;
+
+use crate::{
+    mask::{MAX_WORDS, last_word_bits, words_of},
+    runs::Edges,
+};
 
 /// Most dilations.
 pub const MAX_DILATIONS: u8 = 3;
-/// Rows that the tallest square covers.
-const RING: usize = 2 * MAX_DILATIONS as usize + 1;
+/// Most rows that come in at a time.
+pub const MAX_ROWS: usize = 8;
+/// Rows that are still needed of those that came before, with the most dilations.
+const MAX_KEPT: usize = 2 * MAX_DILATIONS as usize;
 
-/// The rows that the next output still needs: a ring of 2n + 1.
+/// The rows that the next output still needs.
 #[derive(Clone, Debug)]
 pub struct Dilation {
-    ring: [MaskRow; RING],
-    /// Where the set bits of the ring's rows lie.
-    spans: [Span; RING],
-    /// How many of them have any.
-    occupied: u8,
-    /// The row that goes out.
-    out: MaskRow,
+    /// The last 2n rows, and behind them those that come in: ⌈width / 32⌉ words each.
+    mask: [u32; (MAX_KEPT + MAX_ROWS) * MAX_WORDS],
+    /// Bit i is set when one of these rows may have a set bit in word i.
+    occupied: u32,
     /// n.
     radius: u8,
     width: u16,
     /// ⌈width / 32⌉.
     words: usize,
-    /// Where the next row goes.
-    next: usize,
-    /// Rows still to come in before the first goes out.
-    delay: u8,
-}
-
-/// The words of a row from the first to before the last that has a set bit; empty when none has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Span {
-    first: usize,
-    end: usize,
-}
-
-impl Span {
-    const EMPTY: Span = Span {
-        first: usize::MAX,
-        end: 0,
-    };
-
-    fn with(self, other: Span) -> Span {
-        Span {
-            first: self.first.min(other.first),
-            end: self.end.max(other.end),
-        }
-    }
-}
-
-/// The part of a row that has all its set bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Part<'r> {
-    /// Which word of the row is its first.
-    pub first: usize,
-    /// Its words; none when the row is empty.
-    pub words: &'r [u32],
-}
-
-impl Part<'_> {
-    /// Of an empty row.
-    pub const EMPTY: Part<'static> = Part {
-        first: 0,
-        words: &[],
-    };
 }
 
 impl Dilation {
     /// For no frame yet.
     pub const fn new() -> Dilation {
         Dilation {
-            ring: [EMPTY_ROW; RING],
-            spans: [Span::EMPTY; RING],
+            mask: [0; (MAX_KEPT + MAX_ROWS) * MAX_WORDS],
             occupied: 0,
-            out: EMPTY_ROW,
             radius: 0,
             width: 1,
             words: 1,
-            next: 0,
-            delay: 0,
         }
     }
 
     /// Starts a frame of rows of `width` pixels with `dilations` ≤ [`MAX_DILATIONS`] dilations.
     pub fn begin(&mut self, width: u16, dilations: u8) {
-        self.ring = [EMPTY_ROW; RING];
-        self.spans = [Span::EMPTY; RING];
-        self.occupied = 0;
         self.radius = dilations.min(MAX_DILATIONS);
         self.width = width;
         self.words = words_of(width);
-        self.next = 0;
-        self.delay = self.radius;
+        self.occupied = 0;
+        let kept = self.kept();
+        self.mask[..kept].fill(0);
     }
 
-    /// Rows that [`push`](Self::push) is behind: as many empty rows bring out the last.
+    /// Rows that the dilated ones are behind: as many empty rows bring out the last.
     pub fn radius(&self) -> u8 {
         self.radius
     }
 
-    /// Where the next row is to be written, all of its ⌈width / 32⌉ words, before it is [pushed](Self::push). Bits beyond
-    /// the width must be unset.
+    /// Where the next `rows` ≤ [`MAX_ROWS`] rows are to be written, all of their words, before they are
+    /// [looked at](Self::look). Bits beyond the width must be unset.
     #[inline(always)]
-    pub fn incoming(&mut self) -> &mut [u32] {
-        &mut self.ring[self.next][..self.words]
+    pub fn incoming(&mut self, rows: usize) -> &mut [u32] {
+        let kept = self.kept();
+        &mut self.mask[kept..][..rows * self.words]
     }
 
-    /// The number of set bits of the row that was written, when nothing else of it is wanted.
-    pub fn count(&self) -> u32 {
-        let row = &self.ring[self.next][..self.words];
-        row.iter().map(|word| word.count_ones()).sum()
-    }
-
-    /// Takes the row that was written. Gives the number of its set bits, and the row that lies [`radius`](Self::radius)
-    /// rows above it, dilated, once there is one.
-    #[inline(always)]
-    pub fn push(&mut self) -> (u32, Option<Part<'_>>) {
-        let row = &self.ring[self.next][..self.words];
-        let any = row.iter().fold(0, |all, word| all | word);
-        if any | u32::from(self.occupied) == 0 {
-            // As most rows are.
-            self.step();
-            return (0, self.is_due().then_some(Part::EMPTY));
+    /// Looks at the rows that were written: the number of their set bits.
+    pub fn look(&mut self, rows: usize) -> u32 {
+        let row_words = self.words;
+        let incoming = self.incoming(rows);
+        if !any_set(incoming) {
+            // As most are.
+            return 0;
         }
-        self.push_among_occupied()
-    }
-
-    fn push_among_occupied(&mut self) -> (u32, Option<Part<'_>>) {
-        let row = &self.ring[self.next][..self.words];
-        let (mut span, mut count) = (Span::EMPTY, 0);
-        for (i, word) in row.iter().enumerate().filter(|(_, word)| **word != 0) {
-            count += word.count_ones();
-            span.first = span.first.min(i);
-            span.end = i + 1;
-        }
-        let replaced = core::mem::replace(&mut self.spans[self.next], span);
-        self.occupied += u8::from(span != Span::EMPTY);
-        self.occupied -= u8::from(replaced != Span::EMPTY);
-        self.step();
-        if !self.is_due() {
-            return (count, None);
-        }
-        (count, Some(self.dilated()))
-    }
-
-    /// Moves on to the next row of the ring.
-    fn step(&mut self) {
-        self.next += 1;
-        if self.next == self.height() {
-            self.next = 0;
-        }
-    }
-
-    /// Whether a row goes out for the one that came in.
-    fn is_due(&mut self) -> bool {
-        let due = self.delay == 0;
-        self.delay = self.delay.saturating_sub(1);
-        due
-    }
-
-    /// The row in the middle of the ring, dilated.
-    fn dilated(&mut self) -> Part<'_> {
-        let height = self.height();
-        let spans = self.spans.iter().take(height);
-        let span = spans.fold(Span::EMPTY, |all, span| all.with(*span));
-        if span == Span::EMPTY {
-            return Part::EMPTY;
-        }
-        let reach = usize::from(self.radius.min(1));
-        let first = span.first.saturating_sub(reach);
-        let end = (span.end + reach).min(self.words);
-        let words = &mut self.out[first..end];
-        match (self.radius, &self.ring) {
-            (1, [a, b, c, ..]) => dilate_three([a, b, c].map(|row| &row[first..end]), words),
-            (radius, ring) => {
-                words.fill(0);
-                for row in ring.iter().take(height) {
-                    for (to, from) in words.iter_mut().zip(&row[first..end]) {
-                        *to |= from;
-                    }
-                }
-                spread(words, radius);
+        let (mut count, mut occupied) = (0, 0);
+        for row in incoming.chunks_exact(row_words) {
+            for (i, word) in row.iter().enumerate().filter(|(_, word)| **word != 0) {
+                count += word.count_ones();
+                occupied |= 1 << i;
             }
         }
-        if let Some(last) = words.last_mut().filter(|_| end == self.words) {
-            *last &= last_word_bits(self.width);
+        self.occupied |= occupied;
+        count
+    }
+
+    /// Whether no row that is still needed has a set bit.
+    pub fn is_empty(&self) -> bool {
+        self.occupied == 0
+    }
+
+    /// The edges of a dilated row: for row `i` of those that were written, the row [`radius`](Self::radius) rows above it.
+    pub fn edges(&self, i: usize, edges: &mut Edges) {
+        edges.clear();
+        let near = self.near();
+        let height = 2 * usize::from(self.radius) + 1;
+        let mut rows = self.mask[i * self.words..]
+            .chunks_exact(self.words)
+            .take(height)
+            .map(|row| &row[near.clone()]);
+        if let (1, Some(a), Some(b), Some(c)) = (self.radius, rows.next(), rows.next(), rows.next())
+        {
+            let columns = a.iter().zip(b).zip(c).map(|((a, b), c)| a | b | c);
+            self.spread(1, near.start, columns, edges);
+            return;
         }
-        Part { first, words }
-    }
-
-    fn height(&self) -> usize {
-        2 * usize::from(self.radius) + 1
-    }
-}
-
-/// The usual dilation in one go: three rows one over the other and along the row, in as many words.
-fn dilate_three([a, b, c]: [&[u32]; 3], out: &mut [u32]) {
-    let mut columns = a.iter().zip(b).zip(c).map(|((a, b), c)| a | b | c);
-    let (mut left, mut word) = (0, columns.next().unwrap_or(0));
-    for to in out {
-        let right = columns.next().unwrap_or(0);
-        *to = spread_word(left, word, right, 1);
-        (left, word) = (word, right);
-    }
-}
-
-/// Sets every bit within `radius` < 32 columns of a set one.
-fn spread(words: &mut [u32], radius: u8) {
-    let (mut left, mut word) = (0, words.first().copied().unwrap_or(0));
-    for i in 0..words.len() {
-        let right = words.get(i + 1).copied().unwrap_or(0);
-        if left | word | right != 0 {
-            words[i] = spread_word(left, word, right, radius);
+        let rows = self.mask[i * self.words..].chunks_exact(self.words);
+        let mut columns = [0; MAX_WORDS];
+        for row in rows.take(height) {
+            let all = columns.iter_mut().zip(&row[near.clone()]);
+            all.for_each(|(all, word)| *all |= word);
         }
-        (left, word) = (word, right);
+        let columns = columns.into_iter().take(near.len());
+        self.spread(self.radius, near.start, columns, edges);
+    }
+
+    /// The words in which a dilated row may have set bits: from the first to before the last that is next to an occupied one.
+    fn near(&self) -> Range<usize> {
+        let first = self.occupied.trailing_zeros() as usize;
+        let end = 32 - self.occupied.leading_zeros() as usize;
+        first.saturating_sub(1).min(end)..(end + 1).min(self.words)
+    }
+
+    /// The edges of `columns`, the words of some rows one over the other from word `first` on, spread by `radius`.
+    #[inline(always)]
+    fn spread(
+        &self,
+        radius: u8,
+        first: usize,
+        mut columns: impl Iterator<Item = u32>,
+        edges: &mut Edges,
+    ) {
+        let last_column = 32 * (self.words as u16 - 1);
+        let mut column = 32 * first as u16;
+        let mut left = 0;
+        let mut next = columns.next();
+        while let Some(word) = next {
+            next = columns.next();
+            let right = next.unwrap_or(0);
+            if left | word | right != 0 {
+                let mut spread = spread_word(left, word, right, radius);
+                if column == last_column {
+                    spread &= last_word_bits(self.width);
+                }
+                edges.take(column, spread);
+            }
+            left = word;
+            column += 32;
+        }
+        edges.end(last_column + 32);
+    }
+
+    /// Moves on: of the rows that were kept or written, only the last 2n are still needed.
+    pub fn advance(&mut self, rows: usize) {
+        if self.is_empty() {
+            return;
+        }
+        let kept = self.kept();
+        let from = rows * self.words;
+        self.mask.copy_within(from..from + kept, 0);
+        self.occupied = 0;
+        if kept > 0 {
+            for row in self.mask[..kept].chunks_exact(self.words) {
+                for (i, word) in row.iter().enumerate() {
+                    self.occupied |= u32::from(*word != 0) << i;
+                }
+            }
+        }
+    }
+
+    /// Words of the rows that are kept.
+    fn kept(&self) -> usize {
+        2 * usize::from(self.radius) * self.words
     }
 }
 
-/// One word of [`spread`], given its neighbours.
+/// Whether a word is not 0.
+fn any_set(words: &[u32]) -> bool {
+    let (eights, rest) = words.as_chunks();
+    let rest = rest.iter().fold(0, |all, word| all | word);
+    let eight = |[a, b, c, d, e, f, g, h]: &[u32; 8]| ((a | b) | (c | d)) | ((e | f) | (g | h));
+    eights.iter().fold(rest, |all, words| all | eight(words)) != 0
+}
+
+/// One word of a row, spread by `radius` < 32 columns, given its neighbours.
 #[inline(always)]
 fn spread_word(left: u32, word: u32, right: u32, radius: u8) -> u32 {
     (1..=u32::from(radius)).fold(word, |bits, shift| {
@@ -238,6 +201,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::runs::for_each_run;
 
     const WIDTH: u16 = 75;
     const HEIGHT: usize = 40;
@@ -252,32 +216,48 @@ mod tests {
         mask.unwrap().chunks_exact(12).map(row).collect()
     }
 
-    fn dilated(rows: &[[u32; 3]], dilations: u8) -> Vec<[u32; 3]> {
+    /// The runs of each dilated row, for rows that come in so many at a time.
+    fn dilated(rows: &[[u32; 3]], dilations: u8, at_a_time: usize) -> Vec<Vec<(u16, u16)>> {
+        let late = usize::from(dilations);
+        let below = std::iter::repeat_n(&[0; 3], late);
+        let all: Vec<_> = rows.iter().chain(below).collect();
         let mut dilation = Dilation::new();
         dilation.begin(WIDTH, dilations);
-        let below = std::iter::repeat_n(&[0; 3], usize::from(dilations));
         let mut out = Vec::new();
-        for row in rows.iter().chain(below) {
-            dilation.incoming().copy_from_slice(row);
-            let (count, part) = dilation.push();
-            assert_eq!(count, row.iter().map(|word| word.count_ones()).sum());
-            out.extend(part.map(|part| {
-                let mut whole = [0; 3];
-                whole[part.first..][..part.words.len()].copy_from_slice(part.words);
-                whole
-            }));
+        for band in all.chunks(at_a_time) {
+            let words: Vec<u32> = band.iter().flat_map(|row| **row).collect();
+            dilation.incoming(band.len()).copy_from_slice(&words);
+            let count = words.iter().map(|word| word.count_ones()).sum::<u32>();
+            assert_eq!(dilation.look(band.len()), count);
+            for i in 0..band.len() {
+                let mut edges = Edges::new();
+                dilation.edges(i, &mut edges);
+                let runs: Vec<_> = edges.runs().iter().map(|[x, end]| (*x, end - 1)).collect();
+                assert!(!dilation.is_empty() || runs.is_empty());
+                out.push(runs);
+            }
+            dilation.advance(band.len());
         }
-        out
+        out.split_off(late)
+    }
+
+    fn runs(rows: &[[u32; 3]]) -> Vec<Vec<(u16, u16)>> {
+        let runs = |row: &[u32; 3]| {
+            let mut runs = Vec::new();
+            for_each_run(row, |run| runs.push((run.x0, run.x1)));
+            runs
+        };
+        rows.iter().map(runs).collect()
     }
 
     #[test]
     fn masks_equal_opencv() {
         for dilations in 0..=MAX_DILATIONS {
-            assert_eq!(
-                dilated(&opencv(0), dilations),
-                opencv(dilations),
-                "{dilations}"
-            );
+            for at_a_time in 1..=MAX_ROWS {
+                let found = dilated(&opencv(0), dilations, at_a_time);
+                let expected = runs(&opencv(dilations));
+                assert_eq!(found, expected, "{dilations}, {at_a_time}");
+            }
         }
     }
 
@@ -285,7 +265,7 @@ mod tests {
     fn frames_lower_than_the_square_come_out_whole() {
         for dilations in 0..=MAX_DILATIONS {
             for height in 0..4 {
-                let rows = dilated(&opencv(0)[..height], dilations);
+                let rows = dilated(&opencv(0)[..height], dilations, 1);
                 assert_eq!(rows.len(), height);
             }
         }

@@ -24,13 +24,13 @@ impl History {
         &self.rows[usize::from(y % ROWS)]
     }
 
-    /// Keeps the last rows of a band that begins with row `first` of the frame; rows have at most 800 pixels.
-    pub fn keep(&mut self, first: u16, band: &[u16], row_length: usize) {
-        let count = (band.len() / row_length.max(1)) as u16;
-        let skipped = count.saturating_sub(ROWS);
-        let rows = band.chunks_exact(row_length.max(1));
-        for (y, row) in (first + skipped..).zip(rows.skip(usize::from(skipped))) {
+    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] rows before row `end` that are in the band; rows have at most 800 pixels.
+    pub fn keep(&mut self, band: &Band<'_>, end: u16, count: u8) {
+        for y in end.saturating_sub(u16::from(count))..end {
             let kept = &mut self.rows[usize::from(y % ROWS)];
+            let Some(row) = band.row(y) else {
+                continue;
+            };
             if let Some(kept) = kept.get_mut(..row.len()) {
                 kept.copy_from_slice(row);
             }
@@ -38,14 +38,16 @@ impl History {
     }
 }
 
-/// Rows that arrived together, one after the other in memory.
+/// Rows that are in memory together.
 #[derive(Clone, Copy, Debug)]
 pub struct Band<'p> {
     /// Which row of the frame is its first.
     pub first: u16,
-    /// `u16`s of a row, at least 1.
+    /// `u16`s of a row.
     pub row_length: usize,
-    /// The rows; what is left at the end is no row.
+    /// From where one row begins to where the next does: at least 1.
+    pub stride: usize,
+    /// The rows; the last one is whole.
     pub pixels: &'p [u16],
 }
 
@@ -54,12 +56,25 @@ impl<'p> Band<'p> {
     pub const EMPTY: Band<'static> = Band {
         first: u16::MAX,
         row_length: 1,
+        stride: 1,
         pixels: &[],
     };
 
+    /// How many there are.
+    pub fn rows(&self) -> usize {
+        self.pixels.len().div_ceil(self.stride)
+    }
+
+    /// So many rows ≥ 1 from row `y` of the frame on, all of which are in the band.
+    pub fn part(&self, y: u16, rows: usize) -> &'p [u16] {
+        let start = usize::from(y - self.first) * self.stride;
+        let end = start + (rows - 1) * self.stride + self.row_length;
+        self.pixels.get(start..end).unwrap_or_default()
+    }
+
     /// Row `y` of the frame; `None` when it is not in the band.
     pub fn row(&self, y: u16) -> Option<&'p [u16]> {
-        let start = usize::from(y.checked_sub(self.first)?) * self.row_length;
+        let start = usize::from(y.checked_sub(self.first)?) * self.stride;
         self.pixels.get(start..start + self.row_length)
     }
 }

@@ -12,9 +12,10 @@ use heapless::Vec;
 
 use crate::{
     blob::Blob,
-    dilate::Part,
+    dilate::Dilation,
     mask::MAX_WIDTH,
-    runs::{Run, for_each_run},
+    moments::Moments,
+    runs::{Edges, Run},
     tables::Weights,
 };
 
@@ -27,30 +28,31 @@ type Label = u16;
 /// Marks a free slot, in place of its parent.
 const FREE: Label = Label::MAX;
 
-/// A run of the row before or of the current one.
-#[derive(Clone, Copy, Debug)]
-struct LabelledRun {
-    run: Run,
-    label: Label,
+/// The runs of one row, and their labels.
+#[derive(Clone, Debug)]
+struct Row {
+    edges: Edges,
+    labels: [Label; MAX_RUNS],
 }
 
-/// One entry of the union-find forest.
-#[derive(Clone, Copy, Debug)]
-struct Slot {
-    /// Itself when it is a root, [`FREE`] when it is free.
-    parent: Label,
-    /// The sum over all that joined it, when it is a root.
-    blob: Blob,
+impl Row {
+    const EMPTY: Row = Row {
+        edges: Edges::new(),
+        labels: [0; MAX_RUNS],
+    };
 }
 
 /// What is known of a frame's blobs after some of its rows. Keeps up to `BLOBS` finished ones.
 #[derive(Clone, Debug)]
 pub struct Labeller<const BLOBS: usize> {
-    before: Vec<LabelledRun, MAX_RUNS>,
-    current: Vec<LabelledRun, MAX_RUNS>,
-    slots: Vec<Slot, MAX_RUNS>,
-    free: Vec<Label, MAX_RUNS>,
+    /// The row that was pushed last, and the one before it, in turn.
+    rows: [Row; 2],
+    /// Which of them was pushed last.
+    last: usize,
+    forest: Forest,
     kept: Vec<Blob, BLOBS>,
+    /// Column and row in which the frame's first pixel lies.
+    origin: (u16, u16),
     min_area: u32,
     /// Runs that the frame may still have; `None` when it had more.
     runs_left: Option<u32>,
@@ -61,44 +63,51 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// For no frame yet.
     pub const fn new() -> Self {
         Labeller {
-            before: Vec::new(),
-            current: Vec::new(),
-            slots: Vec::new(),
-            free: Vec::new(),
+            rows: [Row::EMPTY; 2],
+            last: 0,
+            forest: Forest::new(),
             kept: Vec::new(),
+            origin: (0, 0),
             min_area: 0,
             runs_left: Some(0),
             overflowed: false,
         }
     }
 
-    /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped.
-    /// After a row with which it has more than `max_runs` runs, nothing more of it is taken.
-    pub fn begin(&mut self, min_area: u32, max_runs: u32) {
-        self.before.clear();
-        self.slots.clear();
-        self.free.clear();
+    /// Starts a frame whose first pixel lies in column and row `origin`, and in which blobs of fewer than `min_area` pixels are
+    /// dropped. After a row with which it has more than `max_runs` runs, nothing more of it is taken.
+    pub fn begin(&mut self, origin: (u16, u16), min_area: u32, max_runs: u32) {
+        self.rows[self.last].edges.clear();
+        self.forest.clear();
         self.kept.clear();
+        self.origin = origin;
         self.min_area = min_area;
         self.runs_left = Some(max_runs);
         self.overflowed = false;
     }
 
-    /// Takes the part of row `y` of the mask that has its set bits; `weigh` gives the weights of one of its runs. Rows come in order, from 0 to at most
-    /// 799.
-    pub fn push(&mut self, part: Part<'_>, y: u16, weigh: impl Fn(Run) -> Weights) {
-        self.current.clear();
-        let mut first = 0;
-        for_each_run(part.first, part.words, |run| {
-            self.push_run(run, y, weigh(run), &mut first)
-        });
-        let count = self.current.len() as u32;
+    /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i`. Rows come in order, from 0 to at most 799; empty ones may be
+    /// left out while the labeller is [idle](Self::is_idle).
+    pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize) {
+        self.last = 1 - self.last;
+        let edges = &mut self.rows[self.last].edges;
+        dilation.edges(i, edges);
+        let count = edges.runs().len() as u32;
         self.runs_left = self.runs_left.and_then(|left| left.checked_sub(count));
-        self.overflowed |= self.is_exhausted();
-        self.resolve_runs();
-        self.finish_untouched(y);
-        self.before.clear();
-        self.overflowed |= self.before.extend_from_slice(&self.current).is_err();
+        self.overflowed |= self.runs_left.is_none();
+        self.label_row(y);
+    }
+
+    /// Weighs the runs of row `y`, which was pushed last.
+    pub fn weigh(&mut self, y: u16, weigh: impl Fn(Run) -> Weights) {
+        let (left, y) = (self.origin.0, y + self.origin.1);
+        let Row { edges, labels } = &self.rows[self.last];
+        for (&[x0, end], label) in edges.runs().iter().zip(labels) {
+            let weights = weigh(Run { x0, x1: end - 1 }).moved(left);
+            self.forest.slots[usize::from(*label)]
+                .moments
+                .weigh(weights, y);
+        }
     }
 
     /// Whether the frame has had more runs than it may.
@@ -108,12 +117,14 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
 
     /// Whether no blob is open, so that an empty row changes nothing.
     pub fn is_idle(&self) -> bool {
-        self.before.is_empty()
+        self.rows[self.last].edges.runs().is_empty()
     }
 
     /// Finishes the blobs that reach the last row, `height` − 1.
     pub fn finish(&mut self, height: u16) {
-        self.push(Part::EMPTY, height, |_| Weights::NONE);
+        self.last = 1 - self.last;
+        self.rows[self.last].edges.clear();
+        self.label_row(height);
     }
 
     /// The blobs kept so far, ordered by their lowest row, then by where they begin in it.
@@ -126,66 +137,118 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed
     }
 
-    /// Takes a run of row `y`. `first` is the first run of the row before that can touch this one or a later one.
-    fn push_run(&mut self, run: Run, y: u16, weights: Weights, first: &mut usize) {
-        // Columns at most one apart touch, straight or across a corner.
-        while self
-            .before
-            .get(*first)
-            .is_some_and(|b| b.run.x1 + 1 < run.x0)
-        {
-            *first += 1;
+    /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.
+    fn label_row(&mut self, y: u16) {
+        let (left, y) = (self.origin.0, y + self.origin.1);
+        let [a, b] = &mut self.rows;
+        let (before, current) = if self.last == 0 { (b, a) } else { (a, b) };
+        let (above, above_labels) = (before.edges.runs(), &before.labels);
+        // The first run above that can touch this one or a later one.
+        let mut first = 0;
+        let mut joined = false;
+        for (&[x0, end], label) in current.edges.runs().iter().zip(&mut current.labels) {
+            // Columns at most one apart touch, straight or across a corner.
+            while above.get(first).is_some_and(|above| above[1] < x0) {
+                first += 1;
+            }
+            let run = Run {
+                x0: x0 + left,
+                x1: end - 1 + left,
+            };
+            let touched = above[first..].iter().zip(&above_labels[first..]);
+            let mut touched = touched.take_while(|(above, _)| above[0] <= end);
+            let Some((_, touched_label)) = touched.next() else {
+                let opened = self.forest.open(Moments::of_run(run, y));
+                self.overflowed |= opened.is_none();
+                *label = opened.unwrap_or(0);
+                continue;
+            };
+            let root = self.forest.find(*touched_label);
+            for (_, other) in touched {
+                self.forest.join(root, *other);
+                joined = true;
+            }
+            self.forest.slots[usize::from(root)].moments.add_run(run, y);
+            *label = root;
         }
-        let label = self.label_run(run, y, weights, *first);
-        let stored =
-            label.is_some_and(|label| self.current.push(LabelledRun { run, label }).is_ok());
-        self.overflowed |= !stored;
+        if joined {
+            // Nothing may point at labels that were joined to others.
+            let count = current.edges.runs().len();
+            for label in &mut current.labels[..count] {
+                *label = self.forest.find(*label);
+            }
+        }
+        self.finish_untouched(y);
     }
 
-    /// Adds a run to the blob of those that it touches, from `first` on in the row before, which become one; or to a new
-    /// blob.
-    fn label_run(&mut self, run: Run, y: u16, weights: Weights, first: usize) -> Option<Label> {
-        let mut root = None;
-        let mut next = first;
-        while let Some(touched) = self.before.get(next).filter(|b| b.run.x0 <= run.x1 + 1) {
-            let other = self.find(touched.label);
-            root = Some(root.map_or(other, |root| self.join(root, other)));
-            next += 1;
+    /// Frees the labels of the row before the last, `y`, that were joined to others, and those that it did not touch.
+    fn finish_untouched(&mut self, y: u16) {
+        let Row { edges, labels } = &self.rows[1 - self.last];
+        for &label in &labels[..edges.runs().len()] {
+            let slot = &mut self.forest.slots[usize::from(label)];
+            let root = slot.parent == label;
+            if slot.parent == FREE || root && slot.moments.y1 == y {
+                continue;
+            }
+            if root && slot.moments.area >= self.min_area {
+                self.overflowed |= self.kept.push(slot.moments.blob()).is_err();
+            }
+            slot.parent = FREE;
+            self.overflowed |= self.forest.free.push(label).is_err();
         }
-        let Some(root) = root else {
-            return self.open(Blob::of_run(run, y, weights));
-        };
-        let blob = &mut self.slots[usize::from(root)].blob;
-        blob.add(&Blob::of_run(run, y, weights));
-        Some(root)
+    }
+}
+
+/// One entry of the union-find forest.
+#[derive(Clone, Copy, Debug)]
+struct Slot {
+    /// Itself when it is a root, [`FREE`] when it is free.
+    parent: Label,
+    /// Over all that joined it, when it is a root.
+    moments: Moments,
+}
+
+/// The open blobs.
+#[derive(Clone, Debug)]
+struct Forest {
+    slots: Vec<Slot, MAX_RUNS>,
+    free: Vec<Label, MAX_RUNS>,
+}
+
+impl Forest {
+    const fn new() -> Forest {
+        Forest {
+            slots: Vec::new(),
+            free: Vec::new(),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.slots.clear();
+        self.free.clear();
     }
 
     /// Puts a blob into a free slot.
-    fn open(&mut self, blob: Blob) -> Option<Label> {
+    fn open(&mut self, moments: Moments) -> Option<Label> {
         let Some(label) = self.free.pop() else {
-            let label = self.slots.len() as Label;
-            let slot = Slot {
-                parent: label,
-                blob,
-            };
-            return self.slots.push(slot).ok().map(|()| label);
+            let parent = self.slots.len() as Label;
+            let slot = Slot { parent, moments };
+            return self.slots.push(slot).ok().map(|()| parent);
         };
-        self.slots[usize::from(label)] = Slot {
-            parent: label,
-            blob,
-        };
+        let parent = label;
+        self.slots[usize::from(label)] = Slot { parent, moments };
         Some(label)
     }
 
-    /// Joins the blob of one root to that of another, which remains.
-    fn join(&mut self, root: Label, other: Label) -> Label {
+    /// Joins the blob of a label to that of a root, which remains.
+    fn join(&mut self, root: Label, label: Label) {
+        let other = self.find(label);
         if root != other {
             let joined = &mut self.slots[usize::from(other)];
             joined.parent = root;
-            let blob = joined.blob;
-            self.slots[usize::from(root)].blob.add(&blob);
+            let moments = joined.moments;
+            self.slots[usize::from(root)].moments.add(&moments);
         }
-        root
     }
 
     /// The root of a label; halves the path to it.
@@ -198,29 +261,6 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             let grandparent = self.slots[usize::from(parent)].parent;
             self.slots[usize::from(label)].parent = grandparent;
             label = grandparent;
-        }
-    }
-
-    /// Points the labels of the current row at their roots, so that nothing points at joined ones.
-    fn resolve_runs(&mut self) {
-        for i in 0..self.current.len() {
-            self.current[i].label = self.find(self.current[i].label);
-        }
-    }
-
-    /// Frees the labels of the row before that were joined to others, and those that row `y` did not touch.
-    fn finish_untouched(&mut self, y: u16) {
-        for &LabelledRun { label, .. } in &self.before {
-            let slot = &mut self.slots[usize::from(label)];
-            let root = slot.parent == label;
-            if slot.parent == FREE || root && slot.blob.y1 == y {
-                continue;
-            }
-            if root && slot.blob.area >= self.min_area {
-                self.overflowed |= self.kept.push(slot.blob).is_err();
-            }
-            slot.parent = FREE;
-            self.overflowed |= self.free.push(label).is_err();
         }
     }
 }

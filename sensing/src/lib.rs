@@ -44,6 +44,7 @@ mod history;
 mod kernels;
 mod label;
 mod mask;
+mod moments;
 #[cfg(test)]
 mod picture;
 mod rescale;

@@ -5,12 +5,6 @@ pub const MAX_WIDTH: u16 = 800;
 /// Words of the widest row.
 pub const MAX_WORDS: usize = words_of(MAX_WIDTH);
 
-/// The thresholded bits of one row. Bits from the row's width on are unset.
-pub type MaskRow = [u32; MAX_WORDS];
-
-/// An empty row.
-pub const EMPTY_ROW: MaskRow = [0; MAX_WORDS];
-
 /// Words that hold a row of `width` pixels.
 pub const fn words_of(width: u16) -> usize {
     width.div_ceil(32) as usize

@@ -1,5 +1,7 @@
 //! Runs: maximal spans of set bits in a row.
 
+use crate::mask::MAX_WIDTH;
+
 /// A run, in columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Run {
@@ -9,20 +11,26 @@ pub struct Run {
     pub x1: u16,
 }
 
-/// Calls `visit` with each run of a row of mask words, whose first is word `first` of the row, from left to right. A row
-/// of w pixels has at most ⌈w / 2⌉.
+/// Calls `visit` with each edge of a word whose first column is `column`: where a bit differs from the one before it. `open` says
+/// whether the bit before the word is set.
 ///
-/// A run begins and ends where a bit differs from the one before it, so the set bits of `word ^ (word << 1)` are the
-/// first columns of runs and of gaps in turn: words without an edge cost one test, whether they are empty or full.
-pub fn for_each_run(first: usize, words: &[u32], mut visit: impl FnMut(Run)) {
+/// Edges are the set bits of `word ^ (word << 1)`: the first columns of runs and of gaps in turn. A word without an edge costs
+/// one test, whether it is empty or full.
+#[inline(always)]
+pub fn for_each_edge(column: u16, word: u32, open: bool, mut visit: impl FnMut(u16)) {
+    let mut edges = word ^ (word << 1 | u32::from(open));
+    while edges != 0 {
+        visit(column + edges.trailing_zeros() as u16);
+        edges &= edges - 1;
+    }
+}
+
+/// Calls `visit` with each run of a row of mask words, from left to right. A row of w pixels has at most ⌈w / 2⌉.
+pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
     let mut open = None;
-    let mut before = 0;
-    let mut column = 32 * first as u16;
+    let mut column = 0;
     for &word in words {
-        let mut edges = word ^ (word << 1 | before);
-        before = word >> 31;
-        while edges != 0 {
-            let x = column + edges.trailing_zeros() as u16;
+        for_each_edge(column, word, open.is_some(), |x| {
             open = match open {
                 None => Some(x),
                 Some(x0) => {
@@ -30,12 +38,63 @@ pub fn for_each_run(first: usize, words: &[u32], mut visit: impl FnMut(Run)) {
                     None
                 }
             };
-            edges &= edges - 1;
-        }
+        });
         column += 32;
     }
     if let Some(x0) = open {
         visit(Run { x0, x1: column - 1 });
+    }
+}
+
+/// The edges of a row: where each of its runs begins, and the column behind its end.
+#[derive(Clone, Debug)]
+pub struct Edges {
+    columns: [u16; MAX_WIDTH as usize],
+    count: usize,
+}
+
+impl Edges {
+    /// Of an empty row.
+    pub const fn new() -> Edges {
+        Edges {
+            columns: [0; MAX_WIDTH as usize],
+            count: 0,
+        }
+    }
+
+    /// Begins another row.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Takes the word whose first column is `column`. Words come from left to right; those that are left out must be empty, and
+    /// must not come right after one whose last bit is set. Edges beyond the widest row are left out.
+    #[inline(always)]
+    pub fn take(&mut self, column: u16, word: u32) {
+        let open = !self.count.is_multiple_of(2);
+        for_each_edge(column, word, open, |x| self.push(x));
+    }
+
+    /// Ends the row, which has so many columns.
+    #[inline(always)]
+    pub fn end(&mut self, columns: u16) {
+        if !self.count.is_multiple_of(2) {
+            self.push(columns);
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, column: u16) {
+        if let Some(place) = self.columns.get_mut(self.count) {
+            *place = column;
+            self.count += 1;
+        }
+    }
+
+    /// First column of each run, and the one behind its last.
+    pub fn runs(&self) -> &[[u16; 2]] {
+        let (edges, _) = self.columns.split_at(self.count.min(self.columns.len()));
+        edges.as_chunks().0
     }
 }
 
@@ -49,7 +108,7 @@ mod tests {
 
     fn runs(words: &[u32]) -> Vec<(u16, u16)> {
         let mut found = Vec::new();
-        for_each_run(0, words, |run| found.push((run.x0, run.x1)));
+        for_each_run(words, |run| found.push((run.x0, run.x1)));
         found
     }
 
@@ -75,9 +134,11 @@ mod tests {
         #[test]
         fn runs_are_those_found_bit_by_bit(words in prop::collection::vec(word(), 0..6)) {
             prop_assert_eq!(runs(&words), bit_by_bit(&words));
-            let mut moved = Vec::new();
-            for_each_run(7, &words, |run| moved.push((run.x0 - 224, run.x1 - 224)));
-            prop_assert_eq!(moved, bit_by_bit(&words));
+            let mut edges = Edges::new();
+            (0..).zip(&words).for_each(|(i, word)| edges.take(32 * i, *word));
+            edges.end(32 * words.len() as u16);
+            let pairs = edges.runs().iter().map(|[start, end]| (*start, end - 1));
+            prop_assert_eq!(pairs.collect::<Vec<_>>(), bit_by_bit(&words));
         }
     }
 

@@ -4,12 +4,12 @@ use core::fmt;
 
 use crate::{
     blob::Blob,
-    dilate::Dilation,
+    dilate::{Dilation, MAX_ROWS},
     history::{Band, History},
     label::Labeller,
     mask::{last_word_bits, words_of},
     status::Status,
-    tables::{Pixels, Weights},
+    tables::Pixels,
 };
 
 pub use crate::{dilate::MAX_DILATIONS, mask::MAX_WIDTH};
@@ -93,7 +93,7 @@ impl ScanSettings {
 pub struct Scan<'a> {
     /// The blobs of at least the minimum area, ordered by their lowest row, then by where they begin in it.
     pub blobs: &'a [Blob],
-    /// Pixels that passed the threshold, before dilation.
+    /// Pixels that passed the threshold, before dilation; of a frame of too many runs, as far as it was looked at.
     pub set_pixels: u32,
     /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width, [`Status::BLOB_OVERFLOW`] when
     /// there were more than `BLOBS` blobs or [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
@@ -115,8 +115,6 @@ pub struct Scanner<const BLOBS: usize> {
     history: History,
     /// Rows taken so far.
     rows_in: u16,
-    /// Rows that came out of the dilation so far.
-    rows_out: u16,
     set_pixels: u32,
     status: Status,
     /// Between `begin` and `finish`.
@@ -139,7 +137,6 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             labels: Labeller::new(),
             history: History::new(),
             rows_in: 0,
-            rows_out: 0,
             set_pixels: 0,
             status: Status::FRAME_INCOMPLETE,
             active: false,
@@ -151,13 +148,36 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// # Errors
     /// Those of [`ScanSettings::check`]; there is then no frame to push rows to.
     pub fn begin(&mut self, settings: ScanSettings) -> Result<(), ScanError> {
+        self.begin_at((0, 0), settings)
+    }
+
+    /// The same, for a part of a frame: its first pixel lies in column and row `origin`, and blobs say where they lie in
+    /// that frame.
+    ///
+    /// # Errors
+    /// As [`begin`](Self::begin); and when the part goes beyond the largest frame.
+    pub(crate) fn begin_at(
+        &mut self,
+        origin: (u16, u16),
+        settings: ScanSettings,
+    ) -> Result<(), ScanError> {
         self.active = false;
         self.status = Status::FRAME_INCOMPLETE;
         self.rows_in = 0;
-        self.rows_out = 0;
         self.set_pixels = 0;
-        self.labels.begin(settings.min_area, settings.max_runs);
+        self.labels
+            .begin(origin, settings.min_area, settings.max_runs);
         settings.check()?;
+        let (right, bottom) = (
+            origin.0.saturating_add(settings.width),
+            origin.1.saturating_add(settings.height),
+        );
+        if right > MAX_WIDTH {
+            return Err(ScanError::Width(right));
+        }
+        if bottom > MAX_HEIGHT {
+            return Err(ScanError::Height(bottom));
+        }
         self.settings = settings;
         self.dilation.begin(settings.width, settings.dilations);
         self.status = Status::OK;
@@ -168,58 +188,67 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// Takes the next row of pixels, as they lie in memory. A row of another length, or one too many, is left out and
     /// makes the frame incomplete.
     pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
-        if !self.expects(row.len() == pixels.row_length(self.settings.width)) {
-            return;
-        }
-        let band = Band {
-            first: self.rows_in,
-            row_length: row.len(),
-            pixels: row,
-        };
-        pixels.mask_row(row, self.dilation.incoming());
-        self.take(pixels, &band);
-        if self.settings.weighted {
-            self.history.keep(band.first, row, row.len());
+        let length = pixels.row_length(self.settings.width);
+        if row.len() == length {
+            self.push_apart(pixels, row, length);
+        } else {
+            self.status |= Status::FRAME_INCOMPLETE;
         }
     }
 
     /// Takes the next rows of pixels, as they lie in memory one after the other. What is no whole row, or too many,
-    /// is left out and makes the frame incomplete. The more rows at a time, the fewer of them are copied.
+    /// is left out and makes the frame incomplete. The more rows at a time, the less each of them costs.
     pub fn push_rows(&mut self, pixels: &impl Pixels, rows: &[u16]) {
-        let row_length = pixels.row_length(self.settings.width).max(1);
-        let band = Band {
-            first: self.rows_in,
-            row_length,
-            pixels: rows,
-        };
-        if !rows.len().is_multiple_of(row_length) {
+        let length = pixels.row_length(self.settings.width).max(1);
+        let whole = rows.len() - rows.len() % length;
+        if whole < rows.len() {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        for row in rows.chunks_exact(row_length) {
-            if !self.expects(true) {
-                break;
+        self.push_apart(pixels, &rows[..whole], length);
+    }
+
+    /// Takes the next rows, which begin every `stride` `u16`s and are whole.
+    pub(crate) fn push_apart(&mut self, pixels: &impl Pixels, rows: &[u16], stride: usize) {
+        let band = Band {
+            first: self.rows_in,
+            row_length: pixels.row_length(self.settings.width),
+            stride: stride.max(1),
+            pixels: rows,
+        };
+        let count = band.rows();
+        let room = self.room();
+        if count > room {
+            self.status |= Status::FRAME_INCOMPLETE;
+        }
+        let mut left = count.min(room);
+        while left > 0 {
+            let rows = left.min(MAX_ROWS);
+            if !self.labels.is_exhausted() {
+                let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
+                pixels.mask_rows(part, band.stride, width, self.dilation.incoming(rows));
             }
-            pixels.mask_row(row, self.dilation.incoming());
-            self.take(pixels, &band);
+            self.take(pixels, &band, rows);
+            left -= rows;
         }
         if self.settings.weighted {
-            let taken = usize::from(self.rows_in - band.first) * row_length;
-            self.history.keep(band.first, &rows[..taken], row_length);
+            self.history
+                .keep(&band, self.rows_in, self.settings.dilations);
         }
     }
 
     /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Its pixels are unknown,
     /// so that nothing of it is weighed. Otherwise as [`push_row`](Self::push_row).
     pub fn push_mask_row(&mut self, words: &[u32]) {
-        if !self.expects(words.len() == words_of(self.settings.width)) {
+        if self.room() == 0 || words.len() != words_of(self.settings.width) {
+            self.status |= Status::FRAME_INCOMPLETE;
             return;
         }
-        let incoming = self.dilation.incoming();
+        let incoming = self.dilation.incoming(1);
         incoming.copy_from_slice(words);
         if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
         }
-        self.take(&(), &Band::EMPTY);
+        self.take(&(), &Band::EMPTY, 1);
     }
 
     /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no successful `begin`
@@ -241,45 +270,42 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.labels.kept()
     }
 
-    /// Whether a row of the right or wrong width is the next one of the frame; notes it when it is not.
-    fn expects(&mut self, right_width: bool) -> bool {
-        let expected = self.active && right_width && self.rows_in < self.settings.height;
-        if !expected {
-            self.status |= Status::FRAME_INCOMPLETE;
-        }
-        expected
+    /// How many rows are still missing.
+    fn room(&self) -> usize {
+        let missing = self.settings.height.saturating_sub(self.rows_in);
+        if self.active { usize::from(missing) } else { 0 }
     }
 
-    /// Takes the row that was written to the dilation.
-    #[inline(always)]
-    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>) {
-        self.rows_in += 1;
-        self.advance(pixels, band);
+    /// Takes the rows that were written to the dilation.
+    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
+        if !self.labels.is_exhausted() {
+            self.set_pixels += self.dilation.look(rows);
+            self.label(pixels, band, rows);
+        }
+        self.rows_in += rows as u16;
     }
 
-    /// Passes a row through the dilation to the labels, where the pixels of its runs are weighed.
-    #[inline(always)]
-    fn advance(&mut self, pixels: &impl Pixels, band: &Band<'_>) {
-        if self.labels.is_exhausted() {
-            self.set_pixels += self.dilation.count();
-            return;
+    /// Passes rows through the dilation to the labels, where the pixels of their runs are weighed.
+    fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
+        let late = u16::from(self.dilation.radius());
+        for i in 0..rows {
+            if self.dilation.is_empty() && self.labels.is_idle() {
+                // As most rows are.
+                return;
+            }
+            let Some(y) = (self.rows_in + i as u16).checked_sub(late) else {
+                continue;
+            };
+            self.labels.push(y, &self.dilation, i);
+            if self.settings.weighted && !self.labels.is_idle() {
+                let row = band.row(y).unwrap_or_else(|| self.history.row(y));
+                self.labels.weigh(y, |run| pixels.weigh(row, run));
+            }
+            if self.labels.is_exhausted() {
+                return;
+            }
         }
-        let (count, dilated) = self.dilation.push();
-        self.set_pixels += count;
-        let Some(dilated) = dilated else {
-            return;
-        };
-        let y = self.rows_out;
-        self.rows_out += 1;
-        if dilated.words.is_empty() && self.labels.is_idle() {
-            return;
-        }
-        if self.settings.weighted {
-            let row = band.row(y).unwrap_or_else(|| self.history.row(y));
-            self.labels.push(dilated, y, |run| pixels.weigh(row, run));
-        } else {
-            self.labels.push(dilated, y, |_| Weights::NONE);
-        }
+        self.dilation.advance(rows);
     }
 
     /// Brings out the rows that the dilation still holds, and the blobs that they end.
@@ -287,11 +313,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if self.rows_in < self.settings.height {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        for _ in 0..self.dilation.radius() {
-            self.dilation.incoming().fill(0);
-            self.advance(pixels, &Band::EMPTY);
+        let late = usize::from(self.dilation.radius());
+        if !self.labels.is_exhausted() {
+            self.dilation.incoming(late).fill(0);
+            self.label(pixels, &Band::EMPTY, late);
         }
-        self.labels.finish(self.rows_out);
+        self.labels.finish(self.rows_in);
         if self.labels.overflowed() {
             self.status |= Status::BLOB_OVERFLOW;
         }

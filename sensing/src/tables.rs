@@ -5,7 +5,8 @@
 
 use crate::{
     hsv::{Hsv, rgb888},
-    kernels::{threshold_bits, threshold_bytes},
+    kernels::{threshold_bits, threshold_bytes, threshold_bytes_down},
+    mask::words_of,
     threshold::{ByteOrder, HsvBox, ThresholdError},
 };
 
@@ -22,6 +23,12 @@ pub trait Pixels {
     /// become unset.
     fn mask_row(&self, row: &[u16], mask: &mut [u32]);
 
+    /// Thresholds several rows of `width` pixels, which begin every `stride` ≥ `row_length(width)` `u16`s. `mask` has ⌈width / 32⌉
+    /// words for each.
+    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
+        mask_row_by_row(self, pixels, stride, width, mask);
+    }
+
     /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
 
@@ -29,6 +36,25 @@ pub trait Pixels {
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let columns = (run.x0..=run.x1).map(|x| (u32::from(x), self.weight(row, x)));
         columns.fold(Weights::NONE, |sums, (x, weight)| sums.with(x, weight))
+    }
+}
+
+/// [`Pixels::mask_rows`] by [`Pixels::mask_row`].
+fn mask_row_by_row(
+    pixels: &(impl Pixels + ?Sized),
+    rows: &[u16],
+    stride: usize,
+    width: u16,
+    mask: &mut [u32],
+) {
+    let length = pixels.row_length(width);
+    if stride == length && width.is_multiple_of(32) {
+        // One long row.
+        return pixels.mask_row(rows, mask);
+    }
+    let rows = rows.chunks(stride.max(1));
+    for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
+        pixels.mask_row(row.get(..length).unwrap_or(row), mask);
     }
 }
 
@@ -80,6 +106,14 @@ pub struct Weights {
 impl Weights {
     /// Of no pixel.
     pub const NONE: Weights = Weights { sum: 0, sum_x: 0 };
+
+    /// The same pixels so many columns to the right.
+    pub(crate) const fn moved(self, columns: u16) -> Weights {
+        Weights {
+            sum: self.sum,
+            sum_x: self.sum_x + self.sum * columns as u32,
+        }
+    }
 
     /// With one more pixel, in column `x` < 800.
     pub const fn with(self, x: u32, weight: u8) -> Weights {
@@ -234,6 +268,20 @@ impl Pixels for ByteTable {
 
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
         threshold_bytes(&self.bytes, row, mask);
+    }
+
+    /// Rows that lie apart go word by word, downwards, when they are more than the words of each.
+    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
+        let words = words_of(width);
+        let apart = stride != usize::from(width) && width.is_multiple_of(32);
+        if !apart || words * words > mask.len() {
+            return mask_row_by_row(self, pixels, stride, width, mask);
+        }
+        for word in 0..words {
+            if let (Some(pixels), Some(mask)) = (pixels.get(32 * word..), mask.get_mut(word..)) {
+                threshold_bytes_down(&self.bytes, pixels, stride, mask, words);
+            }
+        }
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {

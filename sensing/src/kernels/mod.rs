@@ -63,6 +63,20 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {
     }
 }
 
+/// The masks of 32 pixels in each of several rows through a table of bytes: see `portable::threshold_bytes_down`.
+pub fn threshold_bytes_down(
+    table: &[u8; 65_536],
+    pixels: &[u16],
+    pixel_step: usize,
+    mask: &mut [u32],
+    mask_step: usize,
+) {
+    #[cfg(armv7em)]
+    cortex_m7::threshold_bytes_down(table, pixels, pixel_step, mask, mask_step);
+    #[cfg(not(armv7em))]
+    portable::threshold_bytes_down(table, pixels, pixel_step, mask, mask_step);
+}
+
 /// The mask of a row of pixels through a table of bits: see `portable::threshold_bits`.
 pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32]) {
     #[cfg(armv7em)]

@@ -53,6 +53,24 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], firs
     });
 }
 
+/// The masks of 32 pixels in each of several rows, which begin at multiples of `pixel_step` ≥ 1; they go to the words of `mask`
+/// at multiples of `mask_step` ≥ 1, as many as both have.
+#[cfg(not(armv7em))]
+pub fn threshold_bytes_down(
+    table: &[u8; 65_536],
+    pixels: &[u16],
+    pixel_step: usize,
+    mask: &mut [u32],
+    mask_step: usize,
+) {
+    let words = mask.chunks_mut(mask_step);
+    for (word, row) in words.zip(pixels.chunks(pixel_step)) {
+        if let Some(row) = row.get(..32) {
+            threshold_bytes(table, row, &mut word[..1], 0);
+        }
+    }
+}
+
 /// The mask of a row: bit i of word w is bit p % 32 of word p / 32 of `table`, with p = pixel 32·w + i. `mask` has
 /// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
 pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32], first: usize) {

@@ -14,7 +14,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     pub fn begin_cropped(&mut self, window: Rectangle) {
         let settings = settings_within(self.settings.scan(), &window);
         // A window of no size makes the frame incomplete.
-        let _ = self.scanner.begin(settings);
+        let _ = self.scanner.begin_at((window.x0, window.y0), settings);
     }
 
     /// Ends a frame that was begun with the same `window`.
@@ -43,14 +43,10 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             return Err(scan.status);
         }
         let mut blobs = Blobs::new();
-        let large = scan
-            .blobs
-            .iter()
-            .filter(|blob| blob.area >= settings.min_area);
-        for blob in large.map(|blob| blob.moved(window.x0, window.y0)) {
+        for blob in scan.blobs {
             // What is cut lies outside of the markers' windows at least in part.
-            if is_whole(&blob, window, &settings) {
-                blobs.push(blob).map_err(|_| Status::MARKERS_AMBIGUOUS)?;
+            if blob.area >= settings.min_area && is_whole(blob, window, &settings) {
+                blobs.push(*blob).map_err(|_| Status::MARKERS_AMBIGUOUS)?;
             }
         }
         Finder::new(&self.settings).find(&blobs)

@@ -13,7 +13,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// around what it shows, and in doubt everything.
     ///
     /// The result is that of the full scan ([`push_rows`](Self::push_rows)) when each marker is at least n + 2 rows high
-    /// (n = 4 at 800 × 600, 2 at 320 × 240) and no speck of less height touches one; and when this finds no markers.
+    /// (n = 4 at 800 × 600 and at 320 × 240) and no speck of less height touches one; and when this finds no markers.
     pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
         match self.find_coarsely(frame) {
             Some(found) => self.measurement(Ok(found)),

@@ -8,19 +8,19 @@ use super::{
 };
 use crate::{
     geometry::Geometry,
-    mask::{EMPTY_ROW, words_of},
+    mask::{MAX_WORDS, words_of},
     runs::{Run, for_each_run},
     scanner::Scanner,
     tables::Pixels,
     units::Px,
 };
 
-/// A marker at rest is so many steps across: smaller ones, near the edge or foreshortened, are hit, too.
-const STEPS_ACROSS: u32 = 7;
+/// A marker at rest is at least so many steps across: smaller ones, near the edge or foreshortened, are hit, too.
+const STEPS_ACROSS: u32 = 3;
 /// The longest step, rows.
-const LONGEST_STEP: u32 = 8;
+const LONGEST_STEP: u32 = 4;
 
-/// From one row that is looked at to the next: 4 at 800 × 600, 2 at 320 × 240.
+/// From one row that is looked at to the next: 4 at 800 × 600 and at 320 × 240, 2 at 160 × 120.
 ///
 /// Every blob that is at least so many rows high before dilation is hit.
 pub(crate) fn step(geometry: &Geometry) -> u16 {
@@ -45,13 +45,18 @@ fn hits<P: Pixels>(frame: &Frame<'_, P>, step: u16) -> Option<Windows> {
     let width = frame.settings().width;
     let mut windows = Windows::default();
     let mut room = Ok(());
+    let mut mask = [0; MAX_WORDS];
     for y in (step / 2..frame.settings().height).step_by(usize::from(step)) {
-        let mut mask = EMPTY_ROW;
+        let row = Rectangle {
+            y0: y,
+            y1: y + 1,
+            ..frame.rectangle()
+        };
         let mask = mask.get_mut(..words_of(width))?;
-        frame.pixels().mask_row(frame.row(y, 0, width), mask);
-        for_each_run(0, mask, |run| {
+        frame.pixels().mask_row(frame.part(&row), mask);
+        for_each_run(mask, |run| {
             if room.is_ok() {
-                room = windows.add(around(run, y, step, frame));
+                room = windows.add(around(run, y, step, frame), frame.rectangle());
             }
         });
         room.ok()?;

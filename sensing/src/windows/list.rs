@@ -3,7 +3,7 @@
 use super::{MAX_WINDOWS, rectangle::Rectangle};
 use heapless::Vec;
 
-/// A few windows, none of which overlaps another.
+/// A few windows of a frame, none of which overlaps another, even when each is [widened to words](Rectangle::in_words).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Windows(Vec<Rectangle, MAX_WINDOWS>);
 
@@ -12,10 +12,10 @@ impl Windows {
     ///
     /// # Errors
     /// When there are too many.
-    pub fn add(&mut self, window: Rectangle) -> Result<(), TooMany> {
+    pub fn add(&mut self, window: Rectangle, frame: Rectangle) -> Result<(), TooMany> {
         let mut window = window;
-        while let Some(other) = self.0.iter().position(|other| other.overlaps(&window)) {
-            window = window.joined(&self.0.swap_remove(other));
+        while let Some(other) = self.take_overlapping(&window, frame) {
+            window = window.joined(&other);
         }
         self.0.push(window).map_err(|_| TooMany)
     }
@@ -26,8 +26,10 @@ impl Windows {
     }
 
     /// Takes one out that overlaps `window`.
-    pub fn take_overlapping(&mut self, window: &Rectangle) -> Option<Rectangle> {
-        let other = self.0.iter().position(|other| other.overlaps(window))?;
+    pub fn take_overlapping(&mut self, window: &Rectangle, frame: Rectangle) -> Option<Rectangle> {
+        let widened = window.in_words(frame);
+        let overlaps = |other: &Rectangle| other.in_words(frame).overlaps(&widened);
+        let other = self.0.iter().position(overlaps)?;
         Some(self.0.swap_remove(other))
     }
 }

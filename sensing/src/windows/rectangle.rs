@@ -2,9 +2,13 @@
 
 use crate::blob::Blob;
 
-/// Windows begin and end at multiples of so many columns, or at the frame's edge: pixels then are whole words, in every
-/// format.
+/// What is read begins at a multiple of so many columns: no pixel shares its `u16` with one outside, in any format.
+const PAIR: u16 = 2;
+/// What a camera is asked for begins and ends at multiples of so many columns: pixels there begin a word of memory.
 const COLUMNS: u16 = 4;
+
+/// Columns of a word of the mask.
+pub(super) const WORD: u16 = 32;
 
 /// Columns `x0..x1` of rows `y0..y1`, px.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -55,14 +59,37 @@ impl Rectangle {
         u32::from(self.width()) * u32::from(self.height())
     }
 
-    /// Widened on every side, as far as `frame` goes, and to whole words.
+    /// Widened on every side, as far as `frame` goes.
     pub(crate) fn widened(&self, columns: u16, rows: u16, frame: Rectangle) -> Rectangle {
-        let x1 = self.x1.saturating_add(columns).next_multiple_of(COLUMNS);
         Rectangle {
-            x0: (self.x0.saturating_sub(columns) / COLUMNS * COLUMNS).max(frame.x0),
+            x0: self.x0.saturating_sub(columns).max(frame.x0),
             y0: self.y0.saturating_sub(rows).max(frame.y0),
-            x1: x1.min(frame.x1),
+            x1: self.x1.saturating_add(columns).min(frame.x1),
             y1: self.y1.saturating_add(rows).min(frame.y1),
+        }
+    }
+
+    /// Widened to multiples of [`COLUMNS`], as far as `frame` goes.
+    pub(crate) fn in_columns(&self, frame: Rectangle) -> Rectangle {
+        Rectangle {
+            x0: (self.x0 / COLUMNS * COLUMNS).max(frame.x0),
+            x1: self.x1.next_multiple_of(COLUMNS).min(frame.x1),
+            ..*self
+        }
+    }
+
+    /// Widened to both sides to whole words of the mask, as far as `frame` goes: these are scanned fastest.
+    pub(crate) fn in_words(&self, frame: Rectangle) -> Rectangle {
+        let x0 = self.x0 / PAIR * PAIR;
+        let width = (self.x1 - x0).next_multiple_of(WORD);
+        let spare = width - (self.x1 - x0);
+        let middle = x0.saturating_sub(spare / 2) / PAIR * PAIR;
+        let x1 = (middle + width).min(frame.x1);
+        let x0 = x1.saturating_sub(width) / PAIR * PAIR;
+        Rectangle {
+            x0: x0.max(frame.x0),
+            x1,
+            ..*self
         }
     }
 

@@ -45,11 +45,18 @@ impl<'f, P: Pixels> Frame<'f, P> {
         Rectangle::of_frame(self.settings.width, self.settings.height)
     }
 
-    /// Columns `x0..x1` of a row, as they lie in memory.
-    pub fn row(&self, y: u16, x0: u16, x1: u16) -> &'f [u16] {
-        let begin = usize::from(y) * self.row_length;
-        let [from, to] = [x0, x1].map(|x| begin + self.pixels.row_length(x));
-        self.data.get(from..to).unwrap_or_default()
+    /// `u16`s of a row.
+    pub fn row_length(&self) -> usize {
+        self.row_length
+    }
+
+    /// The part of the frame from the first pixel of a rectangle to its last one, as it lies in memory.
+    pub fn part(&self, part: &Rectangle) -> &'f [u16] {
+        let at = |x: u16, y: u16| usize::from(y) * self.row_length + self.pixels.row_length(x);
+        let last = part.y1.saturating_sub(1);
+        self.data
+            .get(at(part.x0, part.y0)..at(part.x1, last))
+            .unwrap_or_default()
     }
 
     /// [`margin`] of this frame.
@@ -120,17 +127,13 @@ pub(crate) fn scan_window<P: Pixels, const BLOBS: usize>(
 ) -> Option<()> {
     budget.spend(window)?;
     let settings = settings_within(*frame.settings(), window);
-    scanner.begin(settings).ok()?;
-    for y in window.y0..window.y1 {
-        scanner.push_row(frame.pixels(), frame.row(y, window.x0, window.x1));
-    }
+    scanner.begin_at((window.x0, window.y0), settings).ok()?;
+    scanner.push_apart(frame.pixels(), frame.part(window), frame.row_length());
     let scan = scanner.finish(frame.pixels());
     if scan.status != Status::OK {
         return None;
     }
-    for blob in scan.blobs {
-        visit(blob.moved(window.x0, window.y0));
-    }
+    scan.blobs.iter().copied().for_each(&mut visit);
     Some(())
 }
 
@@ -143,7 +146,9 @@ pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
     let mut budget = Budget::of(frame);
     let mut settled = Windows::default();
     let mut found = Blobs::new();
+    let whole_frame = frame.rectangle();
     while let Some(window) = windows.pop() {
+        let window = window.in_words(whole_frame);
         let mut grown = window;
         let mut whole = Blobs::new();
         let mut full = false;
@@ -158,16 +163,16 @@ pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
             return None;
         }
         if grown == window {
-            settled.add(window).ok()?;
+            settled.add(window, whole_frame).ok()?;
             found.extend_from_slice(&whole).ok()?;
             continue;
         }
         // What it has grown over is scanned again as its part.
-        while let Some(other) = settled.take_overlapping(&grown) {
+        while let Some(other) = settled.take_overlapping(&grown, whole_frame) {
             grown = grown.joined(&other);
         }
         found.retain(|blob| !grown.contains(&Rectangle::of_blob(blob)));
-        windows.add(grown).ok()?;
+        windows.add(grown, whole_frame).ok()?;
     }
     Some(found)
 }

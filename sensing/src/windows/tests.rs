@@ -77,8 +77,9 @@ fn same_as_full(sensor: &mut Sensor<'_>, picture: &Picture) -> bool {
 }
 
 #[test]
-fn steps_are_a_seventh_of_a_marker() {
-    assert_eq!([coarse_step(&LARGE), coarse_step(&SMALL)], [4, 2]);
+fn steps_are_at_most_a_third_of_a_marker() {
+    let tiny = Geometry::preset(Preset::Ov7725, 160, 120);
+    assert_eq!([LARGE, SMALL, tiny].map(|g| coarse_step(&g)), [4, 4, 2]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::{
     Blobs,
     list::Windows,
-    rectangle::Rectangle,
+    rectangle::{Rectangle, WORD},
     scan::{Budget, Frame, scan_window},
 };
 use crate::{markers::Marker, scanner::Scanner, tables::Pixels};
@@ -57,7 +57,8 @@ impl Tracks {
         let frame = Rectangle::of_frame(width, height);
         let window = |marker: &Marker| window(marker, dilations, frame);
         let windows = self.before.as_ref()?.iter().map(window);
-        windows.reduce(|all, one| all.joined(&one))
+        let all = windows.reduce(|all, one| all.joined(&one))?;
+        Some(all.in_columns(frame))
     }
 
     /// The whole blobs in the markers' windows; `None` when it is not known where the markers were, or one is cut.
@@ -69,12 +70,13 @@ impl Tracks {
         let mut windows = Windows::default();
         for marker in self.before.as_ref()? {
             let window = window(marker, frame.settings().dilations, frame.rectangle());
-            windows.add(window).ok()?;
+            windows.add(window, frame.rectangle()).ok()?;
         }
         let mut budget = Budget::of(frame);
         let mut found = Blobs::new();
         let mut all_whole = true;
         while let Some(window) = windows.pop() {
+            let window = window.in_words(frame.rectangle());
             scan_window(scanner, frame, &window, &mut budget, |blob| {
                 let whole = frame.is_whole(&blob, &window);
                 if blob.area >= frame.settings().min_area || !whole {
@@ -120,11 +122,11 @@ impl Tracks {
     }
 }
 
-/// Where a marker may be in the next frame.
+/// Where a marker may be in the next frame: 4 columns at most are given up so that all fit a word.
 fn window(marker: &Marker, dilations: u8, frame: Rectangle) -> Rectangle {
-    // √(4/π · area), for an ellipse somewhat more.
+    // √(4/π · area); for an ellipse, half of it is somewhat more.
     let across = (marker.area.saturating_mul(14) / 11).isqrt();
-    let reach = across * 5 / 8 + across / MOTION_PART + u32::from(dilations) + 1;
+    let reach = across * 9 / 16 + across / MOTION_PART + u32::from(dilations) + 1;
     let reach = u16::try_from(reach).unwrap_or(u16::MAX);
     let pixel = |at: i32, end: u16| (at >> 16).clamp(0, i32::from(end) - 1) as u16;
     let (x, y) = (pixel(marker.x.0, frame.x1), pixel(marker.y.0, frame.y1));
@@ -134,5 +136,14 @@ fn window(marker: &Marker, dilations: u8, frame: Rectangle) -> Rectangle {
         x1: x + 1,
         y1: y + 1,
     };
-    center.widened(reach, reach, frame)
+    let window = center.widened(reach, reach, frame);
+    if window.width() <= WORD || window.width() > WORD + 4 {
+        return window;
+    }
+    let x0 = x.saturating_sub(WORD / 2 - 1) & !1;
+    Rectangle {
+        x0,
+        x1: (x0 + WORD).min(frame.x1),
+        ..window
+    }
 }

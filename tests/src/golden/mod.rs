@@ -182,8 +182,8 @@ impl<'b> Runner<'b> {
         let file = &self.buffers.model.0[self.model_place.clone()];
         let mut sensor = sensor(file, self.look, [width, height])?;
         for _ in 0..frames {
-            let row = &mut *self.buffers.row;
-            let measurement = sense_frame(&mut sensor, source, row, [width, height])?;
+            let buffers = (&mut self.buffers.row[..], &mut self.buffers.frame[..]);
+            let measurement = sense_frame(&mut sensor, source, buffers, [width, height])?;
             say(results, self.cases, format_args!("{measurement:?}"))?;
             say(results, self.cases, format_args!("{:?}", sensor.blobs()))?;
         }
@@ -308,17 +308,24 @@ fn say(results: &mut impl Write, case: u32, result: fmt::Arguments<'_>) -> Resul
 fn sense_frame(
     sensor: &mut Sensor<'_, BLOBS>,
     source: &mut impl Source,
-    row: &mut [u16],
-    size: [u16; 2],
+    (row, band): (&mut [u16], &mut [u16]),
+    [width, height]: [u16; 2],
 ) -> Result<Measurement, ScriptError> {
+    let mut left = height;
     counting_begins();
     sensor.begin_frame();
     counting_ends();
-    for_each_row(source, row, size, |row| {
+    while left > 0 {
+        let rows = left.min(BAND_ROWS);
+        let band = read_frame(source, row, band, [width, rows])?;
+        if left <= BAND_ROWS {
+            last_band_begins();
+        }
+        left -= rows;
         counting_begins();
-        sensor.push_row(row);
+        sensor.push_rows(band);
         counting_ends();
-    })?;
+    }
     counting_begins();
     let measurement = sensor.finish_frame();
     counting_ends();
@@ -346,13 +353,10 @@ fn for_each_row(
     let raw = raw
         .get_mut(..2 * usize::from(width))
         .ok_or(ScriptError::TooWide(width))?;
-    for y in 0..height {
+    for _ in 0..height {
         fill(source, raw)?;
         for (pixel, pair) in row.iter_mut().zip(raw.chunks_exact(2)) {
             *pixel = u16::from_le_bytes([pair[0], pair[1]]);
-        }
-        if y + BAND_ROWS == height {
-            last_band_begins();
         }
         each(&row[..usize::from(width)]);
     }

@@ -98,7 +98,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
     match module {
         "threshold" | "tables" | "mask" | "hsv" => Some("threshold"),
         "dilate" => Some("dilation"),
-        "runs" | "label" | "blob" => Some("runs, labels, moments"),
+        "runs" | "label" | "blob" | "moments" => Some("runs, labels, moments"),
         "markers" | "geometry" => Some("markers"),
         "features" => Some("features"),
         "network" | "model" => Some("network"),
