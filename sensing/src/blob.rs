@@ -1,6 +1,6 @@
 //! Blobs: 8-connected runs with exact integer moments.
 
-use crate::units::Px;
+use crate::{division::Divisor, units::Px};
 #[cfg(test)]
 use crate::{moments::Moments, runs::Run, tables::Weights};
 
@@ -93,14 +93,23 @@ impl Blob {
     /// The centroid (x, y), each rounded to the nearest step of Q16.16: off by at most 1/131,072 px.
     /// Σx · 2¹⁶ ≤ 640,000 · 799 · 2¹⁶ < 2⁴⁵.
     pub fn centroid(&self) -> (Px, Px) {
-        let area = u64::from(self.area.max(1));
-        (mean(self.sum_x, area), mean(self.sum_y, area))
+        self.centroid_by(&Divisor::new(self.area))
+    }
+
+    /// [`centroid`](Self::centroid) with the area as a divisor, for who needs that otherwise, too.
+    pub(crate) fn centroid_by(&self, area: &Divisor) -> (Px, Px) {
+        let mean = |sum| mean(sum, self.area.max(1), area);
+        (mean(self.sum_x), mean(self.sum_y))
     }
 
     /// The weighted centroid (x, y), rounded likewise; `None` without weights. Σw·x · 2¹⁶ < 2⁵³.
     pub fn weighted_centroid(&self) -> Option<(Px, Px)> {
-        let weight = u64::from(self.weight);
-        (weight > 0).then(|| (mean(self.weight_x, weight), mean(self.weight_y, weight)))
+        if self.weight == 0 {
+            return None;
+        }
+        let weight = Divisor::new(self.weight);
+        let mean = |sum| mean(sum, self.weight, &weight);
+        Some((mean(self.weight_x), mean(self.weight_y)))
     }
 
     /// The second moments about the centroid, exact: each product is at most 640,000² · 799² < 2⁵⁸.
@@ -115,9 +124,9 @@ impl Blob {
     }
 }
 
-/// A mean rounded to the nearest step of Q16.16, `count` ≥ 1.
-fn mean(sum: u64, count: u64) -> Px {
-    Px((((sum << Px::FRACTION_BITS) + count / 2) / count) as i32)
+/// A mean rounded to the nearest step of Q16.16, `count` ≥ 1, by that count.
+fn mean(sum: u64, count: u32, by: &Divisor) -> Px {
+    Px(by.quotient((sum << Px::FRACTION_BITS) + u64::from(count / 2)) as i32)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
-//! Angles and their sine and cosine in integers, by rotation in ever smaller steps (CORDIC).
+//! Sine and cosine of an angle in integers, by rotation in ever smaller steps (CORDIC).
 //!
-//! Against exact arithmetic, over every input: [`atan2`] is off by at most 0.51 m° (0.5 of it is the rounding to
-//! whole m°), [`sin_cos`] by at most 4 · 2⁻³⁰. The tests assert these two figures.
+//! Against exact arithmetic, over every input, [`sin_cos`] is off by at most 4 · 2⁻³⁰; the tests assert it.
 
 use crate::units::MilliDegrees;
 
@@ -52,34 +51,6 @@ const STEP_ANGLES: [i64; STEPS] = [
 /// Π cos(atan(2⁻ⁱ)) · 2⁶⁰: what every rotation by all steps divides a length by.
 const GAIN_INVERSE: i64 = 700_114_967_507_363_239;
 
-/// The angle of (x, y) from the x axis towards y, −180,000 < angle ≤ 180,000 m°; 0 for (0, 0).
-pub fn atan2(y: i64, x: i64) -> MilliDegrees {
-    let (mut x, mut y) = normalize(x, y);
-    let mut angle = 0;
-    if x < 0 {
-        angle = if y < 0 { -HALF_TURN } else { HALF_TURN };
-        (x, y) = (-x, -y);
-    }
-    if (x, y) == (0, 0) {
-        return MilliDegrees(0);
-    }
-    for (step, step_angle) in STEP_ANGLES.iter().enumerate() {
-        if y > 0 {
-            (x, y) = (x + (y >> step), y - (x >> step));
-            angle += step_angle;
-        } else {
-            (x, y) = (x - (y >> step), y + (x >> step));
-            angle -= step_angle;
-        }
-    }
-    let rounded = round_angle(angle);
-    MilliDegrees(if rounded == -180_000 {
-        180_000
-    } else {
-        rounded
-    })
-}
-
 /// (sin, cos) of an angle, with [`ONE_BITS`] fractional bits.
 pub fn sin_cos(angle: MilliDegrees) -> (i64, i64) {
     let turns = i64::from(angle.0).rem_euclid(360_000) << ANGLE_BITS;
@@ -104,24 +75,9 @@ pub fn sin_cos(angle: MilliDegrees) -> (i64, i64) {
     (sign * round(y), sign * round(x))
 }
 
-/// Both shifted alike until the larger has 60 bits: small numbers then turn as precisely as large ones.
-fn normalize(x: i64, y: i64) -> (i64, i64) {
-    let magnitude = x.unsigned_abs() | y.unsigned_abs();
-    match magnitude.leading_zeros() {
-        64 => (0, 0),
-        zeros if zeros >= 4 => (x << (zeros - 4), y << (zeros - 4)),
-        zeros => (x >> (4 - zeros), y >> (4 - zeros)),
-    }
-}
-
-fn round_angle(angle: i64) -> i32 {
-    ((angle + (1 << (ANGLE_BITS - 1))) >> ANGLE_BITS) as i32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     #[test]
     fn constants_are_those_of_their_formulas() {
@@ -135,13 +91,6 @@ mod tests {
         assert!((GAIN_INVERSE as f64 / (1i64 << 60) as f64 - gain).abs() < 1e-15);
     }
 
-    /// Error in m°, the short way round the circle.
-    fn atan2_error(y: i64, x: i64) -> f64 {
-        let exact = (y as f64).atan2(x as f64).to_degrees() * 1e3;
-        let error = (f64::from(atan2(y, x).0) - exact).abs();
-        error.min(360_000.0 - error)
-    }
-
     #[test]
     fn every_thousandth_of_a_degree_is_met() {
         for angle in -180_000..=180_000 {
@@ -151,52 +100,14 @@ mod tests {
                 let error = found as f64 - exact * f64::from(1 << ONE_BITS);
                 assert!(error.abs() <= 4.0, "{angle} m°: {error}");
             }
-            let back = atan2(sin, cos).0;
-            assert_eq!(back, if angle == -180_000 { 180_000 } else { angle });
         }
-    }
-
-    #[test]
-    fn special_directions() {
-        for size in [1, 3, 1 << 31, 1 << 62] {
-            for (y, x, angle) in [
-                (0, size, 0),
-                (size, size, 45_000),
-                (size, 0, 90_000),
-                (size, -size, 135_000),
-                (0, -size, 180_000),
-                (-size, -size, -135_000),
-                (-size, 0, -90_000),
-                (-1, -(1 << 40), 180_000),
-            ] {
-                assert_eq!(atan2(y, x), MilliDegrees(angle), "({x}, {y})");
-            }
-        }
-        assert_eq!(atan2(0, 0), MilliDegrees(0));
     }
 
     #[test]
     fn extreme_arguments() {
-        for (y, x) in [
-            (i64::MIN, i64::MIN),
-            (i64::MAX, i64::MIN),
-            (1, i64::MIN),
-            (i64::MIN, 1),
-        ] {
-            assert!(atan2_error(y, x) <= 0.51, "({x}, {y})");
-        }
         for angle in [i32::MIN, i32::MAX] {
             let (sin, cos) = sin_cos(MilliDegrees(angle));
             assert_eq!((sin * sin + cos * cos + (1 << 59)) >> 60, 1);
-        }
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(20_000))]
-
-        #[test]
-        fn atan2_is_within_its_bound(y: i64, x: i64, y_shift in 0u32..64, x_shift in 0u32..64) {
-            prop_assert!(atan2_error(y >> y_shift, x >> x_shift) <= 0.51);
         }
     }
 }

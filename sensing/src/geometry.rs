@@ -1,7 +1,9 @@
 //! What the sensing needs to know of lens and markers to tell a marker from another red thing.
 
 use crate::{
-    cordic::{ONE_BITS, atan2, sin_cos},
+    angle::atan2,
+    cordic::{ONE_BITS, sin_cos},
+    division::Divisor,
     units::{Micrometres, MilliDegrees, Px},
 };
 
@@ -120,8 +122,7 @@ impl Geometry {
     /// symmetric about its axis shows a circle about the axis as a circle, so this holds for any lens and any
     /// height or tilt of the film.
     pub fn across(&self, distance: Px) -> Px {
-        let radius = i64::from(self.marker_radius.0).max(1);
-        saturated(i64::from(distance.0) * i64::from(self.marker_diameter.0) / radius)
+        Across::of(self).at(distance)
     }
 
     /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with θ = distance/f.
@@ -131,6 +132,27 @@ impl Geometry {
         let (sin, cos) = sin_cos(MilliDegrees(theta as i32));
         let factor_q30 = ((sin * cos) >> ONE_BITS) * RADIAN / theta;
         saturated((i64::from(self.across(distance).0) * factor_q30) >> ONE_BITS)
+    }
+}
+
+/// [`Geometry::across`] for many distances.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Across {
+    diameter: i64,
+    by_radius: Divisor,
+}
+
+impl Across {
+    pub fn of(geometry: &Geometry) -> Across {
+        Across {
+            diameter: geometry.marker_diameter.0.into(),
+            by_radius: Divisor::new(geometry.marker_radius.0),
+        }
+    }
+
+    pub fn at(&self, distance: Px) -> Px {
+        let product = i64::from(distance.0) * self.diameter;
+        saturated(self.by_radius.signed_quotient(product))
     }
 }
 

@@ -38,8 +38,10 @@ pub mod tare;
 pub mod threshold;
 pub mod windows;
 
+mod angle;
 mod cordic;
 mod dilate;
+mod division;
 mod history;
 mod kernels;
 mod label;
@@ -48,4 +50,5 @@ mod moments;
 #[cfg(test)]
 mod picture;
 mod rescale;
+mod root;
 mod runs;

@@ -13,8 +13,11 @@
 mod tests;
 
 use crate::{
-    cordic::{ONE_BITS, atan2, sin_cos},
+    angle::atan2,
+    cordic::{ONE_BITS, sin_cos},
+    division::quotient,
     model::{CalibratedRange, ContactReading, Model, OutputKind, Uncertainty},
+    root::rounded_root,
     status::Status,
     units::{MicroNewtons, MilliDegrees},
 };
@@ -172,7 +175,7 @@ fn propagate(uncertainty: &Uncertainty, vector: [MicroNewtons; 3]) -> (MilliDegr
     let weighted = |variance: u64, part: u64| u128::from(variance) * u128::from(part);
     let along = ((weighted(lateral, (1 << 30) - part) + weighted(normal, part)) >> 30) as u64;
     let across = 2 * lateral + normal - along;
-    let angle = rounded_root(across) * RADIAN / rounded_root(length);
+    let angle = quotient(rounded_root(across) * RADIAN, rounded_root(length));
     let direction = i32::try_from(angle).map_or(NO_DIRECTION, MilliDegrees);
     (
         direction.min(NO_DIRECTION),
@@ -188,12 +191,5 @@ fn square(value: MicroNewtons) -> u64 {
 /// part / whole with 30 fractional bits; part ≤ whole, whole > 0.
 fn part_q30(part: u64, whole: u64) -> u64 {
     let excess = 30u32.saturating_sub(whole.leading_zeros());
-    ((part >> excess) << 30) / (whole >> excess)
-}
-
-/// √n, rounded to nearest.
-fn rounded_root(n: u64) -> u64 {
-    let root = n.isqrt();
-    // n > (root + ½)² ⇔ n > root² + root.
-    root + u64::from(n - root * root > root)
+    quotient((part >> excess) << 30, whole >> excess)
 }

@@ -5,18 +5,18 @@
 //! a disc shifts its centroid and E|d|²d so that the two nearly cancel.
 
 use super::pattern::length;
-use crate::blob::Blob;
+use crate::{blob::Blob, division::Divisor, root::root};
 
 /// Central third moments of a blob per pixel, px³ with 8 fractional bits: x³, x²y, xy², y³.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ThirdMoments([i64; 4]);
 
 impl ThirdMoments {
-    /// Of a blob of at least one pixel.
+    /// Of a blob of at least one pixel, with its area as a divisor.
     ///
     /// Sums are first taken about the whole pixel nearest to the centroid, exactly: no term is beyond
     /// 3 · 640,000 · 799³ < 2⁵¹. About the centroid itself they are then corrected by its remaining fraction (a, b).
-    pub fn of_blob(blob: &Blob) -> ThirdMoments {
+    pub fn of_blob(blob: &Blob, by_area: &Divisor) -> ThirdMoments {
         let area = i64::from(blob.area.max(1));
         let [sx, sy, sxx, sxy, syy] = [
             blob.sum_x,
@@ -28,7 +28,8 @@ impl ThirdMoments {
         .map(|sum| sum as i64);
         let [sxxx, sxxy, sxyy, syyy] =
             [blob.sum_xxx, blob.sum_xxy, blob.sum_xyy, blob.sum_yyy].map(|sum| sum as i64);
-        let nearest = |sum: i64| (2 * sum + area) / (2 * area);
+        // ⌊(2·sum + area)/(2·area)⌋, as the halves that are lost make no whole.
+        let nearest = |sum: i64| by_area.signed_quotient(sum + area / 2);
         let (x, y) = (nearest(sx), nearest(sy));
         let first = [sx - x * area, sy - y * area];
         let xx = sxx - 2 * x * sx + x * x * area;
@@ -40,12 +41,12 @@ impl ThirdMoments {
             sxyy - 2 * y * sxy + y * y * sx - x * yy,
             syyy - 3 * y * syy + 3 * y * y * sy - y * y * y * area,
         ];
-        let [a, b] = first.map(|sum| (sum << 16) / area);
-        let [xx, xy, yy] = [xx, xy, yy].map(|sum| (sum << 8) / area);
+        let [a, b] = first.map(|sum| by_area.signed_quotient(sum << 16));
+        let [xx, xy, yy] = [xx, xy, yy].map(|sum| by_area.signed_quotient(sum << 8));
         // A product of a fraction with 16 bits and a second moment, or of three fractions, with 8.
         let with = |fraction: i64, moment: i64| (fraction * moment) >> 16;
         let cube = |p: i64, q: i64, r: i64| (2 * p * q * r) >> 40;
-        let [xxx, xxy, xyy, yyy] = third.map(|sum| (sum << 8) / area);
+        let [xxx, xxy, xyy, yyy] = third.map(|sum| by_area.signed_quotient(sum << 8));
         ThirdMoments([
             xxx - 3 * with(a, xx) + cube(a, a, a),
             xxy - 2 * with(a, xy) - with(b, xx) + cube(a, a, b),
@@ -55,9 +56,15 @@ impl ThirdMoments {
     }
 
     /// E|d|²d of the shape, scaled to a round one, times its variance: px² with 16 fractional bits. (`cos`, `sin`) with 14
-    /// fractional bits is the direction along which its variance is `along` and across which it is `across`, both in
-    /// px² with 16 fractional bits.
-    pub fn lean(&self, [cos, sin]: [i64; 2], along: i64, across: i64) -> i64 {
+    /// fractional bits is the direction; `by_along` and `by_across` divide by the variances along and across it, and
+    /// `across` is the second of them, in px² with 16 fractional bits.
+    pub fn lean(
+        &self,
+        [cos, sin]: [i64; 2],
+        by_along: &Divisor,
+        by_across: &Divisor,
+        across: i64,
+    ) -> i64 {
         let [xxx, xxy, xyy, yyy] = self.0;
         let turned = |p: i64, q: i64| (cos * p + sin * q) >> 14;
         let crossed = |p: i64, q: i64| (cos * q - sin * p) >> 14;
@@ -66,10 +73,12 @@ impl ThirdMoments {
         let twice_across = |[p, q, r]: [i64; 3]| (ss * p - 2 * cs * q + cc * r) >> 14;
         let u = [turned(xxx, xxy), turned(xxy, xyy), turned(xyy, yyy)];
         let v = [crossed(xxx, xxy), crossed(xxy, xyy), crossed(xyy, yyy)];
-        let over = |moment: i64, variance: i64| (moment << 24) / variance.max(1);
-        let lean_u = over(twice_along(u), along) + over(twice_across(u), across);
-        let lean_v = over(twice_along(v), along) + over(twice_across(v), across);
-        (length([lean_u, lean_v]) * (across.max(0) << 16).isqrt()) >> 16
+        let scaled = |third: [i64; 3]| {
+            by_along.signed_quotient(twice_along(third) << 24)
+                + by_across.signed_quotient(twice_across(third) << 24)
+        };
+        let deviation = i64::from(root((across.max(0) as u64) << 16));
+        (length([scaled(u), scaled(v)]) * deviation) >> 16
     }
 }
 
@@ -98,11 +107,10 @@ mod tests {
         let moments = blob.central_moments();
         let square = i64::from(blob.area) * i64::from(blob.area);
         let variance = |moment: i64| ((i128::from(moment) << 16) / i128::from(square)) as i64;
-        let lean = ThirdMoments::of_blob(blob).lean(
-            [1 << 14, 0],
-            variance(moments.xx),
-            variance(moments.yy),
-        );
+        let [xx, yy] = [moments.xx, moments.yy].map(variance);
+        let [by_xx, by_yy] = [xx, yy].map(|variance| Divisor::new(variance as u32));
+        let third = ThirdMoments::of_blob(blob, &Divisor::new(blob.area));
+        let lean = third.lean([1 << 14, 0], &by_xx, &by_yy, yy);
         lean as f64 / 65_536.0
     }
 
@@ -132,7 +140,11 @@ mod tests {
             mean(&|x, y| x * y * y),
             mean(&|_, y| y * y * y),
         ];
-        for (found, expected) in ThirdMoments::of_blob(&sum).0.iter().zip(expected) {
+        for (found, expected) in ThirdMoments::of_blob(&sum, &Divisor::new(sum.area))
+            .0
+            .iter()
+            .zip(expected)
+        {
             assert!(
                 (*found as f64 / 256.0 - expected).abs() < 0.05,
                 "{found} {expected}"

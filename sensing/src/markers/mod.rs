@@ -25,6 +25,7 @@
 
 mod lean;
 pub(crate) mod pattern;
+mod reading;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -33,12 +34,12 @@ mod trust;
 pub(crate) use trust::Trust;
 
 use crate::{
-    blob::Blob, geometry::Geometry, model::CentroidEstimator, settings::Settings, status::Status,
+    blob::Blob, geometry::Across, model::CentroidEstimator, settings::Settings, status::Status,
     units::Px,
 };
 use heapless::Vec;
 use pattern::Pattern;
-use shape::{Shape, nominal_edge};
+use shape::{Seen, Shape, nominal_edge};
 
 /// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3 lower left
 /// as the image shows them.
@@ -58,9 +59,24 @@ pub(crate) struct Found {
     /// Markers 0–3.
     pub markers: [Marker; 4],
     /// Their images.
-    pub shapes: [Shape; 4],
+    images: [Image; 4],
     /// Their pattern.
-    pub pattern: Pattern,
+    pattern: Pattern,
+}
+
+/// What a rest position is to judge of a marker's image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Image {
+    /// As the pattern's centre sees it.
+    seen: Seen,
+    /// Its width by the optics, without what the mask adds, px in Q16.16.
+    expected: i64,
+    /// [`Shape::hollow`].
+    hollow: i64,
+    /// [`Shape::lopsided`].
+    lopsided: i64,
+    /// [`Shape::density`].
+    density: i64,
 }
 
 /// More candidates than this are not sorted out: 8 make 70 sets of four.
@@ -81,27 +97,35 @@ const LEAST_ASPECT: i64 = 51;
 /// Widest, of 256 (1.15): round, and the noise of a small picture.
 const LARGEST_ASPECT: i64 = 294;
 
-/// Finds the markers among the blobs of a frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Finder<'g> {
-    geometry: &'g Geometry,
+/// Finds the markers among the blobs of a frame. Holds all that follows from the settings before there is a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Finder {
+    /// Columns and rows of a frame.
+    size: [u16; 2],
+    /// The picture's middle.
+    center: (Px, Px),
+    /// A marker's distance from it at rest.
+    rest_distance: Px,
+    across: Across,
     edge: Px,
     areas: (u32, u32),
     centroid: CentroidEstimator,
 }
 
-impl<'g> Finder<'g> {
+impl Finder {
     /// For frames that are scanned so.
-    pub fn new(settings: &'g Settings) -> Finder<'g> {
+    pub fn new(settings: &Settings) -> Finder {
         let geometry = &settings.geometry;
         let edge = nominal_edge(settings.dilations);
         let smallest = geometry.rest_area(Px(0)) / SMALLEST_PART;
         let largest = geometry.rest_area(edge).saturating_mul(LARGEST_MULTIPLE);
-        let areas = (smallest.max(1), largest);
         Finder {
-            geometry,
+            size: [geometry.width, geometry.height],
+            center: geometry.center(),
+            rest_distance: geometry.rest_distance(),
+            across: Across::of(geometry),
             edge,
-            areas,
+            areas: (smallest.max(1), largest),
             centroid: settings.centroid,
         }
     }
@@ -117,7 +141,7 @@ impl<'g> Finder<'g> {
         let mut found = None;
         let mut reason = Status::MARKERS_AMBIGUOUS;
         for set in sets_of_four(candidates.len()) {
-            match self.examine(set.map(|index| candidates[index])) {
+            match self.examine(set.map(|index| &candidates[index])) {
                 Ok(_) if found.is_some() => return Err(Status::MARKERS_AMBIGUOUS),
                 Ok(set) => found = Some(set),
                 Err(why) if why == Status::MARKERS_IMPLAUSIBLE => reason = why,
@@ -152,44 +176,50 @@ impl<'g> Finder<'g> {
         (self.areas.0..=self.areas.1).contains(&blob.area)
             && blob.x0 > 0
             && blob.y0 > 0
-            && blob.x1 + 1 < self.geometry.width
-            && blob.y1 + 1 < self.geometry.height
+            && blob.x1 + 1 < self.size[0]
+            && blob.y1 + 1 < self.size[1]
     }
 
     /// Whether four shapes are the markers.
-    fn examine(&self, shapes: [Shape; 4]) -> Result<Found, Status> {
+    fn examine(&self, shapes: [&Shape; 4]) -> Result<Found, Status> {
         let shapes = pattern::identify(shapes).ok_or(Status::MARKERS_AMBIGUOUS)?;
         let pattern = Pattern::of_centroids(shapes.map(|shape| (shape.x, shape.y)));
-        if !pattern.is_plausible(self.geometry) {
+        if !pattern.is_plausible(self.center, self.rest_distance) {
             return Err(Status::MARKERS_AMBIGUOUS);
         }
-        if !shapes
-            .iter()
-            .all(|shape| self.is_plausible(shape, &pattern))
-        {
-            return Err(Status::MARKERS_IMPLAUSIBLE);
-        }
-        let markers = shapes.map(|shape| Marker {
-            x: shape.x,
-            y: shape.y,
-            area: shape.area,
-        });
+        let image = |shape| {
+            self.image(shape, &pattern)
+                .ok_or(Status::MARKERS_IMPLAUSIBLE)
+        };
+        let [a, b, c, d] = shapes;
         Ok(Found {
-            markers,
-            shapes,
+            markers: shapes.map(|shape| Marker {
+                x: shape.x,
+                y: shape.y,
+                area: shape.area,
+            }),
+            images: [image(a)?, image(b)?, image(c)?, image(d)?],
             pattern,
         })
     }
 
-    /// Whether a marker's size fits its distance from the pattern's centre.
-    fn is_plausible(&self, shape: &Shape, pattern: &Pattern) -> bool {
-        let Some(seen) = shape.seen_from(pattern.center) else {
-            return false;
-        };
-        let expected = i64::from(self.geometry.across(seen.distance).0);
+    /// A marker's image, when its size fits its distance from the pattern's centre.
+    fn image(&self, shape: &Shape, pattern: &Pattern) -> Option<Image> {
+        let seen = shape.seen_from(pattern.center)?;
+        let expected = i64::from(self.across.at(seen.distance).0);
         let excess = (seen.across - i64::from(self.edge.0) - expected).abs();
-        excess * 256 <= expected * SIZE_TOLERANCE
-            && (LEAST_ASPECT..=LARGEST_ASPECT).contains(&(seen.along * 256 / seen.across.max(1)))
+        // ⌊256·along / across⌋ within the limits.
+        let (along, across) = (256 * seen.along, seen.across.max(1));
+        let is_plausible = excess * 256 <= expected * SIZE_TOLERANCE
+            && along >= LEAST_ASPECT * across
+            && along < (LARGEST_ASPECT + 1) * across;
+        is_plausible.then_some(Image {
+            seen,
+            expected,
+            hollow: shape.hollow,
+            lopsided: shape.lopsided,
+            density: shape.density,
+        })
     }
 }
 

@@ -8,8 +8,9 @@
 
 use super::shape::Shape;
 use crate::{
-    cordic::atan2,
-    geometry::Geometry,
+    angle::atan2,
+    division::Divisor,
+    root::root,
     units::{MilliDegrees, Px},
 };
 
@@ -48,7 +49,7 @@ const SIGNS: [(i64, i64); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
 
 /// Puts four shapes in the order of the identities: by the quadrant around their own centre. `None` unless there is
 /// one in each.
-pub fn identify(shapes: [Shape; 4]) -> Option<[Shape; 4]> {
+pub fn identify(shapes: [&Shape; 4]) -> Option<[&Shape; 4]> {
     let sum = |value: fn(&Shape) -> Px| shapes.iter().map(|s| i64::from(value(s).0)).sum::<i64>();
     let (sum_x, sum_y) = (sum(|s| s.x), sum(|s| s.y));
     let mut ordered = [None; 4];
@@ -86,20 +87,22 @@ impl Pattern {
         let (xy, yy) = project(|(_, y)| y);
         let (taper_x, taper_y) = project(|(x, y)| x * y);
         // Eight half sides.
-        let size = ((xx + yy).pow(2) + (yx - xy).pow(2)).isqrt().max(1);
+        let size = root(((xx + yy).pow(2) + (yx - xy).pow(2)) as u64).max(1);
+        let by_size = Divisor::new(size);
         Pattern {
             center: (Px((sum_x >> 2) as i32), Px((sum_y >> 2) as i32)),
-            half_side: size / 8,
+            half_side: i64::from(size / 8),
             turn: atan2(yx - xy, xx + yy),
-            strain: [xx - yy, xy + yx].map(|part| (part << 16) / size),
-            taper: [taper_x, taper_y].map(|part| (part << 17) / size),
+            strain: [xx - yy, xy + yx].map(|part| by_size.signed_quotient(part << 16)),
+            taper: [taper_x, taper_y].map(|part| by_size.signed_quotient(part << 17)),
         }
     }
 
-    /// Whether it can be the markers of such a sensor in any state, from geometry alone.
-    pub fn is_plausible(&self, geometry: &Geometry) -> bool {
-        let rest = i64::from(geometry.rest_distance().0) * SQRT_HALF / 256;
-        let shift = i64::from(distance(self.center, geometry.center()).0);
+    /// Whether it can be the markers of a sensor in any state, from geometry alone: `center` is the picture's, and at rest
+    /// they are `rest_distance` from it.
+    pub fn is_plausible(&self, center: (Px, Px), rest_distance: Px) -> bool {
+        let rest = i64::from(rest_distance.0) * SQRT_HALF / 256;
+        let shift = i64::from(distance(self.center, center).0);
         self.turn.0.abs() <= LARGEST_TURN.0
             && length(self.strain) <= LARGEST_STRAIN
             && length(self.taper) <= LARGEST_TAPER
@@ -116,5 +119,5 @@ pub fn distance(a: (Px, Px), b: (Px, Px)) -> Px {
 
 /// Length of a vector whose parts are below 2³¹.
 pub fn length([x, y]: [i64; 2]) -> i64 {
-    (x * x + y * y).isqrt()
+    i64::from(root((x * x + y * y) as u64))
 }

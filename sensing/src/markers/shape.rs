@@ -1,7 +1,13 @@
 //! How the image of one marker looks: its moments as an ellipse's, and what the optics says of them.
 
 use super::{lean::ThirdMoments, pattern::distance};
-use crate::{blob::Blob, model::CentroidEstimator, units::Px};
+use crate::{
+    blob::Blob,
+    division::{Divisor, signed_quotient},
+    model::CentroidEstimator,
+    root::root,
+    units::Px,
+};
 
 /// A blob's centroid and second moments. Lengths and variances have 16 fractional bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,14 +63,15 @@ pub fn nominal_edge(dilations: u8) -> Px {
 impl Shape {
     /// Of a blob of at least one pixel; `None` when its position cannot be told: no pixel has a weight.
     pub fn of_blob(blob: &Blob, estimator: CentroidEstimator) -> Option<Shape> {
+        let by_area = Divisor::new(blob.area);
         let (x, y) = match estimator {
-            CentroidEstimator::BinaryMask => blob.centroid(),
+            CentroidEstimator::BinaryMask => blob.centroid_by(&by_area),
             CentroidEstimator::RednessWeighted => blob.weighted_centroid()?,
         };
         let moments = blob.central_moments();
         let area = i64::from(blob.area.max(1));
         // A whole number of px² first: the fraction lost is below 1/area.
-        let variance = |moment: i64| ((moment / area) << 16) / area;
+        let variance = |moment: i64| by_area.signed_quotient(by_area.signed_quotient(moment) << 16);
         let variance = [
             variance(moments.xx) + PIXEL_VARIANCE,
             variance(moments.xy),
@@ -82,9 +89,9 @@ impl Shape {
             fill,
             hollow: ((65_536 - fill) * ((variance[0] + variance[2]) / 2)) >> 16,
             lopsided: lopsided(blob.x0, blob.x1, x).max(lopsided(blob.y0, blob.y1, y)),
-            density: (i64::from(blob.weight) << 16) / area,
+            density: by_area.signed_quotient(i64::from(blob.weight) << 16),
             variance,
-            third: ThirdMoments::of_blob(blob),
+            third: ThirdMoments::of_blob(blob, &by_area),
         })
     }
 
@@ -99,24 +106,33 @@ impl Shape {
         if norm == 0 {
             return None;
         }
-        let along = (ux * ux * xx + 2 * ux * uy * xy + uy * uy * yy) / norm;
-        let across = (uy * uy * xx - 2 * ux * uy * xy + ux * ux * yy) / norm;
-        let covariance = (ux * uy * (yy - xx) + (ux * ux - uy * uy) * xy) / norm;
-        let root = norm.isqrt().max(1);
-        let direction = [ux, uy].map(|part| (part << 14) / root);
+        // Both parts are below 2¹⁴.
+        let by_norm = Divisor::new(norm as u32);
+        let [xx_part, xy_part, yy_part] = [ux * ux, ux * uy, uy * uy];
+        let along = by_norm.signed_quotient(xx_part * xx + 2 * xy_part * xy + yy_part * yy);
+        let across = by_norm.signed_quotient(yy_part * xx - 2 * xy_part * xy + xx_part * yy);
+        let covariance = by_norm.signed_quotient(xy_part * (yy - xx) + (xx_part - yy_part) * xy);
+        let by_root = Divisor::new(root(norm as u64));
+        let direction = [ux, uy].map(|part| by_root.signed_quotient(part << 14));
+        let [by_along, by_across] = [along, across].map(divisor);
         Some(Seen {
             distance: distance((self.x, self.y), center),
             across: diameter(across),
             along: diameter(along),
-            skew: (covariance << 16) / across.max(1),
-            lean: self.third.lean(direction, along, across),
+            skew: by_across.signed_quotient(covariance << 16),
+            lean: self.third.lean(direction, &by_along, &by_across, across),
         })
     }
 }
 
+/// By a variance, at least 2⁻¹⁶ px². One of 2¹⁶ px² or more, which no marker has, divides as that does.
+fn divisor(variance: i64) -> Divisor {
+    Divisor::new(u32::try_from(variance.max(1)).unwrap_or(u32::MAX))
+}
+
 /// An ellipse's diameter is four standard deviations.
 fn diameter(variance: i64) -> i64 {
-    4 * (variance.max(0) << 16).isqrt()
+    4 * i64::from(root((variance.max(0) as u64) << 16))
 }
 
 /// An ellipse's area is 4π√det of its covariance. Variances are below 800²/12 + 1 px² < 2³² in Q16, so that the
@@ -124,6 +140,6 @@ fn diameter(variance: i64) -> i64 {
 fn fill(area: i64, [xx, xy, yy]: [i64; 3]) -> i64 {
     let product = |a: i64, b: i64| a.unsigned_abs() * b.unsigned_abs();
     let determinant = product(xx, yy).saturating_sub(product(xy, xy));
-    let ellipse_q24 = (FOUR_PI * determinant.isqrt() as i64) >> 8;
-    (area << 40) / ellipse_q24.max(1)
+    let ellipse_q24 = (FOUR_PI * i64::from(root(determinant))) >> 8;
+    signed_quotient(area << 40, ellipse_q24)
 }

@@ -7,13 +7,16 @@
 //! presses in the middle would read them wrong.
 
 use super::{
-    Found,
+    Found, Image,
     pattern::{Pattern, distance, length},
+    reading::Reading,
     shape::Seen,
 };
 use crate::{
+    division::{Divisor, signed_quotient},
     geometry::Geometry,
-    model::{CentroidEstimator, Rest},
+    model::{CentroidEstimator, ContactReading, Rest},
+    root::root,
     settings::Settings,
     status::Status,
     units::{MilliDegrees, Px},
@@ -24,9 +27,6 @@ use crate::{
 /// thing that stands in for a marker may be off.
 const STRAIN_WEIGHTED: i64 = 16_384;
 const STRAIN_BINARY: i64 = 45_875;
-/// What a sideways force strains: 1.5 times the square of the shift over the half side (seen: 1.3 times with the tip up
-/// to 0.25 mm off the middle, 1.5 times at 0.5 mm); in halves.
-const STRAIN_BY_SHIFT: i64 = 3;
 /// Strain against a model's rest, 0.015 of 65,536: another unit's markers are not quite where this one's are.
 const STRAIN_FOREIGN: i64 = 983;
 /// Taper against the rest's: 0.1 (seen: 0.066), of 65,536.
@@ -63,104 +63,149 @@ const DENSITY_AREA: i64 = 11;
 const LOPSIDED_PIXELS: i64 = 39_322;
 const LOPSIDED: i64 = 8;
 
-/// What four markers are compared with.
-#[derive(Clone, Copy, Debug)]
-pub struct Trust<'a> {
-    /// How they were found.
-    pub settings: &'a Settings,
-    /// Where they rest.
-    pub rest: &'a Rest,
-    /// Whether that was taken on this unit.
-    pub own_rest: bool,
+/// What four markers are compared with: a rest position, and all that follows from it before there is a frame.
+#[derive(Clone, Debug)]
+pub struct Trust {
+    at_rest: Pattern,
+    /// What the mask added to each marker's diameters at rest, px in Q16.16.
+    edges: [i64; 4],
+    /// By a marker's width at rest, px in Q16.16.
+    by_rest_width: Divisor,
+    /// By half the pattern's side at rest, px in Q16.16.
+    by_half_side: Divisor,
+    /// Largest hollowness.
+    hollow: i64,
+    /// Strain as the displacement of one marker that makes it, px in Q16.16; `None` against a model's rest.
+    displacement: Option<i64>,
+    reading: Reading,
 }
 
-impl Trust<'_> {
+impl Trust {
+    /// For markers found with these settings that rest there; `own_rest` says whether that was taken on this unit, and
+    /// `contact` what presses.
+    pub fn new(settings: &Settings, rest: &Rest, own_rest: bool, contact: ContactReading) -> Trust {
+        let geometry = &settings.geometry;
+        let at_rest = Pattern::of_centroids(rest.features.centroids);
+        let dilations = i64::from(settings.dilations);
+        let displacement = match settings.centroid {
+            CentroidEstimator::RednessWeighted => STRAIN_WEIGHTED,
+            CentroidEstimator::BinaryMask => STRAIN_BINARY,
+        };
+        Trust {
+            edges: core::array::from_fn(|identity| {
+                let distance = distance(rest.features.centroids[identity], at_rest.center);
+                edge_at_rest(geometry, distance, rest.areas[identity])
+            }),
+            by_rest_width: divisor(geometry.across(geometry.rest_distance()).0.into()),
+            by_half_side: divisor(at_rest.half_side),
+            at_rest,
+            hollow: HOLLOW + HOLLOW_BY_DILATIONS * dilations * dilations,
+            displacement: own_rest.then_some(displacement),
+            reading: Reading::of(contact),
+        }
+    }
+
     /// Says whether these markers may make a force: [`Status::OK`] or [`Status::MARKERS_IMPLAUSIBLE`].
     pub fn judge(&self, found: &Found) -> Status {
-        let at_rest = Pattern::of_centroids(self.rest.features.centroids);
-        if self.moved_plausibly(&at_rest, found) && self.images_fit(&at_rest, found) {
+        let moved = distance(found.pattern.center, self.at_rest.center);
+        let shift = self.by_half_side.signed_quotient(i64::from(moved.0) << 16);
+        if self.moved_plausibly(&found.pattern, moved, shift) && self.images_fit(found, shift) {
             Status::OK
         } else {
             Status::MARKERS_IMPLAUSIBLE
         }
     }
 
-    fn moved_plausibly(&self, rest: &Pattern, found: &Found) -> bool {
-        let now = &found.pattern;
+    /// `shift` is that of the centre over the half side at rest, of 65,536, here and below.
+    fn moved_plausibly(&self, now: &Pattern, moved: Px, shift: i64) -> bool {
+        let rest = &self.at_rest;
         let change = |now: [i64; 2], rest: [i64; 2]| length([now[0] - rest[0], now[1] - rest[1]]);
-        let shift = i64::from(distance(now.center, rest.center).0);
-        change(now.strain, rest.strain) <= self.strain_limit(rest, now, shift)
-            && change(now.taper, rest.taper) <= TAPER
+        let taper = change(now.taper, rest.taper);
+        change(now.strain, rest.strain) <= self.strain_limit(now, shift, taper)
+            && taper <= TAPER
             && (now.turn.0 - rest.turn.0).abs() <= TURN.0
-            && shift * 256 <= rest.half_side * SHIFT
+            && i64::from(moved.0) * 256 <= rest.half_side * SHIFT
             && (rest.half_side * SCALE.0..=rest.half_side * SCALE.1)
                 .contains(&(now.half_side * 256))
     }
 
     /// Of 65,536.
-    fn strain_limit(&self, rest: &Pattern, now: &Pattern, shift: i64) -> i64 {
-        if !self.own_rest {
+    fn strain_limit(&self, now: &Pattern, shift: i64, taper: i64) -> i64 {
+        let Some(displacement) = self.displacement else {
             return STRAIN_FOREIGN;
-        }
-        // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over four of those.
-        let distance = (now.half_side * 363) >> 8;
-        let displacement = match self.settings.centroid {
-            CentroidEstimator::RednessWeighted => STRAIN_WEIGHTED,
-            CentroidEstimator::BinaryMask => STRAIN_BINARY,
         };
-        let part = (shift << 16) / rest.half_side.max(1);
-        part_of(displacement, 4 * distance) + ((STRAIN_BY_SHIFT * part * part) >> 17)
+        // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over four of those, and
+        // tapers by √2 times as much: that part of a taper is no tip's.
+        let distance = (now.half_side * 363) >> 8;
+        let displaced = part_of(displacement, 4 * distance);
+        let tapered = (taper - ((displaced * 363) >> 8)).max(0);
+        displaced
+            + ((self.reading.strain_by_shift * shift * shift) >> 17)
+            + ((self.reading.strain_by_taper * tapered) >> 8)
     }
 
-    fn images_fit(&self, at_rest: &Pattern, found: &Found) -> bool {
-        let (geometry, rest) = (&self.settings.geometry, self.rest);
+    fn images_fit(&self, found: &Found, shift: i64) -> bool {
         let taper = length(found.pattern.taper);
-        let shift = part_of(
-            distance(found.pattern.center, at_rest.center).0.into(),
-            at_rest.half_side,
-        );
-        let dilations = i64::from(self.settings.dilations);
-        let hollow = HOLLOW + HOLLOW_BY_DILATIONS * dilations * dilations;
-        let at_rest_across = i64::from(geometry.across(geometry.rest_distance()).0);
         let (mut narrowest, mut widest, mut width) = (i64::MAX, 0, i64::MAX);
-        for (identity, shape) in found.shapes.iter().enumerate() {
-            let Some(seen) = shape.seen_from(found.pattern.center) else {
-                return false;
-            };
-            let distance = distance(rest.features.centroids[identity], at_rest.center);
-            let edge = edge_at_rest(geometry, distance, rest.areas[identity]);
-            let expected = i64::from(geometry.across(seen.distance).0);
-            let lopsided = LOPSIDED_PIXELS + seen.across * LOPSIDED / 256;
-            if !width_fits(expected, &seen, edge)
-                || !lies_straight(&seen, taper)
-                || shape.hollow > hollow
-                || seen.lean > lean_limit(expected, at_rest_across)
-                || shape.lopsided > lopsided
-            {
+        let mut inner_densities = [0; 4];
+        let images = found.images.iter().zip(&self.edges);
+        for ((image, edge), inner) in images.zip(&mut inner_densities) {
+            let seen = &image.seen;
+            let by_across = divisor(seen.across);
+            if !self.image_fits(image, &by_across, *edge, taper) {
                 return false;
             }
-            let aspect = (seen.along << 16) / seen.across.max(1);
+            let aspect = by_across.signed_quotient(seen.along << 16);
             (narrowest, widest) = (narrowest.min(aspect), widest.max(aspect));
             width = width.min(seen.across);
+            if self.reading.inner_density_area.is_some() {
+                *inner = inner_density(image, &by_across, *edge);
+            }
         }
-        let spread = ((widest - narrowest) << 16) / widest.max(1);
-        evenly_coloured(found, width)
-            && spread <= ASPECT + part_of(ASPECT_PIXELS, width) + ASPECT_TAPER * taper + shift
+        let spread = part_of(widest - narrowest, widest);
+        let aspect = ASPECT + part_of(ASPECT_PIXELS, width) + ASPECT_TAPER * taper;
+        let even = (self.reading.density_by_shift * shift) >> 8;
+        let densities = found.images.each_ref().map(|image| image.density);
+        evenly_coloured(&densities, even + over_square(DENSITY_AREA, width))
+            && (self.reading.inner_density_area)
+                .is_none_or(|area| evenly_coloured(&inner_densities, over_square(area, width)))
+            && spread <= aspect + ((self.reading.aspect_by_shift * shift) >> 8)
+    }
+
+    fn image_fits(&self, image: &Image, by_across: &Divisor, edge: i64, taper: i64) -> bool {
+        let Image { seen, expected, .. } = image;
+        let lopsided = LOPSIDED_PIXELS + seen.across * LOPSIDED / 256;
+        let skew = by_across.signed_quotient(SKEW_PIXELS << 16)
+            + ((self.reading.skew_by_taper * taper) >> 8);
+        // For a marker that the optics makes so wide now.
+        let wider = self.by_rest_width.signed_quotient(LEAN * expected);
+        let bent = (((seen.across >> 8) * (seen.across >> 8)) >> 16) * taper;
+        let lean = LEAN.max(wider) + ((self.reading.lean_by_taper * bent) >> 16);
+        width_fits(*expected, seen, edge)
+            && seen.skew.abs() <= skew
+            && image.hollow <= self.hollow
+            && seen.lean <= lean
+            && image.lopsided <= lopsided
     }
 }
 
-/// Whether all markers are alike in their mean weight; `width` is that of the narrowest. Always without weights.
-fn evenly_coloured(found: &Found, width: i64) -> bool {
-    let sum: i64 = found.shapes.iter().map(|shape| shape.density).sum();
-    let limit = DENSITY + (DENSITY_AREA << 48) / (width * width).max(1);
-    let differs = |density: i64| (4 * density - sum).abs();
-    let shapes = found.shapes.iter();
-    shapes.map(|shape| differs(shape.density)).max() <= Some((sum * limit) >> 16)
+/// Whether all markers are alike in their mean weight, to 0.015 of it and `more`. Always without weights.
+fn evenly_coloured(densities: &[i64; 4], more: i64) -> bool {
+    let sum: i64 = densities.iter().sum();
+    let differs = |density: &i64| (4 * density - sum).abs();
+    densities.iter().map(differs).max() <= Some((sum * (DENSITY + more)) >> 16)
 }
 
-/// For a marker that the optics makes so wide now, and so wide at rest.
-fn lean_limit(now: i64, at_rest: i64) -> i64 {
-    LEAN.max(LEAN * now / at_rest.max(1))
+/// px² over the square of a width in Q16.16, of 65,536.
+fn over_square(area: i64, width: i64) -> i64 {
+    signed_quotient(area << 48, width * width)
+}
+
+/// The mean weight of a marker without what the mask adds around it, which weighs little and is a larger part of a narrow
+/// image: of an ellipse a by b, e/a + e/b when it adds e to both. Images of other aspects are comparable only so.
+fn inner_density(image: &Image, by_across: &Divisor, edge: i64) -> i64 {
+    let outer = by_across.signed_quotient(edge << 16) + part_of(edge, image.seen.along);
+    part_of(image.density, (65_536 - outer).max(1 << 13))
 }
 
 /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
@@ -169,13 +214,14 @@ fn width_fits(expected: i64, seen: &Seen, edge: i64) -> bool {
     excess <= expected * WIDTH / 256 + WIDTH_PIXELS
 }
 
-fn lies_straight(seen: &Seen, taper: i64) -> bool {
-    seen.skew.abs() <= part_of(SKEW_PIXELS, seen.across) + taper
-}
-
 /// A length as a part of another, of 65,536.
 fn part_of(length: i64, whole: i64) -> i64 {
-    (length << 16) / whole.max(1)
+    signed_quotient(length << 16, whole.max(1))
+}
+
+/// By a length in Q16.16, which is below 2¹⁶ px; at least 2⁻¹⁶ px.
+fn divisor(length: i64) -> Divisor {
+    Divisor::new(u32::try_from(length.max(1)).unwrap_or(u32::MAX))
 }
 
 /// What the mask added to a marker's diameters at rest, px in Q16.16.
@@ -189,6 +235,5 @@ fn edge_at_rest(geometry: &Geometry, distance: Px, area: u32) -> i64 {
     let along = i64::from(geometry.along_flat(distance).0);
     // Below 2⁶⁴: the diameters are of a picture, and the area is at most 640,000 px.
     let squared = (across - along).unsigned_abs().pow(2) + u64::from(area) * SIXTEEN_OVER_PI;
-    let root = squared.isqrt() as i64;
-    (root - across - along) / 2
+    (i64::from(root(squared)) - across - along) / 2
 }

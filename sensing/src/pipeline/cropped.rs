@@ -2,7 +2,7 @@
 
 use super::{Measurement, Sensor};
 use crate::{
-    markers::{Finder, Found},
+    markers::Found,
     status::Status,
     tables::Table,
     windows::{Blobs, Rectangle, Tracks, is_whole, settings_within},
@@ -49,6 +49,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
                 blobs.push(*blob).map_err(|_| Status::MARKERS_AMBIGUOUS)?;
             }
         }
-        Finder::new(&self.settings).find(&blobs)
+        let prepared = self.prepared.as_ref();
+        prepared.ok_or(Status::IMAGE_DARK)?.finder.find(&blobs)
     }
 }

@@ -11,13 +11,14 @@ use crate::{
     force::Force,
     geometry::{Geometry, Preset},
     markers::{Finder, Found, Marker, Trust},
-    model::{CentroidEstimator, Model, Rest},
+    model::{CentroidEstimator, ContactReading, Model, Rest},
     network::Network,
     scanner::Scanner,
     settings::{Settings, SettingsError},
     status::Status,
     tables::{ByteTable, Table},
     threshold::{ByteOrder, HsvBox, ThresholdError},
+    windows::coarse_step,
 };
 
 /// What one frame gave.
@@ -50,6 +51,20 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     table: T,
     scanner: Scanner<BLOBS>,
     network: Network,
+    /// `None` until it is configured.
+    prepared: Option<Prepared>,
+}
+
+/// What follows from settings, model and tare before there is a frame.
+#[derive(Clone, Debug)]
+struct Prepared {
+    finder: Finder,
+    /// `None` without a rest position to compare with.
+    trust: Option<Trust>,
+    /// The bits that every frame has, whatever it shows.
+    standing: Status,
+    /// Rows from one to the next of those that are looked at first in a frame that lies in memory.
+    coarse_step: u16,
 }
 
 impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
@@ -69,6 +84,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             table: T::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
+            prepared: None,
         }
     }
 
@@ -88,6 +104,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.settings = settings;
         self.model = model;
         self.tare = None;
+        self.prepare();
         Ok(())
     }
 
@@ -114,6 +131,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     pub fn set_threshold(&mut self, threshold: HsvBox) -> Result<(), ThresholdError> {
         self.table.set(&threshold, self.settings.byte_order)?;
         self.settings.threshold = threshold;
+        self.prepare();
         Ok(())
     }
 
@@ -121,6 +139,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {
         self.tare = tare.filter(Rest::is_sound);
+        self.prepare();
     }
 
     /// The rest position of this unit, when one was taken.
@@ -152,19 +171,23 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// What follows from the markers.
     fn measurement(&mut self, found: Result<Found, Status>) -> Measurement {
-        let mut status = self.standing_status();
-        let found = found.map_err(|reason| status |= reason).ok();
+        let (found, mut status) = match &found {
+            Ok(found) => (Some(found), Status::OK),
+            Err(reason) => (None, *reason),
+        };
+        match (&self.prepared, found) {
+            (None, _) => status |= self.standing_status(),
+            (Some(prepared), None) => status |= prepared.standing,
+            (Some(prepared), Some(found)) => {
+                let trust = prepared.trust.as_ref();
+                status |= prepared.standing | trust.map_or(Status::OK, |trust| trust.judge(found));
+            }
+        }
         let markers = found.map(|found| found.markers);
         let features = markers.as_ref().map(Features::of_markers);
-        if let (Some(found), Some(rest)) = (&found, self.rest()) {
-            let trust = Trust {
-                settings: &self.settings,
-                rest: &rest,
-                own_rest: self.tare.is_some(),
-            };
-            status |= trust.judge(found);
-        }
-        let force = features.and_then(|features| self.measure(&features, &mut status));
+        let force = features
+            .as_ref()
+            .and_then(|features| self.measure(features, &mut status));
         Measurement {
             status,
             markers,
@@ -178,7 +201,25 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.scanner.blobs()
     }
 
-    /// The bits that every frame has, whatever it shows.
+    /// Works out anew what follows from settings, model and tare.
+    fn prepare(&mut self) {
+        let settings = &self.settings;
+        // What a model for other frames says of rest and contact does not hold here.
+        let fitting = self
+            .model
+            .as_ref()
+            .filter(|model| settings.fit(&model.conditions));
+        let rest = self.tare.or(fitting.map(|model| model.rest));
+        let contact = fitting.map_or(ContactReading::Force, |model| model.conditions.contact);
+        let own_rest = self.tare.is_some();
+        self.prepared = Some(Prepared {
+            finder: Finder::new(settings),
+            trust: rest.map(|rest| Trust::new(settings, &rest, own_rest, contact)),
+            standing: self.standing_status(),
+            coarse_step: coarse_step(&settings.geometry),
+        });
+    }
+
     fn standing_status(&self) -> Status {
         let mut status = Status::OK;
         if self.tare.is_none() {
@@ -198,15 +239,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         status
     }
 
-    /// The rest position to compare with: this unit's, or else the model's, if that was made for such frames.
-    fn rest(&self) -> Option<Rest> {
-        let fitting = self
-            .model
-            .as_ref()
-            .filter(|model| self.settings.fit(&model.conditions));
-        self.tare.or(fitting.map(|model| model.rest))
-    }
-
     fn find_markers(&mut self) -> Result<Found, Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
@@ -220,7 +252,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         if scan.set_pixels > pixels / SATURATED_PART {
             return Err(Status::IMAGE_SATURATED);
         }
-        Finder::new(&self.settings).find(scan.blobs)
+        // Before it is configured nothing passes the threshold.
+        let prepared = self.prepared.as_ref().ok_or(Status::IMAGE_DARK)?;
+        prepared.finder.find(scan.blobs)
     }
 
     /// The force of a frame's features, unless `status` already forbids one.
@@ -229,8 +263,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             return None;
         }
         let model = self.model.as_ref()?;
-        let tare = self.tare.map_or(model.rest.features, |tare| tare.features);
-        let output = self.network.run(model, features, &tare);
+        let tare = self.tare.as_ref().unwrap_or(&model.rest);
+        let output = self.network.run(model, features, &tare.features);
         let (force, trust) = Force::of_outputs(model, output.values);
         *status |= trust;
         if output.input_saturated {

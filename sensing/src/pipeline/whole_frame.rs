@@ -2,10 +2,10 @@
 
 use super::{Measurement, Sensor};
 use crate::{
-    markers::{Finder, Found, Marker},
+    markers::{Found, Marker},
     status::Status,
     tables::Table,
-    windows::{Blobs, Frame, Tracks, coarse_blobs, coarse_step},
+    windows::{Blobs, Frame, Tracks, coarse_blobs},
 };
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
@@ -57,7 +57,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 
     fn find_coarsely(&mut self, frame: &[u16]) -> Option<Found> {
         let frame = Frame::new(&self.table, frame, self.settings.scan())?;
-        let step = coarse_step(&self.settings.geometry);
+        let step = self.prepared.as_ref()?.coarse_step;
         let blobs = coarse_blobs(&mut self.scanner, &frame, step)?;
         self.markers_among(&blobs)
     }
@@ -70,6 +70,6 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     }
 
     fn markers_among(&self, blobs: &Blobs) -> Option<Found> {
-        Finder::new(&self.settings).find(blobs).ok()
+        self.prepared.as_ref()?.finder.find(blobs).ok()
     }
 }
