@@ -1,17 +1,19 @@
-//! Rendered frames, looked at by the pipeline without a model: where it finds the markers, and whether it would trust
-//! them with a force.
+//! Rendered frames, looked at by the pipeline with a model that knows nothing of forces: where it finds the markers, and
+//! whether it would trust them with a force.
 
 use std::boxed::Box;
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_scene::{Frame, Load, Preset, Scene};
+use hivtac_scene::{Contact, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensing::geometry::{self, Geometry};
-use hivtac_sensing::model::CentroidEstimator;
+use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::tare::TareBuilder;
 use hivtac_sensing::threshold::ByteOrder;
+
+use crate::models;
 
 /// Both ways to take a position from pixels.
 pub const ESTIMATORS: [CentroidEstimator; 2] = [
@@ -31,6 +33,8 @@ pub struct View {
     pub size: [u32; 2],
     /// How positions are taken.
     pub estimator: CentroidEstimator,
+    /// What presses, and the reading of the model.
+    pub contact: Contact,
 }
 
 /// What was made of a frame.
@@ -47,7 +51,7 @@ pub enum Seen {
     Refused(Status),
 }
 
-/// A sensor without a model that was tared on the nominal scene at rest.
+/// A sensor that was tared on the nominal scene at rest. Its model is for such frames and such a contact.
 pub struct Looker {
     sensor: Box<Sensor<'static>>,
 }
@@ -65,13 +69,35 @@ impl View {
         }
     }
 
-    /// The nominal scene.
+    /// The nominal scene, pressed in this view's way.
     ///
     /// # Errors
     /// When the frame size is not one.
     pub fn nominal(&self) -> Result<Scene> {
         let [width, height] = self.size;
-        Ok(Scene::preset("rest", self.preset, width, height, 7)?)
+        let scene = Scene::preset("rest", self.preset, width, height, 7)?;
+        Ok(self.pressed(scene)?)
+    }
+
+    /// A scene in which loads press in this view's way.
+    ///
+    /// # Errors
+    /// When the film cannot take the scene's own load so.
+    pub fn pressed(&self, scene: Scene) -> Result<Scene, SceneError> {
+        let options = scene.options().clone();
+        let film = Mechanics {
+            contact: self.contact,
+            ..options.film
+        };
+        scene.with_options(Options { film, ..options })
+    }
+
+    fn reading(&self) -> ContactReading {
+        match self.contact {
+            Contact::Force => ContactReading::Force,
+            Contact::Stick => ContactReading::Stick,
+            Contact::Slip { .. } => ContactReading::Slip,
+        }
     }
 
     /// A sensor that looks so.
@@ -102,7 +128,13 @@ impl View {
             let features = seen.features.context("no features at rest")?;
             rest = builder.add(&markers, &features);
         }
-        looker.sensor.set_tare(rest);
+        let rest = rest.context("too few frames at rest")?;
+        let file = models::file_read_so(&settings, rest, self.reading());
+        // A few hundred bytes that a test keeps to its end.
+        let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
+        let configured = looker.sensor.configure(settings, Some(model));
+        configured.map_err(|error| anyhow!("{error}"))?;
+        looker.sensor.set_tare(Some(rest));
         Ok(looker)
     }
 }
@@ -118,10 +150,8 @@ impl Looker {
     /// What the pipeline makes of a frame.
     pub fn look(&mut self, frame: &Frame) -> Seen {
         let seen = self.sense(frame);
-        // There is no model, so that this one bit is always set.
-        let forbidden = seen.status.bits() & Status::NO_FORCE.bits();
         let markers = match seen.markers {
-            Some(markers) if forbidden == Status::MODEL_MISSING.bits() => markers,
+            Some(markers) if !seen.status.intersects(Status::NO_FORCE) => markers,
             _ => return Seen::Refused(seen.status),
         };
         let (mut worst_px, mut sum) = (0.0f64, [0.0, 0.0]);

@@ -9,6 +9,7 @@ use hivtac_sensing::model::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, OUTPUTS, Origin,
     OutputKind, PixelFormat, Rest, Uncertainty, WeightWidth,
 };
+use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::HsvBox;
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
 
@@ -74,6 +75,22 @@ pub fn file_for(
     seed: u64,
 ) -> Vec<u8> {
     encoded(&spec(geometry, rest, widths, weights, output, seed))
+}
+
+/// A small model for frames that are looked at so, of which labels mean that.
+pub fn file_read_so(settings: &Settings, rest: Rest, contact: ContactReading) -> Vec<u8> {
+    let output = OutputKind::ForceVector;
+    let mut spec = spec(
+        settings.geometry,
+        rest,
+        &[11, 3],
+        Weights::Random,
+        output,
+        1,
+    );
+    spec.conditions.centroid = settings.centroid;
+    spec.conditions.contact = contact;
+    encoded(&spec)
 }
 
 fn qvga() -> Geometry {

@@ -1,10 +1,13 @@
 //! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused for it.
 
-use hivtac_scene::{Expected, Load, Preset};
+use hivtac_scene::{Contact, Expected, Load, Preset};
 use hivtac_tests::hard::look_at_all;
 use hivtac_tests::looking::{ESTIMATORS, Seen, View};
 
-fn views(sizes: &[[u32; 2]]) -> Vec<View> {
+const STICK: Contact = Contact::Stick;
+const SLIP: Contact = Contact::Slip { mu: 0.6 };
+
+fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<View> {
     let mut views = Vec::new();
     for &size in sizes {
         for preset in [Preset::Ov7725, Preset::Paper] {
@@ -12,20 +15,21 @@ fn views(sizes: &[[u32; 2]]) -> Vec<View> {
                 preset,
                 size,
                 estimator,
+                contact,
             }));
         }
     }
     views
 }
 
-/// Every case is right or refused; what is plain to see is mostly found.
+/// Every case is right or refused; what is plain to see is found in half of the frames at least.
 fn hold(views: &[View], repeats: u64) {
     let mut wrong = Vec::new();
     for &view in views {
         for outcome in look_at_all(view, repeats).unwrap() {
             println!("{view:?} {}", outcome.row());
             let found =
-                outcome.case.expected != Expected::Found || 2 * outcome.trusted > outcome.frames;
+                outcome.case.expected != Expected::Found || 2 * outcome.trusted >= outcome.frames;
             if outcome.is_silently_wrong() || !found {
                 wrong.push(format!("{view:?}\n{}", outcome.row()));
             }
@@ -36,23 +40,35 @@ fn hold(views: &[View], repeats: u64) {
 
 #[test]
 fn hard_cases_are_right_or_refused() {
-    hold(&views(&[[320, 240]]), 1);
+    hold(&views(Contact::Force, &[[320, 240]]), 1);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn hard_cases_are_right_or_refused_at_every_size() {
-    hold(&views(&[[320, 240], [800, 600]]), 4);
+    hold(&views(Contact::Force, &[[320, 240], [800, 600]]), 4);
 }
 
-/// Presses over the whole range in a sequence that fills it evenly: |F| to 0.25 N, α to ±11.5°, β to ±9.5°,
-/// the tip up to 0.25 mm off the middle.
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn hard_cases_are_right_or_refused_where_the_tip_sticks() {
+    hold(&views(STICK, &[[320, 240], [800, 600]]), 2);
+}
+
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn hard_cases_are_right_or_refused_where_the_tip_slips() {
+    hold(&views(SLIP, &[[320, 240], [800, 600]]), 2);
+}
+
+/// Presses over the whole range in a sequence that fills it evenly: |F| to 0.25 N, α to ±12°, β to ±10°, the tip up to
+/// 0.25 mm off the middle.
 fn honest_load(index: usize) -> Load {
     let part = |step: f64| (0.5 + index as f64 * step).fract();
     let signed = |step: f64| 2.0 * part(step) - 1.0;
     let (alpha, beta) = (
-        11.5 * signed(0.671_043_606_703_789_2),
-        9.5 * signed(0.549_700_477_901_970_3),
+        12.0 * signed(0.671_043_606_703_789_2),
+        10.0 * signed(0.549_700_477_901_970_3),
     );
     let (sin, cos) = (std::f64::consts::TAU * part(0.450_306_786)).sin_cos();
     let offset = 0.25 * part(0.368_875).sqrt();
@@ -88,21 +104,43 @@ fn refused(view: View, frames: usize) -> usize {
     refused
 }
 
+/// Of so many frames, one of a thousand may be refused.
+fn hardly_any_is_refused(views: &[View], frames: usize) {
+    for &view in views {
+        assert!(refused(view, frames) <= frames.div_ceil(1000), "{view:?}");
+    }
+}
+
 #[test]
 fn honest_frames_are_accepted() {
-    for view in views(&[[320, 240]]) {
-        // One of a thousand may be.
-        assert!(refused(view, 500) <= 1, "{view:?}");
-    }
+    hardly_any_is_refused(&views(Contact::Force, &[[320, 240]]), 500);
+}
+
+#[test]
+fn honest_frames_of_a_tip_that_sticks_or_slips_are_accepted() {
+    hardly_any_is_refused(&views(STICK, &[[320, 240]]), 250);
+    hardly_any_is_refused(&views(SLIP, &[[320, 240]]), 250);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn of_ten_thousand_honest_frames_at_most_ten_are_refused() {
-    for view in views(&[[320, 240]]) {
-        assert!(refused(view, 10_000) <= 10, "{view:?}");
+    hardly_any_is_refused(&views(Contact::Force, &[[320, 240]]), 10_000);
+    hardly_any_is_refused(&views(Contact::Force, &[[800, 600]]), 1_000);
+}
+
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn of_the_honest_frames_of_a_tip_that_sticks_one_in_a_thousand_is_refused() {
+    hardly_any_is_refused(&views(STICK, &[[320, 240]]), 4_000);
+    hardly_any_is_refused(&views(STICK, &[[800, 600]]), 1_000);
+}
+
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn of_the_honest_frames_of_a_tip_that_slips_one_in_a_thousand_is_refused() {
+    for mu in [0.3, 0.6, 1.0] {
+        hardly_any_is_refused(&views(Contact::Slip { mu }, &[[320, 240]]), 2_000);
     }
-    for view in views(&[[800, 600]]) {
-        assert!(refused(view, 1_000) <= 1, "{view:?}");
-    }
+    hardly_any_is_refused(&views(SLIP, &[[800, 600]]), 1_000);
 }

@@ -1,6 +1,6 @@
 //! What the marker rules let through on rendered frames: every honest frame, and no false one beyond a bound.
 
-use hivtac_scene::{Frame, Load, Options, Paint, Patch, Preset, Scene};
+use hivtac_scene::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;
 use hivtac_tests::looking::{ESTIMATORS, Looker, Seen, View};
 
@@ -23,6 +23,7 @@ const fn view(preset: Preset, estimator: CentroidEstimator) -> View {
         preset,
         size: [320, 240],
         estimator,
+        contact: Contact::Force,
     }
 }
 

@@ -1,8 +1,8 @@
 //! Prints what the sensing makes of the scene's hard cases, as Markdown: `cargo run --release -p hivtac-tests --bin
-//! hard-cases -- [REPEATS]`.
+//! hard-cases -- [REPEATS [CONTACT]]`.
 
 use anyhow::{Context, Result};
-use hivtac_scene::Preset;
+use hivtac_scene::{Contact, Preset};
 use hivtac_tests::hard::{look_at_all, table};
 use hivtac_tests::looking::{ESTIMATORS, View};
 
@@ -16,6 +16,10 @@ fn main() -> Result<()> {
             .parse()
             .context("REPEATS is the number of frames for each case and load")?,
     };
+    let contact = match std::env::args().nth(2) {
+        None => Contact::Force,
+        Some(text) => text.parse()?,
+    };
     for (preset, size) in [
         (Preset::Ov7725, [320, 240]),
         (Preset::Paper, [320, 240]),
@@ -27,6 +31,7 @@ fn main() -> Result<()> {
                 preset,
                 size,
                 estimator,
+                contact,
             };
             println!("{}", table(view, &look_at_all(view, repeats)?));
         }
