@@ -270,6 +270,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.labels.kept()
     }
 
+    /// Whether no blob is open: the rows so far may have shown all that the frame has.
+    #[inline(always)]
+    pub(crate) fn is_settled(&self) -> bool {
+        self.labels.is_idle()
+    }
+
     /// How many rows are still missing.
     fn room(&self) -> usize {
         let missing = self.settings.height.saturating_sub(self.rows_in);

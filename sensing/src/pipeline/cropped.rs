@@ -1,6 +1,6 @@
 //! Frames of which the camera interface passes only a rectangle: the one that holds the markers' windows.
 
-use super::{Measurement, Sensor};
+use super::{Measurement, Sensor, ahead::Ahead};
 use crate::{
     markers::Found,
     status::Status,
@@ -15,6 +15,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let settings = settings_within(self.settings.scan(), &window);
         // A window of no size makes the frame incomplete.
         let _ = self.scanner.begin_at((window.x0, window.y0), settings);
+        self.ahead = Ahead::Off;
     }
 
     /// Ends a frame that was begun with the same `window`.

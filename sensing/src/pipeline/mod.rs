@@ -1,5 +1,6 @@
 //! Rows in, measurement out.
 
+mod ahead;
 mod cropped;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,7 @@ use crate::{
     threshold::{ByteOrder, HsvBox, ThresholdError},
     windows::coarse_step,
 };
+use ahead::Ahead;
 
 /// What one frame gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,6 +55,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     network: Network,
     /// `None` until it is configured.
     prepared: Option<Prepared>,
+    ahead: Ahead,
 }
 
 /// What follows from settings, model and tare before there is a frame.
@@ -85,6 +88,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             scanner: Scanner::new(),
             network: Network::new(),
             prepared: None,
+            ahead: Ahead::Off,
         }
     }
 
@@ -151,20 +155,29 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     pub fn begin_frame(&mut self) {
         // An error cannot happen after `configure`, and makes every frame incomplete before it.
         let _ = self.scanner.begin(self.settings.scan());
+        self.ahead = Ahead::Nothing;
     }
 
     /// Takes the next row of pixels, as they lie in memory: one `u16` a pixel, exactly the frame's width.
     pub fn push_row(&mut self, row: &[u16]) {
         self.scanner.push_row(&self.table, row);
+        self.look_ahead();
     }
 
     /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than one by one.
     pub fn push_rows(&mut self, rows: &[u16]) {
         self.scanner.push_rows(&self.table, rows);
+        self.look_ahead();
     }
 
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
+        if let Err(reason) = self.end_scan() {
+            return self.measurement(Err(reason));
+        }
+        if let Some(measurement) = self.ahead.measurement(self.scanner.blobs().len()) {
+            return measurement;
+        }
         let found = self.find_markers();
         self.measurement(found)
     }
@@ -203,6 +216,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Works out anew what follows from settings, model and tare.
     fn prepare(&mut self) {
+        self.ahead = Ahead::Off;
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self
@@ -239,7 +253,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         status
     }
 
-    fn find_markers(&mut self) -> Result<Found, Status> {
+    /// Brings out the last blobs; says why the frame as a whole has no markers.
+    fn end_scan(&mut self) -> Result<(), Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
         let scan = self.scanner.finish(&self.table);
@@ -252,9 +267,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         if scan.set_pixels > pixels / SATURATED_PART {
             return Err(Status::IMAGE_SATURATED);
         }
+        Ok(())
+    }
+
+    fn find_markers(&self) -> Result<Found, Status> {
         // Before it is configured nothing passes the threshold.
         let prepared = self.prepared.as_ref().ok_or(Status::IMAGE_DARK)?;
-        prepared.finder.find(scan.blobs)
+        prepared.finder.find(self.scanner.blobs())
     }
 
     /// The force of a frame's features, unless `status` already forbids one.
