@@ -9,7 +9,7 @@
 use core::ops::Range;
 
 use crate::{
-    mask::{MAX_WORDS, last_word_bits, words_of},
+    mask::{MAX_WORDS, any_set, last_word_bits, words_of},
     runs::Edges,
 };
 
@@ -97,20 +97,24 @@ impl Dilation {
     pub fn edges(&self, i: usize, edges: &mut Edges) {
         edges.clear();
         let near = self.near();
-        let height = 2 * usize::from(self.radius) + 1;
-        let mut rows = self.mask[i * self.words..]
-            .chunks_exact(self.words)
-            .take(height)
-            .map(|row| &row[near.clone()]);
-        if let (1, Some(a), Some(b), Some(c)) = (self.radius, rows.next(), rows.next(), rows.next())
-        {
+        if self.radius == 1 {
+            let first = i * self.words + near.start;
+            let (a, b, c) = (first, first + self.words, first + 2 * self.words);
+            let row = |from: usize| &self.mask[from..][..near.len()];
+            let (a, b, c) = (row(a), row(b), row(c));
             let columns = a.iter().zip(b).zip(c).map(|((a, b), c)| a | b | c);
             self.spread(1, near.start, columns, edges);
-            return;
+        } else {
+            self.edges_of_any(i, near, edges);
         }
+    }
+
+    /// The same for any radius.
+    #[inline(never)]
+    fn edges_of_any(&self, i: usize, near: Range<usize>, edges: &mut Edges) {
         let rows = self.mask[i * self.words..].chunks_exact(self.words);
         let mut columns = [0; MAX_WORDS];
-        for row in rows.take(height) {
+        for row in rows.take(2 * usize::from(self.radius) + 1) {
             let all = columns.iter_mut().zip(&row[near.clone()]);
             all.for_each(|(all, word)| *all |= word);
         }
@@ -163,11 +167,9 @@ impl Dilation {
         let from = rows * self.words;
         self.mask.copy_within(from..from + kept, 0);
         self.occupied = 0;
-        if kept > 0 {
-            for row in self.mask[..kept].chunks_exact(self.words) {
-                for (i, word) in row.iter().enumerate() {
-                    self.occupied |= u32::from(*word != 0) << i;
-                }
+        for row in self.mask[..kept].chunks_exact(self.words) {
+            for (i, word) in row.iter().enumerate() {
+                self.occupied |= u32::from(*word != 0) << i;
             }
         }
     }
@@ -176,14 +178,6 @@ impl Dilation {
     fn kept(&self) -> usize {
         2 * usize::from(self.radius) * self.words
     }
-}
-
-/// Whether a word is not 0.
-fn any_set(words: &[u32]) -> bool {
-    let (eights, rest) = words.as_chunks();
-    let rest = rest.iter().fold(0, |all, word| all | word);
-    let eight = |[a, b, c, d, e, f, g, h]: &[u32; 8]| ((a | b) | (c | d)) | ((e | f) | (g | h));
-    eights.iter().fold(rest, |all, words| all | eight(words)) != 0
 }
 
 /// One word of a row, spread by `radius` < 32 columns, given its neighbours.

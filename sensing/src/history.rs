@@ -45,9 +45,9 @@ pub struct Band<'p> {
     pub first: u16,
     /// `u16`s of a row.
     pub row_length: usize,
-    /// From where one row begins to where the next does: at least 1.
+    /// From where one row begins to where the next does.
     pub stride: usize,
-    /// The rows; the last one is whole.
+    /// The rows.
     pub pixels: &'p [u16],
 }
 
@@ -59,11 +59,6 @@ impl<'p> Band<'p> {
         stride: 1,
         pixels: &[],
     };
-
-    /// How many there are.
-    pub fn rows(&self) -> usize {
-        self.pixels.len().div_ceil(self.stride)
-    }
 
     /// So many rows ≥ 1 from row `y` of the frame on, all of which are in the band.
     pub fn part(&self, y: u16, rows: usize) -> &'p [u16] {

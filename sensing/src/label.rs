@@ -95,7 +95,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         let count = edges.runs().len() as u32;
         self.runs_left = self.runs_left.and_then(|left| left.checked_sub(count));
         self.overflowed |= self.runs_left.is_none();
-        self.label_row(y);
+        if !self.continue_blobs(y) {
+            self.label_row(y);
+        }
     }
 
     /// Weighs the runs of row `y`, which was pushed last.
@@ -137,6 +139,37 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed
     }
 
+    /// Labels the runs of the last row, `y`, when each touches just one of those above, and each of these just one of them: the usual
+    /// case. Otherwise does nothing and gives false.
+    fn continue_blobs(&mut self, y: u16) -> bool {
+        let (left, y) = (self.origin.0, y + self.origin.1);
+        let [a, b] = &mut self.rows;
+        let (before, current) = if self.last == 0 { (b, a) } else { (a, b) };
+        let (above, runs) = (before.edges.runs(), current.edges.runs());
+        let mut free = [0, 0];
+        for (a, b) in above.iter().zip(runs) {
+            let touch = a[0] <= b[1] && b[0] <= a[1];
+            let apart = free[0] <= b[0] && free[1] <= a[0];
+            if !touch || !apart {
+                return false;
+            }
+            // Behind what touches these.
+            free = [a[1] + 1, b[1] + 1];
+        }
+        if above.len() != runs.len() {
+            return false;
+        }
+        let labels = current.labels.iter_mut().zip(&before.labels);
+        for (&[x0, end], (label, above)) in runs.iter().zip(labels) {
+            *label = *above;
+            let run = Run { x0, x1: end - 1 }.moved(left);
+            self.forest.slots[usize::from(*above)]
+                .moments
+                .add_run(run, y);
+        }
+        true
+    }
+
     /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.
     fn label_row(&mut self, y: u16) {
         let (left, y) = (self.origin.0, y + self.origin.1);
@@ -151,10 +184,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             while above.get(first).is_some_and(|above| above[1] < x0) {
                 first += 1;
             }
-            let run = Run {
-                x0: x0 + left,
-                x1: end - 1 + left,
-            };
+            let run = Run { x0, x1: end - 1 }.moved(left);
             let touched = above[first..].iter().zip(&above_labels[first..]);
             let mut touched = touched.take_while(|(above, _)| above[0] <= end);
             let Some((_, touched_label)) = touched.next() else {

@@ -11,6 +11,17 @@ pub struct Run {
     pub x1: u16,
 }
 
+impl Run {
+    /// The run so many columns to the right.
+    #[inline(always)]
+    pub(crate) fn moved(self, columns: u16) -> Run {
+        Run {
+            x0: self.x0 + columns,
+            x1: self.x1 + columns,
+        }
+    }
+}
+
 /// Calls `visit` with each edge of a word whose first column is `column`: where a bit differs from the one before it. `open` says
 /// whether the bit before the word is set.
 ///
@@ -92,6 +103,7 @@ impl Edges {
     }
 
     /// First column of each run, and the one behind its last.
+    #[inline(always)]
     pub fn runs(&self) -> &[[u16; 2]] {
         let (edges, _) = self.columns.split_at(self.count.min(self.columns.len()));
         edges.as_chunks().0

@@ -190,7 +190,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
         let length = pixels.row_length(self.settings.width);
         if row.len() == length {
-            self.push_apart(pixels, row, length);
+            self.push_apart(pixels, row, length, 1);
         } else {
             self.status |= Status::FRAME_INCOMPLETE;
         }
@@ -200,22 +200,27 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// is left out and makes the frame incomplete. The more rows at a time, the less each of them costs.
     pub fn push_rows(&mut self, pixels: &impl Pixels, rows: &[u16]) {
         let length = pixels.row_length(self.settings.width).max(1);
-        let whole = rows.len() - rows.len() % length;
-        if whole < rows.len() {
+        let count = rows.len() / length;
+        if count * length < rows.len() {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        self.push_apart(pixels, &rows[..whole], length);
+        self.push_apart(pixels, rows, length, count);
     }
 
-    /// Takes the next rows, which begin every `stride` `u16`s and are whole.
-    pub(crate) fn push_apart(&mut self, pixels: &impl Pixels, rows: &[u16], stride: usize) {
+    /// Takes the next `count` rows, which begin every `stride` `u16`s.
+    pub(crate) fn push_apart(
+        &mut self,
+        pixels: &impl Pixels,
+        rows: &[u16],
+        stride: usize,
+        count: usize,
+    ) {
         let band = Band {
             first: self.rows_in,
             row_length: pixels.row_length(self.settings.width),
-            stride: stride.max(1),
+            stride,
             pixels: rows,
         };
-        let count = band.rows();
         let room = self.room();
         if count > room {
             self.status |= Status::FRAME_INCOMPLETE;
@@ -286,17 +291,24 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
         if !self.labels.is_exhausted() {
             self.set_pixels += self.dilation.look(rows);
-            self.label(pixels, band, rows);
+            if !self.is_quiet() {
+                self.label(pixels, band, rows);
+            }
         }
         self.rows_in += rows as u16;
+    }
+
+    /// Whether nothing is set nearby and no blob is open, as with most rows.
+    #[inline(always)]
+    fn is_quiet(&self) -> bool {
+        self.dilation.is_empty() && self.labels.is_idle()
     }
 
     /// Passes rows through the dilation to the labels, where the pixels of their runs are weighed.
     fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
         let late = u16::from(self.dilation.radius());
         for i in 0..rows {
-            if self.dilation.is_empty() && self.labels.is_idle() {
-                // As most rows are.
+            if self.is_quiet() {
                 return;
             }
             let Some(y) = (self.rows_in + i as u16).checked_sub(late) else {

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     geometry::Geometry,
-    mask::{MAX_WORDS, words_of},
+    mask::{MAX_WORDS, any_set, words_of},
     runs::{Run, for_each_run},
     scanner::Scanner,
     tables::Pixels,
@@ -54,6 +54,9 @@ fn hits<P: Pixels>(frame: &Frame<'_, P>, step: u16) -> Option<Windows> {
         };
         let mask = mask.get_mut(..words_of(width))?;
         frame.pixels().mask_row(frame.part(&row), mask);
+        if !any_set(mask) {
+            continue;
+        }
         for_each_run(mask, |run| {
             if room.is_ok() {
                 room = windows.add(around(run, y, step, frame), frame.rectangle());

@@ -5,7 +5,14 @@ use heapless::Vec;
 
 /// A few windows of a frame, none of which overlaps another, even when each is [widened to words](Rectangle::in_words).
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Windows(Vec<Rectangle, MAX_WINDOWS>);
+pub(crate) struct Windows(Vec<Window, MAX_WINDOWS>);
+
+/// A window, and widened to words.
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    exact: Rectangle,
+    in_words: Rectangle,
+}
 
 impl Windows {
     /// Adds one; those that overlap it are joined with it.
@@ -13,24 +20,31 @@ impl Windows {
     /// # Errors
     /// When there are too many.
     pub fn add(&mut self, window: Rectangle, frame: Rectangle) -> Result<(), TooMany> {
-        let mut window = window;
-        while let Some(other) = self.take_overlapping(&window, frame) {
-            window = window.joined(&other);
+        let mut exact = window;
+        loop {
+            let in_words = exact.in_words(frame);
+            match self.take_overlapping(&in_words) {
+                Some(other) => exact = exact.joined(&other),
+                None => {
+                    let window = Window { exact, in_words };
+                    return self.0.push(window).map_err(|_| TooMany);
+                }
+            }
         }
-        self.0.push(window).map_err(|_| TooMany)
     }
 
-    /// Takes one out.
+    /// Takes one out, widened to words.
     pub fn pop(&mut self) -> Option<Rectangle> {
-        self.0.pop()
+        self.0.pop().map(|window| window.in_words)
     }
 
-    /// Takes one out that overlaps `window`.
-    pub fn take_overlapping(&mut self, window: &Rectangle, frame: Rectangle) -> Option<Rectangle> {
-        let widened = window.in_words(frame);
-        let overlaps = |other: &Rectangle| other.in_words(frame).overlaps(&widened);
-        let other = self.0.iter().position(overlaps)?;
-        Some(self.0.swap_remove(other))
+    /// Takes one out that overlaps `window`, which is widened to words, when it is so, too.
+    pub fn take_overlapping(&mut self, window: &Rectangle) -> Option<Rectangle> {
+        let other = self
+            .0
+            .iter()
+            .position(|other| other.in_words.overlaps(window))?;
+        Some(self.0.swap_remove(other).exact)
     }
 }
 

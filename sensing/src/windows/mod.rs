@@ -9,6 +9,7 @@
 
 mod coarse;
 mod list;
+mod lone;
 mod rectangle;
 mod scan;
 #[cfg(test)]

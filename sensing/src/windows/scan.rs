@@ -1,6 +1,6 @@
 //! Full scans of windows.
 
-use super::{Blobs, list::Windows, rectangle::Rectangle};
+use super::{Blobs, list::Windows, lone::lone_blob, rectangle::Rectangle};
 use crate::{
     blob::Blob,
     scanner::{ScanSettings, Scanner},
@@ -126,9 +126,14 @@ pub(crate) fn scan_window<P: Pixels, const BLOBS: usize>(
     mut visit: impl FnMut(Blob),
 ) -> Option<()> {
     budget.spend(window)?;
+    if let Some(found) = lone_blob(frame, window) {
+        found.into_iter().for_each(visit);
+        return Some(());
+    }
     let settings = settings_within(*frame.settings(), window);
     scanner.begin_at((window.x0, window.y0), settings).ok()?;
-    scanner.push_apart(frame.pixels(), frame.part(window), frame.row_length());
+    let rows = usize::from(window.height());
+    scanner.push_apart(frame.pixels(), frame.part(window), frame.row_length(), rows);
     let scan = scanner.finish(frame.pixels());
     if scan.status != Status::OK {
         return None;
@@ -148,7 +153,6 @@ pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
     let mut found = Blobs::new();
     let whole_frame = frame.rectangle();
     while let Some(window) = windows.pop() {
-        let window = window.in_words(whole_frame);
         let mut grown = window;
         let mut whole = Blobs::new();
         let mut full = false;
@@ -168,7 +172,7 @@ pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
             continue;
         }
         // What it has grown over is scanned again as its part.
-        while let Some(other) = settled.take_overlapping(&grown, whole_frame) {
+        while let Some(other) = settled.take_overlapping(&grown.in_words(whole_frame)) {
             grown = grown.joined(&other);
         }
         found.retain(|blob| !grown.contains(&Rectangle::of_blob(blob)));

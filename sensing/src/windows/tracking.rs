@@ -76,7 +76,6 @@ impl Tracks {
         let mut found = Blobs::new();
         let mut all_whole = true;
         while let Some(window) = windows.pop() {
-            let window = window.in_words(frame.rectangle());
             scan_window(scanner, frame, &window, &mut budget, |blob| {
                 let whole = frame.is_whole(&blob, &window);
                 if blob.area >= frame.settings().min_area || !whole {

@@ -96,7 +96,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
     let (_, module) = file.rsplit_once("sensing/src/")?;
     let module = module.split(['/', '.']).next()?;
     match module {
-        "threshold" | "tables" | "mask" | "hsv" => Some("threshold"),
+        "threshold" | "tables" | "hsv" => Some("threshold"),
         "dilate" => Some("dilation"),
         "runs" | "label" | "blob" | "moments" => Some("runs, labels, moments"),
         "markers" | "geometry" => Some("markers"),
@@ -104,7 +104,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         "network" | "model" => Some("network"),
         "force" | "cordic" => Some("angles, force"),
         // Small things that belong to whoever uses them.
-        "units" | "status" | "kernels" => None,
+        "units" | "status" | "kernels" | "mask" => None,
         _ => Some("pipeline"),
     }
 }
