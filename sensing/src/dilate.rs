@@ -8,6 +8,8 @@
 
 use core::ops::Range;
 
+#[cfg(armv7em)]
+use crate::kernels::{Near, dilate_edges};
 use crate::{
     mask::{MAX_WORDS, any_set, last_word_bits, words_of},
     runs::Edges,
@@ -97,29 +99,50 @@ impl Dilation {
     pub fn edges(&self, i: usize, edges: &mut Edges) {
         edges.clear();
         let near = self.near();
+        #[cfg(armv7em)]
         if self.radius == 1 {
-            let first = i * self.words + near.start;
-            let (a, b, c) = (first, first + self.words, first + 2 * self.words);
-            let row = |from: usize| &self.mask[from..][..near.len()];
-            let (a, b, c) = (row(a), row(b), row(c));
-            let columns = a.iter().zip(b).zip(c).map(|((a, b), c)| a | b | c);
-            self.spread(1, near.start, columns, edges);
+            let rows = self.mask.get(i * self.words + near.start..);
+            let rows = rows.unwrap_or_default();
+            let words = Near {
+                first: near.start,
+                words: near.len(),
+                last: self.last_bits(near.end),
+            };
+            edges.fill(|edges| dilate_edges(rows, self.words, words, edges));
+            return edges.end(32 * self.words as u16);
+        }
+        self.spread(i, near, edges);
+    }
+
+    /// The bits of the word before word `end` that lie in the row.
+    fn last_bits(&self, end: usize) -> u32 {
+        if end == self.words {
+            last_word_bits(self.width)
         } else {
-            self.edges_of_any(i, near, edges);
+            u32::MAX
         }
     }
 
-    /// The same for any radius.
-    #[inline(never)]
-    fn edges_of_any(&self, i: usize, near: Range<usize>, edges: &mut Edges) {
+    /// The edges of row `i` within its words `near`.
+    fn spread(&self, i: usize, near: Range<usize>, edges: &mut Edges) {
         let rows = self.mask[i * self.words..].chunks_exact(self.words);
         let mut columns = [0; MAX_WORDS];
+        let columns = &mut columns[..near.len()];
         for row in rows.take(2 * usize::from(self.radius) + 1) {
             let all = columns.iter_mut().zip(&row[near.clone()]);
             all.for_each(|(all, word)| *all |= word);
         }
-        let columns = columns.into_iter().take(near.len());
-        self.spread(self.radius, near.start, columns, edges);
+        let mut left = 0;
+        for (i, &word) in columns.iter().enumerate() {
+            let right = columns.get(i + 1).copied().unwrap_or(0);
+            if left | word | right != 0 {
+                let at = near.start + i;
+                let spread = spread_word(left, word, right, self.radius);
+                edges.take(32 * at as u16, spread & self.last_bits(at + 1));
+            }
+            left = word;
+        }
+        edges.end(32 * self.words as u16);
     }
 
     /// The words in which a dilated row may have set bits: from the first to before the last that is next to an occupied one.
@@ -127,35 +150,6 @@ impl Dilation {
         let first = self.occupied.trailing_zeros() as usize;
         let end = 32 - self.occupied.leading_zeros() as usize;
         first.saturating_sub(1).min(end)..(end + 1).min(self.words)
-    }
-
-    /// The edges of `columns`, the words of some rows one over the other from word `first` on, spread by `radius`.
-    #[inline(always)]
-    fn spread(
-        &self,
-        radius: u8,
-        first: usize,
-        mut columns: impl Iterator<Item = u32>,
-        edges: &mut Edges,
-    ) {
-        let last_column = 32 * (self.words as u16 - 1);
-        let mut column = 32 * first as u16;
-        let mut left = 0;
-        let mut next = columns.next();
-        while let Some(word) = next {
-            next = columns.next();
-            let right = next.unwrap_or(0);
-            if left | word | right != 0 {
-                let mut spread = spread_word(left, word, right, radius);
-                if column == last_column {
-                    spread &= last_word_bits(self.width);
-                }
-                edges.take(column, spread);
-            }
-            left = word;
-            column += 32;
-        }
-        edges.end(last_column + 32);
     }
 
     /// Moves on: of the rows that were kept or written, only the last 2n are still needed.

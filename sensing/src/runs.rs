@@ -86,6 +86,12 @@ impl Edges {
         for_each_edge(column, word, open, |x| self.push(x));
     }
 
+    /// Takes all edges but for one at the row's end from `find`, which writes them and says how many.
+    #[cfg(armv7em)]
+    pub fn fill(&mut self, find: impl FnOnce(&mut [u16; MAX_WIDTH as usize]) -> usize) {
+        self.count = find(&mut self.columns).min(self.columns.len());
+    }
+
     /// Ends the row, which has so many columns.
     #[inline(always)]
     pub fn end(&mut self, columns: u16) {

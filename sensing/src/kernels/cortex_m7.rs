@@ -4,15 +4,17 @@
 //! said here are those of LLVM's model of the core (`llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7`, the
 //! block between a label and the branch back to it), with weights and inputs in memory without wait states.
 //!
-//! None of them touches the stack but for what it saves, none has a path that depends on data, and all follow the
+//! None of them touches the stack but for what it saves, only `hivtac_dilate_edges` has paths that depend on data, and all follow the
 //! procedure call standard: r0–r3, r12 and the flags are lost, the Q flag may be set.
 
 use core::arch::global_asm;
 
-use super::{Inputs, LOADED_AHEAD, Sums};
+use super::{Inputs, LOADED_AHEAD, Near, Sums};
+use crate::mask::MAX_WIDTH as MAX_ROW_WIDTH;
 use crate::model::{Layer, MAX_ACTIVATION8, MAX_WEIGHT8, MAX_WIDTH, WeightWidth};
 
 global_asm!(include_str!("activate.s"), options(raw));
+global_asm!(include_str!("dilate_edges.s"), options(raw));
 global_asm!(include_str!("dot8.s"), options(raw));
 global_asm!(include_str!("dot16.s"), options(raw));
 global_asm!(include_str!("threshold_bits.s"), options(raw));
@@ -99,6 +101,25 @@ unsafe extern "C" {
         end: *const i16,
         largest: u32,
     );
+
+    /// Equals `Dilation::edges` for one dilation: the edges of a dilated row, but for one at its end.
+    ///
+    /// Words that are empty, as are their neighbours, cost one test. In others the bits that differ from the one before are found
+    /// from the left by CLZ, mirrored.
+    ///
+    /// *Contract.* `rows`: `words` ≥ 1 words, the same of the row `stride` bytes behind, and of the one behind that; the words beside
+    /// them in these rows are empty. `column`: that of the first word. Writes at most 32 edges for each word, and gives where the
+    /// next would go. `last`: the bits of the last word that are in the row.
+    ///
+    /// *Schedule.* About 9 cycles for an empty word, 17 for another, and 5 for each edge.
+    fn hivtac_dilate_edges(
+        rows: *const u32,
+        stride: usize,
+        words: usize,
+        column: u32,
+        edges: *mut u16,
+        last: u32,
+    ) -> *mut u16;
 
     /// Equals `portable::threshold_bytes` for whole words of the mask.
     ///
@@ -246,4 +267,26 @@ pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32]) -> usi
 fn whole_words<'m>(row: &[u16], mask: &'m mut [u32]) -> &'m mut [u32] {
     let count = (row.len() / 32).min(mask.len());
     mask.split_at_mut(count).0
+}
+
+/// The edges of a row of the mask, of `near` words of which `rows` begins with those of three rows that lie `row_words` apart; their
+/// number. None when that is not so, or there are more than room.
+pub fn dilate_edges(
+    rows: &[u32],
+    row_words: usize,
+    near: Near,
+    edges: &mut [u16; MAX_ROW_WIDTH as usize],
+) -> usize {
+    let Near { first, words, last } = near;
+    let fits = rows.len() >= 2 * row_words + words && 32 * words <= edges.len();
+    if words == 0 || !fits {
+        return 0;
+    }
+    let begin = edges.as_mut_ptr();
+    // SAFETY: the words of all three rows are in `rows`, and there is room for 32 edges for each.
+    let end = unsafe {
+        let (rows, stride, column) = (rows.as_ptr(), 4 * row_words, 32 * first as u32);
+        hivtac_dilate_edges(rows, stride, words, column, begin, last)
+    };
+    (end as usize - begin as usize) / 2
 }

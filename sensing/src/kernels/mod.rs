@@ -6,6 +6,8 @@
 #[cfg(armv7em)]
 #[allow(unsafe_code)]
 mod cortex_m7;
+#[cfg(armv7em)]
+pub use cortex_m7::dilate_edges;
 mod portable;
 
 use crate::model::{Layer, MAX_WIDTH};
@@ -50,6 +52,18 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
     #[cfg(not(armv7em))]
     let done = 0;
     portable::activate(layer, sums, inputs.values_mut(), done);
+}
+
+/// Some words of a row of the mask.
+#[cfg(armv7em)]
+#[derive(Clone, Copy, Debug)]
+pub struct Near {
+    /// Which word of the row is their first.
+    pub first: usize,
+    /// How many.
+    pub words: usize,
+    /// Those bits of the last one that lie in the row.
+    pub last: u32,
 }
 
 /// The mask of a row of pixels through a table of bytes: see `portable::threshold_bytes`.
