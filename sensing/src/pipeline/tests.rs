@@ -116,6 +116,42 @@ fn a_tare_that_cannot_be_is_none() {
     assert_eq!(sensor.tare(), None);
 }
 
+/// The pattern tapered along x and sheared, px at each marker: what a tip does that the film sticks to.
+fn pulled(taper: f64, shear: f64) -> Pattern {
+    let signs = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    Pattern {
+        displaced: signs.map(|(x, y)| (taper * x * y + shear * y, shear * x)),
+        ..Pattern::at_rest(GEOMETRY)
+    }
+}
+
+#[test]
+fn the_models_contact_reading_says_what_the_markers_may_do() {
+    let mut one_displaced = Pattern::at_rest(GEOMETRY);
+    one_displaced.displaced[1] = (1.1, 0.0);
+    for (contact, may_be_pulled) in [
+        (ContactReading::Force, false),
+        (ContactReading::Stick, true),
+        (ContactReading::Slip, false),
+    ] {
+        with_model(
+            |spec| spec.conditions.contact = contact,
+            |sensor| {
+                let rest = rest_of(&pulled(0.0, 0.0).draw(), sensor);
+                sensor.set_tare(Some(rest));
+                let mut is_refused = |pattern: &Pattern| {
+                    let status = pattern.draw().feed(sensor).status;
+                    status.contains(Status::MARKERS_IMPLAUSIBLE)
+                };
+                assert!(!is_refused(&pulled(2.0, 0.0)), "{contact:?}: tapered");
+                assert_eq!(is_refused(&pulled(3.0, 0.7)), !may_be_pulled, "{contact:?}");
+                assert!(is_refused(&pulled(0.0, 0.7)), "{contact:?}: sheared alone");
+                assert!(is_refused(&one_displaced), "{contact:?}: one marker");
+            },
+        );
+    }
+}
+
 #[test]
 fn far_from_all_training_is_out_of_range() {
     with_model(

@@ -102,9 +102,9 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         "markers" | "geometry" => Some("markers"),
         "features" => Some("features"),
         "network" | "model" => Some("network"),
-        "force" | "cordic" => Some("angles, force"),
+        "force" | "angle" | "cordic" => Some("angles, force"),
         // Small things that belong to whoever uses them.
-        "units" | "status" | "kernels" | "mask" => None,
+        "units" | "status" | "kernels" | "mask" | "division" | "root" => None,
         _ => Some("pipeline"),
     }
 }
