@@ -39,25 +39,25 @@ const FORCE: Reading = Reading {
     inner_density_area: None,
 };
 
-/// Strain: 0.34 of the taper (seen: 0.30). Skew: 1.75 of it (seen: 1.65). Lean: 0.0065 of it (seen: 0.006). Mean weights:
+/// Strain: 0.34 of the taper (seen: 0.30). Skew: 1.85 of it (seen: 1.72). Lean: 0.0095 of it (seen: 0.0087). Mean weights:
 /// 0.55 of the shift (seen: 0.54), 18 px² (seen: 13.7, in 4 of 2,000 more).
 const STICK: Reading = Reading {
     strain_by_taper: 87,
-    skew_by_taper: 448,
-    lean_by_taper: 426,
+    skew_by_taper: 474,
+    lean_by_taper: 623,
     density_by_shift: 141,
     inner_density_area: Some(18),
     ..FORCE
 };
 
 /// Strain: 3 times the square of the shift (seen: 2.7, at a friction ratio of 0.1). Skew: 2.2 of the taper (seen: 2.2).
-/// Lean: 0.0045 of it (seen: 0.0042). Aspect: 1.6 of the shift (seen: 1.55). Mean weights: 0.32 of the shift (seen: 0.27),
+/// Lean: 0.0045 of it (seen: 0.0042). Aspect: 1.8 of the shift (seen: 1.73). Mean weights: 0.32 of the shift (seen: 0.27),
 /// 18 px² (seen: 13.7, in 4 of 2,000 more).
 const SLIP: Reading = Reading {
     strain_by_shift: 6,
     skew_by_taper: 563,
     lean_by_taper: 295,
-    aspect_by_shift: 410,
+    aspect_by_shift: 461,
     density_by_shift: 82,
     inner_density_area: Some(18),
     ..FORCE
