@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, ensure};
 use hivtac_scene::Contact;
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::{ContactReading, Model};
@@ -43,6 +43,11 @@ pub fn check(
     progress: impl Fn() + Sync,
 ) -> Result<Report> {
     let model = Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
+    ensure!(
+        model.is_simulated(),
+        "the model was made from a unit's own data, and `check` renders frames of the simulated sensor: use `evaluate` with data of \
+         that unit"
+    );
     let recipe = recipe(&model, samples, seed, friction);
     let scene = recipe.scene(0)?;
     let eyes = || sensor(&model);

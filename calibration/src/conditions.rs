@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use hivtac_scene::{Contact, SceneError};
 use hivtac_sensing::geometry::{Geometry, Preset};
@@ -58,11 +58,40 @@ pub enum CentroidName {
 pub struct ContactName(pub Contact);
 
 /// Origins by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OriginName {
     /// Rendered from a scene.
     Simulated,
+    /// Measured with the unit whose microcontroller has this number, 24 hexadecimal digits.
+    Unit(String),
+}
+
+impl OriginName {
+    /// The unit with this number.
+    pub fn unit(device_id: [u8; 12]) -> Self {
+        OriginName::Unit(device_id.iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    /// The same as the model file holds it.
+    ///
+    /// # Errors
+    /// When the unit's number is no such number.
+    pub fn to_model(&self) -> Result<Origin> {
+        let OriginName::Unit(digits) = self else {
+            return Ok(Origin::Simulated);
+        };
+        let wrong = || format!("unit `{digits}`: 24 hexadecimal digits are needed");
+        ensure!(
+            digits.len() == 24 && digits.bytes().all(|b| b.is_ascii_hexdigit()),
+            wrong()
+        );
+        let mut device_id = [0; 12];
+        for (i, byte) in device_id.iter_mut().enumerate() {
+            *byte = u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).with_context(wrong)?;
+        }
+        Ok(Origin::Unit(device_id))
+    }
 }
 
 impl CentroidName {
@@ -161,9 +190,7 @@ impl Conditions {
             dilations: self.dilations,
             centroid: self.centroid.to_model(),
             contact: self.contact.to_model(),
-            origin: match self.origin {
-                OriginName::Simulated => Origin::Simulated,
-            },
+            origin: self.origin.to_model()?,
         })
     }
 }
@@ -210,6 +237,25 @@ mod tests {
             let bad = text.replace(name, "slip:7");
             let error = serde_json::from_str::<Conditions>(&bad).unwrap_err();
             assert!(error.to_string().contains("friction ratio is 7"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_unit_keeps_its_number() {
+        let id = [0, 1, 2, 0x30, 4, 5, 6, 7, 8, 9, 10, 255];
+        let unit = OriginName::unit(id);
+        assert_eq!(unit, OriginName::Unit("000102300405060708090aff".into()));
+        assert_eq!(unit.to_model().unwrap(), Origin::Unit(id));
+        for digits in [
+            "",
+            "00",
+            "g00102300405060708090aff",
+            "+00102300405060708090aff",
+        ] {
+            assert!(
+                OriginName::Unit(digits.into()).to_model().is_err(),
+                "{digits}"
+            );
         }
     }
 

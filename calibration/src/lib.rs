@@ -8,6 +8,7 @@
 //! | file | subject |
 //! |---|---|
 //! | `loads`, `dataset` | which forces; frames seen by `sensing` itself; the CSV file |
+//! | `collect` | data from a real unit and a force gauge |
 //! | `train`, `closed_form`, `fit` | networks; closed forms; from a data set to weights |
 //! | `import` | networks trained in PyTorch |
 //! | `network`, `weights`, `conditions` | the network in floats, its file, and what it holds for |
@@ -18,6 +19,7 @@
 
 pub mod check;
 pub mod closed_form;
+pub mod collect;
 pub mod conditions;
 pub mod dataset;
 pub mod errors;

@@ -62,6 +62,11 @@ impl PaperPoses {
         ]
     }
 
+    /// The number of the pose with these angles, when it is one of them.
+    pub fn numbered([alpha, beta]: [f64; 2]) -> Option<usize> {
+        (0..Self::COUNT).find(|&pose| Self::angles_deg(pose) == [alpha, beta])
+    }
+
     /// The load of a row in a pose below [`Self::COUNT`].
     ///
     /// # Errors
@@ -147,6 +152,8 @@ mod tests {
         assert_eq!(PaperPoses::angles_deg(1), [-10.0, -7.0]);
         assert_eq!(PaperPoses::angles_deg(178), [0.0, 0.0]);
         assert_eq!(PaperPoses::angles_deg(356), [10.0, 8.0]);
+        assert_eq!(PaperPoses::numbered([-10.0, -7.0]), Some(1));
+        assert_eq!(PaperPoses::numbered([0.5, 0.0]), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use hivtac_calibration::check::check;
+use hivtac_calibration::collect::CollectCommand;
 use hivtac_calibration::conditions::{CentroidName, preset};
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate, generate_file};
 use hivtac_calibration::evaluate::Evaluation;
@@ -38,6 +39,9 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
+    /// Calibration data from a real unit and a force gauge.
+    #[command(subcommand)]
+    Collect(CollectCommand),
     /// Train a network on a data set; writes a weights file.
     Train {
         /// The data set.
@@ -223,6 +227,7 @@ impl RecipeArgs {
 fn main() -> Result<()> {
     match Cli::parse().command {
         Command::Dataset { recipe, out } => make_dataset(&recipe, Some(&out)).map(drop),
+        Command::Collect(command) => command.run(),
         Command::Train {
             data,
             options,

@@ -21,6 +21,8 @@ pub enum Loads {
     PaperPoses(usize),
     /// As many frames of each of ten loads that are enough for a closed form.
     Known(usize),
+    /// What was measured with a unit, in so many poses; nothing to render.
+    Measured(usize),
 }
 
 /// What to generate.
@@ -78,6 +80,7 @@ impl Recipe {
             Loads::Random(count) => count,
             Loads::PaperPoses(each) => each.saturating_mul(PaperPoses::COUNT),
             Loads::Known(each) => each.saturating_mul(KnownLoads::COUNT),
+            Loads::Measured(_) => 0,
         };
         loads.saturating_add(self.rest)
     }
@@ -90,6 +93,10 @@ impl Recipe {
     /// # Errors
     /// When there would be no frame, or more than a file is good for.
     pub(super) fn check(&self) -> Result<()> {
+        ensure!(
+            !matches!(self.loads, Loads::Measured(_)),
+            "measured loads cannot be rendered"
+        );
         ensure!(self.sessions > 0, "a data set needs at least one session");
         ensure!(self.rows() > 0, "a data set needs at least one frame");
         ensure!(
@@ -148,6 +155,7 @@ impl Recipe {
                 PaperPoses { force_n, seed }.load((within - self.rest) / each, row)
             }
             Loads::Known(each) => KnownLoads { force_n }.load((within - self.rest) / each),
+            Loads::Measured(_) => Ok(Load::REST),
         }
         .with_context(|| format!("row {row}"))
     }

@@ -7,7 +7,7 @@ use hivtac_sensing::force::Force;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
 
-use crate::conditions::ContactName;
+use crate::conditions::{ContactName, OriginName};
 use crate::dataset::{Dataset, Split};
 use crate::weights::features_from_q16;
 
@@ -35,6 +35,8 @@ pub struct Evaluation {
     pub model: String,
     /// What the frames are, in words.
     pub frames: String,
+    /// Whether they were measured with a unit rather than simulated.
+    pub measured: bool,
     /// The contact reading.
     pub contact: ContactName,
     /// Which rows were taken, in words.
@@ -82,6 +84,7 @@ impl Evaluation {
                 "{}; {} session(s), data seed {}",
                 about.scene, about.sessions, about.seed
             ),
+            measured: about.conditions.origin != OriginName::Simulated,
             contact: about.conditions.contact,
             rows: match held_out {
                 Some((split, seed)) => format!("{} (seed {seed})", split.words()),

@@ -29,6 +29,13 @@ impl Evaluation {
 
     /// What this is and is not.
     pub fn sentence(&self) -> String {
+        if self.measured {
+            return format!(
+                "Frames of a real unit ({}), contact reading `{}`, {}. The truth is the gauge's reading and the pose that was set: \
+                 their errors are in these numbers, too.",
+                self.frames, self.contact, self.rows
+            );
+        }
         format!(
             "Simulated frames ({}), contact reading `{}` ({}), {}. Nothing here was measured on a real sensor, and the \
              paper's numbers hold its gauge, its stage and its film's hysteresis, too: they are beside ours, not below.",
@@ -205,7 +212,12 @@ fn push_paper(html: &mut String, evaluation: &Evaluation, poses: Option<PoseNumb
     ];
     let _ = writeln!(
         html,
-        "<table><tr><th></th><th>paper, real sensor</th><th>this model, simulated</th></tr>"
+        "<table><tr><th></th><th>paper, real sensor</th><th>this model, {}</th></tr>",
+        if evaluation.measured {
+            "real unit"
+        } else {
+            "simulated"
+        }
     );
     for (name, paper, ours) in rows {
         let _ = writeln!(

@@ -1,0 +1,326 @@
+//! From a recording to a data set: clocks aligned, each frame with the force that pressed it.
+
+use anyhow::{Context, Result, ensure};
+use hivtac_sensing::features::Features;
+use hivtac_sensing::markers::Marker;
+use hivtac_sensing::units::Px;
+
+use super::align::{Alignment, Search, Seen, align};
+use super::folder::{Kept, Recording};
+use super::holds;
+use super::report::{Report, RunReport};
+use super::series::{Joined, Series};
+use crate::dataset::{About, Dataset, Loads, Observation, Place, Row};
+use crate::loads::PaperPoses;
+use crate::weights::Range;
+
+/// What is made of a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Choices {
+    /// The largest lag of a gauge at a serial port, s.
+    pub max_lag_s: f64,
+    /// Smaller forces are no contact, N.
+    pub least_n: f64,
+    /// Only steady stretches, each one load.
+    pub holds: bool,
+}
+
+/// Where the gauge's readings are.
+#[derive(Clone, Debug)]
+pub enum Gauge {
+    /// In the recording, on the computer's clock.
+    AtThePort,
+    /// In files of the gauge's own, on its own clock; the one that fits a run best is taken.
+    Files(Vec<Series>),
+}
+
+/// Noise of the gauge beyond which a force counts as contact, in standard deviations.
+const CONTACT_SIGMAS: f64 = 4.0;
+/// Half as many samples around one give its time on the computer's clock.
+const AROUND: usize = 16;
+
+/// A frame with its force, before it is a row of a data set.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Loaded<'a> {
+    pub kept: &'a Kept,
+    pub time_s: f64,
+    /// |F|, N.
+    pub force_n: f64,
+}
+
+/// Makes the data set.
+///
+/// # Errors
+/// When a run has no frames of the untouched film, or its clocks cannot be aligned; names the run.
+pub fn assemble(
+    recording: &Recording,
+    gauge: &Gauge,
+    unit: super::gauge::Unit,
+    choices: Choices,
+) -> Result<(Dataset, Report)> {
+    ensure!(recording.runs() > 0, "the recording has no samples yet");
+    let mut rows = Vec::new();
+    let mut report = Report::default();
+    for run in 0..recording.runs() {
+        let kept: Vec<&Kept> = recording
+            .samples
+            .iter()
+            .filter(|kept| kept.run == run)
+            .collect();
+        // A run that ended before its first pose, such as one that was begun by mistake.
+        if kept.iter().all(|kept| kept.pose.is_none()) {
+            report.empty_runs += 1;
+            continue;
+        }
+        let session = report.runs.len();
+        let one = || format!("run {run}");
+        let (series, alignment, times) = match gauge {
+            Gauge::AtThePort => at_the_port(recording, &kept, run, unit, choices),
+            Gauge::Files(files) => best_file(files, &kept),
+        }
+        .with_context(one)?;
+        let done = Run {
+            kept: &kept,
+            times: &times,
+            gauge: series.joined(),
+            alignment,
+            choices,
+        };
+        let (more, mut of_run) = done.rows(session).with_context(one)?;
+        of_run.run = run;
+        of_run.complaint = series.complaint();
+        report.runs.push(of_run);
+        rows.extend(more);
+    }
+    ensure!(!rows.is_empty(), "the recording has no frame in a pose");
+    let about = about(recording, &rows, &report);
+    Ok((Dataset { about, rows }, report))
+}
+
+/// The gauge's lines of a run, both on the computer's clock.
+fn at_the_port(
+    recording: &Recording,
+    kept: &[&Kept],
+    run: usize,
+    unit: super::gauge::Unit,
+    choices: Choices,
+) -> Result<(Series, Alignment, Vec<f64>)> {
+    let mut series = Series::default();
+    let lines = recording.gauge_lines.iter().filter(|(r, ..)| *r == run);
+    for (number, (_, host_s, text)) in lines.enumerate() {
+        series.push(number + 1, Some(*host_s), text, unit);
+    }
+    ensure!(
+        series.readings() > 1,
+        "no gauge was heard ({} lines): name the file that it recorded with --gauge, or record with --gauge-port",
+        series.bad.values().sum::<usize>()
+    );
+    let times = on_the_computers_clock(kept);
+    let search = Search {
+        lags_s: [-choices.max_lag_s, choices.max_lag_s],
+        drift: false,
+    };
+    let alignment = align(&seen(kept, &times)?, series.joined(), search)?;
+    Ok((series, alignment, times))
+}
+
+/// When the frames were exposed on the computer's clock, but for a constant: the sensor's clock has no jitter, the
+/// computer's is the gauge's. The median of their difference over the neighbours joins both.
+fn on_the_computers_clock(kept: &[&Kept]) -> Vec<f64> {
+    let device = |kept: &Kept| kept.device_us as f64 / 1e6;
+    let late: Vec<f64> = kept.iter().map(|kept| kept.host_s - device(kept)).collect();
+    let smooth = |i: usize| {
+        // As many on both sides, so that a steady drift does not matter.
+        let reach = AROUND.min(i).min(late.len() - 1 - i);
+        let mut near = late[i - reach..=i + reach].to_vec();
+        near.sort_by(f64::total_cmp);
+        near[near.len() / 2]
+    };
+    (0..kept.len())
+        .map(|i| device(kept[i]) + smooth(i))
+        .collect()
+}
+
+fn best_file(files: &[Series], kept: &[&Kept]) -> Result<(Series, Alignment, Vec<f64>)> {
+    let times: Vec<f64> = kept
+        .iter()
+        .map(|kept| kept.device_us as f64 / 1e6)
+        .collect();
+    let frames = seen(kept, &times)?;
+    let ends = [times[0], times[times.len() - 1]];
+    let tried = files.iter().map(|series| {
+        let [first, last] = series.span().context("the gauge's file has no readings")?;
+        let search = Search {
+            lags_s: [first - ends[1], last - ends[0]],
+            drift: true,
+        };
+        Ok((
+            series.clone(),
+            align(&frames, series.joined(), search)?,
+            times.clone(),
+        ))
+    });
+    let (good, bad): (Vec<_>, Vec<Result<_>>) = tried.partition(Result::is_ok);
+    let best = good
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.1.residual_n.total_cmp(&b.1.residual_n));
+    match (best, bad.into_iter().next()) {
+        (Some(best), _) => Ok(best),
+        (None, Some(failure)) => failure,
+        (None, None) => Err(anyhow::anyhow!("no gauge file was named")),
+    }
+}
+
+/// Times and mean radii of the frames with markers, from the untouched film on.
+fn seen(kept: &[&Kept], times: &[f64]) -> Result<Vec<Seen>> {
+    let radii: Vec<Option<f64>> = kept
+        .iter()
+        .map(|kept| kept.seen.as_ref().ok().map(mean_radius_px))
+        .collect();
+    let at_rest: Vec<f64> = (radii.iter().zip(kept))
+        .filter(|(_, kept)| kept.pose.is_none())
+        .filter_map(|(radius, _)| *radius)
+        .collect();
+    ensure!(
+        !at_rest.is_empty(),
+        "no frame of the untouched film shows the markers"
+    );
+    let rest = at_rest.iter().sum::<f64>() / at_rest.len() as f64;
+    let frames = radii.iter().zip(times).filter_map(|(radius, &time_s)| {
+        Some(Seen {
+            time_s,
+            radius_px: (*radius)? - rest,
+        })
+    });
+    Ok(frames.collect())
+}
+
+/// Mean distance of the markers from their middle, px.
+fn mean_radius_px(markers: &[[i64; 3]; 4]) -> f64 {
+    let px = |m: usize, axis: usize| markers[m][axis] as f64 / 65_536.0;
+    let middle = [0, 1].map(|axis| (0..4).map(|m| px(m, axis)).sum::<f64>() / 4.0);
+    let distance = |m: usize| (px(m, 0) - middle[0]).hypot(px(m, 1) - middle[1]);
+    (0..4).map(distance).sum::<f64>() / 4.0
+}
+
+/// One run with its clocks aligned.
+struct Run<'a> {
+    kept: &'a [&'a Kept],
+    times: &'a [f64],
+    gauge: Joined<'a>,
+    alignment: Alignment,
+    choices: Choices,
+}
+
+impl Run<'_> {
+    fn rows(&self, session: usize) -> Result<(Vec<Row>, RunReport)> {
+        let reading = |i: usize| self.gauge.at(self.alignment.gauge_time(self.times[i]));
+        let at_rest: Vec<f64> = (0..self.kept.len())
+            .filter(|&i| self.kept[i].pose.is_none())
+            .filter_map(reading)
+            .collect();
+        let count = at_rest.len().max(1) as f64;
+        let zero_n = at_rest.iter().sum::<f64>() / count;
+        let noise_n = (at_rest.iter().map(|f| (f - zero_n).powi(2)).sum::<f64>() / count).sqrt();
+        let least_n = self.choices.least_n.max(CONTACT_SIGMAS * noise_n);
+        let mut report = RunReport {
+            alignment: self.alignment,
+            zero_n,
+            noise_n,
+            least_n,
+            ..RunReport::default()
+        };
+        let (mut rows, mut loaded) = (Vec::new(), Vec::new());
+        for (i, &kept) in self.kept.iter().enumerate() {
+            if kept.pose.is_none() {
+                rows.push(row(session, kept, 0.0)?);
+                report.at_rest += 1;
+                continue;
+            }
+            match reading(i).map(|force| force - zero_n) {
+                None => report.without_reading += 1,
+                Some(force) if force < -least_n => report.pulled += 1,
+                Some(force) if force < least_n => report.no_contact += 1,
+                Some(force_n) => loaded.push(Loaded {
+                    kept,
+                    time_s: self.times[i],
+                    force_n,
+                }),
+            }
+        }
+        if self.choices.holds {
+            let before = loaded.len();
+            loaded = holds::steady(&loaded, noise_n);
+            report.unsteady = before - loaded.len();
+        }
+        for loaded in &loaded {
+            rows.push(row(session, loaded.kept, loaded.force_n)?);
+        }
+        report.pressed = loaded.len();
+        for why in rows.iter().filter_map(|row| row.seen.as_ref().err()) {
+            *report.rejected.entry(why.clone()).or_default() += 1;
+        }
+        Ok((rows, report))
+    }
+}
+
+fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
+    let [alpha, beta] = kept.pose.unwrap_or_default();
+    let direction = hivtac_scene::Load::from_angles(force_n, alpha, beta)?;
+    Ok(Row {
+        place: Place {
+            session,
+            pose: kept.pose.and_then(PaperPoses::numbered),
+        },
+        force_n: if force_n == 0.0 {
+            [0.0; 3]
+        } else {
+            direction.vector_n()
+        },
+        seen: match &kept.seen {
+            Ok(markers) => Ok(observation(markers)?),
+            Err(why) => Err(why.clone()),
+        },
+    })
+}
+
+fn observation(markers: &[[i64; 3]; 4]) -> Result<Observation> {
+    let mut found = [Marker::default(); 4];
+    for (marker, [x, y, area]) in found.iter_mut().zip(markers) {
+        *marker = Marker {
+            x: Px(i32::try_from(*x)?),
+            y: Px(i32::try_from(*y)?),
+            area: u32::try_from(*area)?,
+        };
+    }
+    Ok(Observation {
+        features_q16: Features::of_markers(&found).to_array(),
+        areas_px: found.map(|marker| marker.area),
+    })
+}
+
+fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
+    let largest = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).fold(0.0, f64::max);
+    let mut poses: Vec<[f64; 2]> = Vec::new();
+    for pose in recording.samples.iter().filter_map(|kept| kept.pose) {
+        if !poses.contains(&pose) {
+            poses.push(pose);
+        }
+    }
+    let extreme = |axis: usize| poses.iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
+    let at_rest = rows.iter().filter(|row| row.force_n == [0.0; 3]).count();
+    About {
+        conditions: recording.conditions.clone(),
+        scene: report.sentence(),
+        loads: Loads::Measured(poses.len()),
+        rest: at_rest / report.runs.len(),
+        sessions: report.runs.len(),
+        seed: 0,
+        range: Range {
+            force_n: largest(&|row| crate::errors::norm(row.force_n)),
+            alpha_deg: extreme(0),
+            beta_deg: extreme(1),
+        },
+    }
+}

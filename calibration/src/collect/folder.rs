@@ -1,0 +1,442 @@
+//! What a recording leaves on disk: a folder of files that only grow.
+//!
+//! | file | what |
+//! |---|---|
+//! | `unit.json` | the unit, and how it looks at its frames |
+//! | `samples.csv` | every sample of the sensor, with the pose it was taken in |
+//! | `gauge.csv` | every line of a gauge at a serial port, as it came |
+//! | `takes.csv` | the takes that were finished |
+//!
+//! Every line is written at once, so that an interruption costs at most the line under way, which the next run removes.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use hivtac_wire::message::{Centroid, DeviceHello, Sample};
+use hivtac_wire::status::Status;
+use serde::{Deserialize, Serialize};
+
+use crate::conditions::{CentroidName, Conditions, ContactName, OriginName, PixelName};
+
+/// A pose: α and β in degrees, or nothing while the film is untouched.
+pub type Pose = Option<[f64; 2]>;
+
+const SAMPLES: &str = "samples.csv";
+const GAUGE: &str = "gauge.csv";
+const TAKES: &str = "takes.csv";
+const UNIT: &str = "unit.json";
+
+const SAMPLE_COLUMNS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status,\
+x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,x3_q16,y3_q16,area3_px";
+const GAUGE_COLUMNS: &str = "run,host_s,line";
+const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost";
+
+/// A recording's folder, open for writing.
+#[derive(Debug)]
+pub struct Folder {
+    samples: File,
+    takes: File,
+    /// For whoever listens to the gauge.
+    pub gauge: File,
+    /// Number of this run, from 0.
+    pub run: usize,
+    /// Poses whose takes were finished in earlier runs.
+    pub done: Vec<[f64; 2]>,
+}
+
+impl Folder {
+    /// Opens a recording to go on with it, or begins one.
+    ///
+    /// # Errors
+    /// When it is of another unit or of other conditions, or cannot be written.
+    pub fn open(path: &Path, conditions: &Conditions) -> Result<Self> {
+        fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))?;
+        same_unit(&path.join(UNIT), conditions)?;
+        let samples = append(&path.join(SAMPLES), SAMPLE_COLUMNS)?;
+        let gauge = append(&path.join(GAUGE), GAUGE_COLUMNS)?;
+        let takes = append(&path.join(TAKES), TAKE_COLUMNS)?;
+        let before = Recording::read(path)?;
+        let done = takes_done(&path.join(TAKES))?;
+        Ok(Self {
+            samples,
+            takes,
+            gauge,
+            run: before.runs(),
+            done,
+        })
+    }
+
+    /// Keeps a sample.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn sample(&mut self, host_s: f64, pose: Pose, sample: &Sample) -> Result<()> {
+        let mut line = format!(
+            "{},{host_s:.6},{},{},{},{},{}",
+            self.run,
+            sample.time_us,
+            sample.frame,
+            sample.sequence,
+            angles(pose),
+            match &sample.markers {
+                Some(_) => String::new(),
+                None => reasons(sample.status),
+            }
+        );
+        match &sample.markers {
+            Some(markers) => markers.iter().for_each(|m| {
+                line += &format!(",{},{},{}", m.x_q16, m.y_q16, m.area_px);
+            }),
+            None => line += &",".repeat(12),
+        }
+        write_line(&mut self.samples, &line, SAMPLES)
+    }
+
+    /// Notes a finished take.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn take_done(&mut self, pose: Pose, samples: usize, lost: u32) -> Result<()> {
+        let line = format!("{},{},{samples},{lost}", self.run, angles(pose));
+        write_line(&mut self.takes, &line, TAKES)
+    }
+}
+
+/// Keeps a line of the gauge. Quotes would end the field; no reading has any.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn keep_gauge_line(file: &mut File, run: usize, host_s: f64, line: &str) -> Result<()> {
+    let line: String = line
+        .chars()
+        .map(|c| {
+            if c == '"' || c.is_control() {
+                '\u{fffd}'
+            } else {
+                c
+            }
+        })
+        .collect();
+    write_line(file, &format!("{run},{host_s:.6},\"{line}\""), GAUGE)
+}
+
+fn write_line(file: &mut File, line: &str, name: &str) -> Result<()> {
+    file.write_all(format!("{line}\n").as_bytes())
+        .with_context(|| format!("cannot write {name}"))
+}
+
+fn angles(pose: Pose) -> String {
+    pose.map_or(",".to_owned(), |[alpha, beta]| format!("{alpha},{beta}"))
+}
+
+/// The names of the bits that forbid a force; a missing or another model says nothing about the markers.
+fn reasons(status: Status) -> String {
+    let markers =
+        Status(Status::NO_FORCE.0 & !(Status::MODEL_MISSING | Status::MODEL_MISMATCH).0 & status.0);
+    let names: Vec<_> = markers.names().collect();
+    if names.is_empty() {
+        // A sensor that sends no markers although they were found would be a bug of its firmware.
+        return "markers_not_sent".to_owned();
+    }
+    names.join(" ")
+}
+
+/// Opens a file to append to; without a line that an interruption cut.
+fn append(path: &Path, columns: &str) -> Result<File> {
+    let context = || format!("cannot write {}", path.display());
+    let text = match fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+        Err(error) => return Err(error).with_context(context),
+    };
+    let whole = text
+        .iter()
+        .rposition(|&b| b == b'\n')
+        .map_or(0, |end| end + 1);
+    let mut file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)
+        .with_context(context)?;
+    file.set_len(whole as u64).with_context(context)?;
+    if whole == 0 {
+        writeln!(file, "{columns}").with_context(context)?;
+    }
+    Ok(file)
+}
+
+/// Writes the unit into a new recording, or holds it against that of an older one.
+fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
+    match fs::read_to_string(path) {
+        Ok(text) => {
+            let before: Conditions = serde_json::from_str(&text)
+                .with_context(|| format!("{} is damaged", path.display()))?;
+            ensure!(
+                before == *conditions,
+                "this recording is of another unit, or of the same one set otherwise: {} says {text}, the sensor {}; use another \
+                 folder, or set it as before",
+                path.display(),
+                serde_json::to_string(conditions)?
+            );
+            Ok(())
+        }
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            fs::write(path, serde_json::to_string(conditions)?)
+                .with_context(|| format!("cannot write {}", path.display()))
+        }
+        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
+    }
+}
+
+/// Under which conditions a unit's data are taken, from what it says of itself.
+///
+/// # Errors
+/// When this program does not know its preset.
+pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
+    let threshold = hello.threshold;
+    crate::conditions::preset(&hello.preset)
+        .context("the sensor says what this program does not know")?;
+    Ok(Conditions {
+        preset: hello.preset.as_str().to_owned(),
+        width: hello.width,
+        height: hello.height,
+        pixel_format: PixelName::Rgb565,
+        threshold: [
+            threshold.hue_low,
+            threshold.hue_high,
+            threshold.saturation_low,
+            threshold.saturation_high,
+            threshold.value_low,
+            threshold.value_high,
+        ],
+        dilations: hello.dilations,
+        centroid: match hello.centroid {
+            Centroid::BinaryMask => CentroidName::BinaryMask,
+            Centroid::RednessWeighted => CentroidName::RednessWeighted,
+        },
+        contact: ContactName::default(),
+        origin: OriginName::unit(hello.device_id),
+    })
+}
+
+/// Everything that was recorded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// The unit, and how it looks at its frames.
+    pub conditions: Conditions,
+    /// In the order they came.
+    pub samples: Vec<Kept>,
+    /// Lines of the gauge at a serial port: run, time of the computer in s, text.
+    pub gauge_lines: Vec<(usize, f64, String)>,
+}
+
+/// A sample that was kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// Its run.
+    pub run: usize,
+    /// When it came, s of the computer since the run began.
+    pub host_s: f64,
+    /// When it was exposed, µs of the sensor.
+    pub device_us: u64,
+    /// The pose, or nothing for the untouched film.
+    pub pose: Pose,
+    /// The markers' (x, y) in 1/65,536 px and area in px, or the status names that say why there are none.
+    pub seen: Result<[[i64; 3]; 4], String>,
+}
+
+#[derive(Deserialize, Serialize)]
+struct GaugeLine {
+    run: usize,
+    host_s: f64,
+    line: String,
+}
+
+impl Recording {
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// When it is no recording, or a file of it is damaged; names the line. A last line that was cut is left out.
+    pub fn read(path: &Path) -> Result<Self> {
+        let unit = path.join(UNIT);
+        let text = fs::read_to_string(&unit).with_context(|| {
+            format!(
+                "{} is no recording: cannot read {}",
+                path.display(),
+                unit.display()
+            )
+        })?;
+        let conditions = serde_json::from_str(&text)
+            .with_context(|| format!("{} is damaged", unit.display()))?;
+        let samples = rows(&path.join(SAMPLES), sample)?;
+        let gauge_lines = rows(&path.join(GAUGE), |record| {
+            let line: GaugeLine = record.deserialize(Some(&GAUGE_COLUMNS.split(',').collect()))?;
+            Ok((line.run, line.host_s, line.line))
+        })?;
+        Ok(Self {
+            conditions,
+            samples,
+            gauge_lines,
+        })
+    }
+
+    /// How many runs there are.
+    pub fn runs(&self) -> usize {
+        let last = self.samples.iter().map(|kept| kept.run + 1).max();
+        let heard = self.gauge_lines.iter().map(|(run, ..)| run + 1).max();
+        last.max(heard).unwrap_or(0)
+    }
+}
+
+/// The whole lines of one of the folder's tables.
+fn rows<T>(path: &Path, parse: impl Fn(&csv::StringRecord) -> Result<T>) -> Result<Vec<T>> {
+    let text =
+        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    let mut table = csv::Reader::from_reader(whole.as_bytes());
+    let rows = table.records().map(|record| {
+        let record = record?;
+        let line = record.position().map_or(0, csv::Position::line);
+        parse(&record).with_context(|| format!("line {line}"))
+    });
+    rows.collect::<Result<_>>()
+        .with_context(|| format!("{} is damaged", path.display()))
+}
+
+fn sample(record: &csv::StringRecord) -> Result<Kept> {
+    let number = |i: usize| -> Result<i64> { Ok(record[i].parse()?) };
+    let seen = match &record[7] {
+        "" => {
+            let mut markers = [[0; 3]; 4];
+            for (m, marker) in markers.iter_mut().enumerate() {
+                for (part, value) in marker.iter_mut().enumerate() {
+                    *value = number(8 + 3 * m + part)?;
+                }
+            }
+            Ok(markers)
+        }
+        why => Err(why.to_owned()),
+    };
+    Ok(Kept {
+        run: record[0].parse()?,
+        host_s: record[1].parse()?,
+        device_us: record[2].parse()?,
+        pose: pose(&record[5], &record[6])?,
+        seen,
+    })
+}
+
+fn pose(alpha: &str, beta: &str) -> Result<Pose> {
+    match (alpha, beta) {
+        ("", "") => Ok(None),
+        (alpha, beta) => Ok(Some([alpha.parse()?, beta.parse()?])),
+    }
+}
+
+fn takes_done(path: &Path) -> Result<Vec<[f64; 2]>> {
+    let poses = rows(path, |record| pose(&record[1], &record[2]))?;
+    Ok(poses.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_wire::message::Marker;
+
+    fn conditions() -> Conditions {
+        Conditions {
+            origin: OriginName::unit([7; 12]),
+            ..Conditions::simulated(hivtac_sensing::geometry::Preset::Ov7725, 320, 240)
+        }
+    }
+
+    fn sample(frame: u32, found: bool) -> Sample {
+        let marker = |i: i32| Marker {
+            x_q16: 65_536 * i,
+            y_q16: -i,
+            area_px: 190,
+        };
+        Sample {
+            sequence: frame,
+            frame,
+            time_us: u64::from(frame) * 25_600,
+            status: if found {
+                Status::MODEL_MISMATCH
+            } else {
+                Status::MARKERS_MISSING | Status::TARE_MISSING
+            },
+            force: None,
+            markers: found.then(|| [1, 2, 3, 4].map(marker)),
+        }
+    }
+
+    #[test]
+    fn a_recording_goes_on_after_an_interruption() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("unit");
+        let mut folder = Folder::open(&path, &conditions()).unwrap();
+        assert_eq!((folder.run, folder.done.len()), (0, 0));
+        folder.sample(0.5, None, &sample(1, true)).unwrap();
+        folder
+            .sample(0.6, Some([4.0, -3.5]), &sample(2, false))
+            .unwrap();
+        keep_gauge_line(&mut folder.gauge, 0, 0.55, "+0.1\"2,N").unwrap();
+        folder.take_done(Some([4.0, -3.5]), 1, 0).unwrap();
+        drop(folder);
+        // Cut in the middle of a line.
+        let file = path.join(SAMPLES);
+        let mut bytes = fs::read(&file).unwrap();
+        let whole = bytes.len();
+        bytes.extend(b"0,0.7,51");
+        fs::write(&file, &bytes).unwrap();
+        assert_eq!(Recording::read(&path).unwrap().samples.len(), 2);
+
+        let mut again = Folder::open(&path, &conditions()).unwrap();
+        assert_eq!(fs::read(&file).unwrap().len(), whole);
+        assert_eq!((again.run, &again.done[..]), (1, &[[4.0, -3.5]][..]));
+        again.sample(0.1, None, &sample(1, true)).unwrap();
+        let recording = Recording::read(&path).unwrap();
+        assert_eq!(recording.conditions, conditions());
+        assert_eq!((recording.runs(), recording.samples.len()), (2, 3));
+        let kept = &recording.samples[0];
+        assert_eq!((kept.pose, kept.device_us), (None, 25_600));
+        assert_eq!(kept.seen.as_ref().unwrap()[1], [131_072, -2, 190]);
+        assert_eq!(recording.samples[1].pose, Some([4.0, -3.5]));
+        assert_eq!(recording.samples[1].seen, Err("markers_missing".into()));
+        assert_eq!(recording.gauge_lines, [(0, 0.55, "+0.1\u{fffd}2,N".into())]);
+    }
+
+    #[test]
+    fn another_unit_and_another_threshold_are_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        Folder::open(directory.path(), &conditions()).unwrap();
+        let mut other = conditions();
+        other.threshold[0] = 160;
+        let error = Folder::open(directory.path(), &other)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("set otherwise"), "{error}");
+        other = conditions();
+        other.origin = OriginName::unit([8; 12]);
+        assert!(Folder::open(directory.path(), &other).is_err());
+    }
+
+    #[test]
+    fn what_is_damaged_is_named() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path();
+        let error = format!("{:#}", Recording::read(path).unwrap_err());
+        assert!(error.contains("is no recording"), "{error}");
+        let mut folder = Folder::open(path, &conditions()).unwrap();
+        folder.sample(0.5, None, &sample(1, true)).unwrap();
+        let file = path.join(SAMPLES);
+        let text = fs::read_to_string(&file)
+            .unwrap()
+            .replace("131072", "131o72");
+        fs::write(&file, text).unwrap();
+        let error = format!("{:#}", Recording::read(path).unwrap_err());
+        assert!(error.contains("samples.csv is damaged: line 2"), "{error}");
+    }
+}

@@ -1,0 +1,173 @@
+//! A gauge at a serial port: its lines, with the computer's time.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use super::folder::keep_gauge_line;
+use super::gauge::{Unit, reading};
+
+/// Where a gauge is and how it is made to talk.
+#[derive(Clone, Debug, clap::Args)]
+pub struct GaugeArgs {
+    /// Serial port of the force gauge. Without one, the gauge records by itself (`align --gauge`).
+    #[arg(long, value_name = "PORT")]
+    pub gauge_port: Option<String>,
+    /// Its baud rate.
+    #[arg(long, default_value_t = 19_200, requires = "gauge_port")]
+    pub gauge_baud: u32,
+    /// For a gauge that only answers: what it is asked with, again and again (`\r` and `\n` as in C).
+    #[arg(long, value_name = "TEXT", requires = "gauge_port")]
+    pub gauge_ask: Option<String>,
+    /// How often it is asked, ms.
+    #[arg(long, default_value_t = 20, requires = "gauge_ask", value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    pub gauge_ask_every_ms: u64,
+}
+
+/// Longest wait of one read.
+const PATIENCE: Duration = Duration::from_millis(5);
+/// A line that is longer is noise.
+const LONGEST_LINE: usize = 256;
+
+/// A gauge that is listened to, in a thread of its own.
+#[derive(Debug)]
+pub struct GaugePort {
+    thread: Option<JoinHandle<Result<()>>>,
+    end: Arc<AtomicBool>,
+    readings: Arc<AtomicUsize>,
+}
+
+impl GaugePort {
+    /// Opens the port and keeps every line in `file`, with the time since `begun`.
+    ///
+    /// # Errors
+    /// When the port cannot be opened.
+    pub fn listen(
+        args: &GaugeArgs,
+        file: File,
+        run: usize,
+        begun: Instant,
+    ) -> Result<Option<Self>> {
+        let Some(name) = &args.gauge_port else {
+            return Ok(None);
+        };
+        let port = serialport::new(name, args.gauge_baud)
+            .timeout(PATIENCE)
+            .open()
+            .with_context(|| format!("cannot open the gauge at {name}: is it plugged in, and used by no other program?"))?;
+        let (end, readings) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
+        let listener = Listener {
+            port,
+            name: name.clone(),
+            ask: args.gauge_ask.as_deref().map(unescaped),
+            every: Duration::from_millis(args.gauge_ask_every_ms),
+            file,
+            run,
+            begun,
+            end: end.clone(),
+            readings: readings.clone(),
+        };
+        let thread = std::thread::spawn(move || listener.run());
+        Ok(Some(Self {
+            thread: Some(thread),
+            end,
+            readings,
+        }))
+    }
+
+    /// Readings so far. An error when the gauge was lost.
+    ///
+    /// # Errors
+    /// Why nobody listens any more.
+    pub fn readings(&mut self) -> Result<usize> {
+        if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
+            self.finish()?;
+        }
+        Ok(self.readings.load(Ordering::Relaxed))
+    }
+
+    /// Stops listening.
+    ///
+    /// # Errors
+    /// When the gauge was lost, or its lines could not be kept.
+    pub fn finish(&mut self) -> Result<()> {
+        self.end.store(true, Ordering::Relaxed);
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(result)) => result,
+            Some(Err(_)) => bail!("listening to the gauge failed"),
+            None => Ok(()),
+        }
+    }
+}
+
+struct Listener {
+    port: Box<dyn serialport::SerialPort>,
+    name: String,
+    ask: Option<Vec<u8>>,
+    every: Duration,
+    file: File,
+    run: usize,
+    begun: Instant,
+    end: Arc<AtomicBool>,
+    readings: Arc<AtomicUsize>,
+}
+
+impl Listener {
+    fn run(mut self) -> Result<()> {
+        let mut line = Vec::new();
+        let mut buffer = [0; 256];
+        let mut ask_at = Instant::now();
+        while !self.end.load(Ordering::Relaxed) {
+            if let Some(ask) = self.ask.as_ref().filter(|_| Instant::now() >= ask_at) {
+                ask_at = Instant::now() + self.every;
+                self.port.write_all(ask).with_context(|| self.lost())?;
+            }
+            match self.port.read(&mut buffer) {
+                Ok(0) => bail!("{}", self.lost()),
+                Ok(count) => {
+                    let host_s = self.begun.elapsed().as_secs_f64();
+                    for &byte in &buffer[..count] {
+                        self.take(byte, &mut line, host_s)?;
+                    }
+                }
+                Err(error)
+                    if matches!(
+                        error.kind(),
+                        ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
+                    ) => {}
+                Err(error) => return Err(error).with_context(|| self.lost()),
+            }
+        }
+        Ok(())
+    }
+
+    fn lost(&self) -> String {
+        format!("the gauge at {} is lost: cable pulled?", self.name)
+    }
+
+    /// Lines end with CR, LF or both.
+    fn take(&mut self, byte: u8, line: &mut Vec<u8>, host_s: f64) -> Result<()> {
+        if !matches!(byte, b'\r' | b'\n') && line.len() < LONGEST_LINE {
+            line.push(byte);
+            return Ok(());
+        }
+        if !line.is_empty() {
+            let text = String::from_utf8_lossy(line).into_owned();
+            line.clear();
+            keep_gauge_line(&mut self.file, self.run, host_s, &text)?;
+            if reading(&text, Unit::NEWTON).is_ok() {
+                self.readings.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unescaped(text: &str) -> Vec<u8> {
+    text.replace("\\r", "\r").replace("\\n", "\n").into_bytes()
+}

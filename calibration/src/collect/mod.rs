@@ -1,0 +1,117 @@
+//! Data from a real unit: what the sensor saw, what a force gauge said, and the pose that was set.
+//!
+//! ```text
+//! sensor ─samples with markers─┐
+//! gauge ─lines of text─────────┼→ folder → align → data set
+//! person ─poses────────────────┘
+//! ```
+//!
+//! Recording only keeps what comes ([`folder`]); clocks are aligned afterwards, and as often as wanted.
+
+pub mod align;
+pub mod assemble;
+pub mod folder;
+pub mod gauge;
+mod gauge_port;
+mod holds;
+mod poses;
+mod record;
+pub mod report;
+pub mod series;
+pub mod simulated;
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+
+use assemble::{Choices, Gauge, assemble};
+use folder::Recording;
+use gauge::Unit;
+use series::Series;
+
+/// Calibration data from a real unit.
+#[derive(Debug, clap::Subcommand)]
+pub enum CollectCommand {
+    /// Record the sensor's samples, the gauge's lines and the poses into a folder. Ctrl-C loses nothing; the same command
+    /// goes on.
+    Record(record::RecordArgs),
+    /// Align the clocks of a recording and write its data set.
+    Align(AlignArgs),
+    /// Write what a gauge with a clock of its own would have recorded of a rig's run, to try all this without a gauge.
+    SimulateGauge(simulated::SimulateArgs),
+}
+
+/// Options of `collect align`.
+#[derive(Debug, clap::Args)]
+pub struct AlignArgs {
+    /// The folder that was recorded into.
+    #[arg(long, value_name = "FOLDER")]
+    recording: PathBuf,
+    /// What the gauge recorded by itself: a line for each reading, seconds and force. May be repeated. Without it, what
+    /// `record` heard of the gauge.
+    #[arg(long, value_name = "FILE")]
+    gauge: Vec<PathBuf>,
+    /// The unit of readings that name none.
+    #[arg(long, default_value = "N", value_parser = unit)]
+    gauge_unit: Unit,
+    /// The largest lag between sensor and a gauge at a serial port, s.
+    #[arg(long, default_value_t = 2.0)]
+    max_lag_s: f64,
+    /// Smaller forces than this are no contact, N; never less than four times the gauge's noise at rest.
+    #[arg(long, default_value_t = 0.001)]
+    least_n: f64,
+    /// Take only stretches in which the force was held, each as one load: for `quick`.
+    #[arg(long)]
+    holds: bool,
+    /// The CSV file to write.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+fn unit(name: &str) -> Result<Unit, String> {
+    name.parse()
+        .map_err(|error: anyhow::Error| error.to_string())
+}
+
+impl CollectCommand {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// What failed, and what to do.
+    pub fn run(self) -> Result<()> {
+        match self {
+            CollectCommand::Record(args) => record::record(&args),
+            CollectCommand::Align(args) => args.run(),
+            CollectCommand::SimulateGauge(args) => args.run(),
+        }
+    }
+}
+
+impl AlignArgs {
+    fn run(self) -> Result<()> {
+        let recording = Recording::read(&self.recording)?;
+        let files = self
+            .gauge
+            .iter()
+            .map(|path| Series::load(path, self.gauge_unit));
+        let gauge = match files.collect::<Result<Vec<_>>>()? {
+            files if files.is_empty() => Gauge::AtThePort,
+            files => Gauge::Files(files),
+        };
+        let choices = Choices {
+            max_lag_s: self.max_lag_s,
+            least_n: self.least_n,
+            holds: self.holds,
+        };
+        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, choices)?;
+        dataset.save(&self.out)?;
+        println!("{report}");
+        println!(
+            "wrote {}: {} rows in {} session(s)",
+            self.out.display(),
+            dataset.rows.len(),
+            dataset.about.sessions
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,112 @@
+//! What a gauge would have said of a simulated press: for tests, and to try a calibration without a gauge.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+
+/// Options of `collect simulate-gauge`.
+#[derive(Debug, clap::Args)]
+pub struct SimulateArgs {
+    /// The truth log of a rig (`hivtac-rig --truth`).
+    #[arg(long, value_name = "FILE")]
+    truth: PathBuf,
+    #[command(flatten)]
+    gauge: SimulatedGauge,
+    /// The file to write: seconds and reading.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// How the gauge differs from the truth.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct SimulatedGauge {
+    /// How far its clock is ahead, s.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub ahead_s: f64,
+    /// How much faster its clock runs, parts in a million.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub drift_ppm: f64,
+    /// Readings in a second.
+    #[arg(long, default_value_t = 100.0)]
+    pub rate_hz: f64,
+    /// Standard deviation of its readings, N.
+    #[arg(long, default_value_t = 0.0005)]
+    pub noise_n: f64,
+    /// What it shows without a force, N.
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub zero_n: f64,
+    /// One line in so many is damaged; 0: none.
+    #[arg(long, default_value_t = 0)]
+    pub damaged_every: usize,
+    /// Decides the noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+#[derive(Deserialize)]
+struct Exposure {
+    time_s: f64,
+    magnitude_n: f64,
+}
+
+impl SimulateArgs {
+    /// Writes the gauge's file.
+    ///
+    /// # Errors
+    /// When the log cannot be used or the file not be written.
+    pub fn run(self) -> Result<()> {
+        let text = fs::read_to_string(&self.truth)
+            .with_context(|| format!("cannot read {}", self.truth.display()))?;
+        let exposures = text.lines().map(|line| {
+            let Exposure {
+                time_s,
+                magnitude_n,
+            } = serde_json::from_str(line)
+                .with_context(|| format!("{} is no truth log: {line}", self.truth.display()))?;
+            Ok((time_s, magnitude_n))
+        });
+        let forces: Vec<(f64, f64)> = exposures.collect::<Result<_>>()?;
+        fs::write(&self.out, self.gauge.lines(&forces)?)
+            .with_context(|| format!("cannot write {}", self.out.display()))
+    }
+}
+
+impl SimulatedGauge {
+    /// The gauge's file for a force in time, (s, N), between whose points it is taken to be straight.
+    ///
+    /// # Errors
+    /// When there are no two points, or the gauge has no rate.
+    pub fn lines(&self, forces: &[(f64, f64)]) -> Result<String> {
+        ensure!(forces.len() > 1, "the truth log has no two exposures");
+        ensure!(
+            self.rate_hz > 0.0 && self.rate_hz <= 1e5 && self.noise_n >= 0.0,
+            "a rate above 0 and up to 100,000 Hz is needed, and a noise from 0 up"
+        );
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let (first, last) = (forces[0].0, forces[forces.len() - 1].0);
+        let mut text = String::from("time_s,force\n");
+        for i in 0..((last - first) * self.rate_hz) as usize {
+            let time = first + i as f64 / self.rate_hz;
+            let after = forces
+                .partition_point(|f| f.0 < time)
+                .clamp(1, forces.len() - 1);
+            let ((t0, f0), (t1, f1)) = (forces[after - 1], forces[after]);
+            let force = f0 + (f1 - f0) * ((time - t0) / (t1 - t0)).clamp(0.0, 1.0);
+            // The sum of twelve uniform numbers is as good as Gaussian here.
+            let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
+            let shown = force + self.zero_n + self.noise_n * noise;
+            let clock = self.ahead_s + first + (time - first) * (1.0 + self.drift_ppm * 1e-6);
+            if self.damaged_every > 0 && i % self.damaged_every == self.damaged_every - 1 {
+                writeln!(text, "{clock:.4},{shown:+.4}#")?;
+            } else {
+                writeln!(text, "{clock:.4},{shown:+.4}N")?;
+            }
+        }
+        Ok(text)
+    }
+}

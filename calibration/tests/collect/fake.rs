@@ -1,0 +1,207 @@
+//! A sensor whose film is a formula, and a hand that presses it.
+
+use std::f64::consts::TAU;
+use std::fs::File;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use hivtac_wire::decoder::{Decoder, Received};
+use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
+use hivtac_wire::message::*;
+use hivtac_wire::status::Status;
+use hivtac_wire::version::SCHEMA_HASH;
+
+/// How hard the hand presses at a time of the sensor, N; it begins after a second.
+pub fn press_n(time_s: f64) -> f64 {
+    let t = time_s - 1.0;
+    let swing = |hz: f64| (TAU * hz * t).sin();
+    let force = 0.09 - 0.09 * (TAU * 0.4 * t).cos() + 0.02 * swing(0.77) + 0.01 * swing(1.3);
+    if t < 0.0 { 0.0 } else { force.clamp(0.0, 0.2) }
+}
+
+/// A force in the film frame, N.
+pub fn force_n(size: f64, [alpha, beta]: [f64; 2]) -> [f64; 3] {
+    let (sin_a, cos_a) = alpha.to_radians().sin_cos();
+    let (sin_b, cos_b) = beta.to_radians().sin_cos();
+    [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| size * part)
+}
+
+/// Where the markers are under a force: apart with its square root, aside in proportion.
+pub fn markers(force: [f64; 3]) -> [Marker; 4] {
+    let apart = 40.0 * (-force[2]).max(0.0).sqrt();
+    let marker = |x: f64, y: f64| Marker {
+        x_q16: ((160.0 + x * (44.0 + apart) + 60.0 * force[0]) * 65_536.0).round() as i32,
+        y_q16: ((120.0 + y * (44.0 + apart) + 60.0 * force[1]) * 65_536.0).round() as i32,
+        area_px: 190,
+    };
+    [
+        marker(-1.0, -1.0),
+        marker(1.0, -1.0),
+        marker(1.0, 1.0),
+        marker(-1.0, 1.0),
+    ]
+}
+
+pub fn hello() -> DeviceHello {
+    DeviceHello {
+        protocol: PROTOCOL_VERSION,
+        schema: SCHEMA_HASH,
+        device_id: [1; 12],
+        board: "fake".try_into().unwrap(),
+        firmware: "fake".try_into().unwrap(),
+        model: None,
+        width: 320,
+        height: 240,
+        threshold: HsvBox {
+            hue_low: 170,
+            hue_high: 10,
+            saturation_low: 100,
+            saturation_high: 255,
+            value_low: 45,
+            value_high: 255,
+        },
+        preset: "ov7725".try_into().unwrap(),
+        dilations: 1,
+        centroid: Centroid::RednessWeighted,
+    }
+}
+
+/// What the sensor's clock says, and how it goes on from frame to frame.
+pub type Clock = Box<dyn FnMut() -> f64 + Send>;
+
+/// A sensor on a TCP port, whose film is pressed in the pose that the test sets.
+pub struct FakeSensor {
+    pub port: String,
+    pub pose: Arc<Mutex<[f64; 2]>>,
+}
+
+impl FakeSensor {
+    /// Every seventh frame misses a marker. `after` frames of a conversation it is gone.
+    pub fn start(mut clock: Clock, after: usize) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp:{}", listener.local_addr().unwrap());
+        let pose = Arc::new(Mutex::new([0.0; 2]));
+        let set = pose.clone();
+        std::thread::spawn(move || {
+            let mut frame = 0;
+            while let Ok((stream, _)) = listener.accept() {
+                talk(stream, &mut clock, &set, &mut frame, after);
+            }
+        });
+        Self { port, pose }
+    }
+}
+
+fn talk(
+    mut stream: TcpStream,
+    clock: &mut Clock,
+    pose: &Mutex<[f64; 2]>,
+    frame: &mut u32,
+    after: usize,
+) {
+    stream
+        .set_read_timeout(Some(Duration::from_millis(1)))
+        .unwrap();
+    let mut decoder = Decoder::<HOST_FRAME_LIMIT>::new();
+    let (mut streaming, mut sent) = (false, 0);
+    loop {
+        let mut bytes = [0; 64];
+        match stream.read(&mut bytes) {
+            Ok(0) => return,
+            Ok(count) => {
+                let mut bytes = &bytes[..count];
+                while let Some(message) = decoder.feed::<HostMessage>(&mut bytes) {
+                    let Received::Message(message) = message else {
+                        return;
+                    };
+                    answer(&mut stream, message, &mut streaming);
+                }
+            }
+            Err(_) if !streaming => continue,
+            Err(_) => {}
+        }
+        if streaming {
+            sent += 1;
+            if sent > after {
+                return;
+            }
+            *frame += 1;
+            send(
+                &mut stream,
+                &DeviceMessage::Sample(sample(*frame, clock(), *pose.lock().unwrap())),
+            );
+        }
+    }
+}
+
+fn answer(stream: &mut TcpStream, message: HostMessage, streaming: &mut bool) {
+    match message {
+        HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello())),
+        HostMessage::Command(Command { id, request }) => {
+            match request {
+                Request::StartWithMarkers => *streaming = true,
+                Request::Stop => *streaming = false,
+                other => panic!("{other:?} was not expected"),
+            }
+            let outcome = Outcome::Done;
+            send(stream, &DeviceMessage::Reply(Reply { id, outcome }));
+        }
+    }
+}
+
+fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
+    let found = frame % 7 != 0;
+    Sample {
+        sequence: frame,
+        frame,
+        time_us: (time_s * 1e6) as u64,
+        status: if found {
+            Status::MODEL_MISSING
+        } else {
+            Status::MARKERS_MISSING
+        },
+        force: None,
+        markers: found.then(|| markers(force_n(press_n(time_s), pose))),
+    }
+}
+
+fn send(stream: &mut TcpStream, message: &DeviceMessage) {
+    let mut buffer = [0; MAX_DEVICE_FRAME];
+    // A host that is gone is noticed when nothing can be read.
+    let _ = stream.write_all(encode(message, &mut buffer).unwrap());
+}
+
+/// `hivtac-calibrate ARGUMENTS`, ready to be talked to.
+pub fn start(here: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
+        .current_dir(here)
+        .args(arguments)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::from(File::create(here.join("said")).unwrap()))
+        .spawn()
+        .unwrap()
+}
+
+/// The same to its end, with lines on its standard input.
+pub fn run(here: &Path, arguments: &[&str], lines: &str) -> (Output, String) {
+    let mut child = start(here, arguments);
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(lines.as_bytes())
+        .unwrap();
+    let output = child.wait_with_output().unwrap();
+    (output, std::fs::read_to_string(here.join("said")).unwrap())
+}
+
+/// Its standard output when it succeeded.
+pub fn stdout((output, said): (Output, String)) -> String {
+    assert!(output.status.success(), "{said}");
+    String::from_utf8(output.stdout).unwrap()
+}

@@ -1,0 +1,183 @@
+//! A gauge that records by itself, with a clock of its own.
+
+use std::path::Path;
+
+use hivtac_calibration::collect::simulated::SimulatedGauge;
+use hivtac_calibration::dataset::{Dataset, Loads};
+
+use crate::fake::*;
+
+/// 100 frames a second, whatever the computer does.
+fn clock() -> Clock {
+    let mut time = 0.0;
+    Box::new(move || {
+        time += 0.01;
+        time
+    })
+}
+
+/// What the gauge wrote of the first `span_s` seconds.
+fn gauge_file(here: &Path, span_s: f64) {
+    let forces: Vec<_> = (0..(span_s * 200.0) as usize)
+        .map(|i| (i as f64 / 200.0, press_n(i as f64 / 200.0)))
+        .collect();
+    let gauge = SimulatedGauge {
+        ahead_s: 17.25,
+        drift_ppm: 100.0,
+        rate_hz: 100.0,
+        noise_n: 0.000_3,
+        zero_n: -0.004,
+        damaged_every: 97,
+        seed: 3,
+    };
+    std::fs::write(here.join("gauge.csv"), gauge.lines(&forces).unwrap()).unwrap();
+}
+
+fn record<'a>(port: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let common = [
+        "collect",
+        "record",
+        "--into",
+        "unit",
+        "--port",
+        port,
+        "--rest-seconds",
+        "0.5",
+        "--seconds",
+        "8",
+    ];
+    [&common[..], more].concat()
+}
+
+#[test]
+fn from_a_recording_to_a_model_for_the_unit() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let sensor = FakeSensor::start(clock(), usize::MAX);
+    *sensor.pose.lock().unwrap() = [8.0, -4.0];
+    let said = run(here, &record(&sensor.port, &[]), "\nnonsense\n8, -4\n").1;
+    assert!(said.contains("`nonsense` is no pose"), "{said}");
+    assert!(said.contains("samples ("), "{said}");
+    gauge_file(here, 12.0);
+    let align = [
+        "collect",
+        "align",
+        "--recording",
+        "unit",
+        "--gauge",
+        "gauge.csv",
+        "--out",
+        "data.csv",
+    ];
+    let report = stdout(run(here, &align, ""));
+    for words in [
+        "ahead",
+        "rejected by the sensor and kept: markers_missing",
+        "gauge at rest -4.0",
+        "gauge lines were not used (no reading",
+    ] {
+        assert!(report.contains(words), "no `{words}` in:\n{report}");
+    }
+    let data = Dataset::load(&here.join("data.csv")).unwrap();
+    assert_eq!(
+        (data.about.loads, data.about.sessions),
+        (Loads::Measured(1), 1)
+    );
+    // Where the gauge's force is known, the film's formula gives the very features.
+    let rest = data.rest().unwrap();
+    let mut pressed = 0;
+    for (seen, force) in data.accepted().filter(|(_, force)| *force != [0.0; 3]) {
+        let expected = markers(force);
+        let off_px = (seen.features_q16[4] - i64::from(expected[2].x_q16)) as f64 / 65_536.0;
+        assert!(off_px.abs() < 0.5, "{force:?}: {off_px} px");
+        assert!(seen.features_q16[4] >= rest.features_q16[4]);
+        pressed += 1;
+    }
+    assert!(pressed > 500, "{pressed}");
+
+    let closed = ["closed-form", "--data", "data.csv", "--out", "unit.weights"];
+    stdout(run(here, &closed, ""));
+    stdout(run(
+        here,
+        &["export", "--weights", "unit.weights", "--out", "unit.hvtm"],
+        "",
+    ));
+    let evaluate = [
+        "evaluate",
+        "--model",
+        "unit.hvtm",
+        "--data",
+        "data.csv",
+        "--out",
+        "report.html",
+    ];
+    let judged = stdout(run(here, &evaluate, ""));
+    assert!(judged.contains("Frames of a real unit"), "{judged}");
+    let check = run(here, &["check", "--model", "unit.hvtm"], "").1;
+    assert!(check.contains("use `evaluate`"), "{check}");
+}
+
+#[test]
+fn an_interrupted_recording_goes_on_with_the_poses_that_are_left() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    std::fs::write(here.join("poses.csv"), "alpha,beta\n0,0\n8,0\n0,8\n").unwrap();
+    // Gone in the middle of the second take.
+    let sensor = FakeSensor::start(clock(), 1400);
+    let arguments = record(&sensor.port, &["--poses", "poses.csv"]);
+    let (output, said) = run(here, &arguments, "\n\n\n\n");
+    assert!(
+        !output.status.success() && said.contains("the same command goes on"),
+        "{said}"
+    );
+    let kept = || {
+        std::fs::read_to_string(here.join("unit/samples.csv"))
+            .unwrap()
+            .lines()
+            .count()
+    };
+    let before = kept();
+    assert!(before > 1390, "{before}: what came is kept");
+    // Ended by the person.
+    let said = run(here, &arguments, "\ndone\n").1;
+    assert!(said.contains("2 of 3 poses are left"), "{said}");
+    let (output, said) = run(here, &arguments, "\n\n");
+    assert!(
+        output.status.success() || said.contains("goes on"),
+        "{said}"
+    );
+    assert!(kept() > before + 800, "{}", kept());
+    let takes = std::fs::read_to_string(here.join("unit/takes.csv")).unwrap();
+    assert!(
+        takes.contains(",0,0,") && takes.contains(",8,0,"),
+        "{takes}"
+    );
+}
+
+#[test]
+fn a_stranger_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let sensor = FakeSensor::start(clock(), usize::MAX);
+    stdout(run(here, &record(&sensor.port, &[]), "\ndone\n"));
+    let file = here.join("unit/unit.json");
+    let text = std::fs::read_to_string(&file)
+        .unwrap()
+        .replace("0101", "0201");
+    std::fs::write(&file, text).unwrap();
+    let (output, said) = run(here, &record(&sensor.port, &[]), "\ndone\n");
+    assert!(
+        !output.status.success() && said.contains("another unit"),
+        "{said}"
+    );
+    let align = [
+        "collect",
+        "align",
+        "--recording",
+        "unit",
+        "--out",
+        "data.csv",
+    ];
+    let said = run(here, &align, "").1;
+    assert!(said.contains("no frame in a pose"), "{said}");
+}

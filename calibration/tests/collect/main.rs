@@ -1,0 +1,6 @@
+//! `hivtac-calibrate collect` with a sensor and a gauge that are played by the tests.
+#![cfg(unix)]
+
+mod fake;
+mod from_file;
+mod over_serial;

@@ -1,0 +1,116 @@
+//! A gauge at a serial port, and Ctrl-C.
+
+use std::fs::File;
+use std::io::Write;
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rustix::fs::{Mode, OFlags};
+use rustix::pty::OpenptFlags;
+
+use crate::fake::*;
+
+/// Both ends of a new pseudo-terminal, and its name.
+fn pseudo_terminal() -> (File, File, String) {
+    let gauge = rustix::pty::openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)
+        .unwrap();
+    rustix::pty::grantpt(&gauge).unwrap();
+    rustix::pty::unlockpt(&gauge).unwrap();
+    let name = rustix::pty::ptsname(&gauge, Vec::new()).unwrap();
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let host = rustix::fs::open(&name, flags, Mode::empty()).unwrap();
+    (gauge.into(), host.into(), name.into_string().unwrap())
+}
+
+/// A gauge that shows, 0.15 s late, what presses; now and then a line is spoilt. Until it is told to end.
+fn play(mut gauge: File, begun: Instant, end: Arc<AtomicBool>) {
+    let mut count = 0;
+    while !end.load(Ordering::Relaxed) {
+        std::thread::sleep(Duration::from_millis(10));
+        let force = press_n(begun.elapsed().as_secs_f64() - 0.15);
+        count += 1;
+        let line = if count % 50 == 0 {
+            "+0.0".to_owned() + "?\r\n"
+        } else {
+            format!("{force:+.4}N\r\n")
+        };
+        if gauge.write_all(line.as_bytes()).is_err() {
+            return;
+        }
+    }
+}
+
+#[test]
+fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let begun = Instant::now();
+    let clock = move || {
+        std::thread::sleep(Duration::from_millis(10));
+        begun.elapsed().as_secs_f64()
+    };
+    let sensor = FakeSensor::start(Box::new(clock), usize::MAX);
+    let (gauge, _held, name) = pseudo_terminal();
+    let end = Arc::<AtomicBool>::default();
+    let player = std::thread::spawn({
+        let end = end.clone();
+        move || play(gauge, begun, end)
+    });
+    let arguments = [
+        "collect",
+        "record",
+        "--into",
+        "unit",
+        "--port",
+        &sensor.port,
+        "--gauge-port",
+        &name,
+        "--rest-seconds",
+        "0.5",
+        "--seconds",
+        "600",
+    ];
+    let mut child = start(here, &arguments);
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(b"\n0 0\n").unwrap();
+    std::thread::sleep(Duration::from_secs(9));
+    let status = Command::new("kill")
+        .args(["-s", "INT", &child.id().to_string()])
+        .status();
+    assert!(status.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let said = std::fs::read_to_string(here.join("said")).unwrap();
+    end.store(true, Ordering::Relaxed);
+    player.join().unwrap();
+    assert!(
+        !output.status.success() && said.contains("the same command goes on"),
+        "{said}"
+    );
+
+    let align = [
+        "collect",
+        "align",
+        "--recording",
+        "unit",
+        "--out",
+        "data.csv",
+    ];
+    let report = stdout(run(here, &align, ""));
+    let lag: f64 = report
+        .split("clock is ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    // A busy computer adds some milliseconds to either side.
+    assert!((0.1..0.2).contains(&lag), "{report}");
+    assert!(
+        report.contains("gauge lines were not used (no reading"),
+        "{report}"
+    );
+}
