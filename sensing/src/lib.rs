@@ -48,6 +48,8 @@ mod label;
 mod mask;
 mod moments;
 #[cfg(test)]
+mod numerics;
+#[cfg(test)]
 mod picture;
 mod rescale;
 mod root;
