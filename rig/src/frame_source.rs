@@ -1,7 +1,9 @@
 //! Where the camera's pictures come from: a scene, or a test picture.
 
-use anyhow::Context;
-use hivtac_scene::{Preset, Scene};
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use hivtac_scene::{Format, Preset, Scene};
 use serde_json::{Value, json};
 
 /// A picture of the whole pixel array, RGB565 in native order.
@@ -59,6 +61,32 @@ impl FrameSource for TestPicture {
 pub struct SceneSource(Scene);
 
 impl SceneSource {
+    /// The scene of a file (`docs/scene-file.md`), whose frames must be 320 × 240.
+    ///
+    /// # Errors
+    /// When it cannot be read, is no scene, or has frames of another size.
+    pub fn load(path: &Path) -> anyhow::Result<Self> {
+        let context = || format!("--scene {}", path.display());
+        let text = std::fs::read_to_string(path).with_context(context)?;
+        let scene = Scene::from_toml(&text).with_context(context)?;
+        let frame = scene.frame(0, 0.0);
+        if (frame.width, frame.height) != (320, 240) {
+            bail!(
+                "--scene {}: its frames are {} × {}, and this camera's are 320 × 240",
+                path.display(),
+                frame.width,
+                frame.height
+            );
+        }
+        if frame.pixels.is_empty() || frame.format == Format::Yuv422 {
+            bail!(
+                "--scene {}: this camera takes its pixels from frames in RGB565 (format = \"rgb565\")",
+                path.display()
+            );
+        }
+        Ok(Self(scene))
+    }
+
     /// A scene by name under a geometry preset, at 320 × 240.
     ///
     /// # Errors

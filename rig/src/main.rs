@@ -2,7 +2,7 @@
 
 use std::io::Write;
 use std::num::NonZeroU64;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -26,7 +26,8 @@ use hivtac_rig::truth::TruthLog;
 struct Arguments {
     /// The firmware, as it is flashed.
     elf: PathBuf,
-    /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or test-picture.
+    /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or test-picture; or a scene file
+    /// (FILE.toml), which has seed and preset of its own.
     #[arg(long, default_value = "demo")]
     scene: String,
     /// Decides the noise, and where the demo starts.
@@ -124,6 +125,9 @@ fn options(arguments: &Arguments, interrupt: Arc<AtomicBool>) -> anyhow::Result<
 fn source(arguments: &Arguments) -> anyhow::Result<Box<dyn FrameSource>> {
     if arguments.scene == "test-picture" {
         return Ok(Box::new(TestPicture));
+    }
+    if arguments.scene.ends_with(".toml") {
+        return Ok(Box::new(SceneSource::load(Path::new(&arguments.scene))?));
     }
     Ok(Box::new(SceneSource::new(
         &arguments.scene,

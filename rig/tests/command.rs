@@ -167,6 +167,7 @@ fn what_cannot_be_done_is_said() {
     for (arguments, code, word) in [
         (&["/nowhere.elf"][..], 1, "/nowhere.elf"),
         (&["x.elf", "--scene", "dance"], 1, "dance"),
+        (&["x.elf", "--scene", "none.toml"], 1, "none.toml"),
         (&["x.elf", "--preset", "moon"], 1, "moon"),
         (&["x.elf", "--fault", "fire"], 2, "fire"),
         (
