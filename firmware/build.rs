@@ -1,5 +1,19 @@
-//! Links anew when the memory map changes, which cargo does not look at by itself.
+//! Links anew when the memory map changes, which cargo does not look at by itself, and names the model file to embed.
+
+use std::path::Path;
 
 fn main() {
     println!("cargo:rerun-if-changed=../memory.x");
+    println!("cargo:rerun-if-env-changed=HIVTAC_MODEL");
+    let model = std::env::var("HIVTAC_MODEL");
+    let named = model
+        .as_deref()
+        .unwrap_or("calibration/models/default.hvtm");
+    let root = Path::new(&std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("..");
+    let file = root.join(named);
+    let file = file.canonicalize().unwrap_or_else(|error| {
+        panic!("HIVTAC_MODEL={named}: {error}; name a model file, from the root of the repository or in full")
+    });
+    println!("cargo:rerun-if-changed={}", file.display());
+    println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());
 }

@@ -2,9 +2,8 @@
 
 use hivtac_sensing::model::{AlignedFile, Model};
 
-/// The model file; aligned, so that kernels run it.
-static FILE: &AlignedFile<[u8]> =
-    &AlignedFile(*include_bytes!("../../calibration/models/default.hvtm"));
+/// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels run it.
+static FILE: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!(env!("HIVTAC_MODEL_FILE")));
 
 /// A file of at most so many bytes is copied to DTCM at the start, where its weights are read without waiting; a larger
 /// one is read in flash.
