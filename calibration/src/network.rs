@@ -99,6 +99,11 @@ impl Layer {
     }
 }
 
+/// What is smaller is no deviation but the rounding of a mean.
+const NO_SIGMA: f64 = 1e-9;
+/// The σ of an answer that does not vary, in N or degrees: smaller than any use, and large enough for the chip's numbers.
+const CONSTANT_ANSWER: f64 = 1e-5;
+
 /// Mean and standard deviation, component by component.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Standardization {
@@ -109,12 +114,25 @@ pub struct Standardization {
 }
 
 impl Standardization {
-    /// Means and population standard deviations of `rows`. A component that does not vary gets σ = 1, so that
+    /// Means and population standard deviations of a network's inputs. A component that does not vary gets σ = 1, so that
     /// it standardizes to zero instead of dividing by zero.
     ///
     /// # Errors
     /// When `rows` is empty.
     pub fn of<const N: usize>(rows: &[[f64; N]]) -> Result<Self> {
+        Self::with(rows, 1.0)
+    }
+
+    /// The same of its answers. One that does not vary gets next to no σ, so that whatever the network makes of it comes out
+    /// as the constant that it is.
+    ///
+    /// # Errors
+    /// When `rows` is empty.
+    pub fn of_answers<const N: usize>(rows: &[[f64; N]]) -> Result<Self> {
+        Self::with(rows, CONSTANT_ANSWER)
+    }
+
+    fn with<const N: usize>(rows: &[[f64; N]], constant: f64) -> Result<Self> {
         ensure!(
             !rows.is_empty(),
             "nothing to standardize: the data set has no usable row"
@@ -129,12 +147,9 @@ impl Standardization {
                 .sum::<f64>()
                 / count
         };
-        let sigma = (0..N).map(|i| Self::usable(variance(i).sqrt())).collect();
+        let usable = |sigma: f64| if sigma > NO_SIGMA { sigma } else { constant };
+        let sigma = (0..N).map(|i| usable(variance(i).sqrt())).collect();
         Ok(Self { mean, sigma })
-    }
-
-    fn usable(sigma: f64) -> f64 {
-        if sigma > 1e-9 { sigma } else { 1.0 }
     }
 
     /// (x − mean) / σ.
@@ -284,6 +299,13 @@ mod tests {
         assert_eq!(scaling.sigma, [1.0, 1.0]);
         assert_eq!(scaling.forward(&[3.0, 5.0]), [1.0, 0.0]);
         assert_eq!(scaling.backward(&[1.0, 0.0]), [3.0, 5.0]);
+    }
+
+    #[test]
+    fn a_constant_answer_is_the_constant() {
+        let scaling = Standardization::of_answers(&[[1.0, 5.0], [3.0, 5.0]]).unwrap();
+        assert_eq!(scaling.sigma, [1.0, CONSTANT_ANSWER]);
+        assert!((scaling.backward(&[1.0, 2.0])[1] - 5.0).abs() < 1e-4);
     }
 
     #[test]

@@ -153,7 +153,7 @@ fn no_network(rows: &Rows<'_>) -> Result<Network> {
     let forces: Vec<_> = rows.iter().map(|(_, force)| *force).collect();
     Ok(Network {
         input: Standardization::of(&features)?,
-        output: Standardization::of(&forces)?,
+        output: Standardization::of_answers(&forces)?,
         ..Network::default()
     })
 }

@@ -125,7 +125,7 @@ impl Samples {
 fn scaling(training: &Samples) -> Result<[Standardization; 2]> {
     Ok([
         Standardization::of(&training.features)?,
-        Standardization::of(&training.answers)?,
+        Standardization::of_answers(&training.answers)?,
     ])
 }
 
