@@ -75,6 +75,11 @@ impl Rig {
         &self.port
     }
 
+    /// Where it logs what is true of every exposure.
+    pub fn truth_file(&self) -> PathBuf {
+        self.file("truth")
+    }
+
     /// What is true of every exposure so far.
     ///
     /// # Errors

@@ -43,6 +43,21 @@ pub fn host_tool() -> Result<PathBuf> {
     build(command.args(["--package", "hivtac", "--release"]), "hivtac")
 }
 
+/// The calibration, without the solver of the film, which takes minutes to build.
+pub fn calibrate() -> Result<PathBuf> {
+    let mut command = cargo("build", workspace::root());
+    command.args([
+        "--package",
+        "hivtac-calibration",
+        "--no-default-features",
+        "--release",
+    ]);
+    build(
+        command.args(["--bin", "hivtac-calibrate"]),
+        "hivtac-calibrate",
+    )
+}
+
 /// The rig.
 pub fn rig() -> Result<PathBuf> {
     let mut command = rig_cargo("build");

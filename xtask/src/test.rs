@@ -230,6 +230,7 @@ fn cross_room_tests(toolchain: &Toolchain, programs: &Programs) -> Result<Comman
     programs.name_to(&mut command);
     command
         .env("HIVTAC_TOOL", artifacts::host_tool()?)
+        .env("HIVTAC_CALIBRATE", artifacts::calibrate()?)
         .env("HIVTAC_RIG", artifacts::rig()?)
         .env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image(toolchain)?);
     Ok(command)

@@ -30,7 +30,7 @@ pub struct Choices {
 pub enum Gauge {
     /// In the recording, on the computer's clock.
     AtThePort,
-    /// In files of the gauge's own, on its own clock; the one that fits a run best is taken.
+    /// In files of the gauge's own, on its own clock: one for all runs with poses, or one for each of them, in order.
     Files(Vec<Series>),
 }
 
@@ -76,7 +76,7 @@ pub fn assemble(
         let one = || format!("run {run}");
         let (series, alignment, times) = match gauge {
             Gauge::AtThePort => at_the_port(recording, &kept, run, unit, choices),
-            Gauge::Files(files) => best_file(files, &kept),
+            Gauge::Files(files) => from_file(files, session, &kept),
         }
         .with_context(one)?;
         let done = Run {
@@ -93,6 +93,14 @@ pub fn assemble(
         rows.extend(more);
     }
     ensure!(!rows.is_empty(), "the recording has no frame in a pose");
+    if let Gauge::Files(files) = gauge {
+        ensure!(
+            files.len() == 1 || files.len() == report.runs.len(),
+            "{} gauge files were named for {} runs with poses: one for all, or one for each",
+            files.len(),
+            report.runs.len()
+        );
+    }
     let about = about(recording, &rows, &report);
     Ok((Dataset { about, rows }, report))
 }
@@ -141,35 +149,29 @@ fn on_the_computers_clock(kept: &[&Kept]) -> Vec<f64> {
         .collect()
 }
 
-fn best_file(files: &[Series], kept: &[&Kept]) -> Result<(Series, Alignment, Vec<f64>)> {
+fn from_file(
+    files: &[Series],
+    session: usize,
+    kept: &[&Kept],
+) -> Result<(Series, Alignment, Vec<f64>)> {
+    let series = match files {
+        [series] => series,
+        files => files.get(session).context(
+            "there are fewer gauge files than runs with poses: one for all, or one for each",
+        )?,
+    };
     let times: Vec<f64> = kept
         .iter()
         .map(|kept| kept.device_us as f64 / 1e6)
         .collect();
-    let frames = seen(kept, &times)?;
     let ends = [times[0], times[times.len() - 1]];
-    let tried = files.iter().map(|series| {
-        let [first, last] = series.span().context("the gauge's file has no readings")?;
-        let search = Search {
-            lags_s: [first - ends[1], last - ends[0]],
-            drift: true,
-        };
-        Ok((
-            series.clone(),
-            align(&frames, series.joined(), search)?,
-            times.clone(),
-        ))
-    });
-    let (good, bad): (Vec<_>, Vec<Result<_>>) = tried.partition(Result::is_ok);
-    let best = good
-        .into_iter()
-        .flatten()
-        .min_by(|a, b| a.1.residual_n.total_cmp(&b.1.residual_n));
-    match (best, bad.into_iter().next()) {
-        (Some(best), _) => Ok(best),
-        (None, Some(failure)) => failure,
-        (None, None) => Err(anyhow::anyhow!("no gauge file was named")),
-    }
+    let [first, last] = series.span().context("the gauge's file has no readings")?;
+    let search = Search {
+        lags_s: [first - ends[1], last - ends[0]],
+        drift: true,
+    };
+    let alignment = align(&seen(kept, &times)?, series.joined(), search)?;
+    Ok((series.clone(), alignment, times))
 }
 
 /// Times and mean radii of the frames with markers, from the untouched film on.

@@ -23,11 +23,14 @@ pub mod simulated;
 use std::path::PathBuf;
 
 use anyhow::Result;
+use hivtac_scene::Contact;
 
 use assemble::{Choices, Gauge, assemble};
 use folder::Recording;
 use gauge::Unit;
 use series::Series;
+
+use crate::conditions::ContactName;
 
 /// Calibration data from a real unit.
 #[derive(Debug, clap::Subcommand)]
@@ -47,8 +50,8 @@ pub struct AlignArgs {
     /// The folder that was recorded into.
     #[arg(long, value_name = "FOLDER")]
     recording: PathBuf,
-    /// What the gauge recorded by itself: a line for each reading, seconds and force. May be repeated. Without it, what
-    /// `record` heard of the gauge.
+    /// What the gauge recorded by itself: a line for each reading, seconds and force. One file for all runs, or repeated, one
+    /// for each run with a pose, in order. Without it, what `record` heard of the gauge.
     #[arg(long, value_name = "FILE")]
     gauge: Vec<PathBuf>,
     /// The unit of readings that name none.
@@ -60,6 +63,10 @@ pub struct AlignArgs {
     /// Smaller forces than this are no contact, N; never less than four times the gauge's noise at rest.
     #[arg(long, default_value_t = 0.001)]
     least_n: f64,
+    /// What the poses' angles say: `force` (the direction of the force, as of a weight that hangs), or the pressing direction of
+    /// a tip that sticks (`stick`) or slips from a friction ratio on (`slip:0.6`).
+    #[arg(long, default_value = "force")]
+    contact: Contact,
     /// Take only stretches in which the force was held, each as one load: for `quick`.
     #[arg(long)]
     holds: bool,
@@ -89,7 +96,7 @@ impl CollectCommand {
 
 impl AlignArgs {
     fn run(self) -> Result<()> {
-        let recording = Recording::read(&self.recording)?;
+        let mut recording = Recording::read(&self.recording)?;
         let files = self
             .gauge
             .iter()
@@ -103,6 +110,7 @@ impl AlignArgs {
             least_n: self.least_n,
             holds: self.holds,
         };
+        recording.conditions.contact = ContactName(self.contact);
         let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, choices)?;
         dataset.save(&self.out)?;
         println!("{report}");

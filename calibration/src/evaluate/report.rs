@@ -31,9 +31,12 @@ impl Evaluation {
     pub fn sentence(&self) -> String {
         if self.measured {
             return format!(
-                "Frames of a real unit ({}), contact reading `{}`, {}. The truth is the gauge's reading and the pose that was set: \
+                "Frames of a real unit ({}), contact reading `{}` ({}), {}. The truth is the gauge's reading and the pose that was set: \
                  their errors are in these numbers, too.",
-                self.frames, self.contact, self.rows
+                self.frames,
+                self.contact,
+                self.contact.meaning(),
+                self.rows
             );
         }
         format!(

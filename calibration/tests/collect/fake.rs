@@ -11,7 +11,10 @@ use std::time::Duration;
 
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
-use hivtac_wire::message::*;
+use hivtac_wire::message::{
+    Centroid, DeviceHello, DeviceMessage, HostMessage, HsvBox, Marker, Outcome, PROTOCOL_VERSION,
+    Reply, Request, Sample,
+};
 use hivtac_wire::status::Status;
 use hivtac_wire::version::SCHEMA_HASH;
 
@@ -141,7 +144,7 @@ fn talk(
 fn answer(stream: &mut TcpStream, message: HostMessage, streaming: &mut bool) {
     match message {
         HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello())),
-        HostMessage::Command(Command { id, request }) => {
+        HostMessage::Command(hivtac_wire::message::Command { id, request }) => {
             match request {
                 Request::StartWithMarkers => *streaming = true,
                 Request::Stop => *streaming = false,
@@ -154,7 +157,7 @@ fn answer(stream: &mut TcpStream, message: HostMessage, streaming: &mut bool) {
 }
 
 fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
-    let found = frame % 7 != 0;
+    let found = !frame.is_multiple_of(7);
     Sample {
         sequence: frame,
         frame,
