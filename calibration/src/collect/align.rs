@@ -62,6 +62,8 @@ const LEAST_CORRELATION: f64 = 0.95;
 const LEAST_CONTRAST: f64 = 1.5;
 /// Clocks differ by no more than this, in parts: 500 ppm, five times what crystals do.
 const LARGEST_DRIFT: f64 = 5e-4;
+/// In a shorter recording, s, a difference of rates cannot be told from a lag.
+const SHORTEST_FOR_DRIFT_S: f64 = 60.0;
 
 impl Alignment {
     /// The gauge's time at a time of the sensor.
@@ -165,6 +167,7 @@ fn convincing(found: &Alignment, at_an_end: bool) -> Result<()> {
 fn refine(frames: &[Seen], gauge: Joined<'_>, lag_s: f64, drift: bool) -> Alignment {
     let ends = [frames[0].time_s, frames[frames.len() - 1].time_s];
     let middle = f64::midpoint(ends[0], ends[1]);
+    let drift = drift && ends[1] - ends[0] >= SHORTEST_FOR_DRIFT_S;
     let fit = |lag, drift| Fit::of(frames, gauge, lag, drift, middle);
     let cost = |lag, drift| fit(lag, drift).map_or(f64::INFINITY, |fit| fit.relative());
     let (mut lag, mut rate) = (lag_s, 0.0);
