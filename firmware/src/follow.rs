@@ -7,6 +7,7 @@
 use crate::bands::{FRAME, SHAPE};
 use crate::capture;
 use crate::pipeline_task::Sensor;
+use crate::stats;
 use hivtac_capture::Window;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::windows::{Rectangle, Tracks};
@@ -17,8 +18,6 @@ const TRACKING: bool = cfg!(feature = "tracking");
 pub struct Follow {
     window: Window,
     tracks: Tracks,
-    /// Told so far.
-    fallen_back: u32,
 }
 
 impl Follow {
@@ -27,7 +26,6 @@ impl Follow {
         Self {
             window: FRAME,
             tracks: Tracks::new(),
-            fallen_back: 0,
         }
     }
 
@@ -53,11 +51,9 @@ impl Follow {
         } else {
             sensor.finish_cropped(&mut self.tracks, rectangle(self.window))
         };
-        let fallen_back = self.tracks.tally().fallen_back;
-        if fallen_back != self.fallen_back {
-            self.fallen_back = fallen_back;
-            defmt::info!("markers not followed, {=u32} times by now", fallen_back);
-        }
+        let tally = self.tracks.tally();
+        stats::FRAMES_TRACKED.set(tally.tracked);
+        stats::TRACKING_LOST.set(tally.fallen_back);
         capture::set_window(self.wanted(sensor));
         measurement
     }

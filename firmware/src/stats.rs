@@ -90,5 +90,7 @@ counters! {
     CAPTURE_OVERRUNS => capture_overruns;
     USB_DROPPED => usb_dropped;
     HOST_FRAMES_REJECTED => host_frames_rejected;
+    FRAMES_TRACKED => frames_tracked;
+    TRACKING_LOST => tracking_lost;
     PROCESSING_US => processing_us;
 }

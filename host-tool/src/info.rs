@@ -137,7 +137,7 @@ impl<'a> Info<'a> {
 }
 
 /// The counters since boot.
-fn stats_lines(stats: &Stats) -> [String; 4] {
+fn stats_lines(stats: &Stats) -> [String; 5] {
     [
         format!(
             "frames     {} exposed, {} processed; dropped: busy {}, overrun {}, size {}",
@@ -150,6 +150,10 @@ fn stats_lines(stats: &Stats) -> [String; 4] {
         format!(
             "camera     {} timeouts, {} restarts, {} overruns",
             stats.camera_timeouts, stats.camera_restarts, stats.capture_overruns
+        ),
+        format!(
+            "tracking   {} frames by the markers' surroundings alone, lost {} times",
+            stats.frames_tracked, stats.tracking_lost
         ),
         format!(
             "USB        {} samples dropped, {} frames from the host rejected",

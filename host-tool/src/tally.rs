@@ -190,7 +190,7 @@ struct DeviceCounts {
     last: Option<Stats>,
     /// How often they were received after the first time.
     updates: u64,
-    grown: [u64; 10],
+    grown: [u64; 12],
 }
 
 impl DeviceCounts {
@@ -208,7 +208,7 @@ impl DeviceCounts {
     }
 }
 
-fn counters(stats: &Stats) -> [u32; 10] {
+fn counters(stats: &Stats) -> [u32; 12] {
     [
         stats.frames_exposed,
         stats.frames_processed,
@@ -220,6 +220,8 @@ fn counters(stats: &Stats) -> [u32; 10] {
         stats.camera_restarts,
         stats.capture_overruns,
         stats.host_frames_rejected,
+        stats.frames_tracked,
+        stats.tracking_lost,
     ]
 }
 
@@ -239,12 +241,14 @@ impl fmt::Display for DeviceCounts {
             restarts,
             overruns,
             rejected,
+            tracked,
+            lost,
         ] = self.grown;
         write!(
             f,
             "device: {exposed} frames exposed, {processed} processed; dropped: busy {busy}, overrun {overrun}, \
-             size {size}, USB {usb}; camera timeouts {timeouts}, restarts {restarts}, overruns {overruns}; \
-             commands rejected {rejected}; last frame took {} µs",
+             size {size}, USB {usb}; tracked {tracked}, lost {lost} times; camera timeouts {timeouts}, restarts {restarts}, \
+             overruns {overruns}; commands rejected {rejected}; last frame took {} µs",
             last.processing_us
         )
     }

@@ -37,6 +37,9 @@ fn cropped_frames_give_the_forces_of_whole_ones() {
     assert_eq!(equal, both);
     let dcmi = cropped.report.dcmi;
     assert!(dcmi.words < dcmi.frames * WHOLE * 7 / 10, "{dcmi:?}");
+    let tracked = |run: &Run| (run.stats().frames_tracked, run.stats().tracking_lost);
+    assert_eq!(tracked(&whole), (0, 0));
+    assert!(tracked(&cropped).0 >= 12 && tracked(&cropped).1 == 0, "{:?}", cropped.stats());
     assert_eq!(cropped.report.refused, [] as [String; 0]);
 }
 
@@ -48,6 +51,24 @@ fn a_moving_tip_is_followed() {
     let with_force = samples.iter().filter(|sample| sample.force.is_some());
     assert_eq!(with_force.count(), samples.len());
     run.assert_times();
+}
+
+/// An impact moves the markers farther between two frames than their windows reach: that frame has no force, the next one is
+/// whole, and both are counted.
+#[test]
+fn what_jumps_is_lost_counted_and_found_again() {
+    let setup = Setup {
+        scene: "catch",
+        ..Setup::new(bug("tracking"), 600)
+    };
+    let run = setup.run();
+    let (samples, stats) = (run.samples(), run.stats());
+    assert_eq!(run.missing_frames(), Vec::<u32>::new());
+    assert!(stats.tracking_lost >= 1, "{stats:?}");
+    let without = samples.iter().filter(|sample| sample.force.is_none()).count();
+    assert!((1..=stats.tracking_lost as usize).contains(&without), "{without} without force, {stats:?}");
+    assert!(samples.last().is_some_and(|sample| sample.force.is_some()));
+    assert!(stats.frames_tracked >= 8, "{stats:?}");
 }
 
 /// Half a frame does not reach down to all markers: it is counted, and the next one is captured whole or cropped.

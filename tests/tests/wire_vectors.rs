@@ -137,6 +137,8 @@ fn stats() -> DeviceMessage {
         capture_overruns: 2,
         usb_dropped: 130,
         host_frames_rejected: 0,
+        frames_tracked: 940,
+        tracking_lost: 25,
         processing_us: 5300,
         uptime_us: 34_000_000,
     })

@@ -11,7 +11,7 @@ import pathlib
 import sys
 import zlib
 
-SCHEMA = 0xC407FE30E8C6B909
+SCHEMA = 0x145736104F119E2C
 
 
 def varint(value):
@@ -143,6 +143,8 @@ STATS = [
     ("capture_overruns", 2),
     ("usb_dropped", 130),
     ("host_frames_rejected", 0),
+    ("frames_tracked", 940),
+    ("tracking_lost", 25),
     ("processing_us", 5300),
     ("uptime_us", 34_000_000),
 ]

@@ -105,6 +105,8 @@ fn longest_stats() -> Stats {
         capture_overruns: u32::MAX,
         usb_dropped: u32::MAX,
         host_frames_rejected: u32::MAX,
+        frames_tracked: u32::MAX,
+        tracking_lost: u32::MAX,
         processing_us: u32::MAX,
         uptime_us: u64::MAX,
     }
@@ -233,7 +235,7 @@ fn any_force() -> impl Strategy<Value = Force> {
 }
 
 fn any_stats() -> impl Strategy<Value = Stats> {
-    (any::<[u32; 11]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
+    (any::<[u32; 13]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
         frames_exposed: counts[0],
         frames_processed: counts[1],
         dropped_busy: counts[2],
@@ -244,7 +246,9 @@ fn any_stats() -> impl Strategy<Value = Stats> {
         capture_overruns: counts[7],
         usb_dropped: counts[8],
         host_frames_rejected: counts[9],
-        processing_us: counts[10],
+        frames_tracked: counts[10],
+        tracking_lost: counts[11],
+        processing_us: counts[12],
         uptime_us,
     })
 }

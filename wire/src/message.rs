@@ -177,6 +177,10 @@ pub struct Stats {
     pub usb_dropped: u32,
     /// Frames from the host that were thrown away: bad CRC, COBS or content.
     pub host_frames_rejected: u32,
+    /// Frames that became a sample from the markers' surroundings alone; whole frames count as processed only.
+    pub frames_tracked: u32,
+    /// Times a marker was not where it was looked for, so that the whole of the next frame was looked at.
+    pub tracking_lost: u32,
     /// Duration of the last frame's processing, µs.
     pub processing_us: u32,
     /// Device time, µs since boot.
