@@ -13,7 +13,7 @@ use hivtac_sensing::threshold::ByteOrder;
 use rayon::prelude::*;
 
 use crate::conditions::ContactName;
-use crate::dataset::{Loads, Recipe, measure, reasons};
+use crate::dataset::{Loads, Recipe, Spread, measure, reasons};
 use crate::errors::{Errors, WEAK_N};
 use crate::weights::Range;
 
@@ -100,6 +100,7 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64, friction: f64) -> Recipe
         rest: 0,
         range,
         sessions: 1,
+        spread: Spread::default(),
         seed,
     }
 }

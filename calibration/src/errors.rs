@@ -103,7 +103,7 @@ pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
     ];
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
     let sized = norm(a) > 0.0 && norm(b) > 0.0;
-    sized.then(|| norm(cross).atan2(dot).to_degrees())
+    sized.then(|| libm::atan2(norm(cross), dot).to_degrees())
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@
 //! | `import` | networks trained in PyTorch |
 //! | `network`, `weights`, `conditions` | the network in floats, its file, and what it holds for |
 //! | `quantize` | weights to a model file, the same bytes on every machine |
+//! | `uncertainty` | what a model's errors say of its next ones |
 //! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
 //! | `plot`, `loss_plot` | SVG |
 //! | `scene` | pictures and figures of the simulated sensor |
@@ -33,4 +34,5 @@ pub mod plot;
 pub mod quantize;
 pub mod scene;
 pub mod train;
+pub mod uncertainty;
 pub mod weights;

@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand};
 use hivtac_calibration::check::check;
 use hivtac_calibration::collect::CollectCommand;
 use hivtac_calibration::conditions::{CentroidName, preset};
-use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate, generate_file};
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, Spread, generate, generate_file};
 use hivtac_calibration::evaluate::Evaluation;
 use hivtac_calibration::fit::Kind;
 use hivtac_calibration::fit::quick::quick;
@@ -87,6 +87,18 @@ enum Command {
         #[arg(long)]
         tensors: PathBuf,
         /// The data set that it was trained on.
+        #[arg(long)]
+        data: PathBuf,
+        /// The weights file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Make the uncertainties of a weights file anew, from a data set that it was not made from; writes a weights file.
+    Uncertainty {
+        /// The weights file.
+        #[arg(long)]
+        weights: PathBuf,
+        /// The data set: best many sessions (`dataset --sessions 60`).
         #[arg(long)]
         data: PathBuf,
         /// The weights file to write.
@@ -179,9 +191,15 @@ struct RecipeArgs {
     /// Largest force, N.
     #[arg(long, default_value_t = Recipe::default().range.force_n)]
     force_n: f64,
-    /// Sessions: the first is nominal, the others are mounted, lit and focused a little differently.
+    /// Sessions: the first is nominal, the others are built, mounted, lit, focused and pressed a little differently.
     #[arg(long, default_value_t = 1)]
     sessions: usize,
+    /// In all sessions but the first, each marker is glued up to this far from its place along x and y, mm.
+    #[arg(long, default_value_t = Spread::default().glue_mm)]
+    glue_mm: f64,
+    /// In all sessions but the first, the tip touches the film up to this far from its middle along x and y, mm.
+    #[arg(long, default_value_t = Spread::default().offset_mm)]
+    offset_mm: f64,
     /// Decides forces, sessions and noise.
     #[arg(long = "data-seed", visible_alias = "seed", default_value_t = 1)]
     data_seed: u64,
@@ -219,6 +237,10 @@ impl RecipeArgs {
                 ..Recipe::default().range
             },
             sessions: self.sessions,
+            spread: Spread {
+                glue_mm: self.glue_mm,
+                offset_mm: self.offset_mm,
+            },
             seed: self.data_seed,
         })
     }
@@ -254,6 +276,9 @@ fn main() -> Result<()> {
         }
         Command::Import { tensors, data, out } => {
             training::import(&Dataset::load(&data)?, &tensors)?.save(&out)
+        }
+        Command::Uncertainty { weights, data, out } => {
+            training::judged(Weights::load(&weights)?, &Dataset::load(&data)?)?.save(&out)
         }
         Command::Export { weights, rest, out } => export_file(&weights, rest.as_deref(), &out),
         Command::Evaluate {
@@ -344,7 +369,12 @@ fn default_model(
         out_dir.join("default.weights"),
         out_dir.join("default.hvtm"),
     );
-    training::run(&make_dataset(recipe, None)?, options, Kind::Both)?.save(&weights)?;
+    let sessions = recipe.recipe()?.other_sessions();
+    let trained = training::run(&make_dataset(recipe, None)?, options, Kind::Both)?;
+    let bar = bar("rendering", sessions.rows());
+    let sessions = generate(&sessions, || bar.inc(1))?;
+    bar.finish_and_clear();
+    training::judged(trained, &sessions)?.save(&weights)?;
     export_file(&weights, None, &model)?;
     check_file(
         &model,

@@ -7,7 +7,9 @@
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::FEATURES;
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
-use hivtac_sensing::model::{self, InputScaling, MAX_ACTIVATION8, OutputKind, WeightWidth};
+use hivtac_sensing::model::{
+    self, InputScaling, MAX_ACTIVATION8, OutputKind, UncertaintyKnot, WeightWidth,
+};
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
 
 use crate::closed_form::ClosedForm;
@@ -84,9 +86,13 @@ fn range(range: &Range) -> model::CalibratedRange {
 }
 
 fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
+    let micro = |n: f64| MicroNewtons((n * 1e6).round() as i32);
     model::Uncertainty {
-        lateral: MicroNewtons((uncertainty.lateral_n * 1e6).round() as i32),
-        normal: MicroNewtons((uncertainty.normal_n * 1e6).round() as i32),
+        step_bits: uncertainty.step_bits,
+        knots: std::array::from_fn(|i| UncertaintyKnot {
+            across: micro(uncertainty.across_n[i]),
+            along: micro(uncertainty.along_n[i]),
+        }),
     }
 }
 

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use hivtac_calibration::dataset::{Dataset, Split};
 use hivtac_calibration::errors::{Errors, WEAK_N};
-use hivtac_calibration::fit::{Fit, Kind, adopt, fit, fit_closed_form};
+use hivtac_calibration::fit::{Fit, Kind, adopt, fit, fit_closed_form, judged_by};
 use hivtac_calibration::loss_plot::LossPlot;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::train::{Options, Progress};
@@ -124,6 +124,11 @@ fn told(fitted: Fit, rows: &str) -> Weights {
     print_errors(&format!("{rows}, floats"), &fitted.float);
     print_errors(&format!("{rows}, quantized"), &fitted.quantized);
     fitted.weights
+}
+
+/// Makes uncertainties anew, and prints the errors that they are from.
+pub fn judged(weights: Weights, dataset: &Dataset) -> Result<Weights> {
+    Ok(told(judged_by(weights, dataset)?, "rows of other sessions"))
 }
 
 /// Takes a network from a safetensors file and prints its errors on the data set.

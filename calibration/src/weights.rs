@@ -11,9 +11,10 @@ use crate::closed_form::ClosedForm;
 use crate::conditions::Conditions;
 use crate::dataset::Split;
 use crate::network::{INPUTS, Network};
+pub use crate::uncertainty::Uncertainty;
 
 /// What the file calls itself.
-const FORMAT: &str = "hivtac-weights 1";
+const FORMAT: &str = "hivtac-weights 2";
 
 /// A weights file. JSON; its floats are written so that reading gives the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,15 +75,6 @@ impl Default for Range {
             beta_deg: 8.0,
         }
     }
-}
-
-/// Standard uncertainties: root mean square errors on rows that were held out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Uncertainty {
-    /// Of F_x and of F_y, N.
-    pub lateral_n: f64,
-    /// Of F_z, N.
-    pub normal_n: f64,
 }
 
 /// How a network was trained.
@@ -182,13 +174,14 @@ impl Weights {
             );
         }
         let Uncertainty {
-            lateral_n,
-            normal_n,
-        } = self.uncertainty;
-        for (name, sigma) in [("lateral_n", lateral_n), ("normal_n", normal_n)] {
+            across_n, along_n, ..
+        } = &self.uncertainty;
+        for (name, sigmas) in [("across_n", across_n), ("along_n", along_n)] {
+            let wrong = sigmas.iter().find(|sigma| !(0.0..=1000.0).contains(*sigma));
             ensure!(
-                (0.0..=1000.0).contains(&sigma),
-                "uncertainty.{name} is {sigma}: use 0 to 1000"
+                wrong.is_none(),
+                "uncertainty.{name} has {}: use 0 to 1000",
+                wrong.unwrap_or(&0.0)
             );
         }
         features_from_q16(&self.rest.features_q16).context("rest.features_q16")?;

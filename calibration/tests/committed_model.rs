@@ -5,8 +5,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use hivtac_calibration::check::check;
+use hivtac_calibration::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, coverage};
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::weights::Weights;
+use hivtac_calibration::weights::{Range, Weights};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, Origin, OutputKind};
 use hivtac_sensing::threshold::HsvBox;
@@ -57,22 +59,31 @@ fn it_measures_frames_that_no_training_saw() {
     assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
 }
 
+/// Over |F|, and in sessions that were mounted, lit and focused like none that it was made from: a tenth of the frames are
+/// 200, of which 95 to 97 in a hundred give or take 1.5, and somewhat more for 40 sessions only.
 #[test]
-fn its_uncertainties_are_the_errors_that_it_makes() {
-    let bytes = committed();
-    let said = Model::parse(&bytes).unwrap().uncertainty;
-    let errors = check(&bytes, 1000, 78, 0.6, || ()).unwrap().errors;
-    let near = |un: i32, rmse_n: f64| (0.75..1.33).contains(&(rmse_n * 1e6 / f64::from(un)));
-    assert!(
-        near(said.lateral.0, errors.lateral_rmse_n()),
-        "{said:?} {}",
-        errors.lateral_rmse_n()
-    );
-    assert!(
-        near(said.normal.0, errors.normal_rmse_n()),
-        "{said:?} {}",
-        errors.normal_rmse_n()
-    );
+fn its_uncertainties_are_honest_in_sessions_that_it_does_not_know() {
+    let recipe = Recipe {
+        loads: Loads::Random(50),
+        rest: 32,
+        sessions: 40,
+        seed: 78,
+        range: Range::default(),
+        ..Recipe::default()
+    };
+    let dataset = generate(&recipe, || ()).unwrap();
+    let evaluation = Evaluation::of(&committed(), &dataset, None).unwrap();
+    let parts = coverage(&evaluation.judged);
+    assert_eq!(parts.len(), 10);
+    let kinds: [fn(&Coverage) -> Covered; 2] = [|part| part.direction, |part| part.magnitude];
+    for of in kinds {
+        let within: Vec<f64> = parts.iter().map(|part| of(part).within).collect();
+        assert!(within.iter().all(|&part| part >= 0.9), "{evaluation}");
+        let mean = within.iter().sum::<f64>() / 10.0;
+        assert!((0.94..0.98).contains(&mean), "{mean}: {evaluation}");
+    }
+    let narrow = |part: &Coverage| part.direction.bound <= 3.0 * part.direction.error;
+    assert!(parts.iter().all(narrow), "{evaluation}");
 }
 
 #[test]
@@ -91,8 +102,8 @@ fn unusable_weights_are_refused_with_the_reason() {
         assert!(error.contains(words), "{error}");
     };
     refused(
-        text.replace("hivtac-weights 1", "hivtac-weights 2"),
-        "hivtac-weights 2",
+        text.replace("hivtac-weights 2", "hivtac-weights 1"),
+        "hivtac-weights 1",
     );
     refused(
         text.replace("\"force_n\":0.2", "\"force_n\":-0.2"),
@@ -103,8 +114,8 @@ fn unusable_weights_are_refused_with_the_reason() {
         "range.alpha_deg",
     );
     refused(
-        text.replace("\"lateral_n\":", "\"lateral_n\":-"),
-        "uncertainty.lateral_n",
+        text.replace("\"across_n\":[", "\"across_n\":[-"),
+        "uncertainty.across_n",
     );
     refused(
         text.replace("\"contact\":\"force\"", "\"contact\":\"feel\""),

@@ -39,6 +39,14 @@ impl Disc {
         }
     }
 
+    /// The same disc farther along x and y, mm.
+    pub(crate) fn moved(&self, [x, y]: [f64; 2]) -> Disc {
+        Disc {
+            centre_mm: [self.centre_mm[0] + x, self.centre_mm[1] + y],
+            ..*self
+        }
+    }
+
     /// The centroid of the disc's image, px, on a film that moves its points (mm) by `displacement`.
     pub fn centroid_px(
         &self,

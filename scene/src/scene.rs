@@ -165,7 +165,7 @@ impl Scene {
     fn marker_images<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>) -> [Option<Image>; 4] {
         std::array::from_fn(|id| {
             let there = !self.options.missing[id];
-            there.then(|| exposure.image(&MARKERS[id]))
+            there.then(|| exposure.image(&MARKERS[id].moved(self.options.glued_mm[id])))
         })
     }
 

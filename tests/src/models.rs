@@ -7,7 +7,7 @@ use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, OUTPUTS, Origin,
-    OutputKind, PixelFormat, Rest, Uncertainty, WeightWidth,
+    OutputKind, PixelFormat, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
 };
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::HsvBox;
@@ -134,8 +134,11 @@ fn spec(
             beta: MilliDegrees(8_000),
         },
         uncertainty: Uncertainty {
-            lateral: MicroNewtons(900),
-            normal: MicroNewtons(800),
+            step_bits: 14,
+            knots: std::array::from_fn(|i| UncertaintyKnot {
+                across: MicroNewtons(1_300 - 37 * i as i32),
+                along: MicroNewtons(500 + 91 * i as i32),
+            }),
         },
     }
 }

@@ -10,7 +10,7 @@ use super::folder::{Kept, Recording};
 use super::holds;
 use super::report::{Report, RunReport};
 use super::series::{Joined, Series};
-use crate::dataset::{About, Dataset, Loads, Observation, Place, Row};
+use crate::dataset::{About, Dataset, Loads, Observation, Place, Row, Spread};
 use crate::loads::PaperPoses;
 use crate::weights::Range;
 
@@ -318,6 +318,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
         loads: Loads::Measured(poses.len()),
         rest: at_rest / report.runs.len(),
         sessions: report.runs.len(),
+        spread: Spread::default(),
         seed: 0,
         range: Range {
             force_n: largest(&|row| crate::errors::norm(row.force_n)),

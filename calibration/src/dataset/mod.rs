@@ -20,6 +20,7 @@ pub use generate::generate;
 pub(crate) use generate::{measure, reasons};
 pub use recipe::{Loads, Recipe};
 pub use resume::generate_file;
+pub use session::Spread;
 pub use split::Split;
 
 /// A pixel in Q16.16.
@@ -48,6 +49,9 @@ pub struct About {
     pub rest: usize,
     /// How many times the sensor was set up anew.
     pub sessions: usize,
+    /// How far the sessions are apart in what a tare does not see.
+    #[serde(default)]
+    pub spread: Spread,
     /// Decides loads, sessions and noise.
     pub seed: u64,
     /// The limits of its forces.
@@ -183,6 +187,7 @@ mod tests {
             loads: Loads::Random(2),
             rest: 2,
             sessions: 1,
+            spread: Spread::default(),
             seed: 3,
             range: Range::default(),
         };

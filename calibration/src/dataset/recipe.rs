@@ -5,7 +5,7 @@ use hivtac_scene::{Contact, Load, Options, Preset as ScenePreset, Scene};
 use hivtac_sensing::geometry::Preset;
 use serde::{Deserialize, Serialize};
 
-use super::session::Session;
+use super::session::{Session, Spread};
 use super::{About, Place};
 use crate::conditions::{CentroidName, Conditions, ContactName};
 use crate::loads::{KnownLoads, PaperPoses, RandomLoads};
@@ -46,6 +46,8 @@ pub struct Recipe {
     pub range: Range,
     /// Sessions: the first is the nominal sensor, the others are mounted, lit and focused a little differently.
     pub sessions: usize,
+    /// How far they are apart in what a tare does not see.
+    pub spread: Spread,
     /// Decides loads, sessions and noise.
     pub seed: u64,
 }
@@ -68,12 +70,25 @@ impl Default for Recipe {
                 beta_deg: 8.8,
             },
             sessions: 1,
+            spread: Spread::default(),
             seed: 1,
         }
     }
 }
 
 impl Recipe {
+    /// Many sessions of a few random loads each, none of them this recipe's own: what a model made from this one does not know,
+    /// and its uncertainties must.
+    pub fn other_sessions(&self) -> Self {
+        Self {
+            loads: Loads::Random(100),
+            rest: Self::default().rest,
+            sessions: 150,
+            seed: self.seed.wrapping_add(1),
+            ..*self
+        }
+    }
+
     /// Frames of each session.
     pub fn session_rows(&self) -> usize {
         let loads = match self.loads {
@@ -123,7 +138,8 @@ impl Recipe {
             self.height.into(),
             self.seed,
         )?;
-        let mut options = Session::numbered(session, self.seed).options(self.width);
+        let session = Session::numbered(session, self.seed, &self.spread);
+        let mut options = session.options(self.width);
         options.film.contact = self.contact;
         Ok(scene.with_options(options)?)
     }
@@ -176,6 +192,7 @@ impl Recipe {
             loads: self.loads,
             rest: self.rest,
             sessions: self.sessions,
+            spread: self.spread,
             seed: self.seed,
             range: self.range,
         })

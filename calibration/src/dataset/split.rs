@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Dataset, Row};
 
-/// What is held out together. One part in ten is.
+/// What is held out together: one row or pose in ten, one session in four.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Split {
@@ -17,12 +17,9 @@ pub enum Split {
     WithinPose,
     /// All rows of a pose: directions between those of training.
     Poses,
-    /// All rows of a session: another mounting, light and focus than in training.
+    /// All rows of a session: built, mounted, lit, focused and pressed otherwise than in training.
     Sessions,
 }
-
-/// One group in this many is held out, at least one.
-const PART: usize = 10;
 
 impl Split {
     /// What it says, for reports.
@@ -31,6 +28,14 @@ impl Split {
             Split::WithinPose => "rows held out at random within poses",
             Split::Poses => "whole poses held out",
             Split::Sessions => "whole sessions held out",
+        }
+    }
+
+    /// One group in this many is held out, at least one. Each session is wrong in its own way: it takes many to know how much.
+    fn part(self) -> usize {
+        match self {
+            Split::WithinPose | Split::Poses => 10,
+            Split::Sessions => 4,
         }
     }
 
@@ -69,7 +74,7 @@ impl Split {
             groups.len()
         );
         groups.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-        groups.truncate((groups.len() / PART).max(1));
+        groups.truncate((groups.len() / self.part()).max(1));
         groups.sort_unstable();
         let held = |&(i, row): &(usize, &Row)| {
             self.group(i, row)

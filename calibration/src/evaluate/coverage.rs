@@ -1,11 +1,9 @@
-//! Whether the uncertainty of the direction that comes with every force is honest.
+//! Whether the uncertainties that come with every force are honest.
 
 use super::Judged;
 use crate::errors::norm;
+use crate::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND};
 
-/// The angle within which 95 of 100 errors lie, over their root mean square: √(−ln 0.05), for errors that are the same to
-/// all sides.
-const BOUND: f64 = 1.730_818_382_602_285_4;
 const PARTS: usize = 10;
 
 /// A tenth of the frames, by |F|.
@@ -13,12 +11,21 @@ const PARTS: usize = 10;
 pub struct Coverage {
     /// Smallest and largest |F|, N.
     pub force_n: [f64; 2],
-    /// Part of the frames whose direction is no further off than the stated 95 % bound.
+    /// The direction, in degrees.
+    pub direction: Covered,
+    /// |F|, in N.
+    pub magnitude: Covered,
+}
+
+/// How stated bounds and errors compare.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Covered {
+    /// Part of the frames whose error is no larger than the 95 % bound that was stated for it.
     pub within: f64,
-    /// Median of the stated bounds, degrees.
-    pub bound_deg: f64,
-    /// Median of the errors, degrees.
-    pub error_deg: f64,
+    /// Median of the stated bounds.
+    pub bound: f64,
+    /// Median of the errors.
+    pub error: f64,
 }
 
 /// The coverage of each tenth of the frames, from the weakest forces to the strongest; none when there are fewer than ten.
@@ -31,17 +38,33 @@ pub fn coverage(frames: &[Judged]) -> Vec<Coverage> {
 
 fn of_part(frames: &[&Judged]) -> Option<Coverage> {
     let (first, last) = (frames.first()?, frames.last()?);
-    let bound = |frame: &Judged| (BOUND * frame.direction_sigma_deg).min(180.0);
-    let within = frames
-        .iter()
-        .filter(|f| f.direction_deg <= bound(f))
-        .count();
+    let direction = |f: &Judged| {
+        let bound = (DIRECTION_BOUND * f.direction_sigma_deg).min(180.0);
+        (f.direction_deg, bound)
+    };
+    let magnitude = |f: &Judged| {
+        let error = (f.found_polar[2] - f.truth_polar[2]).abs();
+        (error, MAGNITUDE_BOUND * f.magnitude_sigma_n)
+    };
     Some(Coverage {
         force_n: [norm(first.truth), norm(last.truth)],
-        within: within as f64 / frames.len() as f64,
-        bound_deg: median(frames.iter().map(|f| bound(f))),
-        error_deg: median(frames.iter().map(|f| f.direction_deg)),
+        direction: covered(frames.iter().map(|f| direction(f))),
+        magnitude: covered(frames.iter().map(|f| magnitude(f))),
     })
+}
+
+/// Of errors and their bounds.
+fn covered(errors: impl ExactSizeIterator<Item = (f64, f64)> + Clone) -> Covered {
+    let count = errors.len() as f64;
+    let within = errors
+        .clone()
+        .filter(|(error, bound)| error <= bound)
+        .count();
+    Covered {
+        within: within as f64 / count,
+        bound: median(errors.clone().map(|(_, bound)| bound)),
+        error: median(errors.map(|(error, _)| error)),
+    }
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {
@@ -62,38 +85,37 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(4);
         let mut frame = || {
             let size: f64 = random.random_range(0.01..0.2);
-            let sigma = 0.02 / size;
-            let error = sigma * (-random.random_range(1e-9..1.0_f64).ln()).sqrt();
+            let mut rayleigh = || (-random.random_range(1e-9..1.0_f64).ln()).sqrt();
+            let (sigma, magnitude_sigma_n) = (0.02 / size, 1e-4 + 0.01 * size);
+            let direction_deg = sigma * rayleigh();
+            let off = magnitude_sigma_n * std::f64::consts::SQRT_2 * rayleigh();
+            let turn: f64 = random.random_range(0.0..std::f64::consts::TAU);
             Judged {
                 truth: [0.0, 0.0, -size],
                 truth_polar: [0.0, 0.0, size],
-                found_polar: [0.0, 0.0, size],
-                direction_deg: error,
+                found_polar: [0.0, 0.0, size + off * turn.cos()],
+                direction_deg,
                 direction_sigma_deg: sigma,
+                magnitude_sigma_n,
+                session: 0,
                 pose: None,
             }
         };
         let frames: Vec<_> = (0..20_000).map(|_| frame()).collect();
         let parts = coverage(&frames);
         assert_eq!(parts.len(), 10);
-        assert!(
-            parts
-                .windows(2)
-                .all(|pair| pair[0].force_n[1] <= pair[1].force_n[0])
-        );
-        assert!(
-            parts
-                .iter()
-                .all(|part| (0.935..0.965).contains(&part.within)),
-            "{parts:?}"
-        );
-        // √(ln 20 / ln 2) for the medians.
-        assert!(
-            parts
-                .iter()
-                .all(|part| (1.8..2.4).contains(&(part.bound_deg / part.error_deg)))
-        );
-        assert!(coverage(&frames[..9]).is_empty() || coverage(&frames[..9]).len() < 10);
+        let apart = |pair: &[Coverage]| pair[0].force_n[1] <= pair[1].force_n[0];
+        assert!(parts.windows(2).all(apart));
+        for part in &parts {
+            for covered in [part.direction, part.magnitude] {
+                assert!((0.935..0.965).contains(&covered.within), "{part:?}");
+            }
+            // For the medians: √(ln 20 / ln 2), and 1.960 / 0.674.
+            let ratio = |covered: Covered| covered.bound / covered.error;
+            assert!((1.8..2.4).contains(&ratio(part.direction)), "{part:?}");
+            assert!((2.6..3.3).contains(&ratio(part.magnitude)), "{part:?}");
+        }
+        assert!(coverage(&frames[..9]).len() < 10);
         assert!(coverage(&[]).is_empty());
     }
 }

@@ -8,7 +8,7 @@ use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
 
 use crate::conditions::{ContactName, OriginName};
-use crate::dataset::{Dataset, Split};
+use crate::dataset::{Dataset, Place, Split};
 use crate::weights::features_from_q16;
 
 /// One answer with its truth. Angles in degrees, forces in N.
@@ -24,6 +24,10 @@ pub struct Judged {
     pub direction_deg: f64,
     /// The standard uncertainty of the direction that came with the force, degrees.
     pub direction_sigma_deg: f64,
+    /// The standard uncertainty of |F| that came with it, N.
+    pub magnitude_sigma_n: f64,
+    /// The session.
+    pub session: usize,
     /// The pose among the paper's.
     pub pose: Option<usize>,
 }
@@ -108,12 +112,12 @@ fn judge(model: &Model<'_>, dataset: &Dataset, rows: &[usize]) -> Result<Vec<Jud
         }
         let output = network.run(model, &features_from_q16(&seen.features_q16)?, &tare);
         let (force, _) = Force::of_outputs(model, output.values);
-        judged.push(compare(row.force_n, &force, row.place.pose));
+        judged.push(compare(row.force_n, &force, row.place));
     }
     Ok(judged)
 }
 
-fn compare(truth: [f64; 3], force: &Force, pose: Option<usize>) -> Judged {
+fn compare(truth: [f64; 3], force: &Force, place: Place) -> Judged {
     use crate::network::Meaning::AnglesMagnitude as Polar;
     let found_polar = [
         f64::from(force.alpha.0) / 1e3,
@@ -129,6 +133,8 @@ fn compare(truth: [f64; 3], force: &Force, pose: Option<usize>) -> Judged {
         found_polar,
         direction_deg,
         direction_sigma_deg: f64::from(force.direction_sigma.0) / 1e3,
-        pose,
+        magnitude_sigma_n: f64::from(force.magnitude_sigma.0) / 1e6,
+        session: place.session,
+        pose: place.pose,
     }
 }

@@ -6,6 +6,6 @@ mod judge;
 mod numbers;
 mod report;
 
-pub use coverage::{Coverage, coverage};
+pub use coverage::{Coverage, Covered, coverage};
 pub use judge::{Evaluation, Judged};
 pub use numbers::{Interval, Numbers};

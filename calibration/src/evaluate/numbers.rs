@@ -200,6 +200,8 @@ mod tests {
             found_polar: [1.0 + alpha, 0.0, 0.1 + force],
             direction_deg: alpha.abs(),
             direction_sigma_deg: 0.2,
+            magnitude_sigma_n: 1e-3,
+            session: 0,
             pose: Some(pose),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use super::coverage::coverage;
+use super::coverage::{Covered, coverage};
 use super::figures::{error_against_force, found_against_true, histograms, pose_maps};
 use super::numbers::{PoseNumbers, by_pose, errors};
 use super::{Evaluation, Interval, Judged, Numbers};
@@ -156,20 +156,26 @@ fn cell(text: Option<String>) -> String {
     )
 }
 
-/// How often the direction lies within the 95 % bound that comes with it.
+/// How often direction and size lie within the 95 % bounds that come with them.
 fn push_coverage(html: &mut String, frames: &[Judged]) {
     html.push_str(
-        "<h2>Is the stated uncertainty of the direction honest?</h2><table><tr><th>|F|, mN (a tenth of the frames each)</th>\
-         <th>within the stated 95 % bound, %</th><th>median bound, °</th><th>median error, °</th></tr>\n",
+        "<h2>Are the stated uncertainties honest?</h2><table><tr><th>|F|, mN (a tenth of the frames each)</th>\
+         <th>direction within its stated 95 % bound, %</th><th>median bound, °</th><th>median error, °</th>\
+         <th>|F| within its stated 95 % bound, %</th><th>median bound, mN</th><th>median error, mN</th></tr>\n",
     );
     for part in coverage(frames) {
         let [low, high] = part.force_n.map(|n| n * 1e3);
+        let (direction, magnitude) = (part.direction, part.magnitude);
         let _ = writeln!(
             html,
-            "<tr><td>{low:.1} to {high:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.3}</td></tr>",
-            part.within * 100.0,
-            part.bound_deg,
-            part.error_deg
+            "<tr><td>{low:.1} to {high:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.3}</td><td>{:.1}</td><td>{:.3}</td>\
+             <td>{:.3}</td></tr>",
+            direction.within * 100.0,
+            direction.bound,
+            direction.error,
+            magnitude.within * 100.0,
+            magnitude.bound * 1e3,
+            magnitude.error * 1e3
         );
     }
     html.push_str("</table>\n");
@@ -244,14 +250,19 @@ impl fmt::Display for Evaluation {
         }
         writeln!(
             f,
-            "direction within its stated 95 % bound, by tenths of the frames from weak to strong:"
+            "within the stated 95 % bound, by tenths of the frames from weak to strong (in brackets: median bound over \
+             median error):"
         )?;
         for part in coverage(&self.judged) {
             let [low, high] = part.force_n.map(|n| n * 1e3);
-            let (within, ratio) = (100.0 * part.within, part.bound_deg / part.error_deg);
+            let told = |covered: Covered| {
+                let ratio = covered.bound / covered.error;
+                format!("{:.1} % ({ratio:.2})", 100.0 * covered.within)
+            };
+            let (direction, magnitude) = (told(part.direction), told(part.magnitude));
             writeln!(
                 f,
-                "  {low:.1} to {high:.1} mN: {within:.1} %, median bound {ratio:.2} times the median error"
+                "  {low:.1} to {high:.1} mN: direction {direction}, |F| {magnitude}"
             )?;
         }
         write!(f, "rejected: {}", self.rejected.values().sum::<usize>())

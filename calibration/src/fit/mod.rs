@@ -3,6 +3,7 @@
 pub mod quick;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 
@@ -12,12 +13,14 @@ use crate::errors::{Errors, norm};
 use crate::network::{Meaning, Network, Standardization};
 use crate::quantize::export;
 use crate::train::{Options, Progress, Samples, train};
+use crate::uncertainty::Miss;
 use crate::weights::{Range, Training, Uncertainty, Weights, features_from_q16};
 
 /// The fewest accepted rows to train on.
 const FEWEST_ROWS: usize = 20;
 
-/// A fitted model, with its errors on the rows that were held out and lie inside the calibrated range.
+/// A fitted model, with its errors on the rows that were held out and lie inside the calibrated range. Its uncertainties are
+/// from all that were held out, so that they are known up to the range's end.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// Ready to be saved or exported.
@@ -67,14 +70,15 @@ pub fn fit(
             None => [0.0; 3],
         })
     };
-    let network = train(&samples(&training), &samples(&held_out), options, report)?;
+    let judges = samples(&in_range(held_out.iter().copied()));
+    let network = train(&samples(&training), &judges, options, report)?;
     let record = Training {
         seed: options.seed,
         epochs: options.epochs,
         rounded_epochs: options.rounded_epochs,
         ..record(&dataset, split, training.len())
     };
-    measured(&dataset, form, network, record, &held_out)
+    finished(&dataset, form, network, record, &held_out)
 }
 
 /// Fits a closed form to nine tenths of the accepted rows of a data set and measures on the rest.
@@ -89,7 +93,7 @@ pub fn fit_closed_form(dataset: &Dataset, split: Split, seed: u64) -> Result<Fit
         seed,
         ..record(&dataset, split, training.len())
     };
-    measured(
+    finished(
         &dataset,
         Some(form),
         no_network(&training)?,
@@ -106,12 +110,13 @@ pub fn fit_closed_form(dataset: &Dataset, split: Split, seed: u64) -> Result<Fit
 /// chip.
 pub fn adopt(dataset: &Dataset, network: Network, source: &str) -> Result<Fit> {
     let dataset = dataset.clone().tared()?;
-    let rows = in_range(dataset.accepted());
+    let rows: Rows<'_> = dataset.accepted().collect();
+    let inside = in_range(rows.iter().copied());
     ensure!(
-        !rows.is_empty(),
+        !inside.is_empty(),
         "the data set has no accepted row inside the calibrated range"
     );
-    let features: Vec<_> = rows.iter().map(|(seen, _)| seen.features_px()).collect();
+    let features: Vec<_> = inside.iter().map(|(seen, _)| seen.features_px()).collect();
     let network = Network {
         activation_max: network.activation_maxima(&features),
         ..network
@@ -120,10 +125,27 @@ pub fn adopt(dataset: &Dataset, network: Network, source: &str) -> Result<Fit> {
         scene: format!("imported from {source}"),
         ..Training::default()
     };
-    measured(&dataset, None, network, record, &rows)
+    finished(&dataset, None, network, record, &rows)
 }
 
-/// Rows to train on, and held-out ones inside the calibrated range.
+/// Makes a model's uncertainties anew, from a data set that it was not made from, its sessions tared: what it is off by in
+/// other set-ups than that of its training.
+///
+/// # Errors
+/// When the data set is for other conditions, or has no accepted row with a force or none at rest.
+pub fn judged_by(weights: Weights, dataset: &Dataset) -> Result<Fit> {
+    ensure!(
+        dataset.about.conditions == weights.conditions,
+        "the weights are for other conditions than the data set's: {:?} and {:?}",
+        weights.conditions,
+        dataset.about.conditions
+    );
+    let dataset = dataset.clone().tared()?;
+    let tare = features_from_q16(&dataset.rest()?.features_q16)?;
+    measured(weights, &tare, &dataset.accepted().collect())
+}
+
+/// Rows to train on, and held-out ones.
 fn parts(dataset: &Dataset, split: Split, seed: u64) -> Result<(Rows<'_>, Rows<'_>)> {
     let accepted = dataset.accepted().count();
     ensure!(
@@ -131,12 +153,15 @@ fn parts(dataset: &Dataset, split: Split, seed: u64) -> Result<(Rows<'_>, Rows<'
         "{accepted} accepted rows are too few to train on"
     );
     let [training, held_out] = split.of(dataset, seed)?.map(|rows| dataset.pick(&rows));
-    Ok((training, in_range(held_out.into_iter())))
+    Ok((training, held_out))
 }
 
 fn in_range<'a>(rows: impl Iterator<Item = (&'a Observation, [f64; 3])>) -> Rows<'a> {
-    rows.filter(|(_, force)| norm(*force) <= Range::default().force_n)
-        .collect()
+    rows.filter(|(_, force)| is_inside(force)).collect()
+}
+
+fn is_inside(force: &[f64; 3]) -> bool {
+    norm(*force) <= Range::default().force_n
 }
 
 fn form_of(dataset: &Dataset, rows: &Rows<'_>, effort: Effort) -> Result<ClosedForm> {
@@ -158,15 +183,15 @@ fn no_network(rows: &Rows<'_>) -> Result<Network> {
     })
 }
 
-/// Measures a model on `rows` and writes down what it holds for.
-fn measured(
+/// Writes down what a model holds for, and measures it on `rows` that it was not made from.
+fn finished(
     dataset: &Dataset,
     closed_form: Option<ClosedForm>,
     network: Network,
     training: Training,
     rows: &Rows<'_>,
 ) -> Result<Fit> {
-    let mut weights = Weights {
+    let weights = Weights {
         format: Weights::format(),
         conditions: dataset.about.conditions.clone(),
         rest: dataset.rest()?,
@@ -176,15 +201,29 @@ fn measured(
         closed_form,
         network,
     };
-    let mut float = Errors::default();
-    for (seen, force) in rows {
+    let tare = features_from_q16(&weights.rest.features_q16)?;
+    measured(weights, &tare, rows)
+}
+
+/// Measures a model on rows that it was not made from: its errors, and from these its uncertainties.
+fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fit> {
+    let answers = quantized_answers(&weights, tare, rows)?;
+    let misses: Vec<Miss> = answers
+        .iter()
+        .zip(rows)
+        .filter(|(_, (_, truth))| *truth != [0.0; 3])
+        .map(|(found, (_, truth))| Miss::of(*found, *truth))
+        .collect();
+    weights.uncertainty = Uncertainty::of(&misses, weights.range.force_n)?;
+    let (mut float, mut quantized) = (Errors::default(), Errors::default());
+    for ((seen, force), found) in rows
+        .iter()
+        .zip(answers)
+        .filter(|((_, force), _)| is_inside(force))
+    {
         float.add(weights.force_n(&seen.features_px()), *force);
+        quantized.add(found, *force);
     }
-    let quantized = quantized_errors(&weights, rows)?;
-    weights.uncertainty = Uncertainty {
-        lateral_n: quantized.lateral_rmse_n(),
-        normal_n: quantized.normal_rmse_n(),
-    };
     Ok(Fit {
         weights,
         float,
@@ -221,22 +260,21 @@ fn record(dataset: &Dataset, split: Split, rows: usize) -> Training {
     }
 }
 
-/// Errors of the exported model, run by `sensing`'s own arithmetic.
-fn quantized_errors(weights: &Weights, rows: &Rows<'_>) -> Result<Errors> {
+/// The forces (N) that the exported model gives, run by `sensing`'s own arithmetic.
+fn quantized_answers(weights: &Weights, tare: &Features, rows: &Rows<'_>) -> Result<Vec<[f64; 3]>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes)
         .map_err(|error| anyhow!("{error}"))
         .context("the exported model")?;
-    let rest = model.rest.features;
-    let (mut chip, mut errors) = (ChipNetwork::new(), Errors::default());
+    let mut chip = ChipNetwork::new();
     let (meaning, units) = (
         weights.network.meaning,
         weights.network.meaning.chip_units(),
     );
-    for (seen, force) in rows {
-        let output = chip.run(&model, &features_from_q16(&seen.features_q16)?, &rest);
+    let mut answer = |(seen, _): &(&Observation, [f64; 3])| {
+        let output = chip.run(&model, &features_from_q16(&seen.features_q16)?, tare);
         let outputs = std::array::from_fn(|o| f64::from(output.values[o]) / units[o]);
-        errors.add(meaning.to_force(outputs), *force);
-    }
-    Ok(errors)
+        Ok(meaning.to_force(outputs))
+    };
+    rows.iter().map(&mut answer).collect()
 }

@@ -9,6 +9,7 @@ use crate::closed_form::{self, Effort};
 use crate::dataset::{Dataset, Observation};
 use crate::errors::{angle_deg, norm};
 use crate::network::INPUTS;
+use crate::uncertainty::Miss;
 use crate::weights::{Range, Training, Uncertainty, Weights};
 
 /// The fewest loads.
@@ -122,19 +123,19 @@ fn range(loads: &[Checked]) -> Range {
     }
 }
 
-/// Root mean squares of what left-out loads were off by.
+/// Root mean squares of what left-out loads were off by: there are too few of them to say more.
 fn uncertainty(loads: &[Checked]) -> Uncertainty {
-    let mean_square = |axes: &[usize]| {
-        let squares = loads.iter().flat_map(|load| {
-            axes.iter()
-                .map(|&i| (load.found_n[i] - load.force_n[i]).powi(2))
-        });
-        (squares.sum::<f64>() / (loads.len() * axes.len()) as f64).sqrt()
+    let misses = loads
+        .iter()
+        .map(|load| Miss::of(load.found_n, load.force_n));
+    let mean_square = |of: fn(&Miss) -> f64| {
+        let squares: f64 = misses.clone().map(|miss| of(&miss).powi(2)).sum();
+        (squares / loads.len() as f64).sqrt()
     };
-    Uncertainty {
-        lateral_n: mean_square(&[0, 1]),
-        normal_n: mean_square(&[2]),
-    }
+    Uncertainty::constant(
+        mean_square(|miss| miss.across_n),
+        mean_square(|miss| miss.along_n),
+    )
 }
 
 impl fmt::Display for Quick {
@@ -151,14 +152,14 @@ impl fmt::Display for Quick {
             )?;
         }
         let Uncertainty {
-            lateral_n,
-            normal_n,
-        } = self.weights.uncertainty;
-        let (lateral_mn, normal_mn) = (lateral_n * 1e3, normal_n * 1e3);
+            across_n, along_n, ..
+        } = &self.weights.uncertainty;
         write!(
             f,
-            "expect F_x and F_y within {lateral_mn:.2} mN and F_z within {normal_mn:.2} mN (one standard deviation; loads \
-             between these do better than the smallest and the largest, which were extrapolated here)"
+            "expect forces within {:.2} mN across themselves and |F| within {:.2} mN (one standard deviation; loads between \
+             these do better than the smallest and the largest, which were extrapolated here)",
+            across_n[0] * 1e3,
+            along_n[0] * 1e3
         )
     }
 }

@@ -65,6 +65,7 @@ struct NoiseSection {
 #[serde(default, deny_unknown_fields)]
 struct MarksSection {
     missing: Vec<u8>,
+    glued_mm: [[f64; 2]; 4],
     patch: Vec<Patch>,
     specks: u32,
     speck_radius_mm: f64,
@@ -137,6 +138,7 @@ impl SceneFile {
                 paint: self.noise.salt_paint,
             },
             missing: self.marks.missing()?,
+            glued_mm: self.marks.glued_mm,
             patches: self.marks.patch.clone(),
             specks: Specks {
                 count: self.marks.specks,
@@ -270,6 +272,7 @@ impl Default for MarksSection {
         let usual = Options::default();
         MarksSection {
             missing: Vec::new(),
+            glued_mm: usual.glued_mm,
             patch: Vec::new(),
             specks: usual.specks.count,
             speck_radius_mm: usual.specks.radius_mm,

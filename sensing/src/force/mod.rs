@@ -15,8 +15,7 @@ mod tests;
 use crate::{
     angle::atan2,
     cordic::{ONE_BITS, sin_cos},
-    division::quotient,
-    model::{CalibratedRange, ContactReading, Model, OutputKind, Uncertainty},
+    model::{CalibratedRange, ContactReading, Model, OutputKind},
     root::rounded_root,
     status::Status,
     units::{MicroNewtons, MilliDegrees},
@@ -25,8 +24,6 @@ use crate::{
 /// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range of ±10°
 /// (Section 4), so that little more than the sign of α is left.
 pub const UNRELIABLE_DIRECTION: MilliDegrees = MilliDegrees(5_000);
-/// A direction of which nothing is known.
-const NO_DIRECTION: MilliDegrees = MilliDegrees(180_000);
 /// How far beyond the calibrated range a force still counts as inside: a training set's largest forces come out
 /// a little larger or smaller than they were. |F|: one part in this many.
 pub const RANGE_MARGIN: i32 = 20;
@@ -44,9 +41,10 @@ pub struct Force {
     pub magnitude: MicroNewtons,
     /// (Fx, Fy, Fz); `None` where the model's angles are not those of the force (`stick`, `slip`).
     pub cartesian: Option<[MicroNewtons; 3]>,
-    /// Standard uncertainty of the direction: root mean square of the angle between vectors, at most 180°.
+    /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within 1.731 times this angle of
+    /// the one found (`model::Uncertainty`).
     pub direction_sigma: MilliDegrees,
-    /// Standard uncertainty of |F|.
+    /// Standard uncertainty of |F|: 95 of 100 are within 1.960 times this.
     pub magnitude_sigma: MicroNewtons,
 }
 
@@ -109,7 +107,7 @@ impl Force {
                 (polar, polar.to_vector())
             }
         };
-        let (direction_sigma, magnitude_sigma) = propagate(&model.uncertainty, vector);
+        let (direction_sigma, magnitude_sigma) = model.uncertainty.at(polar.magnitude);
         let is_force = model.conditions.contact == ContactReading::Force;
         let force = Force {
             alpha: polar.alpha,
@@ -158,38 +156,7 @@ fn of_angles([alpha, beta, magnitude]: [i32; 3]) -> Polar {
     }
 }
 
-/// Uncertainty of direction and size, to first order.
-///
-/// With σ_l of Fx and Fy, σ_n of Fz, u = F/|F| and c = u_z²: along u, σ² = σ_l²(1 − c) + σ_n²c; the rest of
-/// 2σ_l² + σ_n² lies across u, and turns it by that over |F|.
-fn propagate(uncertainty: &Uncertainty, vector: [MicroNewtons; 3]) -> (MilliDegrees, MicroNewtons) {
-    /// A radian in m°, to 4 · 10⁻⁶ of itself.
-    const RADIAN: u64 = 57_296;
-    let (lateral, normal) = (square(uncertainty.lateral), square(uncertainty.normal));
-    let length: u64 = vector.map(square).iter().sum();
-    if length == 0 {
-        // No direction: the larger of both holds for |F|.
-        return (NO_DIRECTION, uncertainty.lateral.max(uncertainty.normal));
-    }
-    let part = part_q30(square(vector[2]), length);
-    let weighted = |variance: u64, part: u64| u128::from(variance) * u128::from(part);
-    let along = ((weighted(lateral, (1 << 30) - part) + weighted(normal, part)) >> 30) as u64;
-    let across = 2 * lateral + normal - along;
-    let angle = quotient(rounded_root(across) * RADIAN, rounded_root(length));
-    let direction = i32::try_from(angle).map_or(NO_DIRECTION, MilliDegrees);
-    (
-        direction.min(NO_DIRECTION),
-        MicroNewtons(rounded_root(along) as i32),
-    )
-}
-
-/// Of a component or an uncertainty: at most 2⁶², so that three fit 64 bits, unsigned.
+/// Of a component: at most 2⁶², so that three fit 64 bits, unsigned.
 fn square(value: MicroNewtons) -> u64 {
     u64::from(value.0.unsigned_abs()).pow(2)
-}
-
-/// part / whole with 30 fractional bits; part ≤ whole, whole > 0.
-fn part_q30(part: u64, whole: u64) -> u64 {
-    let excess = 30u32.saturating_sub(whole.leading_zeros());
-    quotient((part >> excess) << 30, whole >> excess)
 }

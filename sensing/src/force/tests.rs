@@ -1,5 +1,6 @@
 use super::*;
 use crate::model::samples::spec;
+use crate::model::{LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
 use proptest::prelude::*;
 
 fn vector(x: i32, y: i32, z: i32) -> [MicroNewtons; 3] {
@@ -158,7 +159,7 @@ fn odd_angles_are_brought_into_their_range() {
     assert!((-180_000..=180_000).contains(&force.alpha.0));
 }
 
-/// σ_l = 900 µN, σ_n = 800 µN, |F| ≤ 1 N, |α| ≤ 15°, |β| ≤ 14°.
+/// 1,270 µN across the force, 800 µN along it; |F| ≤ 1 N, |α| ≤ 15°, |β| ≤ 14°.
 #[test]
 fn trust_in_a_force() {
     let status = |x, y, z| force_of([x, y, z], |_| {}).1;
@@ -178,7 +179,7 @@ fn trust_in_a_force() {
     assert_eq!(status(0, 26_500, -100_000), Status::OK, "14.8°");
     assert_eq!(status(0, -27_500, -100_000), Status::OUT_OF_RANGE, "15.4°");
     assert_eq!(status(0, 0, 100_000), Status::OUT_OF_RANGE, "a pull");
-    // √2 · 900 µN / |F| is 5° at 14.6 mN.
+    // 1,270 µN / |F| is 5° at 14.55 mN.
     assert_eq!(status(0, 0, -14_700), Status::OK);
     assert_eq!(status(0, 0, -14_500), Status::DIRECTION_UNRELIABLE);
     assert_eq!(
@@ -189,15 +190,18 @@ fn trust_in_a_force() {
 }
 
 #[test]
-fn uncertainty_follows_the_direction() {
-    let (press, _) = force_of([0, 0, -100_000], |_| {});
-    assert_eq!(press.magnitude_sigma, MicroNewtons(800));
-    let expected = (900.0f64 * 2f64.sqrt() / 100_000.0).to_degrees() * 1e3;
-    assert!((f64::from(press.direction_sigma.0) - expected).abs() <= 1.0);
-    let (shear, _) = force_of([0, 100_000, 0], |_| {});
-    assert_eq!(shear.magnitude_sigma, MicroNewtons(900));
-    let expected = (900.0f64.hypot(800.0) / 100_000.0).to_degrees() * 1e3;
-    assert!((f64::from(shear.direction_sigma.0) - expected).abs() <= 1.0);
+fn a_force_carries_the_uncertainty_of_its_size() {
+    let rising = |spec: &mut crate::model::encode::ModelSpec| {
+        spec.uncertainty.step_bits = 15;
+        spec.uncertainty.knots[3].along = MicroNewtons(1_000);
+    };
+    for direction in [[0, 0, -1], [0, 1, 0]] {
+        let (force, _) = force_of(direction.map(|part| 90 * 1024 * part), rising);
+        let expected = (1_270.0f64 / (90.0 * 1024.0)).to_degrees() * 1e3;
+        assert!((f64::from(force.direction_sigma.0) - expected).abs() <= 0.6);
+        // 90 KiB µN lie between the knots of 64 and 96.
+        assert_eq!(force.magnitude_sigma, MicroNewtons(963));
+    }
 }
 
 #[test]
@@ -206,23 +210,29 @@ fn nothing_has_no_known_direction() {
     assert_eq!(status, Status::DIRECTION_UNRELIABLE);
     assert_eq!((none.magnitude.0, none.alpha.0, none.beta.0), (0, 0, 0));
     assert_eq!(none.direction_sigma, MilliDegrees(180_000));
-    assert_eq!(none.magnitude_sigma, MicroNewtons(900));
+    assert_eq!(none.magnitude_sigma, MicroNewtons(800));
     let (tiny, _) = force_of([1, 0, 0], |_| {});
     assert_eq!(tiny.direction_sigma, MilliDegrees(180_000), "saturated");
 }
 
 #[test]
 fn extreme_uncertainties_do_not_overflow() {
-    for sigma in [0, i32::MAX] {
-        let mut spec = spec(&[11, 3]);
-        spec.uncertainty.lateral = MicroNewtons(sigma);
-        spec.uncertainty.normal = MicroNewtons(sigma);
-        spec.range.magnitude = MicroNewtons(i32::MAX);
-        let bytes = spec.encode().unwrap();
-        let model = Model::parse(&bytes).unwrap();
-        for value in [i32::MIN, -1, 0, 1, i32::MAX] {
-            let (force, _) = Force::of_outputs(&model, [value; 3]);
-            assert!((sigma - 1..=sigma).contains(&force.magnitude_sigma.0));
+    for sigma in [MicroNewtons(0), LARGEST_UNCERTAINTY] {
+        for step_bits in [0, 27] {
+            let mut spec = spec(&[11, 3]);
+            let knot = UncertaintyKnot {
+                across: sigma,
+                along: sigma,
+            };
+            spec.uncertainty = Uncertainty::constant(knot);
+            spec.uncertainty.step_bits = step_bits;
+            spec.range.magnitude = MicroNewtons(i32::MAX);
+            let bytes = spec.encode().unwrap();
+            let model = Model::parse(&bytes).unwrap();
+            for value in [i32::MIN, -1, 0, 1, i32::MAX] {
+                let (force, _) = Force::of_outputs(&model, [value; 3]);
+                assert_eq!(force.magnitude_sigma, sigma);
+            }
         }
     }
 }

@@ -89,13 +89,11 @@ impl ModelSpec {
             bytes.extend(area.to_le_bytes());
         }
         push_input(&mut bytes, &self.input);
-        let (range, uncertainty) = (&self.range, &self.uncertainty);
+        let range = &self.range;
         for value in [range.magnitude.0, range.alpha.0, range.beta.0] {
             bytes.extend(value.to_le_bytes());
         }
-        for value in [uncertainty.lateral.0, uncertainty.normal.0] {
-            bytes.extend(value.to_le_bytes());
-        }
+        self.uncertainty.push(&mut bytes);
         if let Some(form) = &self.closed_form {
             form.push(&mut bytes);
         }

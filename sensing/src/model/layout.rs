@@ -2,8 +2,8 @@
 
 use super::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, MAX_LAYERS,
-    Model, ModelError, Origin, OutputKind, PixelFormat, Rest, Uncertainty, curves::closed_form,
-    layers::layers, reader::Reader,
+    Model, ModelError, Origin, OutputKind, PixelFormat, Rest, curves::closed_form, layers::layers,
+    reader::Reader, uncertainty::uncertainty,
 };
 use crate::{
     features::{FEATURES, Features},
@@ -16,7 +16,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 /// The first four bytes of a model file.
 pub(super) const MAGIC: [u8; 4] = *b"HVTM";
 /// The layout that this program reads and writes.
-pub(super) const VERSION: u16 = 2;
+pub(super) const VERSION: u16 = 3;
 /// How the weights lie: `packing`.
 pub(super) const PACKING: u8 = 1;
 /// Bytes of the preset's name, filled up with zeros.
@@ -324,12 +324,5 @@ fn range(reader: &mut Reader<'_>) -> Result<CalibratedRange, ModelError> {
         magnitude: MicroNewtons(reader.positive("largest force")?),
         alpha: MilliDegrees(reader.i32_in("largest alpha", 90_000, "0 to 90000")?),
         beta: MilliDegrees(reader.i32_in("largest beta", 90_000, "0 to 90000")?),
-    })
-}
-
-fn uncertainty(reader: &mut Reader<'_>) -> Result<Uncertainty, ModelError> {
-    Ok(Uncertainty {
-        lateral: MicroNewtons(reader.i32_in("lateral uncertainty", i32::MAX, "0 to 2147483647")?),
-        normal: MicroNewtons(reader.i32_in("normal uncertainty", i32::MAX, "0 to 2147483647")?),
     })
 }

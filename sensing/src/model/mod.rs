@@ -20,6 +20,7 @@ mod reader;
 pub(crate) mod samples;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 
 pub use aligned::AlignedFile;
 #[cfg(any(test, feature = "encode"))]
@@ -30,6 +31,7 @@ pub use packing::{
     MAX_ACTIVATION8, MAX_ACTIVATION16, MAX_WEIGHT8, MAX_WEIGHT16, ROWS_TOGETHER, WeightWidth,
 };
 pub(crate) use packing::{unpack8, unpack16};
+pub use uncertainty::{LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
 
 use crate::{
     closed_form::ClosedForm,
@@ -167,15 +169,6 @@ pub struct CalibratedRange {
     pub alpha: MilliDegrees,
     /// Largest |β|, 0–90°.
     pub beta: MilliDegrees,
-}
-
-/// Standard uncertainties of a model's force over its calibrated range, each ≥ 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Uncertainty {
-    /// Of each lateral component, Fx and Fy.
-    pub lateral: MicroNewtons,
-    /// Of the normal component, Fz.
-    pub normal: MicroNewtons,
 }
 
 impl Rest {

@@ -48,10 +48,10 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
             alpha: MilliDegrees(15_000),
             beta: MilliDegrees(14_000),
         },
-        uncertainty: Uncertainty {
-            lateral: MicroNewtons(900),
-            normal: MicroNewtons(800),
-        },
+        uncertainty: Uncertainty::constant(UncertaintyKnot {
+            across: MicroNewtons(1_270),
+            along: MicroNewtons(800),
+        }),
     }
 }
 
@@ -149,7 +149,11 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
     spec.output = [OutputKind::ForceVector, OutputKind::AnglesMagnitude][next() as usize % 2];
     spec.range.magnitude = MicroNewtons(1 + (next() >> 2) as i32);
     spec.range.alpha = MilliDegrees((next() % 90_001) as i32);
-    spec.uncertainty.normal = MicroNewtons((next() >> 1) as i32);
+    spec.uncertainty.step_bits = (next() % 28) as u8;
+    for knot in &mut spec.uncertainty.knots {
+        knot.across = MicroNewtons((next() >> 2) as i32);
+        knot.along = MicroNewtons((next() >> 2) as i32);
+    }
     for layer in &mut spec.layers {
         layer
             .weights

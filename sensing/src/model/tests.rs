@@ -89,18 +89,21 @@ fn every_field_is_checked() {
         (247, 0x80, "largest force"),
         (251, 1, "largest alpha"),
         (255, 0xFF, "largest beta"),
-        (259, 0x80, "lateral uncertainty"),
-        (263, 0x80, "normal uncertainty"),
-        (265, 4, "layer inputs"),
-        (267, 4, "layer outputs"),
-        (268, 2, "weight width"),
-        (269, 1, "reserved byte"),
-        (271, 0x80, "largest activation"),
-        (528, 1, "padding"),
-        (543, 1, "padding"),
-        (589, 1, "padding"),
-        (592 + 6, 1, "largest activation"),
-        (728, 1, "padding"),
+        (256, 28, "distance of uncertainties"),
+        (257, 1, "reserved byte"),
+        (259, 1, "reserved byte"),
+        (263, 0x40, "uncertainty"),
+        (387, 0x80, "uncertainty"),
+        (389, 4, "layer inputs"),
+        (391, 4, "layer outputs"),
+        (392, 2, "weight width"),
+        (393, 1, "reserved byte"),
+        (395, 0x80, "largest activation"),
+        (652, 1, "padding"),
+        (667, 1, "padding"),
+        (713, 1, "padding"),
+        (716 + 6, 1, "largest activation"),
+        (852, 1, "padding"),
     ] {
         let mut bytes = good.clone();
         bytes[offset] = value;
@@ -244,7 +247,7 @@ fn damage_is_named() {
         Model::parse(b"\x7fELF....").unwrap_err(),
         ModelError::NotAModel
     );
-    let short = Model::parse(b"HVTM\x02\x00").unwrap_err();
+    let short = Model::parse(b"HVTM\x03\x00").unwrap_err();
     assert_eq!(
         short,
         ModelError::TooShort {

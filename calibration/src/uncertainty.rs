@@ -1,0 +1,192 @@
+//! What a model's uncertainties are: from the errors that it makes on frames that it was not made from.
+//!
+//! Errors are larger for some forces than for others and have long tails: the noise of a centroid depends on its place in the
+//! pixel grid, and each session is a little wrong in its own way. So they are not averaged: over |F|, a table says below what
+//! some 96 of 100 errors lie, as the standard uncertainty of a normal distribution that has its 95 % bound there.
+
+use anyhow::{Result, ensure};
+use hivtac_sensing::model::Uncertainty as ChipUncertainty;
+use serde::{Deserialize, Serialize};
+
+use crate::errors::{angle_deg, norm};
+
+/// The 95 % bound of a direction over its standard uncertainty: √(−ln 0.05), for a root mean square over two dimensions.
+pub const DIRECTION_BOUND: f64 = 1.730_818_382_602_285_4;
+/// The 95 % bound of |F| over its standard uncertainty.
+pub const MAGNITUDE_BOUND: f64 = 1.959_963_984_540_054;
+
+/// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little more than they promise,
+/// for the sessions that come.
+const COVERED: f64 = 0.965;
+/// Rows around a knot, by weight, at the least.
+const FEWEST: f64 = 60.0;
+
+const KNOTS: usize = ChipUncertainty::KNOTS;
+
+/// Standard uncertainties over |F|, as [`hivtac_sensing::model::Uncertainty`] has them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Uncertainty {
+    /// The distance of knots is 2 to the power of this, µN.
+    pub step_bits: u8,
+    /// Of the force's part across itself at |F| = 0, one distance, two distances …, N.
+    pub across_n: [f64; KNOTS],
+    /// Of |F| there, N.
+    pub along_n: [f64; KNOTS],
+}
+
+/// What a force is off by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Miss {
+    /// |F| as it was found, N.
+    pub found_n: f64,
+    /// The angle between found and true force (radians) times |F| as found, N.
+    pub across_n: f64,
+    /// |F| found less |F| true, without sign, N.
+    pub along_n: f64,
+}
+
+impl Miss {
+    /// Of a found and a true force, N.
+    pub fn of(found: [f64; 3], truth: [f64; 3]) -> Self {
+        let found_n = norm(found);
+        // Where one of them has no size there is no direction to miss.
+        let angle = angle_deg(found, truth).unwrap_or(0.0).to_radians();
+        Self {
+            found_n,
+            across_n: angle * found_n,
+            along_n: (found_n - norm(truth)).abs(),
+        }
+    }
+}
+
+impl Uncertainty {
+    /// The same for every |F|.
+    pub fn constant(across_n: f64, along_n: f64) -> Self {
+        Self {
+            step_bits: 0,
+            across_n: [across_n; KNOTS],
+            along_n: [along_n; KNOTS],
+        }
+    }
+
+    /// Of what a model is off by on rows that it was not made from, for forces up to `largest_n`.
+    ///
+    /// # Errors
+    /// When there is no row.
+    pub fn of(misses: &[Miss], largest_n: f64) -> Result<Self> {
+        ensure!(
+            !misses.is_empty(),
+            "no row was held out: nothing says how uncertain the forces are"
+        );
+        let far = |bits: u8| f64::from((KNOTS as u32 - 1) << bits) * 1e-6;
+        let step_bits = (0..27).find(|&bits| far(bits) >= largest_n).unwrap_or(27);
+        let step_n = f64::from(1_u32 << step_bits) * 1e-6;
+        let at = |of: fn(&Miss) -> f64, bound: f64| {
+            let knot = |i| covering(misses, of, step_n * i as f64, step_n) / bound;
+            std::array::from_fn(knot)
+        };
+        Ok(Self {
+            step_bits,
+            across_n: at(|miss| miss.across_n, DIRECTION_BOUND),
+            along_n: at(|miss| miss.along_n, MAGNITUDE_BOUND),
+        })
+    }
+}
+
+/// Below what [`COVERED`] of the errors near a force lie, rows weighted by how near they are; rows from farther away where
+/// there are few.
+fn covering(misses: &[Miss], of: fn(&Miss) -> f64, force_n: f64, step_n: f64) -> f64 {
+    let all = misses.len() as f64;
+    let mut reach = step_n;
+    loop {
+        let near = |miss: &Miss| 1.0 - (miss.found_n - force_n).abs() / reach;
+        let mut near: Vec<(f64, f64)> = misses
+            .iter()
+            .map(|miss| (of(miss), near(miss)))
+            .filter(|(_, weight)| *weight > 0.0)
+            .collect();
+        let total: f64 = near.iter().map(|(_, weight)| weight).sum();
+        if total >= FEWEST.min(0.5 * all) {
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            return quantile(&near, COVERED * total);
+        }
+        reach *= 1.5;
+    }
+}
+
+/// The first value at which the weights of sorted values reach `wanted`.
+fn quantile(sorted: &[(f64, f64)], wanted: f64) -> f64 {
+    let mut sum = 0.0;
+    let reached = sorted.iter().find(|(_, weight)| {
+        sum += weight;
+        sum >= wanted
+    });
+    reached.or(sorted.last()).map_or(0.0, |(value, _)| *value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Errors whose spread changes with |F|, to all sides: across 1 mN at nothing and 3 mN at 0.2 N, along a tenth of it.
+    fn misses(count: usize) -> Vec<Miss> {
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let mut miss = || {
+            let found_n: f64 = random.random_range(0.0..0.22);
+            let sigma = 1e-3 + 0.01 * found_n;
+            let mut rayleigh = || (-random.random_range(1e-12..1.0_f64).ln()).sqrt();
+            let across_n = sigma * rayleigh();
+            // A component of a two-dimensional normal distribution of variance 1.
+            let along_n = 0.1 * sigma * std::f64::consts::SQRT_2 * rayleigh();
+            let turn: f64 = random.random_range(0.0..std::f64::consts::TAU);
+            Miss {
+                found_n,
+                across_n,
+                along_n: (along_n * turn.cos()).abs(),
+            }
+        };
+        (0..count).map(|_| miss()).collect()
+    }
+
+    #[test]
+    fn it_is_what_a_normal_distribution_with_that_bound_has() {
+        let found = Uncertainty::of(&misses(200_000), 0.2).unwrap();
+        assert_eq!(found.step_bits, 14, "15 · 16.4 mN are 246 mN");
+        // 96.5 of 100, where the bounds promise 95.
+        let wider = [
+            (-(1.0 - COVERED).ln()).sqrt() / DIRECTION_BOUND,
+            2.1084 / MAGNITUDE_BOUND,
+        ];
+        for knot in 1..13 {
+            let sigma = 1e-3 + 0.01 * 16_384e-6 * knot as f64;
+            let across = found.across_n[knot] / (sigma * wider[0]);
+            let along = found.along_n[knot] / (0.1 * sigma * wider[1]);
+            assert!((0.97..1.03).contains(&across), "knot {knot}: {across}");
+            assert!((0.96..1.04).contains(&along), "knot {knot}: {along}");
+        }
+    }
+
+    #[test]
+    fn where_there_are_few_rows_farther_ones_count() {
+        let few = misses(30);
+        let found = Uncertainty::of(&few, 0.2).unwrap();
+        let largest = few.iter().map(|miss| miss.across_n).fold(0.0, f64::max) / DIRECTION_BOUND;
+        assert!(found.across_n.iter().all(|&n| n > 0.0 && n <= largest));
+        let one = Uncertainty::of(&few[..1], 0.2).unwrap();
+        assert_eq!(one.across_n, [few[0].across_n / DIRECTION_BOUND; KNOTS]);
+        assert!(Uncertainty::of(&[], 0.2).is_err());
+    }
+
+    #[test]
+    fn a_miss_is_told_along_and_across_the_force() {
+        let miss = Miss::of([0.0, 0.003, -0.1], [0.0, 0.0, -0.1]);
+        assert!((miss.across_n - 0.003).abs() < 2e-6, "{miss:?}");
+        assert!((miss.along_n - 45e-6).abs() < 1e-7, "{miss:?}");
+        let opposite = Miss::of([0.0, 0.0, 1e-3], [0.0, 0.0, -1e-3]);
+        assert!((opposite.across_n - std::f64::consts::PI * 1e-3).abs() < 1e-12);
+        assert_eq!(Miss::of([0.0; 3], [0.0, 0.0, -1e-3]).across_n, 0.0);
+    }
+}
