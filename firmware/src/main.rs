@@ -28,6 +28,7 @@ mod info;
 mod log;
 mod model;
 mod near_table;
+mod next_table;
 mod outbox;
 mod pipeline_task;
 mod priorities;

@@ -10,6 +10,15 @@ static TABLE: ConstStaticCell<ByteTable> = ConstStaticCell::new(ByteTable::CLOSE
 /// The one that was set first has the table; every other accepts nothing.
 pub struct NearTable(Option<&'static mut ByteTable>);
 
+impl NearTable {
+    /// Takes over all of another table.
+    pub fn copy_from(&mut self, other: &ByteTable) {
+        if let Some(table) = &mut self.0 {
+            table.copy_from(other);
+        }
+    }
+}
+
 impl Table for NearTable {
     const CLOSED: Self = NearTable(None);
 

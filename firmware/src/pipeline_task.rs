@@ -7,6 +7,7 @@ use crate::convert;
 use crate::follow::Follow;
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
+use crate::next_table::NextTable;
 use crate::tare::Taring;
 use crate::{info, outbox, session, stats};
 use embassy_futures::select::{Either3, select3};
@@ -45,8 +46,10 @@ pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
 pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
+    let next = NextTable::take(sensor.settings().byte_order);
     let mut task = PipelineTask {
         sensor,
+        next,
         bands,
         follower: Follower::new(SHAPE),
         follow: Follow::new(),
@@ -62,6 +65,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
+    next: NextTable,
     bands: BandCopy,
     follower: Follower,
     follow: Follow,
@@ -81,6 +85,11 @@ impl PipelineTask {
         if self.follower.is_scanning() {
             return self.go_on().await;
         }
+        self.use_next_table();
+        if self.next.is_unfinished() && EVENTS.is_empty() {
+            self.next.go_on();
+            return;
+        }
         self.taring.take_if(|taring| !taring.is_wanted());
         let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
         match select3(ORDERS.receive(), EVENTS.receive(), Timer::at(deadline)).await {
@@ -96,6 +105,8 @@ impl PipelineTask {
         if complete && EVENTS.is_empty() && !capture::has_begun_a_band() {
             let action = self.follower.deliver();
             self.act(action);
+        } else if !complete && self.next.is_unfinished() && EVENTS.is_empty() {
+            self.next.go_on();
         } else {
             let event = EVENTS.receive().await;
             self.follow(event);
@@ -144,7 +155,13 @@ impl PipelineTask {
 
     fn obey(&mut self, order: Order) {
         match order {
-            Order::SetThreshold { id, threshold } => reply(id, self.set_threshold(threshold)),
+            Order::SetThreshold { id, .. } if self.next.is_wanted() => reply(id, Outcome::Busy),
+            Order::SetThreshold { id, threshold } => {
+                let wanted = convert::threshold_from_wire(threshold);
+                if self.next.begin(id, wanted).is_err() {
+                    reply(id, Outcome::InvalidArgument);
+                }
+            }
             Order::Tare { id, .. } if self.taring.is_some() => reply(id, Outcome::Busy),
             Order::Tare { id, frames } => match Taring::begin(id, frames) {
                 Some(taring) => self.taring = Some(taring),
@@ -153,15 +170,21 @@ impl PipelineTask {
         }
     }
 
-    fn set_threshold(&mut self, threshold: HsvBox) -> Outcome {
-        let wanted = convert::threshold_from_wire(threshold);
-        match self.sensor.set_threshold(wanted) {
+    /// Between two frames: from the next one on, the threshold that was asked for holds, if its table is whole.
+    fn use_next_table(&mut self) {
+        let Some((id, threshold)) = self.next.finish() else {
+            return;
+        };
+        let install = |near: &mut NearTable| self.next.install(near);
+        // It was checked when it came.
+        let outcome = match self.sensor.set_made_threshold(threshold, install) {
             Ok(()) => {
                 info::set_looking(self.sensor.settings());
                 Outcome::Done
             }
             Err(_) => Outcome::InvalidArgument,
-        }
+        };
+        reply(id, outcome);
     }
 
     /// Measures the frame whose rows were scanned.

@@ -1,5 +1,6 @@
 // Runs right after a reset, before any memory is initialized, and so uses registers only: switches on the clocks of
-// SRAM1 to 3, and loads .itcm and .sram (memory.x) from flash in double words, as ITCM's error correction has them.
+// SRAM1 to 3, loads .itcm and .sram (memory.x) from flash in double words, as ITCM's error correction has them, and clears
+// .sram_zero.
 
     .syntax unified
     .section .text.__pre_init, "ax", %progbits
@@ -32,7 +33,16 @@ __pre_init:
     strd    r3, r12, [r0], #8
     b       3b
 
-4:  dsb
+4:  ldr     r0, =__ssram_zero
+    ldr     r1, =__esram_zero
+    movs    r3, #0
+    mov     r12, r3
+5:  cmp     r0, r1
+    bhs     6f
+    strd    r3, r12, [r0], #8
+    b       5b
+
+6:  dsb
     isb
     bx      lr
     .ltorg

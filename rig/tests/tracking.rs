@@ -39,7 +39,11 @@ fn cropped_frames_give_the_forces_of_whole_ones() {
     assert!(dcmi.words < dcmi.frames * WHOLE * 7 / 10, "{dcmi:?}");
     let tracked = |run: &Run| (run.stats().frames_tracked, run.stats().tracking_lost);
     assert_eq!(tracked(&whole), (0, 0));
-    assert!(tracked(&cropped).0 >= 12 && tracked(&cropped).1 == 0, "{:?}", cropped.stats());
+    assert!(
+        tracked(&cropped).0 >= 12 && tracked(&cropped).1 == 0,
+        "{:?}",
+        cropped.stats()
+    );
     assert_eq!(cropped.report.refused, [] as [String; 0]);
 }
 
@@ -65,8 +69,14 @@ fn what_jumps_is_lost_counted_and_found_again() {
     let (samples, stats) = (run.samples(), run.stats());
     assert_eq!(run.missing_frames(), Vec::<u32>::new());
     assert!(stats.tracking_lost >= 1, "{stats:?}");
-    let without = samples.iter().filter(|sample| sample.force.is_none()).count();
-    assert!((1..=stats.tracking_lost as usize).contains(&without), "{without} without force, {stats:?}");
+    let without = samples
+        .iter()
+        .filter(|sample| sample.force.is_none())
+        .count();
+    assert!(
+        (1..=stats.tracking_lost as usize).contains(&without),
+        "{without} without force, {stats:?}"
+    );
     assert!(samples.last().is_some_and(|sample| sample.force.is_some()));
     assert!(stats.frames_tracked >= 8, "{stats:?}");
 }

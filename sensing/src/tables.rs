@@ -9,6 +9,7 @@ use crate::{
     mask::words_of,
     threshold::{ByteOrder, HsvBox, ThresholdError},
 };
+use core::ops::Range;
 
 pub use crate::runs::Run;
 
@@ -226,6 +227,9 @@ pub struct ByteTable {
 const INSIDE: u8 = 0x80;
 
 impl ByteTable {
+    /// Values of a pixel.
+    pub const VALUES: usize = 65_536;
+
     /// The table of a box. Large: on a microcontroller, [`set`](Table::set) one in place.
     ///
     /// # Errors
@@ -234,6 +238,22 @@ impl ByteTable {
         let mut table = ByteTable::CLOSED;
         table.set(hsv_box, order)?;
         Ok(table)
+    }
+
+    /// Sets the bytes of some values of a pixel to a box that [`HsvBox::check`] accepts: all of them, one part after the
+    /// other, are what [`set`](Table::set) does at once.
+    pub fn set_part(&mut self, hsv_box: &HsvBox, order: ByteOrder, part: Range<usize>) {
+        let bytes = self.bytes.iter_mut().enumerate();
+        for (raw, byte) in bytes.take(part.end).skip(part.start) {
+            let pixel = order.pixel(raw as u16);
+            let inside = hsv_box.contains(Hsv::from_rgb565(pixel));
+            *byte = redness(pixel) | if inside { INSIDE } else { 0 };
+        }
+    }
+
+    /// Takes over all of another one.
+    pub fn copy_from(&mut self, other: &ByteTable) {
+        self.bytes.copy_from_slice(&other.bytes);
     }
 
     /// The byte of the pixel that lies in memory as `raw`.
@@ -248,11 +268,7 @@ impl Table for ByteTable {
 
     fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
         hsv_box.check()?;
-        for (raw, byte) in (0..=u16::MAX).zip(&mut self.bytes) {
-            let pixel = order.pixel(raw);
-            let inside = hsv_box.contains(Hsv::from_rgb565(pixel));
-            *byte = redness(pixel) | if inside { INSIDE } else { 0 };
-        }
+        self.set_part(hsv_box, order, 0..Self::VALUES);
         Ok(())
     }
 
@@ -328,6 +344,20 @@ mod tests {
             assert_eq!(redness(level << 11 | level << 6 | level), 0, "{level}");
         }
         assert_eq!(redness(0x07ff), 0, "cyan");
+    }
+
+    #[test]
+    fn a_table_that_is_made_in_parts_is_the_same() {
+        let whole = Box::new(ByteTable::new(&GREEN, ByteOrder::Swapped).unwrap());
+        let mut parts = Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap());
+        for ends in [0, 1, 256, 257, 40_000, ByteTable::VALUES].windows(2) {
+            assert!(parts != whole);
+            parts.set_part(&GREEN, ByteOrder::Swapped, ends[0]..ends[1]);
+        }
+        assert!(parts == whole);
+        let mut copy = Box::new(ByteTable::CLOSED);
+        copy.copy_from(&parts);
+        assert!(copy == whole);
     }
 
     #[test]

@@ -44,24 +44,24 @@ impl Script {
 
     /// Uses this threshold and byte order from here on.
     pub fn threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
-        self.push_threshold(hsv_box, order, false)
+        self.push_threshold(hsv_box, order, 0)
+    }
+
+    /// The same; the instruction counter counts what the table of 64 KiB takes.
+    pub fn counted_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
+        self.push_threshold(hsv_box, order, 4)
     }
 
     /// The same; from here on the pixels of scans are weighed, and so are those of frames sensed without a model.
     pub fn weighted_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
-        self.push_threshold(hsv_box, order, true)
+        self.push_threshold(hsv_box, order, 2)
     }
 
-    fn push_threshold(
-        &mut self,
-        hsv_box: &HsvBox,
-        order: ByteOrder,
-        weighted: bool,
-    ) -> &mut Script {
+    fn push_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder, flags: u8) -> &mut Script {
         self.order = order;
         self.bytes.push(Kind::Threshold as u8);
         self.bytes
-            .push(u8::from(order == ByteOrder::Swapped) | u8::from(weighted) << 1);
+            .push(u8::from(order == ByteOrder::Swapped) | flags);
         self.bytes.extend(hsv_box.limits());
         self
     }

@@ -227,7 +227,7 @@ pub enum Request {
     Start,
     /// Stop streaming.
     Stop,
-    /// Set the threshold, effective from the next frame that starts.
+    /// Set the threshold. Answered when it holds, from the next frame that starts; until then the one before does.
     SetThreshold(HsvBox),
     /// Take the mean of the next `frames` good frames (1–256) as the rest position. Answered when done.
     Tare {

@@ -139,6 +139,22 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
+    /// Sets the threshold to one whose table was made elsewhere while frames went on: `install` puts that table in place. Do
+    /// it between frames; all else is as with [`set_threshold`](Self::set_threshold).
+    ///
+    /// # Errors
+    /// A box that means nothing; the threshold is then unchanged, and `install` not called.
+    pub fn set_made_threshold(
+        &mut self,
+        threshold: HsvBox,
+        install: impl FnOnce(&mut T),
+    ) -> Result<(), ThresholdError> {
+        threshold.check()?;
+        install(&mut self.table);
+        self.settings.threshold = threshold;
+        Ok(())
+    }
+
     /// Sets the rest position of this unit, or goes back to the model's. One that is not [sound](Rest::is_sound) is
     /// as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {

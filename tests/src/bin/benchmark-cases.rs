@@ -1,6 +1,6 @@
 //! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
 //! one JSON object a line: `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
-//! what is special about the frame, `{"Windows":{"tracked":…}}` or `{"Network":[widths]}`. What a board can hold of them it writes as `board.rs`, too,
+//! what is special about the frame, `{"Windows":{"tracked":…}}`, `{"Network":[widths]}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
 //! for `tests/board`. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
 
 use std::path::{Path, PathBuf};
@@ -80,6 +80,8 @@ enum Work {
     },
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
+    /// The threshold's table of 64 KiB.
+    Table,
 }
 
 impl Case {
@@ -103,6 +105,7 @@ impl Case {
                     *tracked,
                 )
             }
+            Work::Table => script.counted_threshold(&HsvBox::RED, ByteOrder::Swapped),
             Work::Network(_) => script.network(&models::rest(), &models::rest()),
         };
         script
@@ -115,6 +118,7 @@ impl Work {
             Work::Frame { special, .. } => json!({ "Frame": special }),
             Work::Windows { tracked, .. } => json!({ "Windows": { "tracked": tracked } }),
             Work::Network(widths) => json!({ "Network": widths }),
+            Work::Table => json!("Table"),
         }
     }
 }
@@ -151,6 +155,12 @@ fn cases() -> Result<Vec<Case>> {
         model: models::file(widths, Weights::Random, OutputKind::ForceVector, 1),
         size: [320, 240],
     }));
+    cases.push(Case {
+        work: Work::Table,
+        model: Vec::new(),
+        // As many values as a pixel has.
+        size: [256, 256],
+    });
     Ok(cases)
 }
 
@@ -181,7 +191,7 @@ impl Board {
         let file = |name: &str| folder.join(format!("{number}.{name}"));
         let (model, pixels) = (file("model"), file("rgb565"));
         match &case.work {
-            Work::Windows { .. } => return Ok(()),
+            Work::Windows { .. } | Work::Table => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
             Work::Frame {
                 special,

@@ -132,10 +132,13 @@ impl<'b> Runner<'b> {
             ByteOrder::Native
         };
         self.look.hsv_box = HsvBox::of_limits(limits);
-        let (bytes, bits) = (&mut self.table, &mut self.small_table);
-        bytes
-            .set(&self.look.hsv_box, self.look.order)
-            .and_then(|()| bits.set(&self.look.hsv_box, self.look.order))
+        let Look { order, hsv_box, .. } = self.look;
+        if flags & 4 != 0 {
+            counting_begins();
+        }
+        let set = self.table.set(&hsv_box, order);
+        counting_ends();
+        set.and_then(|()| self.small_table.set(&hsv_box, order))
             .map_err(ScriptError::Threshold)
     }
 

@@ -14,7 +14,7 @@ pub enum Kind {
     /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model file that later records
     /// use.
     Model = 1,
-    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan), then a threshold box (6 × u8) for later frames.
+    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the byte table takes), then a threshold box (6 × u8) for later frames.
     Threshold = 2,
     /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16): blobs.
     Scan = 3,

@@ -33,6 +33,8 @@ pub enum Work {
     },
     /// One inference of a model with these layer widths.
     Network(Vec<u64>),
+    /// The threshold's table of 64 KiB, made once for each threshold.
+    Table,
 }
 
 impl Case {

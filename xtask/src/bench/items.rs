@@ -21,7 +21,7 @@ pub struct Report<'i> {
 /// One measured item. Its three numbers are per frame, or per inference; those of `mac` are per multiplication.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Item {
-    /// `threshold`, `blobs`, `frame full`, `frame windows`, `latency`, `network …` or `mac`; of a frame that is not the usual one, what it
+    /// `threshold`, `blobs`, `frame full`, `frame windows`, `latency`, `network …`, `mac` or `table` (the threshold's, of 256 × 256 values); of a frame that is not the usual one, what it
     /// is follows after a comma.
     pub item: String,
     /// Columns and rows: `320x240`.
@@ -94,6 +94,7 @@ fn of_one(measured: &Measured) -> Vec<Item> {
         Work::Windows { tracked: true } => {
             vec![make("frame windows, tracked", measured.total())]
         }
+        Work::Table => vec![make("table", measured.total())],
         Work::Network(widths) => {
             let names: Vec<String> = widths.iter().map(u64::to_string).collect();
             let mut items = vec![make(

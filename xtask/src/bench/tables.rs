@@ -152,6 +152,7 @@ fn name(measured: &Measured) -> String {
         Work::Windows { tracked: true } => {
             format!("{} {}, windows, tracked", case.frame(), case.format)
         }
+        Work::Table => "the threshold's table".to_owned(),
         Work::Network(widths) => {
             let widths: Vec<String> = widths.iter().map(u64::to_string).collect();
             format!("network {}", widths.join("-"))
