@@ -247,6 +247,8 @@ impl RecipeArgs {
 }
 
 fn main() -> Result<()> {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     match Cli::parse().command {
         Command::Dataset { recipe, out } => make_dataset(&recipe, Some(&out)).map(drop),
         Command::Collect(command) => command.run(),

@@ -28,6 +28,8 @@ struct Arrow {
 }
 
 fn main() -> ExitCode {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     let words: Vec<String> = std::env::args().skip(1).collect();
     let done = match &words[..] {
         [folder] => draw(Path::new(folder)),

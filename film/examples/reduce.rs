@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_film::{Design, check, fit};
+use hivtac_film::{Check, Design, check, fit};
 use hivtac_scene::Contact;
 use hivtac_scene::film::curves::Curves;
 use hivtac_scene::film::{Family, Film};
@@ -26,10 +26,10 @@ struct Task {
 }
 
 const TASKS: [Task; 4] = [
-    Task::new("force", Family::Force, Contact::Force, 0.0, 60),
+    Task::new("force", Family::Force, Contact::Force, 0.0, 40),
     Task::new("stick", Family::Stick, Contact::Stick, 0.0, 60),
-    Task::new("slip", Family::Slip, Contact::Slip { mu: 0.6 }, 0.0, 30),
-    Task::new("force-overhang", Family::Force, Contact::Force, 6.0, 20),
+    Task::new("slip", Family::Slip, Contact::Slip { mu: 0.6 }, 0.0, 20),
+    Task::new("force-overhang", Family::Force, Contact::Force, 6.0, 12),
 ];
 
 impl Task {
@@ -51,6 +51,8 @@ impl Task {
 }
 
 fn main() -> ExitCode {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     match reduce(std::env::args().skip(1)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
@@ -108,7 +110,7 @@ fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error
     let notes = format!(
         "# The reduced film, {:?}, overhang {} mm: {} curves (see scene/src/film/curves.rs).\n\
          # cargo run --release -p hivtac-film --example reduce -- scene/data {}\n\
-         # Against the full solution at {} loads of the whole domain: at most {:.3} px, rms {:.3} px; the tip within \
+         # Against the full solution at {} loads of the whole domain: at most {:.3} px ({}), rms {:.3} px; the tip within \
          {:.4} mm.\n\
          # output, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients\n",
         task.family,
@@ -117,12 +119,26 @@ fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error
         task.name,
         check.poses,
         check.worst_px,
+        place(&check),
         check.rms_px,
         check.worst_tip_mm
     );
     std::fs::write(path, format!("{notes}{text}"))?;
     print!("{notes}");
     Ok(())
+}
+
+/// Which load the curves are farthest off at.
+fn place(check: &Check) -> String {
+    check.worst_at.map_or("nowhere".into(), |load| {
+        let [x, y] = load.offset_mm();
+        format!(
+            "{:.4} N, {:.1}°, {:.1}°, offset {x:.2}, {y:.2} mm",
+            load.magnitude_n(),
+            load.alpha_deg(),
+            load.beta_deg()
+        )
+    })
 }
 
 fn file(folder: &Path, name: &str) -> PathBuf {

@@ -22,6 +22,8 @@ struct Request {
 }
 
 fn main() -> ExitCode {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     match Request::parse(std::env::args().skip(1)).and_then(|request| request.run()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {

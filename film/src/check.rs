@@ -6,7 +6,7 @@ use hivtac_scene::film::Film as ReducedFilm;
 use hivtac_scene::{Camera, Contact, Load, MARKERS};
 
 use crate::parallel::in_parallel;
-use crate::reduce::halton;
+use crate::samples::halton;
 use crate::{Design, Film, FilmError, Loaded, paper_camera, press_load};
 
 /// The stated domain: the largest force, N, |α| and |β|, degrees, and offset, mm.
@@ -21,6 +21,8 @@ pub struct Check {
     pub poses: usize,
     /// The largest distance of a marker's centroid at 800×600 `paper`, px.
     pub worst_px: f64,
+    /// The load that it is at.
+    pub worst_at: Option<Load>,
     /// Its root mean square, px.
     pub rms_px: f64,
     /// The largest error of the tip's place, mm.
@@ -51,10 +53,12 @@ pub fn check(
         poses,
         ..Check::default()
     };
-    for (tip_mm, pixels) in &errors {
+    for ((tip_mm, pixels), load) in errors.iter().zip(&cases) {
         check.worst_tip_mm = check.worst_tip_mm.max(*tip_mm);
         for px in pixels {
-            check.worst_px = check.worst_px.max(*px);
+            if *px > check.worst_px {
+                (check.worst_px, check.worst_at) = (*px, Some(*load));
+            }
             check.rms_px += px * px;
         }
     }

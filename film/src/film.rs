@@ -111,11 +111,11 @@ impl Film {
         let guided: Vec<V3> = guides.iter().map(|(direction, _)| *direction).collect();
         let problem = Problem {
             shell: &self.shell,
-            load: self.on_tip(&force),
+            load: weighted(&self.tip, &force),
             guides: guides
                 .iter()
                 .map(|(direction, target_mm)| Guide {
-                    weights: self.on_tip(direction),
+                    weights: weighted(&self.tip, direction),
                     target_mm: *target_mm,
                 })
                 .collect(),
@@ -161,14 +161,6 @@ impl Film {
         }
     }
 
-    fn on_tip(&self, vector: &V3) -> Vec<f64> {
-        let parts = self
-            .tip
-            .iter()
-            .flat_map(|share| vector.map(|part| share * part));
-        parts.collect()
-    }
-
     fn equilibrium(&self, solution: Solution, load: V3, guided: &[V3]) -> Equilibrium {
         let mut force_n = load;
         for (direction, size) in guided.iter().zip(&solution.guide_n) {
@@ -176,20 +168,143 @@ impl Film {
                 *sum += size * part;
             }
         }
-        let mut tip_mm = [0.0; 3];
-        for (share, u) in self.tip.iter().zip(solution.unknowns.chunks(COMPONENTS)) {
-            for (sum, part) in tip_mm.iter_mut().zip(u) {
-                *sum += share * part;
-            }
-        }
         Equilibrium {
-            tip_mm,
+            tip_mm: mean(&self.tip, &solution.unknowns),
             force_n,
             reaction_n: self.shell.reaction(&solution.unknowns),
             unknowns: solution.unknowns,
             steps: solution.steps,
         }
     }
+}
+
+/// How a state's tip and unknowns answer to a small change.
+pub struct Response {
+    unknowns: Vec<f64>,
+    /// The tip's way, mm per unit.
+    pub tip_mm: V3,
+}
+
+impl Film {
+    /// How a state answers to one more newton along x, y and z, and to a tip that touches the film one millimetre farther
+    /// along x and y with the force kept: its derivatives.
+    ///
+    /// # Errors
+    /// When the stiffness is not positive definite: a force would not hold the film there.
+    pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], FilmError> {
+        let at = self.shell.derivatives(&state.unknowns);
+        let factors = self.solver.factor(self.shell.pattern(), &at.stiffness);
+        let factors = factors.ok_or_else(|| FilmError::Solver("the film is not stable".into()))?;
+        let moved = [[1.0, 0.0], [0.0, 1.0]].map(|way| self.shares_per_mm(way));
+        let mut sides = Vec::new();
+        for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+            sides.extend(weighted(&self.tip, &axis));
+        }
+        for shares in &moved {
+            sides.extend(weighted(shares, &state.force_n));
+        }
+        factors.solve(&mut sides, 5);
+        let unknowns: Vec<&[f64]> = sides.chunks(self.unknowns()).collect();
+        Ok(std::array::from_fn(|k| {
+            let mut tip_mm = mean(&self.tip, unknowns[k]);
+            if let Some(shares) = k.checked_sub(3).map(|way| &moved[way]) {
+                for (sum, part) in tip_mm.iter_mut().zip(mean(shares, &state.unknowns)) {
+                    *sum += part;
+                }
+            }
+            Response {
+                unknowns: unknowns[k].to_vec(),
+                tip_mm,
+            }
+        }))
+    }
+
+    /// The state beside this one that a response foretells, `units` away; only its unknowns are changed.
+    pub fn beside(&self, state: &Equilibrium, response: &Response, units: f64) -> Equilibrium {
+        let mut there = state.clone();
+        for (u, part) in there.unknowns.iter_mut().zip(&response.unknowns) {
+            *u += units * part;
+        }
+        there
+    }
+
+    /// How the tip's shares change with its place, per mm.
+    fn shares_per_mm(&self, way: [f64; 2]) -> Vec<f64> {
+        const STEP_MM: f64 = 1e-3;
+        let [back, forth] = [-STEP_MM, STEP_MM].map(|step| {
+            let at = self.design.tip_offset_mm;
+            let tip_offset_mm = [0, 1].map(|k| at[k] + step * way[k]);
+            let design = Design {
+                tip_offset_mm,
+                ..self.design.clone()
+            };
+            tip_shares(&self.shell, &design)
+        });
+        let pairs = forth.iter().zip(&back);
+        pairs.map(|(b, a)| (b - a) / (2.0 * STEP_MM)).collect()
+    }
+}
+
+impl Response {
+    /// How a state answers to several changes at once.
+    pub fn to_all(responses: &[Response; 5], changes: [f64; 5]) -> Response {
+        let mut sum = Response {
+            unknowns: vec![0.0; responses[0].unknowns.len()],
+            tip_mm: [0.0; 3],
+        };
+        for (response, change) in responses.iter().zip(changes) {
+            for (total, part) in sum.unknowns.iter_mut().zip(&response.unknowns) {
+                *total += change * part;
+            }
+            for (total, part) in sum.tip_mm.iter_mut().zip(response.tip_mm) {
+                *total += change * part;
+            }
+        }
+        sum
+    }
+
+    /// The largest part of it.
+    pub fn size(&self) -> f64 {
+        let parts = self.unknowns.iter();
+        parts.fold(0.0, |most, part| most.max(part.abs()))
+    }
+}
+
+impl Equilibrium {
+    /// The state at a place of a path that the polynomial through some known states of it foretells: a start for
+    /// [`Film::press`]. `None` of none.
+    pub fn foretold(path: &[(f64, &Equilibrium)], at: f64) -> Option<Equilibrium> {
+        let mut state = (*path.last()?.1).clone();
+        state.unknowns.fill(0.0);
+        for (k, (place, known)) in path.iter().enumerate() {
+            let others = path.iter().enumerate().filter(|(other, _)| *other != k);
+            let parts = others.map(|(_, (other, _))| (at - other) / (place - other));
+            let weight: f64 = parts.product();
+            for (sum, part) in state.unknowns.iter_mut().zip(&known.unknowns) {
+                *sum += weight * part;
+            }
+        }
+        Some(state)
+    }
+}
+
+/// Σ share · displacement.
+fn mean(shares: &[f64], unknowns: &[f64]) -> V3 {
+    let mut sum = [0.0; 3];
+    for (share, u) in shares.iter().zip(unknowns.chunks(COMPONENTS)) {
+        for (total, part) in sum.iter_mut().zip(u) {
+            *total += share * part;
+        }
+    }
+    sum
+}
+
+/// A vector on each coefficient by its share.
+fn weighted(shares: &[f64], vector: &V3) -> Vec<f64> {
+    let parts = shares
+        .iter()
+        .flat_map(|share| vector.map(|part| share * part));
+    parts.collect()
 }
 
 fn tip_shares(shell: &Shell, design: &Design) -> Vec<f64> {

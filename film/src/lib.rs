@@ -17,6 +17,7 @@ mod newton;
 mod parallel;
 mod point;
 mod reduce;
+mod samples;
 mod shell;
 mod sparse;
 mod spline;

@@ -3,12 +3,15 @@
 //! Finds the displacements where the energy less the loads' work is stationary, on the set where each guided sum of
 //! unknowns has its target. Every step solves the linearized problem by Cholesky's factors, with the guides by their
 //! Schur complement; a stiffness that is not positive definite is shifted until it is. Once the guides are met (after
-//! one full step: they are linear), a step is shortened until the energy falls.
+//! one full step: they are linear), a step is shortened until the energy falls. Near the equilibrium the last factors serve
+//! again, which costs a fifth of a step, as long as each use brings the film ten times nearer.
 
 use crate::FilmError;
 use crate::shell::{Derivatives, Shell};
 use crate::sparse::{Factors, Solver};
 
+/// Less left over than this is near: there the energy needs no watching, N.
+const NEAR_N: f64 = 1e-4;
 /// Equilibrium: no unknown has more force left over, N.
 pub const FORCE_TOLERANCE_N: f64 = 1e-10;
 const TARGET_TOLERANCE_MM: f64 = 1e-11;
@@ -62,11 +65,13 @@ impl Problem<'_> {
         let mut u = start.to_vec();
         let mut guide_n = vec![0.0; self.guides.len()];
         let mut left_over_n = f64::INFINITY;
+        let mut factors = None;
         for steps in 0..=MAX_STEPS {
-            let at = self.shell.derivatives(&u);
+            let gradient = self.shell.gradient(&u);
             let missing = self.missing(&u);
             let met = missing.iter().all(|gap| gap.abs() < TARGET_TOLERANCE_MM);
-            left_over_n = largest(&self.left_over(&at, &guide_n));
+            let before_n = left_over_n;
+            left_over_n = largest(&self.left_over(&gradient, &guide_n));
             if left_over_n.is_nan() {
                 break;
             }
@@ -78,13 +83,23 @@ impl Problem<'_> {
                     steps,
                 });
             }
-            let step = self.step(solver, &at, &missing)?;
-            let length = if met {
-                self.length(&u, &at, &step.step)
-            } else {
-                1.0
+            let serves = met && left_over_n < NEAR_N && left_over_n < 0.1 * before_n;
+            let Some(known) = factors.as_ref().filter(|_| serves) else {
+                let at = self.shell.derivatives(&u);
+                let fresh = self.factors(solver, &at)?;
+                let step = self.step(&fresh, &gradient, &missing)?;
+                let length = if met {
+                    self.length(&u, &at, &step.step)
+                } else {
+                    1.0
+                };
+                factors = Some(fresh);
+                advance(&mut u, &step.step, length);
+                guide_n = step.guide_n;
+                continue;
             };
-            advance(&mut u, &step.step, length);
+            let step = self.step(known, &gradient, &missing)?;
+            advance(&mut u, &step.step, 1.0);
             guide_n = step.guide_n;
         }
         Err(FilmError::NoEquilibrium {
@@ -94,13 +109,9 @@ impl Problem<'_> {
     }
 
     /// Load + guides' forces − the film's own, for each unknown.
-    fn left_over(&self, at: &Derivatives, guide_n: &[f64]) -> Vec<f64> {
-        let mut rest: Vec<f64> = self
-            .load
-            .iter()
-            .zip(&at.gradient)
-            .map(|(f, g)| f - g)
-            .collect();
+    fn left_over(&self, gradient: &[f64], guide_n: &[f64]) -> Vec<f64> {
+        let pairs = self.load.iter().zip(gradient);
+        let mut rest: Vec<f64> = pairs.map(|(f, g)| f - g).collect();
         for (guide, force) in self.guides.iter().zip(guide_n) {
             advance(&mut rest, &guide.weights, *force);
         }
@@ -112,11 +123,15 @@ impl Problem<'_> {
         self.guides.iter().map(gap).collect()
     }
 
-    fn step(&self, solver: &Solver, at: &Derivatives, missing: &[f64]) -> Result<Step, FilmError> {
-        let factors = self.factors(solver, at)?;
+    fn step(
+        &self,
+        factors: &Factors,
+        gradient: &[f64],
+        missing: &[f64],
+    ) -> Result<Step, FilmError> {
         let count = self.guides.len();
         let unknowns = self.load.len();
-        let mut sides = self.left_over(at, &vec![0.0; count]);
+        let mut sides = self.left_over(gradient, &vec![0.0; count]);
         for guide in &self.guides {
             sides.extend(&guide.weights);
         }

@@ -2,66 +2,51 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::film::curves::{Answer, Curve, Curves, Output, Pose, chebyshev, product};
-use hivtac_scene::film::{Family, MAX_DEPTH_MM, MAX_FORCE_N};
+use hivtac_scene::film::Family;
+use hivtac_scene::film::curves::{Curve, Curves, Output, chebyshev, product};
 
 use crate::newton::solve_small;
 use crate::parallel::in_parallel;
-use crate::view::disc_motions;
-use crate::{Contact, Design, Film, FilmError};
+use crate::samples::{Sample, samples};
+use crate::{Design, FilmError};
 
-/// A curve whose part nowhere exceeds this is left out: mm, mm per 0.5 mm (0.1 px is about 2 µm) or N.
-const NEGLIGIBLE: f64 = 3e-4;
+/// A curve whose part nowhere exceeds this is left out: a marker's displacement, mm (0.1 px is about 2 µm) …
+const NEGLIGIBLE_MM: f64 = 1e-4;
+/// … its slope, mm per mm (a rim of 0.5 mm around a place that the mean tells) …
+const NEGLIGIBLE_SLOPE: f64 = 1e-3;
+/// … and the tip's vector, mm or N.
+const NEGLIGIBLE_TIP: f64 = 2e-5;
 /// So is the end of a series that does not exceed this.
 const NEGLIGIBLE_TAIL: f64 = 5e-6;
+/// What a difference of slopes counts for beside one of values, the whole range of tilt and offset being 1.
+const SLOPES_COUNT: f64 = 0.1;
 
 /// How a family is made.
 struct Effort {
-    /// Poses (tilt and offset). Each gives four markers' samples of a term.
+    /// Poses (tilt and offset). Each gives four markers' samples of a term, with its four slopes.
     poses: usize,
     /// Nodes in s.
     nodes: usize,
     /// The highest degree in the tilt without offset, with its first power, with its second …
     degrees: &'static [u8],
+    /// The same for the markers' slopes, which turn a disc by little: its mean says where it is.
+    slope_degrees: &'static [u8],
 }
 
 fn effort(family: Family, overhang_mm: f64) -> Effort {
-    match family {
+    type Degrees = &'static [u8];
+    let (poses, nodes, degrees, slope_degrees): (_, _, Degrees, Degrees) = match family {
         // Twice as many unknowns: as few poses and nodes as will do.
-        Family::Force if overhang_mm > 0.0 => Effort {
-            poses: 10,
-            nodes: 18,
-            degrees: &[3, 2, 1, 0],
-        },
-        Family::Force => Effort {
-            poses: 20,
-            nodes: 24,
-            degrees: &[3, 2, 1, 0],
-        },
-        Family::Stick => Effort {
-            poses: 56,
-            nodes: 16,
-            degrees: &[8, 5, 2],
-        },
-        Family::Slip => Effort {
-            poses: 56,
-            nodes: 16,
-            degrees: &[5, 4, 3, 2],
-        },
-    }
-}
-
-fn contact(family: Family, pose: &Pose) -> Contact {
-    let [x, y] = family.tangents(pose.size, pose.tilt);
-    match family {
-        Family::Force => {
-            let size = MAX_FORCE_N * pose.size.powi(3) / (1.0 + x * x + y * y).sqrt();
-            Contact::Force([size * x, size * y, -size])
-        }
-        Family::Stick | Family::Slip => {
-            let depth = MAX_DEPTH_MM * pose.size;
-            Contact::Travel([depth * x, depth * y, -depth])
-        }
+        Family::Force if overhang_mm > 0.0 => (5, 18, &[3, 2, 1, 0], &[3, 2, 1, 0]),
+        Family::Force => (8, 24, &[3, 2, 1, 0], &[3, 2, 1, 0]),
+        Family::Stick => (36, 18, &[11, 7, 3], &[6, 3, 1]),
+        Family::Slip => (12, 20, &[4, 3, 2, 1], &[4, 3, 2, 1]),
+    };
+    Effort {
+        poses,
+        nodes,
+        degrees,
+        slope_degrees,
     }
 }
 
@@ -77,16 +62,27 @@ pub fn fit(
 ) -> Result<Curves, FilmError> {
     let effort = effort(family, design.overhang_mm);
     let nodes = nodes(effort.nodes);
-    let poses: Vec<Pose> = (0..effort.poses)
-        .map(|index| training_pose(family, index))
-        .collect();
-    let runs = in_parallel(design, &poses, threads, progress, |film, pose| {
-        run(family, film, pose, &nodes)
+    let poses: Vec<usize> = (0..effort.poses).collect();
+    let runs = in_parallel(design, &poses, threads, progress, |film, index| {
+        samples(family, film, *index, &nodes)
     })?;
-    let mut curves = Vec::new();
-    for output in Output::ALL {
-        curves.extend(curves_of(output, effort.degrees, &nodes, &poses, &runs)?);
+    let [terms, slope_terms] = [effort.degrees, effort.slope_degrees].map(all_terms);
+    let terms = |output| match output {
+        Output::AlongR(_) | Output::AlongT(_) => &slope_terms,
+        _ => &terms,
+    };
+    let mut solved: Vec<Vec<Vec<f64>>> = Vec::new();
+    for node in 0..nodes.len() {
+        let at_node: Vec<&Sample> = runs.iter().map(|run| &run[node]).collect();
+        let each = Output::ALL.map(|output| fit_node(output, terms(output), &at_node));
+        let each: Option<Vec<_>> = each.into_iter().collect();
+        solved.push(each.ok_or_else(|| FilmError::Solver("too few poses for the terms".into()))?);
     }
+    let curves = Output::ALL.into_iter().flat_map(|output| {
+        let of_node = |at: &Vec<Vec<f64>>| at[output.index()].clone();
+        let at_nodes: Vec<Vec<f64>> = solved.iter().map(of_node).collect();
+        curves_of(output, terms(output), &nodes, &at_nodes)
+    });
     Ok(Curves::new(curves))
 }
 
@@ -96,110 +92,74 @@ fn nodes(count: usize) -> Vec<f64> {
     (0..count).map(node).collect()
 }
 
-/// Presses the film at one pose, harder and harder: the outputs at each node of s.
-fn run(
-    family: Family,
-    film: &mut Film,
-    pose: &Pose,
-    nodes: &[f64],
-) -> Result<Vec<[[f64; 4]; 12]>, FilmError> {
-    film.move_tip(pose.offset.map(|part| family.offset_mm() * part))?;
-    let mut state = film.rest();
-    let mut run = Vec::new();
-    for &size in nodes {
-        state = film.press(contact(family, &Pose { size, ..*pose }), &state)?;
-        let answer = Answer {
-            tip: match family {
-                Family::Force => state.tip_mm,
-                Family::Stick | Family::Slip => state.force_n,
-            },
-            discs: disc_motions(film, &state),
-        };
-        run.push(answer.outputs());
-    }
-    Ok(run)
-}
-
-/// Spread evenly in four dimensions and denser towards the limits, where a polynomial would stray first.
-fn training_pose(family: Family, index: usize) -> Pose {
-    let part = |base| halton(index + 1, base);
-    let spread = |base| -(PI * part(base)).cos();
-    let (radius, angle) = ((PI / 2.0 * part(2)).sin(), 2.0 * PI * part(3));
-    Pose {
-        size: 1.0,
-        tilt: match family {
-            Family::Force => [2, 3].map(spread),
-            Family::Stick | Family::Slip => [radius * angle.cos(), radius * angle.sin()],
-        },
-        offset: [5, 7].map(spread),
-    }
-}
-
-/// Halton's sequence: the digits of `index` in `base` behind the point, reversed.
-pub(crate) fn halton(mut index: usize, base: usize) -> f64 {
-    let (mut value, mut place) = (0.0, 1.0);
-    while index > 0 {
-        place /= base as f64;
-        value += place * (index % base) as f64;
-        index /= base;
-    }
-    value
-}
-
-/// The terms that the symmetry leaves to an output.
-fn terms(output: Output, degrees: &[u8]) -> Vec<[u8; 4]> {
+/// The powers of all terms.
+fn all_terms(degrees: &[u8]) -> Vec<[u8; 4]> {
     let mut terms = Vec::new();
     for (offset, most) in (0u8..).zip(degrees) {
         for (qr, qt) in (0..=*most).flat_map(|qr| (0..=*most - qr).map(move |qt| (qr, qt))) {
-            for ot in 0..=offset {
-                let odd = (qt + ot) % 2 == 1;
-                if odd == output.is_odd() && output.allows_degree(qr + qt + offset) {
-                    terms.push([qr, qt, offset - ot, ot]);
-                }
-            }
+            terms.extend((0..=offset).map(|ot| [qr, qt, offset - ot, ot]));
         }
     }
     terms
 }
 
-/// The curves of one output: least squares over the poses at each node, then Chebyshev series through the nodes.
-fn curves_of(
-    output: Output,
-    degrees: &[u8],
-    nodes: &[f64],
-    poses: &[Pose],
-    runs: &[Vec<[[f64; 4]; 12]>],
-) -> Result<Vec<Curve>, FilmError> {
-    let terms = terms(output, degrees);
-    let seen = poses.iter().flat_map(|pose| (0..4).map(move |k| (pose, k)));
-    let rows: Vec<Vec<f64>> = seen
-        .map(|(pose, k)| terms.iter().map(|term| product(*term, pose, k)).collect())
+/// Whether the symmetry leaves a term to an output.
+fn has(output: Output, [qr, qt, or, ot]: [u8; 4]) -> bool {
+    let odd = (qt + ot) % 2 == 1;
+    odd == output.is_odd() && output.allows_degree(qr + qt + or + ot)
+}
+
+/// The coefficient of each of an output's terms at a node: least squares over values and slopes.
+fn fit_node(output: Output, terms: &[[u8; 4]], samples: &[&Sample]) -> Option<Vec<f64>> {
+    let own: Vec<[u8; 4]> = terms
+        .iter()
+        .copied()
+        .filter(|term| has(output, *term))
         .collect();
-    let mut at_nodes = Vec::new();
-    for (node, s) in nodes.iter().enumerate() {
-        let values = runs.iter().flat_map(|run| run[node][output.index()]);
-        let values: Vec<f64> = values.map(|value| value / s).collect();
-        let solved = least_squares(&rows, &values);
-        at_nodes
-            .push(solved.ok_or_else(|| FilmError::Solver("too few poses for the terms".into()))?);
-    }
-    let mut curves = Vec::new();
-    for (k, powers) in terms.iter().enumerate() {
-        let values: Vec<f64> = at_nodes.iter().map(|solved| solved[k]).collect();
-        let sizes = values.iter().zip(nodes).map(|(value, s)| (value * s).abs());
-        let negligible = match output {
-            Output::Tip(_) => NEGLIGIBLE / 10.0,
-            _ => NEGLIGIBLE,
-        };
-        if sizes.fold(0.0, f64::max) > negligible {
-            curves.push(Curve {
-                output,
-                powers: *powers,
-                series: series(nodes, &values),
-            });
+    let (mut rows, mut sides) = (Vec::new(), Vec::new());
+    for (sample, marker) in samples
+        .iter()
+        .flat_map(|sample| (0..4).map(move |k| (sample, k)))
+    {
+        let products: Vec<_> = own
+            .iter()
+            .map(|term| product(*term, &sample.pose, marker))
+            .collect();
+        let s = sample.pose.size;
+        rows.push(products.iter().map(|(value, _)| *value).collect());
+        sides.push(sample.outputs[output.index()][marker] / s);
+        for (k, slopes) in sample.slopes.iter().enumerate() {
+            let row = products.iter().map(|(_, slope)| SLOPES_COUNT * slope[k]);
+            rows.push(row.collect());
+            sides.push(SLOPES_COUNT * slopes[output.index()][marker] / s);
         }
     }
-    Ok(curves)
+    least_squares(&rows, &sides)
+}
+
+/// The curves of one output: Chebyshev series through what was found at the nodes.
+fn curves_of(
+    output: Output,
+    terms: &[[u8; 4]],
+    nodes: &[f64],
+    at_nodes: &[Vec<f64>],
+) -> Vec<Curve> {
+    let own = terms.iter().filter(|term| has(output, **term));
+    let negligible = match output {
+        Output::Moved(_) => NEGLIGIBLE_MM,
+        Output::AlongR(_) | Output::AlongT(_) => NEGLIGIBLE_SLOPE,
+        Output::Tip(_) => NEGLIGIBLE_TIP,
+    };
+    let curve = |(k, powers): (usize, &[u8; 4])| {
+        let values: Vec<f64> = at_nodes.iter().map(|solved| solved[k]).collect();
+        let sizes = values.iter().zip(nodes).map(|(value, s)| (value * s).abs());
+        (sizes.fold(0.0, f64::max) > negligible).then(|| Curve {
+            output,
+            powers: *powers,
+            series: series(nodes, &values),
+        })
+    };
+    own.enumerate().filter_map(curve).collect()
 }
 
 /// Solves the normal equations; the terms are of size 1, and few.
@@ -241,7 +201,8 @@ mod tests {
 
     #[test]
     fn symmetry_leaves_these_terms() {
-        let count = |output| terms(output, &[3, 2, 1, 0]).len();
+        let terms = all_terms(&[3, 2, 1, 0]);
+        let count = |output| terms.iter().filter(|term| has(output, **term)).count();
         assert_eq!(count(Output::Moved(Part::R)), 19);
         assert_eq!(count(Output::Moved(Part::T)), 16);
         assert_eq!(count(Output::AlongT(Part::T)), 19);

@@ -98,6 +98,38 @@ impl Shell {
         energy
     }
 
+    /// The gradient of the energy of displacements `u`, N.
+    pub fn gradient(&self, u: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; u.len()];
+        for &(unknown, stiffness) in &self.pins {
+            sum[unknown] += stiffness * u[unknown];
+        }
+        for Spring { place, stiffness } in &self.springs {
+            let moved = self.grid.interpolate(u, place);
+            for (a, value) in place.values.iter().enumerate() {
+                let row = self.grid.coefficient(place.origin, a);
+                for c in 0..COMPONENTS {
+                    sum[COMPONENTS * row + c] += stiffness * value * moved[c];
+                }
+            }
+        }
+        for cell in self.cells() {
+            let local = self.grid.gather(u, cell.origin);
+            let mut own = [[0.0; 3]; LOCAL];
+            for (weight, slopes) in self.points(&cell) {
+                let (_, first, _) = self.laws.derivatives(&surface(&slopes, &local));
+                add_gradient(&mut own, &slopes, &first, weight);
+            }
+            for (a, part) in own.iter().enumerate() {
+                let row = COMPONENTS * self.grid.coefficient(cell.origin, a);
+                for (total, part) in sum[row..].iter_mut().zip(part) {
+                    *total += part;
+                }
+            }
+        }
+        sum
+    }
+
     /// The energy of displacements `u` with its derivatives.
     pub fn derivatives(&self, u: &[f64]) -> Derivatives {
         let mut sum = Derivatives {

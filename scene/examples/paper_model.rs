@@ -21,6 +21,8 @@ const READINGS: [PinholeDistance; 2] = [PinholeDistance::Slant, PinholeDistance:
 const MEAN_CELLS: usize = 700;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let figure8 = match arguments.as_slice() {
         [] => None,

@@ -10,6 +10,8 @@ const FRAMES: u32 = 100;
 const REPEATS: u32 = 5;
 
 fn main() -> Result<(), SceneError> {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     for preset in [Preset::Paper, Preset::Ov7725] {
         for (width, height) in [(320, 240), (800, 600)] {
             let scene = Scene::preset("demo", preset, width, height, 1)?;

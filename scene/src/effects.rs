@@ -174,11 +174,11 @@ fn pitch_um(scene: &Scene) -> f64 {
 
 fn light() -> Vec<Effect> {
     vec![
-        off(
+        on(
             "falloff",
-            "no falloff of light off the axis",
+            "three tenths of the light lost 75° off the axis",
             |_, options| {
-                options.falloff = 0.0;
+                options.falloff = 0.3;
             },
         ),
         on(
@@ -191,8 +191,8 @@ fn light() -> Vec<Effect> {
         on("dim light", "half the light", |_, options| {
             options.gain = 0.5
         }),
-        on("dark", "three tenths of the light", |_, options| {
-            options.gain = 0.3
+        on("dark", "0.28 of the light", |_, options| {
+            options.gain = 0.28
         }),
         on("haze", "veiling light of 20 levels", |_, options| {
             options.haze = 20.0

@@ -50,6 +50,8 @@ enum Task {
 }
 
 fn main() -> ExitCode {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     match run(Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -9,7 +9,8 @@
 //! A marker is a small disc. Its nine outputs are the affine map that is nearest to the film's displacement over the
 //! disc: the disc's mean displacement and its slopes along r and t.
 
-use super::products::{MOST_PRODUCTS, Products};
+use super::products::Products;
+use super::table::Table;
 use crate::MARKERS;
 
 pub use super::products::product;
@@ -17,7 +18,7 @@ pub use super::products::product;
 /// Chebyshev polynomials at most.
 pub const TERMS: usize = 24;
 /// The highest degree of a term in tilt and offset together.
-pub const DEGREE: u8 = 8;
+pub const DEGREE: u8 = 12;
 
 /// What a curve contributes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +107,7 @@ pub struct Pose {
 }
 
 /// What the curves say of a press.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
     /// The tip's vector, film frame.
     pub tip: [f64; 3],
@@ -147,30 +148,32 @@ pub struct Curve {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curves {
     pub(super) curves: Vec<Curve>,
-    /// The product of each curve, among `products`.
-    places: Vec<usize>,
     products: Products,
+    table: Table,
 }
 
 impl Curves {
-    /// Curves of at most [`TERMS`] numbers, of at most 127 different terms whose powers sum up to at most [`DEGREE`];
+    /// Curves of at most [`TERMS`] numbers, of at most 255 different terms whose powers sum up to at most [`DEGREE`];
     /// others are left out.
     pub fn new(curves: impl IntoIterator<Item = Curve>) -> Curves {
         let fits = |curve: &Curve| {
             let degree: u32 = curve.powers.iter().map(|power| u32::from(*power)).sum();
             degree <= u32::from(DEGREE) && curve.series.len() <= TERMS
         };
+        let mut curves: Vec<Curve> = curves.into_iter().filter(fits).collect();
         let mut products = Products::default();
-        let placed = curves.into_iter().filter(fits).filter_map(|curve| {
-            let place = products.place(curve.powers);
-            (place < MOST_PRODUCTS).then_some((curve, place))
-        });
-        let (curves, places) = placed.unzip();
-        products.truncate();
+        // The tip's first, so that it can be told without the others.
+        let of_tip = |curve: &Curve| matches!(curve.output, Output::Tip(_));
+        for curve in curves.iter().filter(|curve| of_tip(curve)) {
+            products.place(curve.powers);
+        }
+        products.mark_tip();
+        curves.retain(|curve| products.place(curve.powers).is_some());
+        let table = Table::new(&curves, &products);
         Curves {
             curves,
-            places,
             products,
+            table,
         }
     }
 
@@ -181,31 +184,20 @@ impl Curves {
 
     /// Tip and markers under a press.
     pub fn at(&self, pose: &Pose) -> Answer {
-        answer(&self.sums(pose, |_| true))
+        answer(&self.table.sums(pose.size, &self.products.values(pose)))
     }
 
     /// The tip's vector alone.
     pub fn tip(&self, pose: &Pose) -> [f64; 3] {
-        tip(&self.sums(pose, |output| matches!(output, Output::Tip(_))))
-    }
-
-    /// The outputs that are wanted, as each marker sees them.
-    fn sums(&self, pose: &Pose, wanted: impl Fn(Output) -> bool) -> [[f64; 4]; 12] {
-        let products = self.products.values(pose);
-        let polynomials = chebyshev(pose.size);
-        let mut sums = [[0.0; 4]; Output::ALL.len()];
-        let placed = self.curves.iter().zip(&self.places);
-        for (curve, place) in placed.filter(|(curve, _)| wanted(curve.output)) {
-            let parts = curve.series.iter().zip(&polynomials);
-            let coefficient: f64 = parts.map(|(c, t)| c * t).sum();
-            let size = pose.size * coefficient;
-            for (sum, product) in sums[curve.output.index()].iter_mut().zip(products[*place]) {
-                *sum += size * product;
-            }
-        }
-        sums
+        let products = self.products.tip_values(pose, TIP_VIEW);
+        let [r, t, z] = self.table.tip_sums(pose.size, &products);
+        let [x, y] = from_diagonal([r, t], MARKERS[TIP_VIEW].centre_mm);
+        [x, y, z]
     }
 }
+
+/// The marker in whose directions the tip alone is told; the symmetry of the curves gives all four the same.
+const TIP_VIEW: usize = 2;
 
 impl Answer {
     /// The outputs as each marker sees them, by [`Output::index`] and identity.

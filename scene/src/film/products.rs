@@ -4,63 +4,120 @@ use super::curves::{Pose, to_diagonal};
 use crate::MARKERS;
 
 /// Different products at most, among them those on the way to a higher one.
-pub(super) const MOST_PRODUCTS: usize = 128;
+pub(super) const MOST_PRODUCTS: usize = 256;
 
 /// Products of powers of (q_r, q_t, o_r, o_t), each from another by one multiplication.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Products {
     powers: Vec<[u8; 4]>,
     /// Product k + 1 is the product at the first index times the variable at the second; product 0 is 1.
-    steps: Vec<(usize, usize)>,
+    steps: Vec<(u8, u8)>,
+    /// Steps that the tip's curves need.
+    tip_steps: usize,
 }
 
 impl Products {
-    /// Leaves out what does not fit.
-    pub(super) fn truncate(&mut self) {
-        self.powers.truncate(MOST_PRODUCTS - 1);
-        self.steps.truncate(MOST_PRODUCTS - 1);
-    }
-
-    /// Where the product of these powers is, added if need be.
-    pub(super) fn place(&mut self, powers: [u8; 4]) -> usize {
+    /// Where the product of these powers is, added if need be; `None` when there is no room for it.
+    pub(super) fn place(&mut self, powers: [u8; 4]) -> Option<u8> {
         let Some(variable) = powers.iter().position(|power| *power > 0) else {
-            return 0;
+            return Some(0);
         };
-        if let Some(known) = self.powers.iter().position(|known| *known == powers) {
-            return known + 1;
+        if let Some(known) = self.find(powers) {
+            return Some(known);
         }
         let mut fewer = powers;
         fewer[variable] -= 1;
-        let from = self.place(fewer);
+        let from = self.place(fewer)?;
+        let place = u8::try_from(self.powers.len() + 1).ok()?;
         self.powers.push(powers);
-        self.steps.push((from, variable));
-        self.powers.len()
+        self.steps.push((from, variable as u8));
+        Some(place)
+    }
+
+    /// Where the product of these powers is.
+    pub(super) fn find(&self, powers: [u8; 4]) -> Option<u8> {
+        let known = self.powers.iter().position(|known| *known == powers);
+        match powers {
+            [0, 0, 0, 0] => Some(0),
+            _ => known.and_then(|known| u8::try_from(known + 1).ok()),
+        }
+    }
+
+    /// What is there so far is what the tip's curves need.
+    pub(super) fn mark_tip(&mut self) {
+        self.tip_steps = self.steps.len();
     }
 
     /// Each product as each marker sees it.
     pub(super) fn values(&self, pose: &Pose) -> [[f64; 4]; MOST_PRODUCTS] {
         let mut variables = [[0.0; 4]; 4];
-        for (k, marker) in MARKERS.iter().enumerate() {
-            let [qr, qt] = to_diagonal(pose.tilt, marker.centre_mm);
-            let [or, ot] = to_diagonal(pose.offset, marker.centre_mm);
-            for (variable, value) in variables.iter_mut().zip([qr, qt, or, ot]) {
-                variable[k] = value;
+        for marker in 0..MARKERS.len() {
+            for (variable, value) in variables.iter_mut().zip(seen(pose, marker)) {
+                variable[marker] = value;
             }
         }
         let mut values = [[1.0; 4]; MOST_PRODUCTS];
         for (k, (from, variable)) in self.steps.iter().enumerate() {
-            let (from, variable) = (values[*from], variables[*variable]);
+            let (from, variable) = (
+                values[usize::from(*from)],
+                variables[usize::from(*variable)],
+            );
             values[k + 1] = std::array::from_fn(|marker| from[marker] * variable[marker]);
+        }
+        values
+    }
+
+    /// The tip's products as one marker sees them.
+    pub(super) fn tip_values(&self, pose: &Pose, marker: usize) -> [f64; MOST_PRODUCTS] {
+        let variables = seen(pose, marker);
+        let mut values = [1.0; MOST_PRODUCTS];
+        for (k, (from, variable)) in self.steps[..self.tip_steps].iter().enumerate() {
+            values[k + 1] = values[usize::from(*from)] * variables[usize::from(*variable)];
         }
         values
     }
 }
 
-/// The product of these powers of (q_r, q_t, o_r, o_t) as a marker sees them.
-pub fn product(powers: [u8; 4], pose: &Pose, marker: usize) -> f64 {
-    let mut products = Products::default();
-    let place = products.place(powers);
-    products.values(pose)[place][marker]
+/// (q_r, q_t, o_r, o_t) as a marker sees them.
+pub(super) fn seen(pose: &Pose, marker: usize) -> [f64; 4] {
+    let corner = MARKERS[marker].centre_mm;
+    let [qr, qt] = to_diagonal(pose.tilt, corner);
+    let [or, ot] = to_diagonal(pose.offset, corner);
+    [qr, qt, or, ot]
+}
+
+/// The product of these powers of (q_r, q_t, o_r, o_t) as a marker sees them, and its derivatives by the pose's tilt
+/// and offset along x and along y.
+pub fn product(powers: [u8; 4], pose: &Pose, marker: usize) -> (f64, [f64; 4]) {
+    let variables = seen(pose, marker);
+    let factor = |k: usize| libm::pow(variables[k], f64::from(powers[k]));
+    let without = |k: usize| {
+        let others = (0..4).filter(|other| *other != k).map(factor);
+        others.product::<f64>()
+    };
+    let slopes: [f64; 4] = std::array::from_fn(|k| match powers[k] {
+        0 => 0.0,
+        power => f64::from(power) * libm::pow(variables[k], f64::from(power) - 1.0) * without(k),
+    });
+    // The variables are linear in tilt and offset.
+    let along = |tilt, offset| {
+        let unit = Pose {
+            size: 0.0,
+            tilt,
+            offset,
+        };
+        let parts = seen(&unit, marker).into_iter().zip(slopes);
+        parts.map(|(a, b)| a * b).sum::<f64>()
+    };
+    let (x, y) = ([1.0, 0.0], [0.0, 1.0]);
+    let none = [0.0; 2];
+    let derivatives = [
+        along(x, none),
+        along(y, none),
+        along(none, x),
+        along(none, y),
+    ];
+    ((0..4).map(factor).product(), derivatives)
 }
 
 #[cfg(test)]
@@ -78,7 +135,40 @@ mod tests {
         // Marker 2 is in the (+, +) corner.
         let [qr, qt, or, ot] = [-0.1, -0.7, 0.7, -0.3].map(|x| x * half);
         let expected = qr * qr * qt * or * ot;
-        assert!((product([2, 1, 1, 1], &pose, 2) - expected).abs() < 1e-15);
-        assert_eq!(product([0; 4], &pose, 2), 1.0);
+        let (value, slopes) = product([2, 1, 1, 1], &pose, 2);
+        assert!((value - expected).abs() < 1e-15);
+        assert_eq!(product([0; 4], &pose, 2), (1.0, [0.0; 4]));
+        let mut products = Products::default();
+        let place = products.place([2, 1, 1, 1]).unwrap();
+        assert_eq!(products.find([2, 1, 1, 1]), Some(place));
+        products.mark_tip();
+        let place = usize::from(place);
+        assert!((products.values(&pose)[place][2] - expected).abs() < 1e-15);
+        assert!((products.tip_values(&pose, 2)[place] - expected).abs() < 1e-15);
+        for (k, slope) in slopes.into_iter().enumerate() {
+            let moved = |step: f64| {
+                let mut pose = pose;
+                match k {
+                    0 | 1 => pose.tilt[k] += step,
+                    _ => pose.offset[k - 2] += step,
+                }
+                product([2, 1, 1, 1], &pose, 2).0
+            };
+            let expected = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+            assert!((slope - expected).abs() < 1e-9, "{k}: {slope} {expected}");
+        }
+    }
+
+    #[test]
+    fn there_is_room_for_so_many() {
+        let mut products = Products::default();
+        let all =
+            (0..4u8).flat_map(|a| (0..4).flat_map(move |b| (0..4).map(move |c| [a, b, c, 1])));
+        let placed = all
+            .chain((0..200).map(|a| [a, 0, 0, 2]))
+            .filter(|powers| products.place(*powers).is_some());
+        assert!(placed.count() < MOST_PRODUCTS);
+        assert_eq!(products.powers.len(), MOST_PRODUCTS - 1);
+        assert_eq!(products.place([250, 0, 0, 2]), None);
     }
 }

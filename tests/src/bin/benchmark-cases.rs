@@ -33,6 +33,8 @@ const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
 const WIDEST_ON_BOARD: u16 = 320;
 
 fn main() -> Result<()> {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
     let folder = folder.context("usage: benchmark-cases FOLDER [MICROSECONDS …]")?;
     let times: Vec<u64> = env::args()

@@ -10,6 +10,8 @@ use hivtac_tests::looking::{ESTIMATORS, View};
 const REPEATS: u64 = 4;
 
 fn main() -> Result<()> {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     let repeats = match std::env::args().nth(1) {
         None => REPEATS,
         Some(text) => text

@@ -24,6 +24,8 @@ const SIZES: [[u16; 2]; 4] = [[160, 120], [320, 240], [640, 480], [800, 600]];
 const DURATION: Duration = Duration::from_millis(400);
 
 fn main() -> Result<()> {
+    // Whoever reads the output may have enough of it.
+    sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
     let folder = folder.context("usage: host-speed FOLDER")?;
     for [width, height] in SIZES {
