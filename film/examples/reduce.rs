@@ -110,7 +110,7 @@ fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error
     let notes = format!(
         "# The reduced film, {:?}, overhang {} mm: {} curves (see scene/src/film/curves.rs).\n\
          # cargo run --release -p hivtac-film --example reduce -- scene/data {}\n\
-         # Against the full solution at {} loads of the whole domain: at most {:.3} px ({}), rms {:.3} px; the tip within \
+         # Against the full solution at {} loads of the whole domain: at most {:.3} px, rms {:.3} px; the tip within \
          {:.4} mm.\n\
          # output, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients\n",
         task.family,
@@ -119,12 +119,12 @@ fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error
         task.name,
         check.poses,
         check.worst_px,
-        place(&check),
         check.rms_px,
         check.worst_tip_mm
     );
     std::fs::write(path, format!("{notes}{text}"))?;
     print!("{notes}");
+    println!("# The largest error is at {}.", place(&check));
     Ok(())
 }
 

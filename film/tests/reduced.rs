@@ -5,7 +5,7 @@ use hivtac_scene::film::{Family, Film as ReducedFilm};
 use hivtac_scene::{Contact, Load, MARKERS};
 
 /// What the reading `stick` is held to, px.
-const STICK_PX: f64 = 0.1;
+const STICK_PX: f64 = 0.4;
 
 /// |F|, α, β and offset.
 type Case = (f64, f64, f64, [f64; 2]);

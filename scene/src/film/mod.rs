@@ -134,8 +134,8 @@ fn committed(text: &str) -> Arc<Curves> {
     Arc::new(text.parse().expect("the committed curves are curves"))
 }
 
-/// The film by its curves: markers within 0.1 px of the full solution at 800×600 in the reading `force`, within 0.4 px in
-/// `stick` and 0.8 px in `slip` (rms 0.11 and 0.15 px; `film/README.md`); the film between them roughly.
+/// The film by its curves: markers within 0.1 px of the full solution at 800×600 in the readings `force` and `slip`, within
+/// 0.4 px in `stick` (rms 0.13 px; `film/README.md`); the film between them roughly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     curves: [Arc<Curves>; 3],
