@@ -6,8 +6,8 @@ use hivtac_sensing::features::{FEATURES, Features};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
-    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, OUTPUTS, Origin,
-    OutputKind, PixelFormat, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
+    CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
+    OUTPUTS, Origin, OutputKind, PixelFormat, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
 };
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::HsvBox;
@@ -91,6 +91,39 @@ pub fn file_read_so(settings: &Settings, rest: Rest, contact: ContactReading) ->
     spec.conditions.centroid = settings.centroid;
     spec.conditions.contact = contact;
     encoded(&spec)
+}
+
+/// The file of a model of the trade between speed and accuracy: a closed form, layers of these widths (none for no
+/// layers), or both; for frames of a geometry, with the rest position that they show.
+pub fn trade_file(
+    (geometry, rest, centroid): (Geometry, Rest, CentroidEstimator),
+    closed_form: bool,
+    widths: &[u16],
+    weights: Weights,
+) -> Vec<u8> {
+    let mut spec = spec(geometry, rest, widths, weights, OutputKind::ForceVector, 1);
+    spec.conditions.centroid = centroid;
+    // The paper's camera is the only one of its size.
+    if geometry == Geometry::preset(Preset::Paper, geometry.width, geometry.height) {
+        spec.conditions.preset = Preset::Paper;
+    }
+    spec.closed_form = closed_form.then(|| straight_curves(geometry.width));
+    encoded(&spec)
+}
+
+/// Curves that give about the forces of the simulated sensor at frames so wide.
+fn straight_curves(width: u16) -> ClosedFormSpec {
+    /// Half the square root of two.
+    const DIAGONAL: i32 = 23_170;
+    let across = [-DIAGONAL, DIAGONAL, DIAGONAL, -DIAGONAL];
+    let down = [-DIAGONAL, -DIAGONAL, DIAGONAL, DIAGONAL];
+    // 0.2 N at 3 px and 10 mN/px at 320 columns, in 96 steps of 1/32 px and their like.
+    let knot = |i: i32| [i * 2_083, 256 * 10_000 * 320 / i32::from(width), 0];
+    ClosedFormSpec {
+        directions: core::array::from_fn(|marker| [across[marker], down[marker]]),
+        step_bits: 11 + (width / 320).checked_ilog2().unwrap_or(0) as u8,
+        knots: (0..=96).map(knot).collect(),
+    }
 }
 
 fn qvga() -> Geometry {

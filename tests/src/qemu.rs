@@ -8,7 +8,7 @@ use std::{fs, vec::Vec};
 use anyhow::{Context, Result, ensure};
 
 use crate::artifact;
-use crate::golden::{Buffers, MAX_FRAME_PIXELS, MAX_ROW_PIXELS, NO_MODEL, Runner};
+use crate::golden::{Buffers, MAX_FRAME_PIXELS, MAX_ROW_PIXELS, NO_USUAL_MODEL, Runner};
 use crate::script::Script;
 
 /// Runs a script on the emulated Cortex-M7 (`HIVTAC_QEMU_IMAGE`) and gives the text it printed.
@@ -38,7 +38,7 @@ pub fn run(script: &Script) -> Result<String> {
 pub fn run_on_host(script: &Script) -> Result<String> {
     let mut frame = std::vec![0; MAX_FRAME_PIXELS];
     let buffers = Buffers {
-        model: &mut std::boxed::Box::new(NO_MODEL),
+        model: &mut *std::boxed::Box::new(NO_USUAL_MODEL),
         row: &mut [0; MAX_ROW_PIXELS],
         frame: frame
             .as_mut_slice()

@@ -21,7 +21,7 @@ pub struct Size {
 
 /// A memory of `memory.x`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-struct Region {
+pub struct Region {
     name: String,
     origin: u64,
     length: u64,
@@ -30,7 +30,7 @@ struct Region {
 
 /// A section that takes memory.
 #[derive(Debug, Serialize)]
-struct Section {
+pub struct Section {
     name: String,
     address: u64,
     size: u64,
@@ -44,13 +44,7 @@ impl Size {
     /// # Errors
     /// When the firmware cannot be built, or a section lies in no memory.
     pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
-        let elf = artifacts::firmware(toolchain)?;
-        let bytes = fs::read(&elf).with_context(|| format!("reading {}", elf.display()))?;
-        let sections = sections(&bytes).with_context(|| format!("reading {}", elf.display()))?;
-        let script = workspace::folder("memory.x");
-        let text =
-            fs::read_to_string(&script).with_context(|| format!("reading {}", script.display()))?;
-        let regions = fill(regions(&text), &sections)?;
+        let (regions, sections) = of_firmware(toolchain)?;
         if self.json {
             let all = serde_json::json!({ "regions": regions, "sections": sections });
             println!("{}", serde_json::to_string_pretty(&all)?);
@@ -59,6 +53,20 @@ impl Size {
         }
         Ok(())
     }
+}
+
+/// Memories and sections of the firmware, which is built first.
+///
+/// # Errors
+/// When it cannot be built, or a section lies in no memory.
+pub fn of_firmware(toolchain: &Toolchain) -> Result<(Vec<Region>, Vec<Section>)> {
+    let elf = artifacts::firmware(toolchain)?;
+    let bytes = fs::read(&elf).with_context(|| format!("reading {}", elf.display()))?;
+    let sections = sections(&bytes).with_context(|| format!("reading {}", elf.display()))?;
+    let script = workspace::folder("memory.x");
+    let text =
+        fs::read_to_string(&script).with_context(|| format!("reading {}", script.display()))?;
+    Ok((fill(regions(&text), &sections)?, sections))
 }
 
 /// Sections that lie in the chip's memory, with something in them.

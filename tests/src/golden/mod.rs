@@ -3,6 +3,7 @@
 //! A script is a sequence of records, each a kind in one byte and what [`Kind`] says, little-endian, until its end.
 //! Every result is one line, printed by `Debug`: all numbers are integers, so equal text means equal bits.
 
+mod cropped;
 mod marks;
 mod record;
 
@@ -26,8 +27,13 @@ use marks::{counting_begins, counting_ends, last_band_begins};
 pub use record::{Kind, ScriptError, Source};
 use record::{bytes, fill, number};
 
-/// Room for a model of 11-512-512-512-3, or of one wide layer less with int16 weights.
-pub const MAX_MODEL_BYTES: usize = 600 * 1024;
+/// Room for a model of 11-512-512-512-3 with int16 weights.
+pub const MAX_MODEL_BYTES: usize = 1088 * 1024;
+/// Room for one of int8 weights, which is enough where nothing is counted.
+const USUAL_MODEL_BYTES: usize = 600 * 1024;
+/// Storage for that. A constant: a value would cross the stack twice.
+pub const NO_USUAL_MODEL: AlignedFile<[u8; USUAL_MODEL_BYTES]> =
+    AlignedFile([0; USUAL_MODEL_BYTES]);
 /// Storage for a model file, at a multiple of four.
 pub type ModelBuffer = AlignedFile<[u8; MAX_MODEL_BYTES]>;
 /// Storage without a model.
@@ -44,7 +50,7 @@ pub const BLOBS: usize = 64;
 /// Storage for what comes from a script. It is handed in, so that a microcontroller decides which memory it lies in.
 pub struct Buffers<'b> {
     /// The model file.
-    pub model: &'b mut ModelBuffer,
+    pub model: &'b mut AlignedFile<[u8]>,
     /// The row of pixels that is pushed.
     pub row: &'b mut [u16; MAX_ROW_PIXELS],
     /// A frame that lies in memory.
@@ -206,8 +212,19 @@ impl<'b> Runner<'b> {
         let mut tracks = Tracks::new();
         for number in 0..frames {
             let (row, frame) = (&mut *self.buffers.row, &mut *self.buffers.frame);
+            let window = match tracked {
+                2 => cropped::window(&sensor, &tracks),
+                _ => None,
+            };
             let frame = read_frame(source, row, frame, [width, height])?;
-            if number + 1 == frames {
+            let last = number + 1 == frames;
+            if let Some(window) = window {
+                let frame = cropped::crop(frame, width, &window);
+                let measurement = cropped::measure(&mut sensor, &mut tracks, frame, &window, last);
+                say(results, self.cases, format_args!("{measurement:?}"))?;
+                continue;
+            }
+            if last {
                 counting_begins();
             }
             let measurement = match tracked {
@@ -284,7 +301,7 @@ fn read_frame<'f>(
     row: &mut [u16],
     frame: &'f mut [u16],
     [width, height]: [u16; 2],
-) -> Result<&'f [u16], ScriptError> {
+) -> Result<&'f mut [u16], ScriptError> {
     let pixels = usize::from(width) * usize::from(height);
     let frame = frame.get_mut(..pixels);
     let frame = frame.ok_or(ScriptError::TooLarge([width, height]))?;

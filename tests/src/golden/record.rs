@@ -24,8 +24,9 @@ pub enum Kind {
     Network = 5,
     /// Three numbers (i32), taken as a force vector in µN and as α, β in m° and |F| in µN.
     Force = 6,
-    /// Width, height, number of frames (u16), whether windows follow the markers (u8), then the pixels (u16): the pipeline
-    /// on frames that lie in memory.
+    /// Width, height, number of frames (u16), how they are looked at (u8: 0 coarsely and then in windows, 1 in windows that
+    /// follow the markers, 2 cropped to these windows' rectangle), then the pixels (u16): the pipeline on frames that lie in
+    /// memory.
     Windows = 7,
 }
 

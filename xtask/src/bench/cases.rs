@@ -19,6 +19,22 @@ pub struct Case {
     pub size: [u64; 2],
     /// Pixel format of that frame: `rgb565`, `yuv422` or `mono`.
     pub format: String,
+    /// What it is of the trade between speed and accuracy, if it belongs there.
+    #[serde(default)]
+    pub part: Option<Part>,
+}
+
+/// A part of the trade between speed and accuracy, or some of them together.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Part {
+    /// How markers' positions are taken, and how the frame is scanned; nothing without a frame.
+    pub centroid: Option<String>,
+    /// See `centroid`.
+    pub scan: Option<String>,
+    /// The model's name.
+    pub model: String,
+    /// Size of its file.
+    pub bytes: u64,
 }
 
 /// What a case runs.
@@ -73,6 +89,19 @@ pub fn write(folder: &Path) -> Result<Vec<Case>> {
 /// # Errors
 /// When they cannot be made.
 pub fn write_frames(folder: &Path, times_us: &[u64]) -> Result<Vec<Case>> {
+    let times: Vec<String> = times_us.iter().map(u64::to_string).collect();
+    describe(folder, &times)
+}
+
+/// Writes what the trade between speed and accuracy is made of.
+///
+/// # Errors
+/// When they cannot be made.
+pub fn write_trade(folder: &Path) -> Result<Vec<Case>> {
+    describe(folder, &["tradeoff".to_owned()])
+}
+
+fn describe(folder: &Path, which: &[String]) -> Result<Vec<Case>> {
     let mut command = cargo("run", workspace::root());
     command.args([
         "--quiet",
@@ -83,7 +112,7 @@ pub fn write_frames(folder: &Path, times_us: &[u64]) -> Result<Vec<Case>> {
         "--",
     ]);
     command.arg(folder);
-    process::show(command.args(times_us.iter().map(u64::to_string)));
+    process::show(command.args(which));
     let lines = process::output(&mut command)?;
     lines
         .lines()

@@ -24,7 +24,7 @@ pub const DTCM_FOR_WEIGHTS: u64 = 48 * 1024;
 /// Where the image has the rows of pixels: `ROWS` in its memory.x.
 const ROWS: std::ops::Range<u64> = 0x6000_0000..0x6010_0000;
 /// Where the image has the model file: `WEIGHTS`.
-const WEIGHTS: std::ops::Range<u64> = 0x6010_0000..0x6020_0000;
+const WEIGHTS: std::ops::Range<u64> = 0x6010_0000..0x6030_0000;
 
 /// Where data was loaded from.
 #[derive(Clone, Copy, Debug, Default)]

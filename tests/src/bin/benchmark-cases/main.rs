@@ -1,7 +1,10 @@
 //! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
 //! one JSON object a line: `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
 //! what is special about the frame, `{"Windows":{"tracked":…}}`, `{"Network":[widths]}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
-//! for `tests/board`. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
+//! for `tests/board`. `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is made of
+//! (`trade`), and each line says the `"part"`, too. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
+
+mod trade;
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -9,7 +12,7 @@ use std::{env, fs};
 use anyhow::{Context, Result, bail};
 use hivtac_scene::{Preset, Scene};
 use hivtac_sensing::geometry::{self, Geometry};
-use hivtac_sensing::model::{OutputKind, Rest};
+use hivtac_sensing::model::{CentroidEstimator, OutputKind, Rest};
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{ByteOrder, HsvBox};
@@ -36,7 +39,10 @@ fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
-    let folder = folder.context("usage: benchmark-cases FOLDER [MICROSECONDS …]")?;
+    let folder = folder.context("usage: benchmark-cases FOLDER [tradeoff | MICROSECONDS …]")?;
+    if env::args().nth(2).as_deref() == Some("tradeoff") {
+        return trade::write_cases(&folder);
+    }
     let times: Vec<u64> = env::args()
         .skip(2)
         .map(|word| word.parse().with_context(|| format!("the time `{word}`")))
@@ -48,12 +54,8 @@ fn main() -> Result<()> {
         demo(&times)?
     };
     for (number, case) in cases.iter().enumerate() {
-        let file = folder.join(format!("{number}.script"));
-        write(&file, case.script().bytes())?;
+        println!("{}", case.write(&folder, number)?);
         board.add(&folder, number, case)?;
-        let (work, size) = (case.work.description(), case.size);
-        let line = json!({ "work": work, "file": file, "size": size, "format": "rgb565" });
-        println!("{line}");
     }
     write(&folder.join("board.rs"), board.source().as_bytes())
 }
@@ -87,6 +89,14 @@ enum Work {
 }
 
 impl Case {
+    /// Writes the script, and describes the case.
+    fn write(&self, folder: &Path, number: usize) -> Result<Value> {
+        let file = folder.join(format!("{number}.script"));
+        write(&file, self.script().bytes())?;
+        let (work, size) = (self.work.description(), self.size);
+        Ok(json!({ "work": work, "file": file, "size": size, "format": "rgb565" }))
+    }
+
     fn script(&self) -> Script {
         let mut script = Script::new();
         script.model(&self.model);
@@ -129,7 +139,7 @@ fn cases() -> Result<Vec<Case>> {
     let mut cases = Vec::new();
     for size in SIZES {
         let model = model(size)?;
-        let usual = usual_frame(&model, size)?;
+        let usual = usual_frame(&model, &scene("static", size)?, size)?;
         let case = |(special, pixels)| Case {
             work: Work::Frame { special, pixels },
             model: model.clone(),
@@ -241,8 +251,7 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
 
 /// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first frame that goes all the
 /// way to a force, so that all of it is measured. In the smallest frames noise can make a marker implausible.
-fn usual_frame(model: &[u8], [width, height]: [u16; 2]) -> Result<Vec<u16>> {
-    let scene = scene("static", [width, height])?;
+fn usual_frame(model: &[u8], scene: &Scene, [width, height]: [u16; 2]) -> Result<Vec<u16>> {
     for number in 0..ATTEMPTS {
         let pixels = scene.frame(number, 1.0).pixels;
         let mut script = Script::new();
@@ -265,22 +274,27 @@ fn scene(name: &str, [width, height]: [u16; 2]) -> Result<Scene> {
 /// The small model, for frames of a size.
 fn model(size: [u16; 2]) -> Result<Vec<u8>> {
     let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
-    let rest = rest(geometry, &scene("rest", size)?.frame(0, 0.0).pixels)?;
+    let pixels = scene("rest", size)?.frame(0, 0.0).pixels;
+    let rest = position(geometry, CentroidEstimator::BinaryMask, &pixels)?;
     let (weights, output) = (Weights::Random, OutputKind::ForceVector);
     Ok(models::file_for(geometry, rest, &SMALL, weights, output, 1))
 }
 
-/// The rest position that a frame shows.
-fn rest(geometry: Geometry, pixels: &[u16]) -> Result<Rest> {
+/// Where a frame shows the markers.
+fn position(geometry: Geometry, centroid: CentroidEstimator, pixels: &[u16]) -> Result<Rest> {
     let mut sensor = Box::new(Sensor::<64>::new());
-    sensor.configure(Settings::usual(geometry, ByteOrder::Native), None)?;
+    let settings = Settings {
+        centroid,
+        ..Settings::usual(geometry, ByteOrder::Native)
+    };
+    sensor.configure(settings, None)?;
     sensor.begin_frame();
     for row in pixels.chunks(usize::from(geometry.width)) {
         sensor.push_row(row);
     }
     let measurement = sensor.finish_frame();
     let found = measurement.features.zip(measurement.markers);
-    let (features, markers) = found.context("the frame at rest has no markers")?;
+    let (features, markers) = found.context("a frame that shows where the markers are has none")?;
     Ok(Rest {
         features,
         areas: markers.map(|marker| marker.area),

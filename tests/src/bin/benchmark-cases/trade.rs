@@ -1,0 +1,199 @@
+//! What the configurations of the trade between speed and accuracy cost (`docs/tradeoff.md`).
+//!
+//! A frame costs the same whatever model is behind it, and a model the same whatever frame is before it: so the frames are
+//! written with the cheapest model, a closed form, the models by themselves, and some of both together, to check that.
+
+use std::path::Path;
+
+use anyhow::Result;
+use hivtac_scene::Scene;
+use hivtac_sensing::features::Features;
+use hivtac_sensing::geometry::{Geometry, Preset};
+use hivtac_sensing::model::{CentroidEstimator, Rest};
+use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_tests::models::{self, Weights};
+use hivtac_tests::script::Script;
+use serde_json::{Value, json};
+
+use super::{ATTEMPTS, SIZES, position, usual_frame, write};
+
+const ESTIMATORS: [(&str, CentroidEstimator); 2] = [
+    ("binary-mask", CentroidEstimator::BinaryMask),
+    ("redness-weighted", CentroidEstimator::RednessWeighted),
+];
+/// Every pixel as the rows arrive; a frame in memory, coarsely and then in windows; the rectangle around the windows that
+/// follow the markers, as its rows arrive.
+const SCANS: [&str; 3] = ["full", "windows", "tracked"];
+/// The size whose models are measured.
+const SIZE: [u16; 2] = [320, 240];
+
+/// A model by its name.
+struct Made {
+    name: String,
+    closed_form: bool,
+    widths: Vec<u16>,
+    weights: Weights,
+}
+
+/// Frames of one size under one estimator.
+struct Frames {
+    geometry: Geometry,
+    centroid: (&'static str, CentroidEstimator),
+    /// The usual one and one before it.
+    usual: Vec<u16>,
+    before: Vec<u16>,
+    rest: Rest,
+}
+
+/// Writes all cases and describes each in a line.
+pub fn write_cases(folder: &Path) -> Result<()> {
+    let mut number = 0..;
+    let mut write_one = |script: &Script, what: Value| -> Result<()> {
+        let file = folder.join(format!("trade-{}.script", number.next().unwrap_or(0)));
+        write(&file, script.bytes())?;
+        let mut line = what;
+        line["file"] = json!(file);
+        line["format"] = json!("rgb565");
+        println!("{line}");
+        Ok(())
+    };
+    let models = made();
+    for size in SIZES {
+        for centroid in ESTIMATORS {
+            let frames = Frames::of(size, centroid)?;
+            for scan in SCANS {
+                let together = together(size, centroid.0, scan);
+                let with = |model: &&Made| model.is_closed_form() || together == Some(&model.name);
+                for model in models.iter().filter(with) {
+                    let file = frames.model(model);
+                    write_one(&frames.script(scan, &file), frames.part(scan, model, &file))?;
+                }
+            }
+            if size == SIZE && centroid == ESTIMATORS[1] {
+                for model in &models {
+                    let file = frames.model(model);
+                    write_one(&frames.inference(&file)?, inference_part(model, &file))?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Lens and camera: the sensor's, or the paper's for its size, which no supported camera has.
+fn preset(size: [u16; 2]) -> (Preset, hivtac_scene::Preset) {
+    match size {
+        [800, 600] => (Preset::Paper, hivtac_scene::Preset::Paper),
+        _ => (Preset::Ov7725, hivtac_scene::Preset::Ov7725),
+    }
+}
+
+/// The model that is also measured behind such frames.
+fn together(size: [u16; 2], centroid: &str, scan: &str) -> Option<&'static str> {
+    match (size, centroid, scan) {
+        (SIZE, "redness-weighted", "full") => Some("closed form + 64-64 int8"),
+        (SIZE, "binary-mask", "windows") => Some("64-64 int16"),
+        ([800, 600], "redness-weighted", "tracked") => Some("512-512-512 int8"),
+        _ => None,
+    }
+}
+
+fn made() -> Vec<Made> {
+    let mut models = vec![Made {
+        name: "closed form".to_owned(),
+        closed_form: true,
+        widths: Vec::new(),
+        weights: Weights::Random,
+    }];
+    let hidden: [(bool, &[u16]); 6] = [
+        (true, &[64, 64]),
+        (false, &[16, 16]),
+        (false, &[32, 32]),
+        (false, &[64, 64]),
+        (false, &[128, 128]),
+        (false, &[512, 512, 512]),
+    ];
+    for (closed_form, hidden) in hidden {
+        for (width, weights) in [("int8", Weights::Random), ("int16", Weights::Wide)] {
+            let names: Vec<String> = hidden.iter().map(u16::to_string).collect();
+            let beside = if closed_form { "closed form + " } else { "" };
+            models.push(Made {
+                name: format!("{beside}{} {width}", names.join("-")),
+                closed_form,
+                widths: [&[11], hidden, &[3]].concat(),
+                weights,
+            });
+        }
+    }
+    models
+}
+
+impl Made {
+    fn is_closed_form(&self) -> bool {
+        self.widths.is_empty()
+    }
+}
+
+impl Frames {
+    fn of(size: [u16; 2], centroid: (&'static str, CentroidEstimator)) -> Result<Frames> {
+        let (here, there) = preset(size);
+        let geometry = Geometry::preset(here, size[0], size[1]);
+        let (width, height) = (size[0].into(), size[1].into());
+        let scene = |name: &str| Scene::preset(name, there, width, height, 1);
+        let rest = position(geometry, centroid.1, &scene("rest")?.frame(0, 0.0).pixels)?;
+        let conditions = (geometry, rest, centroid.1);
+        let model = models::trade_file(conditions, true, &[], Weights::Random);
+        Ok(Frames {
+            geometry,
+            centroid,
+            usual: usual_frame(&model, &scene("static")?, size)?,
+            before: scene("static")?.frame(ATTEMPTS, 1.0).pixels,
+            rest,
+        })
+    }
+
+    fn model(&self, made: &Made) -> Vec<u8> {
+        let conditions = (self.geometry, self.rest, self.centroid.1);
+        models::trade_file(conditions, made.closed_form, &made.widths, made.weights)
+    }
+
+    fn script(&self, scan: &str, model: &[u8]) -> Script {
+        let mut script = Script::new();
+        script
+            .model(model)
+            .threshold(&HsvBox::RED, ByteOrder::Swapped);
+        let (width, usual) = (self.geometry.width, &self.usual[..]);
+        match scan {
+            "full" => script.sense(width, &[usual]),
+            "windows" => script.windows(width, &[usual], false),
+            _ => script.cropped(width, &[&self.before, usual]),
+        };
+        script
+    }
+
+    /// The model alone, on what the usual frame shows.
+    fn inference(&self, model: &[u8]) -> Result<Script> {
+        let shown = position(self.geometry, self.centroid.1, &self.usual)?;
+        let (features, tare): (Features, Features) = (shown.features, self.rest.features);
+        let mut script = Script::new();
+        script.model(model).network(&features, &tare);
+        Ok(script)
+    }
+
+    fn part(&self, scan: &str, made: &Made, file: &[u8]) -> Value {
+        let work = match scan {
+            "full" => json!({ "Frame": "" }),
+            _ => json!({ "Windows": { "tracked": scan == "tracked" } }),
+        };
+        let size = [self.geometry.width, self.geometry.height];
+        let (centroid, model) = (self.centroid.0, &made.name);
+        let part =
+            json!({ "centroid": centroid, "scan": scan, "model": model, "bytes": file.len() });
+        json!({ "work": work, "size": size, "part": part })
+    }
+}
+
+fn inference_part(made: &Made, file: &[u8]) -> Value {
+    let part = json!({ "model": made.name, "bytes": file.len() });
+    json!({ "work": { "Network": made.widths }, "size": SIZE, "part": part })
+}

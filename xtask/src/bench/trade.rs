@@ -1,0 +1,277 @@
+//! What the configurations of the trade between speed and accuracy cost (`docs/tradeoff.md`): frames without a model, models
+//! without a frame, and some of both together, which must be their sum.
+
+use std::fs;
+
+use anyhow::{Context, Result, ensure};
+use serde::Serialize;
+
+use super::cases::Part;
+use super::measure::{Cost, Measured};
+use crate::size::{self, Region};
+use crate::toolchain::{Toolchain, cargo};
+use crate::{process, workspace};
+
+/// The model behind every frame; its own cost is taken off.
+const BEHIND: &str = "closed form";
+/// How far from the sum of its parts a whole may be, of itself: what a force takes to become angles depends a little on it,
+/// and blocks of instructions follow others.
+const TOLERANCE: f64 = 0.01;
+/// Where the result goes.
+const FILE: &str = "calibration/tradeoff/costs.json";
+/// A model of at most so many bytes is copied to DTCM by the firmware (`NEAR_LIMIT` of its `model.rs`).
+const NEAR_LIMIT: u64 = 12 * 1024;
+
+/// Everything, as the file has it.
+#[derive(Serialize)]
+struct Costs {
+    compiler: String,
+    frames: Vec<Frame>,
+    models: Vec<Model>,
+    together: Vec<Together>,
+    /// The firmware's memories, and the size of the model file that it holds.
+    firmware: Vec<Region>,
+    default_model_bytes: u64,
+}
+
+/// Instructions, and modelled cycles in memory without wait states.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+struct Numbers {
+    instructions: i64,
+    cycles: i64,
+}
+
+/// From the first pixel to the features, and from the model's answer to the force.
+#[derive(Serialize)]
+struct Frame {
+    size: [u64; 2],
+    centroid: String,
+    scan: String,
+    whole: Numbers,
+    /// Of that, what is left to do after the last pixel came.
+    latency: Numbers,
+    /// Whether the model's answer is a part of that, too.
+    answers_last: bool,
+}
+
+/// From features to the model's answer.
+#[derive(Serialize)]
+struct Model {
+    model: String,
+    bytes: u64,
+    whole: Numbers,
+    /// Cycles that come on top when its weights are read from flash.
+    flash_cycles: u64,
+}
+
+/// A frame with its model, counted, and as the sum of its parts.
+#[derive(Debug, Serialize)]
+struct Together {
+    size: [u64; 2],
+    centroid: String,
+    scan: String,
+    model: String,
+    counted: Numbers,
+    sum: Numbers,
+}
+
+/// Takes the parts apart, checks that they add up, and writes the file.
+///
+/// # Errors
+/// When a part is missing, LLVM is, or a whole is not the sum of its parts.
+pub fn write(toolchain: &Toolchain, measured: &[Measured]) -> Result<()> {
+    let models = models(measured)?;
+    let frames = frames(measured, &models)?;
+    let together = together(measured, &frames, &models)?;
+    let model = workspace::folder("calibration/models/default.hvtm");
+    let model = fs::metadata(&model).with_context(|| format!("reading {}", model.display()))?;
+    let costs = Costs {
+        compiler: toolchain.compiler()?,
+        frames,
+        models,
+        together,
+        firmware: size::of_firmware(toolchain)?.0,
+        default_model_bytes: model.len(),
+    };
+    let file = workspace::folder(FILE);
+    let text = serde_json::to_string_pretty(&costs)? + "\n";
+    fs::create_dir_all(file.parent().unwrap_or(workspace::root()))?;
+    fs::write(&file, text).with_context(|| format!("writing {}", file.display()))?;
+    eprintln!("wrote {}", file.display());
+    Ok(())
+}
+
+/// Has `hivtac-calibrate tradeoff` write its tables anew.
+///
+/// # Errors
+/// When it fails.
+pub fn write_documents() -> Result<()> {
+    let mut command = cargo("run", workspace::root());
+    command.args(["--release", "--package", "hivtac-calibration"]);
+    process::run(command.args(["--bin", "hivtac-calibrate", "--", "tradeoff"]))
+}
+
+fn numbers(cost: Cost) -> Result<Numbers> {
+    let cycles = cost
+        .cycles
+        .context("the trade is in modelled cycles, which need LLVM")?;
+    Ok(Numbers {
+        instructions: cost.instructions as i64,
+        cycles: cycles.round() as i64,
+    })
+}
+
+fn part(measured: &Measured) -> Result<&Part> {
+    let part = measured.case.part.as_ref();
+    part.with_context(|| format!("{} is no part of the trade", measured.case.file.display()))
+}
+
+fn models(measured: &[Measured]) -> Result<Vec<Model>> {
+    let mut models = Vec::new();
+    for measured in measured {
+        let part = part(measured)?;
+        if part.scan.is_none() {
+            models.push(Model {
+                model: part.model.clone(),
+                bytes: part.bytes,
+                whole: numbers(measured.total())?,
+                flash_cycles: if part.bytes > NEAR_LIMIT {
+                    measured.loads.weights_in_flash()
+                } else {
+                    0
+                },
+            });
+        }
+    }
+    Ok(models)
+}
+
+fn frames(measured: &[Measured], models: &[Model]) -> Result<Vec<Frame>> {
+    let behind = find_model(models, BEHIND)?.whole;
+    let mut frames = Vec::new();
+    for measured in measured {
+        let part = part(measured)?;
+        let (Some(centroid), Some(scan)) = (&part.centroid, &part.scan) else {
+            continue;
+        };
+        if part.model == BEHIND {
+            let whole = minus(numbers(measured.total())?, behind);
+            // A frame in memory is complete before anything is done.
+            let (latency, answers_last) = match (scan.as_str(), measured.answers_last) {
+                ("windows", _) => (whole, true),
+                (_, true) => (minus(numbers(measured.last_band)?, behind), true),
+                (_, false) => (numbers(measured.last_band)?, false),
+            };
+            frames.push(Frame {
+                size: measured.case.size,
+                centroid: centroid.clone(),
+                scan: scan.clone(),
+                whole,
+                latency,
+                answers_last,
+            });
+        }
+    }
+    Ok(frames)
+}
+
+fn together(measured: &[Measured], frames: &[Frame], models: &[Model]) -> Result<Vec<Together>> {
+    let mut together = Vec::new();
+    for measured in measured {
+        let part = part(measured)?;
+        let (Some(centroid), Some(scan)) = (&part.centroid, &part.scan) else {
+            continue;
+        };
+        if part.model == BEHIND {
+            continue;
+        }
+        let is_same = |frame: &&Frame| {
+            (frame.size, &frame.centroid, &frame.scan) == (measured.case.size, centroid, scan)
+        };
+        let frame = frames.iter().find(is_same);
+        let frame = frame.with_context(|| format!("no frame without {}", part.model))?;
+        let (a, b) = (frame.whole, find_model(models, &part.model)?.whole);
+        let whole = Together {
+            size: measured.case.size,
+            centroid: centroid.clone(),
+            scan: scan.clone(),
+            model: part.model.clone(),
+            counted: numbers(measured.total())?,
+            sum: Numbers {
+                instructions: a.instructions + b.instructions,
+                cycles: a.cycles + b.cycles,
+            },
+        };
+        whole.check()?;
+        together.push(whole);
+    }
+    Ok(together)
+}
+
+impl Together {
+    fn check(&self) -> Result<()> {
+        let off = |sum: i64, counted: i64| (sum - counted) as f64 / counted as f64;
+        let (counted, sum) = (self.counted, self.sum);
+        let offs = [
+            off(sum.instructions, counted.instructions),
+            off(sum.cycles, counted.cycles),
+        ];
+        eprintln!(
+            "{} behind a {} scan of {:?}, {}: the sum of its parts is off by {:+.2} % in instructions and {:+.2} % in cycles",
+            self.model,
+            self.scan,
+            self.size,
+            self.centroid,
+            1e2 * offs[0],
+            1e2 * offs[1]
+        );
+        ensure!(
+            offs.iter().all(|off| off.abs() <= TOLERANCE),
+            "the parts do not add up to the whole, which is {counted:?}"
+        );
+        Ok(())
+    }
+}
+
+fn find_model<'m>(models: &'m [Model], name: &str) -> Result<&'m Model> {
+    let found = models.iter().find(|model| model.model == name);
+    found.with_context(|| format!("the model `{name}` was not counted"))
+}
+
+fn minus(a: Numbers, b: Numbers) -> Numbers {
+    Numbers {
+        instructions: a.instructions - b.instructions,
+        cycles: a.cycles - b.cycles,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_are_copied_as_in_the_firmware() {
+        let source = fs::read_to_string(workspace::folder("firmware/src/model.rs")).unwrap();
+        let line = format!("const NEAR_LIMIT: usize = {} * 1024;", NEAR_LIMIT / 1024);
+        assert!(source.contains(&line), "no `{line}`");
+    }
+
+    #[test]
+    fn a_whole_that_is_not_the_sum_is_refused() {
+        let numbers = |instructions, cycles| Numbers {
+            instructions,
+            cycles,
+        };
+        let mut whole = Together {
+            size: [320, 240],
+            centroid: String::new(),
+            scan: String::new(),
+            model: String::new(),
+            counted: numbers(1000, 500),
+            sum: numbers(1009, 496),
+        };
+        assert!(whole.check().is_ok());
+        whole.sum = numbers(1000, 510);
+        assert!(whole.check().is_err());
+    }
+}
