@@ -43,7 +43,7 @@ pub enum PixelName {
 }
 
 /// Centroid estimators by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum CentroidName {
     /// The mean of a marker's pixels in the mask.

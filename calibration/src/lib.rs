@@ -16,6 +16,7 @@
 //! | `uncertainty` | what a model's errors say of its next ones |
 //! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
 //! | `plot`, `loss_plot` | SVG |
+//! | `tradeoff` | speed against accuracy: a sweep, its Pareto front, the best under limits |
 //! | `scene` | pictures and figures of the simulated sensor |
 
 pub mod check;
@@ -33,6 +34,7 @@ pub mod network;
 pub mod plot;
 pub mod quantize;
 pub mod scene;
+pub mod tradeoff;
 pub mod train;
 pub mod uncertainty;
 pub mod weights;

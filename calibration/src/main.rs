@@ -16,6 +16,7 @@ use hivtac_calibration::fit::Kind;
 use hivtac_calibration::fit::quick::quick;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::scene::SceneCommand;
+use hivtac_calibration::tradeoff::{Step, TradeoffArgs};
 use hivtac_calibration::weights::{Range, Weights};
 use hivtac_scene::Contact;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -153,6 +154,9 @@ enum Command {
         #[arg(long, default_value = "calibration/models")]
         out_dir: PathBuf,
     },
+    /// Speed against accuracy: sweep frame sizes, estimators, arithmetics and scans, and write docs/tradeoff.md; or pick the best
+    /// under limits. An interrupted sweep goes on.
+    Tradeoff(TradeoffArgs),
     /// Look at the simulated sensor: frames, its film, what each of its effects does.
     #[command(subcommand)]
     Scene(SceneCommand),
@@ -299,6 +303,7 @@ fn main() -> Result<()> {
             options,
             out_dir,
         } => default_model(&recipe, &options, &out_dir),
+        Command::Tradeoff(args) => args.run(sweep_bars),
         Command::Scene(command) => command.run(),
     }
 }
@@ -386,6 +391,15 @@ fn default_model(
             friction: 0.6,
         },
     )
+}
+
+/// What to call at every step of so many frames and trainings.
+fn sweep_bars([frames, trainings]: [usize; 2]) -> impl Fn(Step) + Sync {
+    let (rendering, training) = (bar("rendering", frames), bar("training", trainings));
+    move |step| match step {
+        Step::Frame => rendering.inc(1),
+        Step::Training => training.inc(1),
+    }
 }
 
 /// A progress bar on the terminal's error stream; nothing when that is no terminal.

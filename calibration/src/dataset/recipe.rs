@@ -176,7 +176,7 @@ impl Recipe {
         .with_context(|| format!("row {row}"))
     }
 
-    pub(super) fn about(&self) -> Result<About> {
+    pub(crate) fn about(&self) -> Result<About> {
         let scene = self.scene(0)?;
         let options: &Options = scene.options();
         Ok(About {

@@ -1,0 +1,257 @@
+//! What configurations cost on the chip, out of the parts that `cargo xtask bench --tradeoff` counted.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::Deserialize;
+
+use super::plan::{Estimator, Numbers, Scan};
+use crate::conditions::CentroidName;
+
+/// The command that counts them.
+pub const COMMAND: &str = "cargo xtask bench --tradeoff";
+/// The core's clock, MHz.
+pub const CLOCK_MHZ: f64 = 480.0;
+/// A model of at most so many bytes is copied to DTCM, a larger one stays in flash (`firmware/src/model.rs`).
+const NEAR_LIMIT: u64 = 12 * 1024;
+/// For each column of a frame: a ring of 64 bands and two bands more, of 4 rows and 2 bytes a pixel (`firmware/src/bands.rs`).
+const BAND_BYTES_OF_A_COLUMN: i64 = (64 + 2) * 4 * 2;
+/// AXI SRAM, where a whole frame would lie, bytes.
+const FRAME_MEMORY: i64 = 512 * 1024;
+/// Memories that hold data; the code's copy in ITCM is none.
+const DATA_MEMORIES: [&str; 3] = ["RAM", "SRAM", "AXISRAM"];
+
+/// All counted parts.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Costs {
+    frames: Vec<FramePart>,
+    models: Vec<ModelPart>,
+    firmware: Vec<Memory>,
+    default_model_bytes: i64,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+struct Counted {
+    instructions: i64,
+    cycles: i64,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct FramePart {
+    size: [u16; 2],
+    centroid: CentroidName,
+    scan: Scan,
+    whole: Counted,
+    latency: Counted,
+    /// Whether the model is run after the last pixel, too.
+    answers_last: bool,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct ModelPart {
+    model: String,
+    bytes: u64,
+    whole: Counted,
+    flash_cycles: i64,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Memory {
+    name: String,
+    used: i64,
+}
+
+/// What one configuration costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cost {
+    /// Instructions of a frame, counted.
+    pub instructions: i64,
+    /// Cycles of a frame, modelled; weights where they lie.
+    pub cycles: i64,
+    /// Of these, after the last pixel came.
+    pub latency_cycles: i64,
+    /// The firmware with this model, bytes of flash.
+    pub flash: i64,
+    /// Its data: DTCM, SRAM and AXI SRAM, without the stack, bytes.
+    pub ram: i64,
+    /// Whether a whole frame has to lie in memory and does not fit.
+    pub too_large: bool,
+}
+
+impl Cost {
+    /// Time of a frame at the core's clock, µs.
+    pub fn microseconds(&self) -> f64 {
+        self.cycles as f64 / CLOCK_MHZ
+    }
+
+    /// Frames a second that the core could do.
+    pub fn rate(&self) -> f64 {
+        1e6 / self.microseconds()
+    }
+
+    /// From the last pixel to the sample, µs.
+    pub fn latency_microseconds(&self) -> f64 {
+        self.latency_cycles as f64 / CLOCK_MHZ
+    }
+}
+
+impl Costs {
+    /// Reads the counted parts.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is none; says what makes it.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path)
+            .with_context(|| format!("cannot read {}; `{COMMAND}` makes it", path.display()))?;
+        Self::parse(&text)
+            .with_context(|| format!("{} is not usable; `{COMMAND}` makes it", path.display()))
+    }
+
+    pub(super) fn parse(text: &str) -> Result<Self> {
+        Ok(serde_json::from_str(text)?)
+    }
+
+    /// Of a configuration; `None` for one that the chip does not run.
+    ///
+    /// # Errors
+    /// When one of its parts was not counted.
+    pub fn of(
+        &self,
+        size: [u16; 2],
+        centroid: CentroidName,
+        scan: Scan,
+        (estimator, numbers): (&Estimator, Numbers),
+    ) -> Result<Option<Cost>> {
+        let Some(name) = estimator.cost_name(numbers) else {
+            return Ok(None);
+        };
+        let is_here =
+            |part: &&FramePart| (part.size, part.centroid, part.scan) == (size, centroid, scan);
+        let frame = self.frames.iter().find(is_here);
+        let frame =
+            frame.with_context(|| format!("frames of {size:?}, {scan}, were not counted"))?;
+        let model = self.models.iter().find(|part| part.model == name);
+        let model = model.with_context(|| format!("the model `{name}` was not counted"))?;
+        let near = |bytes: i64| if bytes as u64 <= NEAR_LIMIT { bytes } else { 0 };
+        let bytes = model.bytes as i64;
+        let extra = model.whole.cycles + model.flash_cycles;
+        let frame_bytes = 2 * i64::from(size[0]) * i64::from(size[1]);
+        let in_memory = scan == Scan::Windows;
+        let columns = i64::from(size[0]) - i64::from(super::plan::firmware_size()[0]);
+        let used = |name: &str| {
+            let memory = self.firmware.iter().find(|memory| memory.name == name);
+            memory
+                .map(|memory| memory.used)
+                .with_context(|| format!("no memory {name}"))
+        };
+        let data: i64 = DATA_MEMORIES.map(used).into_iter().sum::<Result<i64>>()?;
+        let ram = data + near(bytes) - near(self.default_model_bytes);
+        Ok(Some(Cost {
+            instructions: frame.whole.instructions + model.whole.instructions,
+            cycles: frame.whole.cycles + extra,
+            latency_cycles: frame.latency.cycles + if frame.answers_last { extra } else { 0 },
+            flash: used("FLASH")? + bytes - self.default_model_bytes,
+            ram: match in_memory {
+                // A frame instead of the ring.
+                true => ram - used("AXISRAM")? + frame_bytes,
+                false => ram + columns * BAND_BYTES_OF_A_COLUMN,
+            },
+            too_large: in_memory && frame_bytes > FRAME_MEMORY,
+        }))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// 1000 instructions and 500 cycles for a full scan of 320×240, and a tenth of each for a model.
+    pub fn example() -> Costs {
+        let frame = |size: &str, scan: &str, centroid: &str| {
+            format!(
+                r#"{{"size":{size},"centroid":"{centroid}","scan":"{scan}",
+                    "whole":{{"instructions":1000,"cycles":500}},"latency":{{"instructions":100,"cycles":50}},"answers_last":{}}}"#,
+                scan != "full"
+            )
+        };
+        let model = |name: &str, bytes: u64, flash: u64| {
+            format!(
+                r#"{{"model":"{name}","bytes":{bytes},"whole":{{"instructions":100,"cycles":50}},"flash_cycles":{flash}}}"#
+            )
+        };
+        let memory = |name: &str, used: u64| {
+            format!(r#"{{"name":"{name}","origin":0,"length":0,"used":{used}}}"#)
+        };
+        let text = format!(
+            r#"{{"compiler":"rustc","together":[],"frames":[{}],"models":[{}],"firmware":[{}],"default_model_bytes":8000}}"#,
+            [
+                frame("[320,240]", "full", "binary-mask"),
+                frame("[640,480]", "windows", "binary-mask"),
+            ]
+            .join(","),
+            [
+                model("closed form", 2_000, 0),
+                model("128-128 int8", 20_000, 700),
+            ]
+            .join(","),
+            [
+                memory("FLASH", 200_000),
+                memory("RAM", 90_000),
+                memory("SRAM", 60_000),
+                memory("AXISRAM", 160_000),
+            ]
+            .join(",")
+        );
+        Costs::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn a_configuration_costs_what_its_parts_do() {
+        let (costs, all) = (example(), Estimator::all());
+        let of = |size, scan, estimator: usize, numbers| {
+            let which = (&all[estimator], numbers);
+            costs.of(size, CentroidName::BinaryMask, scan, which)
+        };
+        let cost = of([320, 240], Scan::Full, 5, Numbers::Int8PerTensor);
+        let cost = cost.unwrap().unwrap();
+        assert_eq!(
+            (cost.instructions, cost.cycles, cost.latency_cycles),
+            (1100, 1250, 50)
+        );
+        // Weights that do not fit DTCM leave it.
+        assert_eq!((cost.flash, cost.ram), (212_000, 302_000));
+        assert!((cost.rate() - 480e6 / 1250.0).abs() < 1e-6);
+        let cost = of([640, 480], Scan::Windows, 0, Numbers::Integers);
+        let cost = cost.unwrap().unwrap();
+        assert!(cost.too_large, "a frame of 614,400 bytes");
+        assert_eq!(cost.latency_cycles, 100, "the answer comes last");
+        assert_eq!(cost.ram, 150_000 - 6_000 + 614_400);
+        assert_eq!(of([320, 240], Scan::Full, 0, Numbers::F32).unwrap(), None);
+        let error = of([160, 120], Scan::Full, 0, Numbers::Integers).unwrap_err();
+        assert!(error.to_string().contains("[160, 120]"), "{error}");
+    }
+
+    #[test]
+    fn memories_are_the_firmwares() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let has = |file: &str, line: &str| {
+            let text = fs::read_to_string(root.join(file)).unwrap();
+            assert!(text.contains(line), "no `{line}` in {file}");
+        };
+        has(
+            "firmware/src/model.rs",
+            "const NEAR_LIMIT: usize = 12 * 1024;",
+        );
+        has("firmware/src/bands.rs", "pub const ROWS: u16 = 4;");
+        has("firmware/src/bands.rs", "pub const SLOTS: u16 = 64;");
+        has(
+            "firmware/src/camera/ov7725.rs",
+            "pub const WIDTH: u16 = 320;",
+        );
+        has(
+            "firmware/src/camera/ov7725.rs",
+            "pub const HEIGHT: u16 = 240;",
+        );
+    }
+}

@@ -1,0 +1,216 @@
+//! The frames of a sweep: rendered once for each size, seen with both centroid estimators, kept as data sets.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, anyhow, ensure};
+use hivtac_scene::Frame;
+use hivtac_sensing::features::Features;
+use hivtac_sensing::geometry::Geometry;
+use hivtac_sensing::model::Rest;
+use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::threshold::ByteOrder;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::plan::{CENTROIDS, Plan, preset};
+use crate::conditions::CentroidName;
+use crate::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
+use crate::weights::features_from_q16;
+
+/// Frames of one size, as both estimators see them.
+pub struct Frames {
+    /// In the order of [`CENTROIDS`].
+    pub datasets: [Dataset; 2],
+    /// Of them.
+    pub seen: Seen,
+}
+
+/// What became of the frames of one size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seen {
+    /// Frames with a load.
+    pub frames: usize,
+    /// Those without a force, by the estimator.
+    pub rejected: [usize; 2],
+    /// Those whose features are others when they lie in memory and are looked at in windows.
+    pub windows_differ: [usize; 2],
+    /// Over all features: the same frames have the same.
+    pub fingerprint: u64,
+}
+
+/// What an estimator makes of a frame, and whether windows make the same of it.
+type Look = (Result<Observation, String>, bool);
+
+/// The frames of a size, from `folder` or rendered into it. `progress` is called for each, from any thread.
+///
+/// # Errors
+/// When the folder holds something else or cannot be written, or the scene cannot be rendered.
+pub fn frames(
+    plan: &Plan,
+    size: [u16; 2],
+    folder: &Path,
+    progress: impl Fn() + Sync,
+) -> Result<Frames> {
+    let recipes = CENTROIDS.map(|centroid| recipe(plan, size, centroid));
+    let files = [0, 1].map(|i| file(folder, &recipes[i]));
+    let mark = folder.join(format!("{}x{}.json", size[0], size[1]));
+    if let Ok(text) = fs::read_to_string(&mark) {
+        let seen: Seen = serde_json::from_str(&text)?;
+        let datasets = [Dataset::load(&files[0])?, Dataset::load(&files[1])?];
+        let same = |i: usize| -> Result<bool> { Ok(datasets[i].about == recipes[i].about()?) };
+        ensure!(
+            same(0)? && same(1)? && fingerprint(&datasets) == seen.fingerprint,
+            "{} holds other frames: remove it, or use another folder",
+            folder.display()
+        );
+        return Ok(Frames { datasets, seen });
+    }
+    let frames = rendered(&recipes, progress)?;
+    for (dataset, file) in frames.datasets.iter().zip(&files) {
+        dataset.save(file)?;
+    }
+    // Written last: it says that the others are whole.
+    fs::write(&mark, serde_json::to_string(&frames.seen)?)?;
+    Ok(frames)
+}
+
+fn recipe(plan: &Plan, [width, height]: [u16; 2], centroid: CentroidName) -> Recipe {
+    Recipe {
+        preset: preset([width, height]),
+        width,
+        height,
+        centroid,
+        loads: Loads::Random(plan.rows),
+        ..Recipe::default()
+    }
+}
+
+fn file(folder: &Path, recipe: &Recipe) -> PathBuf {
+    let centroid = match recipe.centroid {
+        CentroidName::BinaryMask => "binary",
+        CentroidName::RednessWeighted => "weighted",
+    };
+    folder.join(format!("{}x{}-{centroid}.csv", recipe.width, recipe.height))
+}
+
+fn rendered(recipes: &[Recipe; 2], progress: impl Fn() + Sync) -> Result<Frames> {
+    let [recipe, _] = recipes;
+    let looks = look(recipes, 0..recipe.rest, [None, None], &progress)?;
+    let mut datasets = [dataset(&recipes[0])?, dataset(&recipes[1])?];
+    add(&mut datasets, recipe, looks, &mut [0; 2])?;
+    // As the chip is tared, so that what is judged by the rest position is.
+    let mut rests = [None; 2];
+    for (rest, dataset) in rests.iter_mut().zip(&datasets) {
+        let mean = dataset.rest()?;
+        *rest = Some(Rest {
+            features: features_from_q16(&mean.features_q16)?,
+            areas: mean.areas_px,
+        });
+    }
+    let looks = look(recipes, recipe.rest..recipe.rows(), rests, &progress)?;
+    let mut windows_differ = [0; 2];
+    add(&mut datasets, recipe, looks, &mut windows_differ)?;
+    let rejected = |dataset: &Dataset| dataset.rejected().values().sum();
+    let seen = Seen {
+        frames: recipe.rows() - recipe.rest,
+        rejected: [rejected(&datasets[0]), rejected(&datasets[1])],
+        windows_differ,
+        fingerprint: fingerprint(&datasets),
+    };
+    Ok(Frames { datasets, seen })
+}
+
+fn dataset(recipe: &Recipe) -> Result<Dataset> {
+    Ok(Dataset {
+        about: recipe.about()?,
+        rows: Vec::new(),
+    })
+}
+
+/// Renders rows and looks at each with both estimators.
+fn look(
+    recipes: &[Recipe; 2],
+    rows: std::ops::Range<usize>,
+    rests: [Option<Rest>; 2],
+    progress: impl Fn() + Sync,
+) -> Result<Vec<([f64; 3], [Look; 2])>> {
+    let scene = recipes[0].scene(0)?;
+    let eyes = || -> Result<[Box<Sensor<'static>>; 2]> {
+        Ok([eye(&recipes[0], rests[0])?, eye(&recipes[1], rests[1])?])
+    };
+    let looks = rows.into_par_iter().map_init(eyes, |eyes, row| {
+        let eyes = eyes.as_mut().map_err(|error| anyhow!("{error}"))?;
+        let frame = scene.render_load(&recipes[0].load(row)?, row as u64)?;
+        progress();
+        let looks = eyes.each_mut().map(|eye| look_once(eye, &frame));
+        Ok((frame.truth.force.vector_n(), looks))
+    });
+    looks.collect()
+}
+
+fn eye(recipe: &Recipe, rest: Option<Rest>) -> Result<Box<Sensor<'static>>> {
+    let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
+    let settings = Settings {
+        centroid: recipe.centroid.to_model(),
+        ..Settings::usual(geometry, ByteOrder::Native)
+    };
+    let mut sensor = Box::new(Sensor::new());
+    sensor
+        .configure(settings, None)
+        .map_err(|error| anyhow!("{error}"))?;
+    sensor.set_tare(rest);
+    Ok(sensor)
+}
+
+fn look_once(sensor: &mut Sensor<'_>, frame: &Frame) -> Look {
+    let whole = measure(sensor, frame);
+    let windows = sensor.measure_frame(&frame.pixels);
+    let same = (whole.features, whole.status) == (windows.features, windows.status);
+    (observation(&whole), same)
+}
+
+/// What the chip would take a force from.
+fn observation(measurement: &Measurement) -> Result<Observation, String> {
+    let why = reasons(measurement.status);
+    match (measurement.markers, measurement.features) {
+        (Some(markers), Some(features)) if why.is_empty() => Ok(Observation {
+            features_q16: Features::to_array(&features),
+            areas_px: markers.map(|marker| marker.area),
+        }),
+        _ => Err(why),
+    }
+}
+
+fn add(
+    datasets: &mut [Dataset; 2],
+    recipe: &Recipe,
+    looks: Vec<([f64; 3], [Look; 2])>,
+    windows_differ: &mut [usize; 2],
+) -> Result<()> {
+    for (force_n, looks) in looks {
+        let place = recipe.place(datasets[0].rows.len());
+        for (i, (seen, same)) in looks.into_iter().enumerate() {
+            windows_differ[i] += usize::from(!same);
+            datasets[i].rows.push(Row {
+                place,
+                force_n,
+                seen,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// FNV-1a over all features.
+fn fingerprint(datasets: &[Dataset; 2]) -> u64 {
+    let rows = datasets.iter().flat_map(|dataset| &dataset.rows);
+    let numbers = rows.flat_map(|row| row.seen.as_ref().map_or([0; 11], |seen| seen.features_q16));
+    numbers
+        .flat_map(i64::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+}

@@ -1,0 +1,123 @@
+//! The model and the settings of a picked configuration, ready to flash.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde_json::json;
+
+use super::plan::{Scan, preset};
+use super::table::Configuration;
+use crate::check::check;
+use crate::conditions::Conditions;
+use crate::dataset::{Recipe, Split, generate};
+use crate::fit::{Kind, fit, fit_closed_form};
+use crate::quantize::export;
+use crate::train::Options;
+
+/// Frames to train on; as many passes as for the default model.
+const ROWS: usize = 40_000;
+/// Frames to check on, and the seed of their loads and noise.
+const CHECKED: (usize, u64) = (4000, 1_000_001);
+
+/// Trains the model of a configuration on as many frames as the default model has, and writes `model.weights`, `model.hvtm` and
+/// `settings.json` into a folder. `progress` is called for every rendered frame.
+///
+/// Gives what to do with them, in words.
+///
+/// # Errors
+/// When the frames cannot be rendered, training fails, or a file cannot be written.
+pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) -> Result<String> {
+    let recipe = Recipe {
+        preset: preset(picked.size),
+        width: picked.size[0],
+        height: picked.size[1],
+        centroid: picked.centroid,
+        loads: crate::dataset::Loads::Random(ROWS),
+        ..Recipe::default()
+    };
+    let dataset = generate(&recipe, progress)?;
+    let split = Split::WithinPose;
+    let options = Options {
+        hidden: picked.estimator.hidden.clone(),
+        arithmetic: picked.numbers.arithmetic().unwrap_or_default(),
+        ..Options::default()
+    };
+    let fitted = match (
+        picked.estimator.hidden.is_empty(),
+        picked.estimator.closed_form,
+    ) {
+        (true, _) => fit_closed_form(&dataset, split, options.seed)?,
+        (_, true) => fit(&dataset, split, Kind::Both, &options, |_| ())?,
+        (_, false) => fit(&dataset, split, Kind::Network, &options, |_| ())?,
+    };
+    let bytes = export(&fitted.weights)?;
+    fs::create_dir_all(folder)?;
+    let folder = folder.canonicalize()?;
+    let file = |name: &str| folder.join(name);
+    fitted.weights.save(&file("model.weights"))?;
+    let save = |name: &str, bytes: &[u8]| {
+        fs::write(file(name), bytes)
+            .with_context(|| format!("cannot write {}", file(name).display()))
+    };
+    save("model.hvtm", &bytes)?;
+    let settings = settings(picked, &fitted.weights.conditions);
+    save(
+        "settings.json",
+        (serde_json::to_string_pretty(&settings)? + "\n").as_bytes(),
+    )?;
+    let (samples, seed) = CHECKED;
+    // The contact reading is `force`: no friction has a part in it.
+    let report = check(&bytes, samples, seed, 0.0, || ())?;
+    Ok(format!(
+        "{report}\n\nwrote model.hvtm, model.weights and settings.json into {}\n\n{}",
+        folder.display(),
+        orders(picked, &file("model.hvtm"))
+    ))
+}
+
+fn features(picked: &Configuration) -> &'static [&'static str] {
+    match picked.scan {
+        Scan::Tracked => &["tracking"],
+        _ => &[],
+    }
+}
+
+fn settings(picked: &Configuration, conditions: &Conditions) -> serde_json::Value {
+    json!({
+        "conditions": conditions,
+        "scan": picked.scan,
+        "firmware_features": features(picked),
+        "commands": ["hivtac tare"],
+    })
+}
+
+/// What to type. The model file carries all settings of the sensing; the firmware takes them from it at the start.
+fn orders(picked: &Configuration, model: &Path) -> String {
+    let features: String = features(picked)
+        .iter()
+        .map(|feature| format!(" --features {feature}"))
+        .collect();
+    format!(
+        "flash it, from the root of the repository:\n\n  HIVTAC_MODEL={} \\\n    cargo run --release -p hivtac-firmware --target \
+         thumbv7em-none-eabihf{features}\n\nthen, while nothing touches the film:\n\n  hivtac tare",
+        model.display()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pick::tests::made;
+    use super::*;
+
+    #[test]
+    fn what_follows_the_markers_needs_the_firmwares_feature() {
+        let orders = |scan| {
+            let picked = made([320, 240], scan, 1, [0.1; 2]);
+            super::orders(&picked, Path::new("/a/model.hvtm"))
+        };
+        assert!(orders(Scan::Tracked).contains("--features tracking"));
+        assert!(!orders(Scan::Full).contains("features"));
+        assert!(orders(Scan::Full).contains("HIVTAC_MODEL=/a/model.hvtm"));
+    }
+}

@@ -1,0 +1,278 @@
+//! The Pareto front, and which configuration is best under a user's limits.
+
+use anyhow::{Context, Result, bail};
+
+use super::plan::Scan;
+use super::table::{Configuration, Reach};
+
+/// Errors count as equal within this part of themselves: training again changes them as much.
+const EQUAL: f64 = 0.05;
+
+/// A user's limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Longest time of a frame, µs at 480 MHz, modelled.
+    pub budget_us: Option<f64>,
+    /// Least frames a second that the core can do, modelled.
+    pub min_rate: Option<f64>,
+    /// Largest mean direction error from 50 mN up, degrees, simulated: the upper end of its interval.
+    pub max_error_deg: Option<f64>,
+}
+
+/// The configurations within reach that no other within reach beats or equals in both time and direction error from 50 mN
+/// up, by time.
+pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configuration> {
+    let mut candidates: Vec<_> = configurations
+        .iter()
+        .filter(|c| c.reach() >= reach)
+        .filter_map(|c| Some((c.cost?.cycles, c.strong_direction_deg.value, c)))
+        .collect();
+    candidates.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let mut least = f64::INFINITY;
+    candidates.retain(|(_, error, _)| {
+        let better = *error < least;
+        least = least.min(*error);
+        better
+    });
+    candidates.into_iter().map(|(_, _, c)| c).collect()
+}
+
+/// The best configuration within the limits that the firmware does as it is.
+///
+/// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction error from 50 mN up and error
+/// of |F| are both within a twentieth of the least of each, one that scans whole frames rather than one that follows the
+/// markers, as that needs no second frame after a doubt; of these the fastest.
+///
+/// # Errors
+/// When there is none; says what comes nearest.
+pub fn best<'c>(configurations: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
+    let reachable: Vec<&Configuration> = configurations
+        .iter()
+        .filter(|c| c.reach() == Reach::Firmware)
+        .collect();
+    let fitting: Vec<_> = reachable
+        .iter()
+        .copied()
+        .filter(|c| limits.hold(c))
+        .collect();
+    if fitting.is_empty() {
+        bail!(
+            "nothing that the firmware does is within these limits{}",
+            nearest(&reachable, limits)
+        );
+    }
+    let fastest = |among: &[&'c Configuration]| among.iter().copied().min_by_key(|c| cycles(c));
+    let best = match limits.max_error_deg {
+        Some(_) => fastest(&fitting),
+        None => fastest(&as_accurate(&fitting)),
+    };
+    best.context("no configuration has a cost")
+}
+
+/// The most accurate and their equals; those that scan whole frames, if there are any.
+fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
+    let equals = |among: &[&'c Configuration], of: fn(&Configuration) -> f64| {
+        let least = among.iter().map(|c| of(c)).fold(f64::INFINITY, f64::min);
+        let near = |c: &&&Configuration| of(c) <= least * (1.0 + EQUAL);
+        among.iter().filter(near).copied().collect::<Vec<_>>()
+    };
+    let by_direction = equals(fitting, |c| c.strong_direction_deg.value);
+    let by_both = equals(&by_direction, |c| c.force_rmse_mn.value);
+    let whole = |c: &&&Configuration| c.scan == Scan::Full;
+    let of_whole: Vec<_> = by_both.iter().filter(whole).copied().collect();
+    if of_whole.is_empty() {
+        by_both
+    } else {
+        of_whole
+    }
+}
+
+fn cycles(configuration: &Configuration) -> i64 {
+    configuration.cost.map_or(i64::MAX, |cost| cost.cycles)
+}
+
+fn nearest(reachable: &[&Configuration], limits: &Limits) -> String {
+    let fastest = reachable.iter().min_by_key(|c| cycles(c));
+    let accurate = reachable
+        .iter()
+        .min_by(|a, b| limit_error(a).total_cmp(&limit_error(b)));
+    let (Some(fastest), Some(accurate)) = (fastest, accurate) else {
+        return String::new();
+    };
+    let mut text = String::new();
+    if let (true, Some(cost)) = (
+        limits.budget_us.is_some() || limits.min_rate.is_some(),
+        fastest.cost,
+    ) {
+        text += &format!(
+            "; the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second)",
+            cost.microseconds(),
+            cost.rate()
+        );
+    }
+    if limits.max_error_deg.is_some() {
+        text += &format!(
+            "; the most accurate, {accurate}, is within {:.3}°",
+            limit_error(accurate)
+        );
+    }
+    text
+}
+
+/// The upper end of the direction error's interval.
+fn limit_error(configuration: &Configuration) -> f64 {
+    let error = configuration.strong_direction_deg;
+    error.value + error.half_width.unwrap_or(0.0)
+}
+
+impl Limits {
+    /// Whether a configuration is within them.
+    pub fn hold(&self, configuration: &Configuration) -> bool {
+        let Some(cost) = configuration.cost else {
+            return false;
+        };
+        self.budget_us
+            .is_none_or(|most| cost.microseconds() <= most)
+            && self.min_rate.is_none_or(|least| cost.rate() >= least)
+            && self
+                .max_error_deg
+                .is_none_or(|most| limit_error(configuration) <= most)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::conditions::CentroidName;
+    use crate::tradeoff::costs::Cost;
+    use crate::tradeoff::plan::{Estimator, Numbers};
+    use crate::tradeoff::table::Mean;
+
+    /// A configuration that takes so many cycles for so much error: direction (degrees) and |F| (mN).
+    pub fn made(
+        size: [u16; 2],
+        scan: Scan,
+        cycles: i64,
+        [direction, force]: [f64; 2],
+    ) -> Configuration {
+        let mean = |value: f64| Mean {
+            value,
+            half_width: Some(0.1 * value),
+        };
+        Configuration {
+            size,
+            centroid: CentroidName::RednessWeighted,
+            estimator: Estimator::all()[0].clone(),
+            numbers: Numbers::Integers,
+            scan,
+            direction_deg: mean(3.0 * direction),
+            strong_direction_deg: mean(direction),
+            force_rmse_mn: mean(force),
+            worst: [10.0 * direction, 5.0 * force],
+            cost: Some(Cost {
+                instructions: 2 * cycles,
+                cycles,
+                latency_cycles: cycles / 5,
+                flash: 200_000,
+                ram: 300_000,
+                too_large: false,
+            }),
+        }
+    }
+
+    const QVGA: [u16; 2] = [320, 240];
+
+    /// By cycles: tracked and rough; tracked and good; whole and good; whole and a little better; whole and much better in
+    /// |F|; then one without a firmware, and one without a camera.
+    fn several() -> Vec<Configuration> {
+        vec![
+            made(QVGA, Scan::Tracked, 96_000, [0.5, 0.3]),
+            made(QVGA, Scan::Tracked, 144_000, [0.20, 0.1]),
+            made(QVGA, Scan::Full, 240_000, [0.20, 0.1]),
+            made(QVGA, Scan::Full, 288_000, [0.195, 0.1]),
+            made(QVGA, Scan::Full, 480_000, [0.198, 0.01]),
+            made([640, 480], Scan::Full, 960_000, [0.1, 0.01]),
+            made([800, 600], Scan::Full, 1_440_000, [0.05, 0.01]),
+        ]
+    }
+
+    fn picked(limits: Limits) -> i64 {
+        let all = several();
+        best(&all, &limits).unwrap().cost.unwrap().cycles
+    }
+
+    #[test]
+    fn without_limits_the_most_accurate_that_the_firmware_does_is_best() {
+        assert_eq!(picked(Limits::default()), 480_000);
+    }
+
+    #[test]
+    fn among_equals_whole_frames_come_before_speed() {
+        let budget = |us| Limits {
+            budget_us: Some(us),
+            ..Limits::default()
+        };
+        assert_eq!(picked(budget(600.0)), 240_000);
+        assert_eq!(picked(budget(499.0)), 144_000, "no whole frame fits");
+        assert_eq!(picked(budget(200.0)), 96_000);
+        let rate = Limits {
+            min_rate: Some(2000.0),
+            ..Limits::default()
+        };
+        assert_eq!(picked(rate), 240_000);
+    }
+
+    #[test]
+    fn with_a_limit_on_the_error_the_fastest_is_best() {
+        // The upper end of the interval counts: 0.22°.
+        let error = |most| Limits {
+            max_error_deg: Some(most),
+            ..Limits::default()
+        };
+        assert_eq!(picked(error(0.23)), 144_000);
+        assert_eq!(picked(error(0.216)), 288_000);
+        assert_eq!(picked(error(1.0)), 96_000);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_what_comes_nearest() {
+        let all = several();
+        let limits = Limits {
+            budget_us: Some(100.0),
+            max_error_deg: Some(0.1),
+            ..Limits::default()
+        };
+        let error = best(&all, &limits).unwrap_err().to_string();
+        for words in ["200 µs", "is within 0.21"] {
+            assert!(error.contains(words), "no `{words}` in: {error}");
+        }
+    }
+
+    #[test]
+    fn the_front_holds_what_nothing_beats() {
+        let all = several();
+        let cycles = |reach| -> Vec<i64> {
+            let front = front(&all, reach);
+            front.iter().map(|c| c.cost.unwrap().cycles).collect()
+        };
+        assert_eq!(cycles(Reach::Firmware), [96_000, 144_000, 288_000]);
+        assert_eq!(cycles(Reach::Camera), [96_000, 144_000, 288_000, 960_000]);
+    }
+
+    #[test]
+    fn floats_and_frames_without_room_are_out_of_reach() {
+        let mut float = made(QVGA, Scan::Full, 1, [0.0; 2]);
+        float.cost = None;
+        assert_eq!(float.reach(), Reach::None);
+        let mut large = made([640, 480], Scan::Windows, 1, [0.0; 2]);
+        assert_eq!(large.reach(), Reach::Camera);
+        large.cost.as_mut().unwrap().too_large = true;
+        assert_eq!(large.reach(), Reach::None);
+        let windows = made(QVGA, Scan::Windows, 1, [0.0; 2]);
+        assert_eq!(
+            windows.reach(),
+            Reach::Camera,
+            "the firmware keeps no frame"
+        );
+    }
+}

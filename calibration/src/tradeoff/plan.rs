@@ -1,0 +1,289 @@
+//! What is swept: frame sizes, centroid estimators, estimators of the force, arithmetics, scans.
+
+use std::fmt;
+
+use hivtac_sensing::geometry::Preset;
+use serde::{Deserialize, Serialize};
+
+use crate::conditions::CentroidName;
+use crate::dataset::Recipe;
+use crate::network::Arithmetic;
+
+/// What makes a force of features.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Estimator {
+    /// Whether a closed form does, alone or with the network.
+    pub closed_form: bool,
+    /// Widths of the network's hidden layers; none for no network.
+    pub hidden: Vec<usize>,
+}
+
+/// How the numbers of an estimator are held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Numbers {
+    /// Floats: what the others are compared with. The chip runs no floats.
+    F32,
+    /// Integers, of a closed form without a network.
+    Integers,
+    /// int16 weights, activations of 12 bits.
+    Int16,
+    /// int8 weights with a scale for each output, activations of 7 bits.
+    Int8PerChannel,
+    /// int8 weights with one scale for a layer.
+    Int8PerTensor,
+}
+
+/// How a frame is looked at. All give the same features.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scan {
+    /// Every pixel, as the rows arrive.
+    Full,
+    /// A frame that lies in memory: every n-th row, then windows around what it hits.
+    Windows,
+    /// The rectangle around the windows that follow the markers, as its rows arrive; everything after a doubt.
+    Tracked,
+}
+
+/// All scans.
+pub const SCANS: [Scan; 3] = [Scan::Full, Scan::Windows, Scan::Tracked];
+/// Both ways to take a marker's position.
+pub const CENTROIDS: [CentroidName; 2] = [CentroidName::BinaryMask, CentroidName::RednessWeighted];
+/// Hidden layers of the paper's network.
+const PAPER: [usize; 3] = [512; 3];
+
+/// How much is swept, and how well: what results depend on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Columns and rows of frames.
+    pub sizes: Vec<[u16; 2]>,
+    /// Estimators of the force.
+    pub estimators: Vec<Estimator>,
+    /// The paper's network is trained for these sizes, once; for no other.
+    pub paper_sizes: Vec<[u16; 2]>,
+    /// Frames of each size, besides those of the untouched film.
+    pub rows: usize,
+    /// Parts that the frames are cut into. Each seed trains without one and is judged on it.
+    pub parts: usize,
+    /// Seeds; at most as many as parts.
+    pub seeds: usize,
+    /// Passes over the data in floats, and then with the chip's rounding for each arithmetic.
+    pub epochs: [usize; 2],
+    /// The same for the paper's network.
+    pub paper_epochs: [usize; 2],
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            sizes: vec![[160, 120], [320, 240], [640, 480], [800, 600]],
+            estimators: Estimator::all(),
+            paper_sizes: vec![[320, 240], [800, 600]],
+            rows: 8_000,
+            parts: 5,
+            seeds: 3,
+            epochs: [60, 20],
+            paper_epochs: [10, 4],
+        }
+    }
+}
+
+/// One training, and what comes of it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Task {
+    /// Columns and rows of the frames.
+    pub size: [u16; 2],
+    /// How markers' positions are taken.
+    pub centroid: CentroidName,
+    /// What is trained.
+    pub estimator: Estimator,
+    /// From 1.
+    pub seed: usize,
+}
+
+impl Plan {
+    /// The trainings for frames of a size.
+    pub fn tasks(&self, size: [u16; 2]) -> Vec<Task> {
+        let mut tasks = Vec::new();
+        for centroid in CENTROIDS {
+            for estimator in &self.estimators {
+                let seeds = match (estimator.is_papers(), self.paper_sizes.contains(&size)) {
+                    (false, _) => self.seeds,
+                    (true, wanted) => usize::from(wanted),
+                };
+                tasks.extend((1..=seeds).map(|seed| Task {
+                    size,
+                    centroid,
+                    estimator: estimator.clone(),
+                    seed,
+                }));
+            }
+        }
+        tasks
+    }
+
+    /// Passes of a training: in floats, and with each rounding.
+    pub fn epochs_of(&self, estimator: &Estimator) -> [usize; 2] {
+        match estimator.is_papers() {
+            true => self.paper_epochs,
+            false => self.epochs,
+        }
+    }
+}
+
+impl Estimator {
+    /// All that are swept.
+    pub fn all() -> Vec<Self> {
+        let network = |hidden: &[usize]| Self {
+            closed_form: false,
+            hidden: hidden.to_vec(),
+        };
+        let both = Self {
+            closed_form: true,
+            ..network(&[64, 64])
+        };
+        let closed_form = Self {
+            closed_form: true,
+            ..network(&[])
+        };
+        let widths: [&[usize]; 5] = [&[16; 2], &[32; 2], &[64; 2], &[128; 2], &PAPER];
+        let networks = widths.into_iter().map(network);
+        [closed_form, both].into_iter().chain(networks).collect()
+    }
+
+    /// Whether it is the paper's network.
+    pub fn is_papers(&self) -> bool {
+        self.hidden == PAPER
+    }
+
+    /// How its numbers may be held.
+    pub fn numbers(&self) -> &'static [Numbers] {
+        match self.hidden[..] {
+            [] => &[Numbers::F32, Numbers::Integers],
+            _ => &[
+                Numbers::F32,
+                Numbers::Int16,
+                Numbers::Int8PerChannel,
+                Numbers::Int8PerTensor,
+            ],
+        }
+    }
+
+    /// Its model's name among the counted costs; `None` where the chip does not run it.
+    pub fn cost_name(&self, numbers: Numbers) -> Option<String> {
+        match numbers {
+            Numbers::F32 => None,
+            Numbers::Integers => Some(self.to_string()),
+            Numbers::Int16 => Some(format!("{self} int16")),
+            Numbers::Int8PerChannel | Numbers::Int8PerTensor => Some(format!("{self} int8")),
+        }
+    }
+}
+
+impl Numbers {
+    /// The same as the trainer has it; `None` for what is no arithmetic of a network on the chip.
+    pub fn arithmetic(self) -> Option<Arithmetic> {
+        match self {
+            Numbers::F32 | Numbers::Integers => None,
+            Numbers::Int16 => Some(Arithmetic::Int16),
+            Numbers::Int8PerChannel => Some(Arithmetic::Int8PerChannel),
+            Numbers::Int8PerTensor => Some(Arithmetic::Int8PerTensor),
+        }
+    }
+}
+
+/// Lens and camera for frames of a size: the sensor's own, or the paper's for its 800×600, which no supported camera has.
+pub fn preset(size: [u16; 2]) -> Preset {
+    if size == [800, 600] {
+        Preset::Paper
+    } else {
+        Preset::Ov7725
+    }
+}
+
+/// Whether a supported camera delivers frames of a size: the OV7725 does up to 640×480.
+pub fn has_camera(size: [u16; 2]) -> bool {
+    preset(size) == Preset::Ov7725
+}
+
+/// The size of the frames that the firmware captures.
+pub fn firmware_size() -> [u16; 2] {
+    let recipe = Recipe::default();
+    [recipe.width, recipe.height]
+}
+
+impl fmt::Display for Estimator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let widths: Vec<String> = self.hidden.iter().map(usize::to_string).collect();
+        match (self.closed_form, widths.is_empty()) {
+            (true, true) => f.write_str("closed form"),
+            (true, false) => write!(f, "closed form + {}", widths.join("-")),
+            (false, _) => f.write_str(&widths.join("-")),
+        }
+    }
+}
+
+impl fmt::Display for Numbers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Numbers::F32 => "f32",
+            Numbers::Integers => "integers",
+            Numbers::Int16 => "int16",
+            Numbers::Int8PerChannel => "int8 per channel",
+            Numbers::Int8PerTensor => "int8 per tensor",
+        })
+    }
+}
+
+impl fmt::Display for Scan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Scan::Full => "full",
+            Scan::Windows => "windows",
+            Scan::Tracked => "tracked",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_network_is_trained_once_for_two_sizes() {
+        let plan = Plan::default();
+        let papers = |size| {
+            let tasks = plan.tasks(size);
+            tasks.iter().filter(|t| t.estimator.is_papers()).count()
+        };
+        assert_eq!(
+            [[160, 120], [320, 240], [640, 480], [800, 600]].map(papers),
+            [0, 2, 0, 2]
+        );
+        assert_eq!(plan.tasks([640, 480]).len(), 2 * 6 * 3);
+    }
+
+    #[test]
+    fn names_are_those_of_the_counted_models() {
+        let names: Vec<_> = Estimator::all()
+            .iter()
+            .map(|e| e.cost_name(e.numbers()[1]).unwrap())
+            .collect();
+        assert_eq!(
+            names,
+            [
+                "closed form",
+                "closed form + 64-64 int16",
+                "16-16 int16",
+                "32-32 int16",
+                "64-64 int16",
+                "128-128 int16",
+                "512-512-512 int16"
+            ]
+        );
+        assert_eq!(Estimator::all()[0].cost_name(Numbers::F32), None);
+    }
+}

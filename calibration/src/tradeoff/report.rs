@@ -1,0 +1,323 @@
+//! A sweep as tables in Markdown, as CSV and as a plot.
+
+use std::fmt::Write;
+
+use super::pick::{Limits, best, front};
+use super::plan::{Estimator, Numbers, SCANS, Scan, firmware_size, has_camera};
+use super::results::Results;
+use super::table::{Configuration, Mean, Reach, words};
+use crate::plot::{Axis, COLOURS, Plot, Scale};
+
+/// What the document holds between its marks.
+pub fn markdown(results: &Results, configurations: &[Configuration]) -> String {
+    let mut text = about(results);
+    let _ = write!(
+        text,
+        "\n### The Pareto front\n\nWhat a supported camera delivers and the chip has room for, and nothing else beats in both time \
+         and direction error from 50 mN up:\n\n{}",
+        table(&front(configurations, Reach::Camera))
+    );
+    let _ = write!(
+        text,
+        "\nThe same of what the firmware does as it is:\n\n{}",
+        table(&front(configurations, Reach::Firmware))
+    );
+    let here: Vec<&Configuration> = configurations
+        .iter()
+        .filter(|c| c.size == firmware_size() && c.scan == Scan::Full)
+        .collect();
+    let [width, height] = firmware_size();
+    let _ = write!(
+        text,
+        "\n### Every estimator at {width}×{height}, full scan\n\n{}",
+        table(&here)
+    );
+    let _ = write!(
+        text,
+        "\n### Every size and scan, behind them the same estimator\n\n{}",
+        sizes(configurations)
+    );
+    let _ = write!(text, "\n### The default\n\n{}", default(configurations));
+    text
+}
+
+fn about(results: &Results) -> String {
+    let plan = &results.plan;
+    let [epochs, rounded] = plan.epochs;
+    let [paper_epochs, paper_rounded] = plan.paper_epochs;
+    let mut text = format!(
+        "**Simulated** frames, contact reading `force`: {} of each size, in {} parts. Each of {} seeds trains without one part \
+         and is judged on it, on the frames up to 0.2 N. Networks: {epochs} passes over the data in floats, then {rounded} with \
+         the chip's rounding for each arithmetic; 512-512-512: one seed, {paper_epochs} and {paper_rounded} passes. Intervals \
+         (±) hold the mean of all seeds with 95 %, by Student's t.\n\n\
+         | frames | of | binary: rejected | others in windows | weighted: rejected | others in windows |\n\
+         |---|---:|---:|---:|---:|---:|\n",
+        plan.rows, plan.parts, plan.seeds
+    );
+    for (size, seen) in &results.seen {
+        let ([a, b], [x, y]) = (seen.rejected, seen.windows_differ);
+        let _ = writeln!(
+            text,
+            "| {} | {} | {a} | {x} | {b} | {y} |",
+            frame(*size),
+            seen.frames
+        );
+    }
+    text
+}
+
+fn frame([width, height]: [u16; 2]) -> String {
+    let mark = if has_camera([width, height]) {
+        ""
+    } else {
+        " (no camera)"
+    };
+    format!("{width}×{height}{mark}")
+}
+
+fn interval(mean: &Mean, digits: usize) -> String {
+    let value = mean.value;
+    match mean.half_width {
+        Some(half) => format!("{value:.digits$} ± {half:.digits$}"),
+        None => format!("{value:.digits$}"),
+    }
+}
+
+fn grouped(number: i64) -> String {
+    let digits = number.to_string();
+    let groups: Vec<&str> = digits
+        .as_bytes()
+        .rchunks(3)
+        .rev()
+        .filter_map(|group| std::str::from_utf8(group).ok())
+        .collect();
+    groups.join(",")
+}
+
+const HEAD: &str = "| frame | centroids | estimator | numbers | scan | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | worst: °, mN | \
+                    instructions | modelled cycles | µs | per second | latency, µs | flash, KB | RAM, KB |\n\
+                    |---|---|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+
+fn table(configurations: &[&Configuration]) -> String {
+    let rows = configurations.iter().map(|c| row(c));
+    HEAD.to_owned() + &rows.collect::<String>()
+}
+
+fn row(c: &Configuration) -> String {
+    let cost = match &c.cost {
+        None => "| – | – | – | – | – | – | – |".to_owned(),
+        Some(cost) => format!(
+            "| {} | {} | {:.0} | {} | {:.0} | {:.0} | {:.0} |",
+            grouped(cost.instructions),
+            grouped(cost.cycles),
+            cost.microseconds(),
+            grouped(cost.rate().round() as i64),
+            cost.latency_microseconds(),
+            cost.flash as f64 / 1e3,
+            cost.ram as f64 / 1e3,
+        ),
+    };
+    format!(
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {:.2}, {:.2} {cost}\n",
+        frame(c.size),
+        words(c.centroid),
+        c.estimator,
+        c.numbers,
+        c.scan,
+        interval(&c.strong_direction_deg, 3),
+        interval(&c.direction_deg, 2),
+        interval(&c.force_rmse_mn, 3),
+        c.worst[0],
+        c.worst[1],
+    )
+}
+
+/// One estimator at every size, with what each scan costs.
+fn sizes(configurations: &[Configuration]) -> String {
+    let estimator = default_estimator();
+    let mut text = format!(
+        "{estimator}, {}. A frame in memory that does not fit the chip's is marked *.\n\n\
+         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | full: cycles | µs | windows: cycles | µs | \
+         tracked: cycles | µs |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+        Numbers::Int8PerChannel
+    );
+    let of_it = configurations
+        .iter()
+        .filter(|c| c.estimator == estimator && c.numbers == Numbers::Int8PerChannel);
+    let of_it: Vec<&Configuration> = of_it.collect();
+    // The scans of one configuration follow each other.
+    for scans in of_it.chunks(SCANS.len()) {
+        let c = scans[0];
+        let _ = write!(
+            text,
+            "| {} | {} | {} | {} | {} |",
+            frame(c.size),
+            words(c.centroid),
+            interval(&c.strong_direction_deg, 3),
+            interval(&c.direction_deg, 2),
+            interval(&c.force_rmse_mn, 3)
+        );
+        for cost in scans.iter().filter_map(|c| c.cost) {
+            let mark = if cost.too_large { "*" } else { "" };
+            let (cycles, time) = (grouped(cost.cycles), cost.microseconds());
+            let _ = write!(text, " {cycles}{mark} | {time:.0} |");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn default_estimator() -> Estimator {
+    Estimator {
+        closed_form: true,
+        hidden: crate::train::Options::default().hidden,
+    }
+}
+
+fn default(configurations: &[Configuration]) -> String {
+    match best(configurations, &Limits::default()) {
+        Ok(best) => format!("Without limits the pick is **{best}**.\n"),
+        Err(error) => format!("Without limits there is no pick: {error}.\n"),
+    }
+}
+
+/// Every configuration.
+pub fn csv(configurations: &[Configuration]) -> String {
+    let mut text = "width,height,centroid,estimator,numbers,scan,reach,direction_deg,direction_deg_95,strong_direction_deg,\
+                    strong_direction_deg_95,force_rmse_mn,force_rmse_mn_95,worst_strong_direction_deg,worst_force_mn,\
+                    instructions,modelled_cycles,microseconds,per_second,latency_microseconds,flash_bytes,ram_bytes\n"
+        .to_owned();
+    for c in configurations {
+        let reach = match c.reach() {
+            Reach::None => "none",
+            Reach::Camera => "camera",
+            Reach::Firmware => "firmware",
+        };
+        let [width, height] = c.size;
+        let (centroid, estimator, numbers, scan) =
+            (words(c.centroid), &c.estimator, c.numbers, c.scan);
+        let _ = write!(
+            text,
+            "{width},{height},{centroid},{estimator},{numbers},{scan},{reach}"
+        );
+        for mean in [&c.direction_deg, &c.strong_direction_deg, &c.force_rmse_mn] {
+            let half = mean
+                .half_width
+                .map_or(String::new(), |half| format!("{half:.5}"));
+            let _ = write!(text, ",{:.5},{half}", mean.value);
+        }
+        let _ = write!(text, ",{:.5},{:.5}", c.worst[0], c.worst[1]);
+        let _ = match &c.cost {
+            None => writeln!(text, ",,,,,,,"),
+            Some(cost) => writeln!(
+                text,
+                ",{},{},{:.1},{:.0},{:.1},{},{}",
+                cost.instructions,
+                cost.cycles,
+                cost.microseconds(),
+                cost.rate(),
+                cost.latency_microseconds(),
+                cost.flash,
+                cost.ram
+            ),
+        };
+    }
+    text
+}
+
+/// Direction error from 50 mN up against modelled cycles, with the fronts.
+pub fn plot(configurations: &[Configuration]) -> String {
+    let place = |c: &Configuration| Some((c.cost?.cycles as f64, c.strong_direction_deg.value));
+    let placed: Vec<_> = configurations.iter().filter_map(place).collect();
+    let x = Axis::over(
+        "modelled cycles of a frame",
+        placed.iter().map(|p| p.0),
+        Scale::Log,
+    );
+    let y = Axis::over(
+        "mean direction error from 50 mN up, ° (simulated)",
+        placed.iter().map(|p| p.1),
+        Scale::Log,
+    );
+    let mut plot = Plot::new("Speed and accuracy", x, y);
+    let mut sizes: Vec<[u16; 2]> = configurations.iter().map(|c| c.size).collect();
+    sizes.dedup();
+    let mut colours = COLOURS.into_iter().cycle();
+    for size in sizes {
+        let colour = colours.next().unwrap_or("black");
+        let of_size = configurations.iter().filter(|c| c.size == size);
+        plot.points(&of_size.filter_map(place).collect::<Vec<_>>(), 3.0, colour);
+        plot.name(&frame(size), colour);
+    }
+    for (reach, name) in [
+        (Reach::Camera, "front: a camera delivers"),
+        (Reach::Firmware, "front: the firmware does"),
+    ] {
+        let colour = colours.next().unwrap_or("black");
+        let points: Vec<_> = front(configurations, reach)
+            .into_iter()
+            .filter_map(place)
+            .collect();
+        plot.line(&points, colour);
+        plot.name(name, colour);
+    }
+    plot.to_svg()
+}
+
+/// Puts `text` between the document's marks.
+pub fn replaced(document: &str, text: &str) -> Option<String> {
+    let start = document.find("<!-- tradeoff: begin")?;
+    let start = start + document[start..].find("-->")? + "-->".len();
+    let end = start + document[start..].find("<!-- tradeoff: end -->")?;
+    Some(format!(
+        "{}\n\n{}\n\n{}",
+        &document[..start],
+        text.trim(),
+        &document[end..]
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::pick::tests::made;
+    use super::*;
+
+    #[test]
+    fn tables_say_what_is_there_and_mark_what_cannot_be() {
+        let mut all = vec![
+            made([320, 240], Scan::Full, 480_000, [0.25, 0.1]),
+            made([800, 600], Scan::Full, 1_200_000, [0.125, 0.1]),
+            made([320, 240], Scan::Full, 1, [0.0625, 0.1]),
+        ];
+        all[2].cost = None;
+        all[2].numbers = Numbers::F32;
+        let text = table(&all.iter().collect::<Vec<_>>());
+        assert!(
+            text.contains("| 480,000 | 1000 | 1,000 |")
+                || text.contains("| 480,000 | 1000 | 1,000 | 200 |"),
+            "{text}"
+        );
+        assert!(
+            text.contains("800×600 (no camera)") && text.contains("| f32 |"),
+            "{text}"
+        );
+        assert!(text.contains("0.250 ± 0.025"), "{text}");
+        assert!(default(&all).contains("320×240, full scan"));
+        assert_eq!(csv(&all).lines().count(), 4);
+        let columns: Vec<usize> = csv(&all)
+            .lines()
+            .map(|line| line.split(',').count())
+            .collect();
+        assert_eq!(columns, [22; 4]);
+        let svg = plot(&all);
+        assert!(svg.contains("800×600 (no camera)") && svg.ends_with("</svg>\n"));
+    }
+
+    #[test]
+    fn only_what_is_generated_changes() {
+        let document = "a\n<!-- tradeoff: begin, by x -->\nold\n<!-- tradeoff: end -->\nb\n";
+        let new = replaced(document, "new").unwrap();
+        assert_eq!(new, document.replace("\nold\n", "\n\nnew\n\n"));
+        assert_eq!(replaced("no marks", "new"), None);
+    }
+}

@@ -1,0 +1,184 @@
+//! Accuracy and cost of every configuration, side by side.
+
+use std::fmt;
+
+use anyhow::Result;
+
+use super::costs::{Cost, Costs};
+use super::plan::{Estimator, Numbers, SCANS, Scan, firmware_size, has_camera};
+use super::results::{Figures, Finished, Results};
+use crate::conditions::CentroidName;
+
+/// A mean over seeds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mean {
+    /// The mean.
+    pub value: f64,
+    /// Half of the interval that holds the true mean with 95 %, by Student's t; none of a single seed.
+    pub half_width: Option<f64>,
+}
+
+/// One configuration: what it is, how accurate it is (simulated), what it costs.
+#[derive(Clone, Debug)]
+pub struct Configuration {
+    /// Columns and rows of a frame.
+    pub size: [u16; 2],
+    /// How markers' positions are taken.
+    pub centroid: CentroidName,
+    /// What makes a force of features.
+    pub estimator: Estimator,
+    /// How its numbers are held.
+    pub numbers: Numbers,
+    /// How the frame is looked at.
+    pub scan: Scan,
+    /// Mean angle between found and true force, degrees.
+    pub direction_deg: Mean,
+    /// The same from 50 mN up.
+    pub strong_direction_deg: Mean,
+    /// Root mean square error of |F|, mN.
+    pub force_rmse_mn: Mean,
+    /// The worst over all seeds: direction from 50 mN up (degrees), |F| (mN).
+    pub worst: [f64; 2],
+    /// Cost on the chip; none of floats.
+    pub cost: Option<Cost>,
+}
+
+impl fmt::Display for Configuration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            size: [width, height],
+            estimator,
+            numbers,
+            scan,
+            ..
+        } = self;
+        let centroid = words(self.centroid);
+        write!(
+            f,
+            "{estimator} ({numbers}) on {centroid} centroids of {width}×{height}, {scan} scan"
+        )
+    }
+}
+
+/// A centroid estimator in a word.
+pub fn words(centroid: CentroidName) -> &'static str {
+    match centroid {
+        CentroidName::BinaryMask => "binary",
+        CentroidName::RednessWeighted => "weighted",
+    }
+}
+
+/// How far a configuration is from use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reach {
+    /// Not at all: the chip runs no floats, has no room for the frame, or no supported camera has the size.
+    None,
+    /// A supported camera delivers it and the chip has room, but the firmware captures frames otherwise.
+    Camera,
+    /// The firmware does it.
+    Firmware,
+}
+
+impl Configuration {
+    /// How far it is from use.
+    pub fn reach(&self) -> Reach {
+        match &self.cost {
+            Some(cost) if !cost.too_large && has_camera(self.size) => {
+                let streamed = self.scan != Scan::Windows;
+                if streamed && self.size == firmware_size() {
+                    Reach::Firmware
+                } else {
+                    Reach::Camera
+                }
+            }
+            _ => Reach::None,
+        }
+    }
+}
+
+/// Every configuration of a sweep's results.
+///
+/// # Errors
+/// When a part of one was not counted.
+pub fn configurations(results: &Results, costs: &Costs) -> Result<Vec<Configuration>> {
+    let mut configurations = Vec::new();
+    // Sorted by task: the seeds of one training follow each other.
+    let same = |a: &Finished, b: &Finished| {
+        (a.task.size, a.task.centroid, &a.task.estimator)
+            == (b.task.size, b.task.centroid, &b.task.estimator)
+    };
+    for seeds in results.finished.chunk_by(same) {
+        let task = &seeds[0].task;
+        for (i, (numbers, _)) in seeds[0].figures.iter().enumerate() {
+            let figures: Vec<Figures> = seeds.iter().map(|seed| seed.figures[i].1).collect();
+            for scan in SCANS {
+                let which = (&task.estimator, *numbers);
+                let cost = costs.of(task.size, task.centroid, scan, which)?;
+                configurations.push(Configuration {
+                    size: task.size,
+                    centroid: task.centroid,
+                    estimator: task.estimator.clone(),
+                    numbers: *numbers,
+                    scan,
+                    direction_deg: mean(&figures, |f| f.direction_deg),
+                    strong_direction_deg: mean(&figures, |f| f.strong_direction_deg),
+                    force_rmse_mn: mean(&figures, |f| f.force_rmse_mn),
+                    worst: [
+                        largest(&figures, |f| f.worst_direction_deg),
+                        largest(&figures, |f| f.worst_force_mn),
+                    ],
+                    cost,
+                });
+            }
+        }
+    }
+    Ok(configurations)
+}
+
+fn largest(figures: &[Figures], of: impl Fn(&Figures) -> f64) -> f64 {
+    figures.iter().map(of).fold(0.0, f64::max)
+}
+
+fn mean(figures: &[Figures], of: impl Fn(&Figures) -> f64) -> Mean {
+    let count = figures.len() as f64;
+    let value = figures.iter().map(&of).sum::<f64>() / count;
+    let squares: f64 = figures.iter().map(|f| (of(f) - value).powi(2)).sum();
+    let half_width = student(figures.len()).map(|t| t * (squares / (count - 1.0) / count).sqrt());
+    Mean { value, half_width }
+}
+
+/// Student's t for 95 %, both sides, of a mean of so many.
+fn student(count: usize) -> Option<f64> {
+    const T: [f64; 9] = [
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262,
+    ];
+    let freedom = count.checked_sub(2)?;
+    Some(T.get(freedom).copied().unwrap_or(2.228))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(direction: f64) -> Figures {
+        Figures {
+            frames: 100,
+            direction_deg: direction,
+            strong_direction_deg: direction,
+            force_rmse_mn: direction,
+            worst_direction_deg: direction,
+            worst_force_mn: direction,
+        }
+    }
+
+    #[test]
+    fn intervals_are_students() {
+        let three: Vec<_> = [0.9, 1.0, 1.1].map(figures).to_vec();
+        let Mean { value, half_width } = mean(&three, |f| f.direction_deg);
+        assert!((value - 1.0).abs() < 1e-12);
+        // s = 0.1, over the square root of three.
+        assert!((half_width.unwrap() - 4.303 * 0.1 / 3_f64.sqrt()).abs() < 1e-9);
+        assert_eq!(mean(&three[..1], |f| f.direction_deg).half_width, None);
+        assert!((largest(&three, |f| f.worst_force_mn) - 1.1).abs() < 1e-12);
+    }
+}
