@@ -90,6 +90,7 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64, friction: f64) -> Recipe
         preset: model.conditions.preset,
         width,
         height,
+        format: model.conditions.threshold.format().into(),
         centroid: model.conditions.centroid.into(),
         contact: match model.conditions.contact {
             ContactReading::Force => Contact::Force,

@@ -6,8 +6,8 @@ use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use hivtac_scene::{Contact, SceneError};
 use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin, PixelFormat};
-use hivtac_sensing::threshold::HsvBox;
+use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin};
+use hivtac_sensing::threshold::{PixelFormat, Threshold};
 use serde::{Deserialize, Serialize};
 
 /// Everything about frames and labels that a model depends on (`docs/model-file.md`, conditions).
@@ -22,7 +22,8 @@ pub struct Conditions {
     pub height: u16,
     /// What a pixel is.
     pub pixel_format: PixelName,
-    /// Threshold: lowest and highest hue, saturation and value (OpenCV's 8-bit HSV; hue may wrap through 0).
+    /// Threshold, as the model file has it: lowest and highest hue, saturation and value (OpenCV's 8-bit HSV; hue may wrap
+    /// through 0); the lowest Cr of YUV422 and zeros; the lowest and highest luma of mono and zeros.
     pub threshold: [u8; 6],
     /// 3×3 dilations of the mask.
     pub dilations: u8,
@@ -35,11 +36,15 @@ pub struct Conditions {
 }
 
 /// Pixel formats by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum PixelName {
     /// 16-bit colour.
     Rgb565,
+    /// Luma of each pixel and colour of each pair.
+    Yuv422,
+    /// Luma alone, in green light.
+    Mono,
 }
 
 /// Centroid estimators by name.
@@ -91,6 +96,27 @@ impl OriginName {
             *byte = u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).with_context(wrong)?;
         }
         Ok(Origin::Unit(device_id))
+    }
+}
+
+impl PixelName {
+    /// The same as the model file holds it.
+    pub fn to_model(self) -> PixelFormat {
+        match self {
+            PixelName::Rgb565 => PixelFormat::Rgb565,
+            PixelName::Yuv422 => PixelFormat::Yuv422,
+            PixelName::Mono => PixelFormat::Mono,
+        }
+    }
+}
+
+impl From<PixelFormat> for PixelName {
+    fn from(format: PixelFormat) -> Self {
+        match format {
+            PixelFormat::Rgb565 => PixelName::Rgb565,
+            PixelFormat::Yuv422 => PixelName::Yuv422,
+            PixelFormat::Mono => PixelName::Mono,
+        }
     }
 }
 
@@ -159,14 +185,14 @@ impl From<CentroidEstimator> for CentroidName {
 }
 
 impl Conditions {
-    /// What the scene renders and the pipeline does by default, at a frame size.
-    pub fn simulated(preset: Preset, width: u16, height: u16) -> Self {
+    /// What the scene renders and the pipeline does by default, at a frame size and in a pixel format.
+    pub fn simulated(preset: Preset, width: u16, height: u16, pixel_format: PixelName) -> Self {
         Self {
             preset: preset.name().into(),
             width,
             height,
-            pixel_format: PixelName::Rgb565,
-            threshold: HsvBox::RED.limits(),
+            pixel_format,
+            threshold: Threshold::red(pixel_format.to_model()).limits(),
             dilations: 1,
             centroid: CentroidName::BinaryMask,
             contact: ContactName::default(),
@@ -177,16 +203,13 @@ impl Conditions {
     /// The same as the model file holds it.
     ///
     /// # Errors
-    /// When there is no such preset.
+    /// When there is no such preset, or the threshold means nothing.
     pub fn to_model(&self) -> Result<model::Conditions> {
         let preset = preset(&self.preset)?;
         Ok(model::Conditions {
             preset,
             geometry: Geometry::preset(preset, self.width, self.height),
-            pixel_format: match self.pixel_format {
-                PixelName::Rgb565 => PixelFormat::Rgb565,
-            },
-            threshold: HsvBox::of_limits(self.threshold),
+            threshold: Threshold::of_limits(self.pixel_format.to_model(), self.threshold)?,
             dilations: self.dilations,
             centroid: self.centroid.to_model(),
             contact: self.contact.to_model(),
@@ -209,10 +232,10 @@ mod tests {
 
     #[test]
     fn the_default_is_what_the_firmware_uses() {
-        let model = Conditions::simulated(Preset::Ov7725, 320, 240)
+        let model = Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565)
             .to_model()
             .unwrap();
-        assert_eq!(model.threshold, HsvBox::RED);
+        assert_eq!(model.threshold, Threshold::red(PixelFormat::Rgb565));
         assert_eq!(model.dilations, 1);
         assert_eq!(model.geometry, Geometry::preset(Preset::Ov7725, 320, 240));
         assert_eq!(model.origin, Origin::Simulated);
@@ -225,7 +248,7 @@ mod tests {
             ("stick", ContactReading::Stick),
             ("slip:0.6", ContactReading::Slip),
         ] {
-            let mut conditions = Conditions::simulated(Preset::Ov7725, 320, 240);
+            let mut conditions = Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565);
             conditions.contact = ContactName(name.parse().unwrap());
             assert_eq!(conditions.to_model().unwrap().contact, reading);
             let text = serde_json::to_string(&conditions).unwrap();
@@ -261,7 +284,7 @@ mod tests {
 
     #[test]
     fn an_unknown_preset_is_named() {
-        let mut conditions = Conditions::simulated(Preset::Paper, 800, 600);
+        let mut conditions = Conditions::simulated(Preset::Paper, 800, 600, PixelName::Rgb565);
         conditions.preset = "Paper".into();
         assert!(
             conditions

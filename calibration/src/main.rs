@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use hivtac_calibration::check::check;
 use hivtac_calibration::collect::CollectCommand;
-use hivtac_calibration::conditions::{CentroidName, preset};
+use hivtac_calibration::conditions::{CentroidName, PixelName, preset};
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, Spread, generate, generate_file};
 use hivtac_calibration::evaluate::Evaluation;
 use hivtac_calibration::fit::Kind;
@@ -173,7 +173,11 @@ struct RecipeArgs {
     /// Rows of a frame.
     #[arg(long, default_value_t = 240)]
     height: u16,
-    /// How markers' positions are taken: from all pixels of the mask alike, or weighted with their redness.
+    /// Pixel format.
+    #[arg(long, value_enum, default_value = "rgb565")]
+    format: PixelName,
+    /// How markers' positions are taken: from all pixels of the mask alike, or weighted with their redness, or with what
+    /// stands for it in other formats than RGB565.
     #[arg(long, value_enum, default_value = "redness-weighted")]
     centroid: CentroidName,
     /// What α, β and |F| mean: force (the force on the film), stick (the way of a tip that sticks, and the force along it) or
@@ -228,6 +232,7 @@ impl RecipeArgs {
             preset: preset(&self.preset)?,
             width: self.width,
             height: self.height,
+            format: self.format,
             centroid: self.centroid,
             contact: self.contact,
             loads: match (self.per_pose, self.known_loads) {

@@ -40,7 +40,7 @@ fn it_is_made_for_the_firmware() {
         conditions.geometry,
         Geometry::preset(Preset::Ov7725, 320, 240)
     );
-    assert_eq!(conditions.threshold, HsvBox::RED);
+    assert_eq!(conditions.threshold, HsvBox::RED.into());
     assert_eq!(conditions.dilations, 1);
     assert_eq!(conditions.contact, ContactReading::Force);
     assert_eq!(conditions.origin, Origin::Simulated);

@@ -32,8 +32,9 @@ pub fn centroid_to_wire(from: CentroidEstimator) -> message::Centroid {
     }
 }
 
-/// A threshold for the wire.
-pub fn threshold_to_wire(from: threshold::HsvBox) -> message::HsvBox {
+/// A threshold of RGB565 for the wire, which knows no other.
+pub fn threshold_to_wire(from: threshold::Threshold) -> message::HsvBox {
+    let from = threshold::HsvBox::of_limits(from.limits());
     message::HsvBox {
         hue_low: from.hue_low,
         hue_high: from.hue_high,
@@ -45,13 +46,13 @@ pub fn threshold_to_wire(from: threshold::HsvBox) -> message::HsvBox {
 }
 
 /// A threshold from the wire, unchecked.
-pub fn threshold_from_wire(from: message::HsvBox) -> threshold::HsvBox {
-    threshold::HsvBox {
+pub fn threshold_from_wire(from: message::HsvBox) -> threshold::Threshold {
+    threshold::Threshold::Rgb565(threshold::HsvBox {
         hue_low: from.hue_low,
         hue_high: from.hue_high,
         saturation_low: from.saturation_low,
         saturation_high: from.saturation_high,
         value_low: from.value_low,
         value_high: from.value_high,
-    }
+    })
 }

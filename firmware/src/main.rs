@@ -85,16 +85,17 @@ fn main() -> ! {
         })
 }
 
-/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers.
+/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers. A model for
+/// another pixel format than the camera's gives no force then, and every sample says so.
 fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;
     let settings = match &model {
-        Some(model) => Settings {
+        Some(model) if model.conditions.threshold.format() == camera::FORMAT => Settings {
             geometry,
             ..Settings::of_model(model, order)
         },
-        None => Settings::usual(geometry, order),
+        _ => Settings::usual(geometry, order),
     };
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");

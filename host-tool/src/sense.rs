@@ -168,7 +168,10 @@ impl<'a> Bench<'a> {
                 ..usual
             };
         }
-        settings.threshold = self.options.threshold.unwrap_or(settings.threshold);
+        settings.threshold = match self.options.threshold {
+            Some(hsv_box) => hsv_box.into(),
+            None => settings.threshold,
+        };
         settings.min_area = self.options.min_area.unwrap_or(settings.min_area);
         settings
     }

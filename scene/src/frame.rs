@@ -80,6 +80,15 @@ impl Frame {
         self.mono.chunks_exact(self.width as usize)
     }
 
+    /// The frame as 16-bit words: [`Self::pixels`], or two pixels of [`Self::mono`] in each, the left one below.
+    pub fn words(&self) -> Cow<'_, [u16]> {
+        if self.format == Format::Mono {
+            let (pairs, _) = self.mono.as_chunks();
+            return pairs.iter().map(|pair| u16::from_le_bytes(*pair)).collect();
+        }
+        Cow::Borrowed(&self.pixels)
+    }
+
     /// The picture in 8-bit red, green and blue, three bytes per pixel, row by row, whatever its format. RGB565 is
     /// widened by repeating the upper bits of a channel.
     pub fn to_rgb888(&self) -> Vec<u8> {

@@ -1,58 +1,150 @@
-//! How rows of YUV422 and mono pixels are read. Neither needs a table.
-//!
-//! A [`Scanner`](crate::scanner::Scanner) takes them as it takes a table's RGB565; the model file and
-//! [`Settings`](crate::settings::Settings) know RGB565 only.
+//! How rows of each pixel format are read: RGB565 through a table, YUV422 and mono by themselves.
 
-use crate::tables::{FULL_WEIGHT, Pixels};
+use crate::{
+    kernels::{threshold_cr, threshold_luma},
+    runs::Run,
+    tables::{FULL_WEIGHT, Pixels, Table, Weights},
+    threshold::{ByteOrder, HsvBox, PixelFormat, Threshold, ThresholdError},
+};
 
-/// Weight of a pixel at a threshold: half covered. A level more or less is worth two.
+/// Weight of a pixel at a threshold: half covered.
 const AT_THRESHOLD: i16 = 64;
+
+/// Reads rows of the format of a [`Threshold`]; those of RGB565 through a table `T`, which else is not used.
+#[derive(Clone, Debug)]
+pub struct Formats<T> {
+    table: T,
+    threshold: Threshold,
+}
+
+impl<T: Table> Formats<T> {
+    /// Accepts no pixel, until it is [`set`](Self::set).
+    pub const CLOSED: Formats<T> = Formats {
+        table: T::CLOSED,
+        threshold: Threshold::Rgb565(HsvBox::RED),
+    };
+
+    /// Sets format and threshold. The byte order is that of RGB565; other formats have but one.
+    ///
+    /// # Errors
+    /// Those of [`Threshold::check`]; nothing is then changed.
+    pub fn set(&mut self, threshold: &Threshold, order: ByteOrder) -> Result<(), ThresholdError> {
+        threshold.check()?;
+        if let Threshold::Rgb565(hsv_box) = threshold {
+            self.table.set(hsv_box, order)?;
+        }
+        self.threshold = *threshold;
+        Ok(())
+    }
+
+    /// The threshold in use.
+    pub fn threshold(&self) -> &Threshold {
+        &self.threshold
+    }
+
+    /// The table, for what tests count in it.
+    #[cfg(test)]
+    pub(crate) fn table(&self) -> &T {
+        &self.table
+    }
+}
+
+impl<T: Table> Pixels for Formats<T> {
+    fn row_length(&self, width: u16) -> usize {
+        self.threshold.format().row_length(width)
+    }
+
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
+        match &self.threshold {
+            Threshold::Rgb565(_) => self.table.mask_row(row, mask),
+            Threshold::Yuv422(yuv422) => yuv422.mask_row(row, mask),
+            Threshold::Mono(mono) => mono.mask_row(row, mask),
+        }
+    }
+
+    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
+        match &self.threshold {
+            Threshold::Rgb565(_) => self.table.mask_rows(pixels, stride, width, mask),
+            Threshold::Yuv422(yuv422) => yuv422.mask_rows(pixels, stride, width, mask),
+            Threshold::Mono(mono) => mono.mask_rows(pixels, stride, width, mask),
+        }
+    }
+
+    fn weight(&self, row: &[u16], column: u16) -> u8 {
+        match &self.threshold {
+            Threshold::Rgb565(_) => self.table.weight(row, column),
+            Threshold::Yuv422(yuv422) => yuv422.weight(row, column),
+            Threshold::Mono(mono) => mono.weight(row, column),
+        }
+    }
+
+    fn weigh(&self, row: &[u16], run: Run) -> Weights {
+        match &self.threshold {
+            Threshold::Rgb565(_) => self.table.weigh(row, run),
+            Threshold::Yuv422(yuv422) => yuv422.weigh(row, run),
+            Threshold::Mono(mono) => mono.weigh(row, run),
+        }
+    }
+}
 
 /// YUV422 in the order Y0 Cb Y1 Cr: a `u16` a pixel, luma below. A pair of pixels belongs to a marker when their Cr is
 /// at least the threshold. A pixel's weight grows by two for each level of Cr, from 64 at the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Yuv422 {
-    /// Lowest Cr of a marker: about half way between the film's (132) and its (191).
+    /// Lowest Cr of a marker.
     pub cr_low: u8,
 }
 
 /// Mono: two pixels a `u16`, the left one below. A pixel belongs to a marker when its luma lies within the limits, both
-/// included. Its weight grows by two for each level that it lies inside the nearer limit, from 64 there; a limit of 0
+/// included. Its weight grows by 5/4 for each level that it lies inside the nearer limit, from 64 there; a limit of 0
 /// or 255 is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Mono {
     /// Lowest luma of a marker.
     pub low: u8,
-    /// Highest luma of a marker: half way to the film's. Red markers are dark in green light (36 against the
-    /// film's 141), and hardly darker than the film in white light.
+    /// Highest luma of a marker.
     pub high: u8,
 }
 
-fn weight_inside(levels: i16) -> u8 {
-    (AT_THRESHOLD + 2 * levels).clamp(0, i16::from(FULL_WEIGHT)) as u8
+impl Yuv422 {
+    /// Half way between the Cr of grey film (132) and of red markers (191).
+    pub const RED: Yuv422 = Yuv422 { cr_low: 162 };
+}
+
+impl Mono {
+    /// Half way between markers and film where markers are dark: red ones have a luma of 36 in green light or behind a green
+    /// filter, and the film 141. (In white light they are hardly darker than the film.)
+    pub const DARK: Mono = Mono { low: 0, high: 88 };
+}
+
+/// The weight of a pixel that lies so far inside a threshold, in quarters of a step.
+fn weight_inside(quarters: i16) -> u8 {
+    (AT_THRESHOLD + (quarters >> 2)).clamp(0, i16::from(FULL_WEIGHT)) as u8
 }
 
 impl Pixels for Yuv422 {
     /// Rows of an odd width end within a pair: its last pixel has no Cr, and is none of a marker.
     fn row_length(&self, width: u16) -> usize {
-        usize::from(width)
+        PixelFormat::Yuv422.row_length(width)
     }
 
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        for (word, pixels) in mask.iter_mut().zip(row.chunks(32)) {
-            *word = (0..)
-                .zip(pixels.chunks_exact(2))
-                .fold(0, |bits, (i, pair)| {
-                    let inside = (pair[1] >> 8) as u8 >= self.cr_low;
-                    bits | (3 * u32::from(inside)) << (2 * i)
-                });
-        }
+        threshold_cr(self.cr_low, row, mask);
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         let pixel = row.get(usize::from(column | 1));
         pixel.map_or(0, |pixel| {
-            weight_inside((pixel >> 8) as i16 - i16::from(self.cr_low))
+            weight_inside(8 * ((pixel >> 8) as i16 - i16::from(self.cr_low)))
+        })
+    }
+
+    /// Of whole pairs: a dilation reaches into every other pair by one pixel only, and half of its Cr would draw the
+    /// centroid aside. No two runs of a dilated row share a pair, as a pair passes the threshold as a whole.
+    fn weigh(&self, row: &[u16], run: Run) -> Weights {
+        let columns = run.x0 & !1..=run.x1 | 1;
+        columns.fold(Weights::NONE, |sums, x| {
+            sums.with(u32::from(x), self.weight(row, x))
         })
     }
 }
@@ -62,11 +154,11 @@ impl Mono {
     fn depth(&self, luma: u8) -> i16 {
         let luma = i16::from(luma);
         let above = match self.low {
-            0 => i16::MAX / 4,
+            0 => i16::MAX / 8,
             low => luma - i16::from(low),
         };
         let below = match self.high {
-            255 => i16::MAX / 4,
+            255 => i16::MAX / 8,
             high => i16::from(high) - luma,
         };
         above.min(below)
@@ -76,16 +168,13 @@ impl Mono {
 impl Pixels for Mono {
     /// Rows have an even width: a `u16` holds two pixels, and a last one alone would leave a half that is none.
     fn row_length(&self, width: u16) -> usize {
-        usize::from(width.div_ceil(2))
+        PixelFormat::Mono.row_length(width)
     }
 
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        for (word, pairs) in mask.iter_mut().zip(row.chunks(16)) {
-            *word = (0..).zip(pairs).fold(0, |bits, (i, pair)| {
-                let [left, right] = pair.to_le_bytes();
-                let [left, right] = [left, right].map(|luma| u32::from(self.depth(luma) >= 0));
-                bits | (left | right << 1) << (2 * i)
-            });
+        match self.high.checked_sub(self.low) {
+            Some(span) => threshold_luma(self.low, span, row, mask),
+            None => mask.fill(0),
         }
     }
 
@@ -93,7 +182,7 @@ impl Pixels for Mono {
         let pair = row.get(usize::from(column / 2));
         pair.map_or(0, |pair| {
             let luma = pair.to_le_bytes()[usize::from(column % 2)];
-            weight_inside(self.depth(luma))
+            weight_inside(5 * self.depth(luma))
         })
     }
 }
@@ -147,8 +236,11 @@ mod tests {
     fn weights_grow_with_what_is_covered() {
         let cr = |cr: u16| Yuv422 { cr_low: 160 }.weight(&[0, cr << 8], 0);
         assert_eq!([120, 150, 160, 180, 250].map(cr), [0, 44, 64, 104, 127]);
-        let mono = |luma: u16| Mono { low: 0, high: 108 }.weight(&[luma], 0);
-        assert_eq!([0, 80, 108, 130, 200].map(mono), [127, 120, 64, 20, 0]);
+        let mono = |luma: u16| Mono { low: 0, high: 88 }.weight(&[luma], 0);
+        assert_eq!(
+            [0, 36, 87, 88, 89, 141].map(mono),
+            [127, 127, 65, 64, 62, 0]
+        );
         assert_eq!(
             Mono { low: 9, high: 255 }.weight(&[7], 5),
             0,

@@ -4,7 +4,7 @@ use crate::{
     geometry::Geometry,
     model::{CentroidEstimator, Conditions, Model},
     scanner::{ScanError, ScanSettings},
-    threshold::{ByteOrder, HsvBox, ThresholdError},
+    threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError},
     units::Px,
 };
 use core::fmt;
@@ -20,9 +20,9 @@ const FEWEST_RUNS: u32 = 64;
 pub struct Settings {
     /// Lens, frame size and markers.
     pub geometry: Geometry,
-    /// The colours of a marker.
-    pub threshold: HsvBox,
-    /// How the bytes of a pixel lie in a row.
+    /// Which pixels a marker may have, and with that the pixel format.
+    pub threshold: Threshold,
+    /// How the bytes of an RGB565 pixel lie in a row.
     pub byte_order: ByteOrder,
     /// 3×3 dilations of the mask, 0–3.
     pub dilations: u8,
@@ -39,6 +39,8 @@ pub enum SettingsError {
     Scan(ScanError),
     /// The threshold means nothing.
     Threshold(ThresholdError),
+    /// Rows of this odd width cannot be of this format, which has pixels in pairs.
+    OddWidth(u16, PixelFormat),
     /// [`Geometry::is_sound`] says no.
     Geometry,
 }
@@ -49,7 +51,7 @@ impl Settings {
     pub fn usual(geometry: Geometry, byte_order: ByteOrder) -> Settings {
         Settings {
             geometry,
-            threshold: HsvBox::RED,
+            threshold: Threshold::red(PixelFormat::Rgb565),
             byte_order,
             dilations: 1,
             min_area: geometry.rest_area(Px(0)) / 4,
@@ -81,6 +83,10 @@ impl Settings {
     pub fn check(&self) -> Result<(), SettingsError> {
         self.scan().check().map_err(SettingsError::Scan)?;
         self.threshold.check().map_err(SettingsError::Threshold)?;
+        let (width, format) = (self.geometry.width, self.threshold.format());
+        if format != PixelFormat::Rgb565 && !width.is_multiple_of(2) {
+            return Err(SettingsError::OddWidth(width, format));
+        }
         if self.geometry.is_sound() {
             Ok(())
         } else {
@@ -114,6 +120,11 @@ impl fmt::Display for SettingsError {
         match self {
             SettingsError::Scan(error) => error.fmt(f),
             SettingsError::Threshold(error) => error.fmt(f),
+            SettingsError::OddWidth(width, format) => write!(
+                f,
+                "frame width {width} is odd, and {} has pixels in pairs: use an even width",
+                format.name()
+            ),
             SettingsError::Geometry => f.write_str(
                 "the focal length and all measures of markers and film must be positive and at most a metre, \
                  and a marker no wider than its distance from the axis",

@@ -1,7 +1,124 @@
-//! HSV box threshold: which colours a marker may have. `tables` compiles one to a look-up table.
+//! Thresholds: which pixels a marker may have, for each pixel format. `tables` compiles an HSV box to a look-up table.
 
-use crate::hsv::Hsv;
+use crate::{
+    formats::{Mono, Yuv422},
+    hsv::Hsv,
+};
 use core::fmt;
+
+/// What a pixel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PixelFormat {
+    /// 16 bits: red in bits 15–11, green in 10–5, blue in 4–0.
+    Rgb565,
+    /// Pairs of pixels in the byte order Y0 Cb Y1 Cr.
+    Yuv422,
+    /// A byte a pixel: its luma.
+    Mono,
+}
+
+impl PixelFormat {
+    /// All formats, in the order in which the model file numbers them.
+    pub const ALL: [PixelFormat; 3] = [PixelFormat::Rgb565, PixelFormat::Yuv422, PixelFormat::Mono];
+
+    /// Its name in files and on command lines: `rgb565`, `yuv422` or `mono`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            PixelFormat::Rgb565 => "rgb565",
+            PixelFormat::Yuv422 => "yuv422",
+            PixelFormat::Mono => "mono",
+        }
+    }
+
+    /// `u16`s of a row of `width` pixels.
+    pub const fn row_length(self, width: u16) -> usize {
+        match self {
+            PixelFormat::Rgb565 | PixelFormat::Yuv422 => width as usize,
+            PixelFormat::Mono => width.div_ceil(2) as usize,
+        }
+    }
+}
+
+/// Which pixels a marker may have, and with that what a pixel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Threshold {
+    /// A box of colours.
+    Rgb565(HsvBox),
+    /// A least Cr.
+    Yuv422(Yuv422),
+    /// Limits of the luma.
+    Mono(Mono),
+}
+
+impl Threshold {
+    /// The default for red markers on grey film.
+    pub const fn red(format: PixelFormat) -> Threshold {
+        match format {
+            PixelFormat::Rgb565 => Threshold::Rgb565(HsvBox::RED),
+            PixelFormat::Yuv422 => Threshold::Yuv422(Yuv422::RED),
+            PixelFormat::Mono => Threshold::Mono(Mono::DARK),
+        }
+    }
+
+    /// What a pixel is.
+    pub const fn format(&self) -> PixelFormat {
+        match self {
+            Threshold::Rgb565(_) => PixelFormat::Rgb565,
+            Threshold::Yuv422(_) => PixelFormat::Yuv422,
+            Threshold::Mono(_) => PixelFormat::Mono,
+        }
+    }
+
+    /// Of its six numbers, as files have them: those of [`HsvBox::limits`]; a least Cr and zeros; or lowest and highest
+    /// luma and zeros.
+    ///
+    /// # Errors
+    /// Those of [`check`](Self::check), or a number that is not zero though the format has none there.
+    pub const fn of_limits(
+        format: PixelFormat,
+        limits: [u8; 6],
+    ) -> Result<Threshold, ThresholdError> {
+        let threshold = match (format, limits) {
+            (PixelFormat::Rgb565, limits) => Threshold::Rgb565(HsvBox::of_limits(limits)),
+            (PixelFormat::Yuv422, [cr_low, 0, 0, 0, 0, 0]) => Threshold::Yuv422(Yuv422 { cr_low }),
+            (PixelFormat::Mono, [low, high, 0, 0, 0, 0]) => Threshold::Mono(Mono { low, high }),
+            (format, _) => return Err(ThresholdError::NotZero(format)),
+        };
+        match threshold.check() {
+            Ok(()) => Ok(threshold),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Its six numbers, as [`of_limits`](Self::of_limits) takes them.
+    pub const fn limits(&self) -> [u8; 6] {
+        match *self {
+            Threshold::Rgb565(hsv_box) => hsv_box.limits(),
+            Threshold::Yuv422(Yuv422 { cr_low }) => [cr_low, 0, 0, 0, 0, 0],
+            Threshold::Mono(Mono { low, high }) => [low, high, 0, 0, 0, 0],
+        }
+    }
+
+    /// Says whether it means something.
+    ///
+    /// # Errors
+    /// Those of [`HsvBox::check`], or a lowest luma above the highest.
+    pub const fn check(&self) -> Result<(), ThresholdError> {
+        match *self {
+            Threshold::Rgb565(hsv_box) => hsv_box.check(),
+            Threshold::Mono(Mono { low, high }) if low > high => {
+                Err(ThresholdError::LumaEmpty { low, high })
+            }
+            Threshold::Yuv422(_) | Threshold::Mono(_) => Ok(()),
+        }
+    }
+}
+
+impl From<HsvBox> for Threshold {
+    fn from(hsv_box: HsvBox) -> Threshold {
+        Threshold::Rgb565(hsv_box)
+    }
+}
 
 /// An inclusive box in OpenCV's 8-bit HSV (H 0–179). `hue_low > hue_high` wraps through 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -108,7 +225,7 @@ impl HsvBox {
     }
 }
 
-/// Why a box cannot be a threshold.
+/// Why numbers cannot be a threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ThresholdError {
     /// This hue is above 179: OpenCV's 8-bit hue counts steps of two degrees.
@@ -127,6 +244,15 @@ pub enum ThresholdError {
         /// Highest value.
         high: u8,
     },
+    /// The lowest luma is above the highest: no pixel would pass.
+    LumaEmpty {
+        /// Lowest luma.
+        low: u8,
+        /// Highest luma.
+        high: u8,
+    },
+    /// Of the six numbers of a file, those that this format does not use must be zero.
+    NotZero(PixelFormat),
 }
 
 impl fmt::Display for ThresholdError {
@@ -145,6 +271,14 @@ impl fmt::Display for ThresholdError {
             ThresholdError::ValueEmpty { low, high } => {
                 write!(f, "threshold value {low} to {high} is empty: swap the two")
             }
+            ThresholdError::LumaEmpty { low, high } => {
+                write!(f, "threshold luma {low} to {high} is empty: swap the two")
+            }
+            ThresholdError::NotZero(format) => write!(
+                f,
+                "a threshold of {} has fewer numbers than six: set the others to 0",
+                format.name()
+            ),
         }
     }
 }

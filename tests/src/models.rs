@@ -7,10 +7,10 @@ use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
     CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
-    OUTPUTS, Origin, OutputKind, PixelFormat, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
+    OUTPUTS, Origin, OutputKind, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
 };
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::HsvBox;
+use hivtac_sensing::threshold::{PixelFormat, Threshold};
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
 
 use crate::pictures::Random;
@@ -58,23 +58,33 @@ pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> 
     encoded(&spec(qvga(), qvga_rest(), widths, weights, output, seed))
 }
 
-/// The same for redness-weighted centroids.
-pub fn weighted_file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> Vec<u8> {
+/// The same for weighted centroids, and for a pixel format with its usual threshold.
+pub fn weighted_file(
+    format: PixelFormat,
+    widths: &[u16],
+    weights: Weights,
+    output: OutputKind,
+    seed: u64,
+) -> Vec<u8> {
     let mut spec = spec(qvga(), qvga_rest(), widths, weights, output, seed);
     spec.conditions.centroid = CentroidEstimator::RednessWeighted;
+    spec.conditions.threshold = Threshold::red(format);
     encoded(&spec)
 }
 
-/// The same as [`file`] for frames of another geometry, with the rest position that they show.
+/// The same as [`file`] for frames of another geometry and pixel format, with the rest position that they show.
 pub fn file_for(
     geometry: Geometry,
+    format: PixelFormat,
     rest: Rest,
     widths: &[u16],
     weights: Weights,
     output: OutputKind,
     seed: u64,
 ) -> Vec<u8> {
-    encoded(&spec(geometry, rest, widths, weights, output, seed))
+    let mut spec = spec(geometry, rest, widths, weights, output, seed);
+    spec.conditions.threshold = Threshold::red(format);
+    encoded(&spec)
 }
 
 /// A small model for frames that are looked at so, of which labels mean that.
@@ -180,8 +190,7 @@ fn conditions(geometry: Geometry) -> Conditions {
     Conditions {
         preset: Preset::Ov7725,
         geometry,
-        pixel_format: PixelFormat::Rgb565,
-        threshold: HsvBox::RED,
+        threshold: Threshold::red(PixelFormat::Rgb565),
         dilations: 1,
         centroid: CentroidEstimator::BinaryMask,
         contact: ContactReading::Force,

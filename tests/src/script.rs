@@ -3,7 +3,7 @@
 use std::vec::Vec;
 
 use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 
 use crate::golden::Kind;
 
@@ -12,14 +12,16 @@ use crate::golden::Kind;
 pub struct Script {
     bytes: Vec<u8>,
     order: ByteOrder,
+    format: PixelFormat,
 }
 
 impl Script {
-    /// An empty script; pixels are `Native` until a threshold says otherwise.
+    /// An empty script; pixels are RGB565, `Native`, until a threshold says otherwise.
     pub fn new() -> Script {
         Script {
             bytes: Vec::new(),
             order: ByteOrder::Native,
+            format: PixelFormat::Rgb565,
         }
     }
 
@@ -42,34 +44,48 @@ impl Script {
         self
     }
 
-    /// Uses this threshold and byte order from here on.
-    pub fn threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
-        self.push_threshold(hsv_box, order, 0)
+    /// Uses this threshold, its pixel format and this byte order of RGB565 from here on.
+    pub fn threshold(&mut self, threshold: impl Into<Threshold>, order: ByteOrder) -> &mut Script {
+        self.push_threshold(threshold.into(), order, 0)
     }
 
     /// The same; the instruction counter counts what the table of 64 KiB takes.
-    pub fn counted_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
-        self.push_threshold(hsv_box, order, 4)
+    pub fn counted_threshold(
+        &mut self,
+        threshold: impl Into<Threshold>,
+        order: ByteOrder,
+    ) -> &mut Script {
+        self.push_threshold(threshold.into(), order, 4)
     }
 
     /// The same; from here on the pixels of scans are weighed, and so are those of frames sensed without a model.
-    pub fn weighted_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> &mut Script {
-        self.push_threshold(hsv_box, order, 2)
+    pub fn weighted_threshold(
+        &mut self,
+        threshold: impl Into<Threshold>,
+        order: ByteOrder,
+    ) -> &mut Script {
+        self.push_threshold(threshold.into(), order, 2)
     }
 
-    fn push_threshold(&mut self, hsv_box: &HsvBox, order: ByteOrder, flags: u8) -> &mut Script {
-        self.order = order;
+    fn push_threshold(
+        &mut self,
+        threshold: Threshold,
+        order: ByteOrder,
+        flags: u8,
+    ) -> &mut Script {
+        (self.order, self.format) = (order, threshold.format());
+        let number = PixelFormat::ALL.iter().position(|it| *it == self.format);
+        let flags = flags | u8::from(order == ByteOrder::Swapped);
         self.bytes.push(Kind::Threshold as u8);
-        self.bytes
-            .push(u8::from(order == ByteOrder::Swapped) | flags);
-        self.bytes.extend(hsv_box.limits());
+        self.bytes.push(flags | (number.unwrap_or(0) as u8) << 3);
+        self.bytes.extend(threshold.limits());
         self
     }
 
-    /// Scans a frame of `width` columns into blobs. Pixels have red in bits 15–11, whatever the byte order.
+    /// Scans a frame of `width` columns into blobs. Pixels of RGB565 have red in bits 15–11, whatever the byte order.
     pub fn scan(&mut self, width: u16, pixels: &[u16], dilations: u8, min_area: u8) -> &mut Script {
         self.bytes.push(Kind::Scan as u8);
-        self.put(&[width, rows(width, pixels)]);
+        self.put(&[width, self.rows(width, pixels)]);
         self.bytes.extend([dilations, min_area]);
         self.frame(pixels);
         self
@@ -77,12 +93,12 @@ impl Script {
 
     /// Runs frames of one size, `width` columns each, through the whole pipeline. Pixels as in [`scan`](Self::scan).
     pub fn sense(&mut self, width: u16, frames: &[&[u16]]) -> &mut Script {
-        let height = frames.first().map_or(0, |pixels| rows(width, pixels));
+        let height = frames.first().map_or(0, |pixels| self.rows(width, pixels));
         let count = u16::try_from(frames.len()).expect("at most 65,535 frames");
         self.bytes.push(Kind::Sense as u8);
         self.put(&[width, height, count]);
         for pixels in frames {
-            assert_eq!(rows(width, pixels), height, "frames of one size");
+            assert_eq!(self.rows(width, pixels), height, "frames of one size");
             self.frame(pixels);
         }
         self
@@ -101,13 +117,13 @@ impl Script {
     }
 
     fn push_windows(&mut self, width: u16, frames: &[&[u16]], how: u8) -> &mut Script {
-        let height = frames.first().map_or(0, |pixels| rows(width, pixels));
+        let height = frames.first().map_or(0, |pixels| self.rows(width, pixels));
         let count = u16::try_from(frames.len()).expect("at most 65,535 frames");
         self.bytes.push(Kind::Windows as u8);
         self.put(&[width, height, count]);
         self.bytes.push(how);
         for pixels in frames {
-            assert_eq!(rows(width, pixels), height, "frames of one size");
+            assert_eq!(self.rows(width, pixels), height, "frames of one size");
             self.frame(pixels);
         }
         self
@@ -131,9 +147,18 @@ impl Script {
         self
     }
 
+    fn rows(&self, width: u16, pixels: &[u16]) -> u16 {
+        let length = self.format.row_length(width);
+        assert_eq!(pixels.len() % length, 0, "whole rows");
+        u16::try_from(pixels.len() / length).expect("at most 65,535 rows")
+    }
+
     fn frame(&mut self, pixels: &[u16]) {
-        // As they lie in memory: swapping is its own inverse.
-        let order = self.order;
+        // As they lie in memory: swapping is its own inverse. Other formats have one order.
+        let order = match self.format {
+            PixelFormat::Rgb565 => self.order,
+            PixelFormat::Yuv422 | PixelFormat::Mono => ByteOrder::Native,
+        };
         self.put(
             &pixels
                 .iter()
@@ -163,9 +188,4 @@ pub fn features(numbers: [i64; FEATURES]) -> Features {
         rect_center: (px(8), px(9)),
         rect_area: numbers[10],
     }
-}
-
-fn rows(width: u16, pixels: &[u16]) -> u16 {
-    assert_eq!(pixels.len() % usize::from(width), 0, "whole rows");
-    u16::try_from(pixels.len() / usize::from(width)).expect("at most 65,535 rows")
 }

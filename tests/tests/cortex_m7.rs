@@ -1,8 +1,9 @@
 //! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
 
-use hivtac_scene::{Load, Options, Preset, Scene};
+use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_sensing::formats::{Mono, Yuv422};
 use hivtac_sensing::model::OutputKind;
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu;
@@ -20,7 +21,7 @@ fn same_on_both(script: &Script) -> String {
 }
 
 fn red(script: &mut Script, order: ByteOrder) {
-    script.threshold(&HsvBox::RED, order);
+    script.threshold(HsvBox::RED, order);
 }
 
 fn loads() -> Vec<Load> {
@@ -50,6 +51,7 @@ fn frames_of_the_scene_give_the_same_forces() {
         }
     }
     script.model(&models::weighted_file(
+        PixelFormat::Rgb565,
         &[11, 64, 64, 3],
         Weights::Random,
         OutputKind::ForceVector,
@@ -106,7 +108,7 @@ fn frames_without_a_force_give_the_same_reasons() {
 #[test]
 fn blobs_of_extreme_pictures_are_the_same() {
     let mut script = Script::new();
-    script.weighted_threshold(&HsvBox::RED, ByteOrder::Native);
+    script.weighted_threshold(HsvBox::RED, ByteOrder::Native);
     for (width, height) in [
         (320, 240),
         (800, 600),
@@ -148,13 +150,84 @@ fn every_pixel_value_passes_the_same_thresholds() {
     let mut script = Script::new();
     for hsv_box in [HsvBox::RED, narrow] {
         for order in [ByteOrder::Native, ByteOrder::Swapped] {
-            script.threshold(&hsv_box, order);
+            script.threshold(hsv_box, order);
             for half in values.chunks(256 * 128) {
                 script.scan(256, half, 0, 1);
             }
         }
     }
     same_on_both(&script);
+}
+
+#[test]
+fn other_formats_pass_the_same_thresholds() {
+    let thresholds = [0, 1, 127, 128, 162, 254, 255]
+        .map(|cr_low| Threshold::Yuv422(Yuv422 { cr_low }))
+        .into_iter()
+        .chain(
+            [(0, 88), (0, 0), (0, 255), (255, 255), (36, 141), (128, 129)]
+                .map(|(low, high)| Threshold::Mono(Mono { low, high })),
+        );
+    let mut script = Script::new();
+    // Every byte in every place of a word of pixels, then anything; rows with whole words of the mask and with parts.
+    let places = (0..4).flat_map(|place| (0..256_u32).map(move |byte| byte << (8 * place)));
+    let every: Vec<u16> = places
+        .chain((0..1024).map(|i| i * 0x0101_0101))
+        .flat_map(|word| [word as u16, (word >> 16) as u16])
+        .collect();
+    for threshold in thresholds {
+        script.weighted_threshold(threshold, ByteOrder::Native);
+        let words = |width: u16| threshold.format().row_length(width);
+        script.scan(64, &every, 0, 1);
+        for width in (2..=136).step_by(2).chain([320, 638, 640, 798, 800]) {
+            let noise = pictures::noise(width, 3, u64::from(width));
+            script.scan(width, &noise[..3 * words(width)], 0, 1);
+        }
+        for pixel in [0, 0xffff, 0xff00, 0x00ff] {
+            let plain = pictures::plain(320, 240, pixel);
+            script.scan(320, &plain[..240 * words(320)], 1, 1);
+        }
+    }
+    same_on_both(&script);
+}
+
+#[test]
+fn frames_in_other_formats_give_the_same_forces() {
+    let mut script = Script::new();
+    let formats = [
+        (Format::Yuv422, PixelFormat::Yuv422),
+        (Format::Mono, PixelFormat::Mono),
+    ];
+    for (rendered, format) in formats {
+        let options = Options {
+            format: rendered,
+            ..Options::default()
+        };
+        let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
+        let scene = scene.with_options(options).unwrap();
+        let frames: Vec<_> = (0..)
+            .zip(loads())
+            .map(|(number, load)| {
+                let frame = scene.render_load(&load, number).unwrap();
+                frame.words().into_owned()
+            })
+            .collect();
+        let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
+        let (widths, weights) = (&[11, 64, 64, 3], Weights::Random);
+        let output = OutputKind::ForceVector;
+        script.model(&models::weighted_file(format, widths, weights, output, 3));
+        script.threshold(Threshold::red(format), ByteOrder::Swapped);
+        script.sense(320, &frames);
+        script.windows(320, &frames, false);
+        script.windows(320, &frames, true);
+        // A model of one format does not measure frames of another.
+        script.model(&models::file(widths, weights, output, 3));
+        script.sense(320, &frames);
+    }
+    let text = same_on_both(&script);
+    let count = |what: &str| text.lines().filter(|line| line.contains(what)).count();
+    assert_eq!(count("force: Some"), 2 * 3 * loads().len(), "{text}");
+    assert_eq!(count("force: None"), 2 * loads().len(), "{text}");
 }
 
 #[test]

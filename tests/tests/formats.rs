@@ -45,12 +45,10 @@ fn yuv422_and_mono_show_the_same_markers() {
     for newtons in [0.0, 0.05, 0.2] {
         let load = Load::from_angles(newtons, 4.0, -3.0).unwrap();
         let yuv = frame(Format::Yuv422, &load);
-        let error = worst_error(&Yuv422 { cr_low: 160 }, &yuv.pixels, &yuv);
+        let error = worst_error(&Yuv422::RED, &yuv.pixels, &yuv);
         assert!(error < 0.5, "YUV422 at {newtons} N: {error} px");
         let mono = frame(Format::Mono, &load);
-        let pairs = mono.mono.as_chunks::<2>().0.iter();
-        let words: Vec<u16> = pairs.map(|pair| u16::from_le_bytes(*pair)).collect();
-        let error = worst_error(&Mono { low: 10, high: 100 }, &words, &mono);
+        let error = worst_error(&Mono::DARK, &mono.words(), &mono);
         assert!(error < 0.15, "mono at {newtons} N: {error} px");
     }
 }

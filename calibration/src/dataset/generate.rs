@@ -9,7 +9,7 @@ use hivtac_sensing::geometry::Geometry;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_sensing::threshold::{ByteOrder, Threshold};
 use rayon::prelude::*;
 
 use super::{Dataset, Observation, Recipe, Row};
@@ -66,6 +66,7 @@ fn unmodelled_sensor(recipe: &Recipe) -> Result<Box<Sensor<'static>>> {
     let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
     let mut sensor = Box::new(Sensor::new());
     let settings = Settings {
+        threshold: Threshold::red(recipe.format.to_model()),
         centroid: recipe.centroid.to_model(),
         ..Settings::usual(geometry, ByteOrder::Native)
     };
@@ -78,9 +79,7 @@ fn unmodelled_sensor(recipe: &Recipe) -> Result<Box<Sensor<'static>>> {
 /// Shows a frame to a sensor.
 pub(crate) fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
     sensor.begin_frame();
-    for row in frame.pixels.chunks(frame.width as usize) {
-        sensor.push_row(row);
-    }
+    sensor.push_rows(&frame.words());
     sensor.finish_frame()
 }
 

@@ -174,6 +174,7 @@ impl Dataset {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conditions::PixelName;
     use hivtac_sensing::geometry::Preset;
 
     pub(super) fn example() -> Dataset {
@@ -182,7 +183,7 @@ mod tests {
             areas_px: [200; 4],
         };
         let about = About {
-            conditions: Conditions::simulated(Preset::Ov7725, 320, 240),
+            conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565),
             scene: "made up".into(),
             loads: Loads::Random(2),
             rest: 2,

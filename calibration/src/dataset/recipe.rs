@@ -1,13 +1,13 @@
 //! What a data set shows: camera, sessions, loads.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_scene::{Contact, Load, Options, Preset as ScenePreset, Scene};
+use hivtac_scene::{Contact, Format, Load, Options, Preset as ScenePreset, Scene};
 use hivtac_sensing::geometry::Preset;
 use serde::{Deserialize, Serialize};
 
 use super::session::{Session, Spread};
 use super::{About, Place};
-use crate::conditions::{CentroidName, Conditions, ContactName};
+use crate::conditions::{CentroidName, Conditions, ContactName, PixelName};
 use crate::loads::{KnownLoads, PaperPoses, RandomLoads};
 use crate::weights::Range;
 
@@ -34,6 +34,8 @@ pub struct Recipe {
     pub width: u16,
     /// Rows of a frame.
     pub height: u16,
+    /// What a pixel is.
+    pub format: PixelName,
     /// How markers' positions are taken.
     pub centroid: CentroidName,
     /// What the loads' labels mean.
@@ -60,6 +62,7 @@ impl Default for Recipe {
             preset: Preset::Ov7725,
             width: 320,
             height: 240,
+            format: PixelName::Rgb565,
             centroid: CentroidName::RednessWeighted,
             contact: Contact::Force,
             loads: Loads::Random(40_000),
@@ -141,6 +144,11 @@ impl Recipe {
         let session = Session::numbered(session, self.seed, &self.spread);
         let mut options = session.options(self.width);
         options.film.contact = self.contact;
+        options.format = match self.format {
+            PixelName::Rgb565 => Format::Rgb565,
+            PixelName::Yuv422 => Format::Yuv422,
+            PixelName::Mono => Format::Mono,
+        };
         Ok(scene.with_options(options)?)
     }
 
@@ -183,7 +191,7 @@ impl Recipe {
             conditions: Conditions {
                 centroid: self.centroid,
                 contact: ContactName(self.contact),
-                ..Conditions::simulated(self.preset, self.width, self.height)
+                ..Conditions::simulated(self.preset, self.width, self.height, self.format)
             },
             scene: format!(
                 "reduced film, gain {}, falloff {}, noise {} of 255 levels",

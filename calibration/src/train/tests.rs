@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::mlp::Mlp;
 use super::*;
-use crate::conditions::Conditions;
+use crate::conditions::{Conditions, PixelName};
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
 use crate::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
@@ -17,7 +17,7 @@ const ROWS: usize = 200;
 fn weights(network: Network) -> Weights {
     Weights {
         format: Weights::format(),
-        conditions: Conditions::simulated(Preset::Ov7725, 320, 240),
+        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565),
         rest: Rest {
             features_q16: [1 << 20; INPUTS],
             areas_px: [200; 4],

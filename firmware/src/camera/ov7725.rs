@@ -8,6 +8,7 @@ use embassy_stm32::i2c::{self, I2c, Master};
 use embassy_stm32::mode::Blocking;
 use embassy_time::{Duration, Timer};
 use hivtac_sensing::geometry::Preset;
+use hivtac_sensing::threshold::PixelFormat;
 
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";
@@ -17,6 +18,9 @@ pub const PRESET: Preset = Preset::Ov7725;
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
+
+/// What its pixels are.
+pub const FORMAT: PixelFormat = PixelFormat::Rgb565;
 
 /// Time from frame to frame: 278 lines of 576 pixels of two bytes, one byte per PCLK; PCLK = XCLK as configured.
 pub const FRAME_TIME: Duration = Duration::from_micros(278 * 576 * 2 * 1_000_000 / XCLK_HZ as u64);

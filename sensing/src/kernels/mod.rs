@@ -91,6 +91,28 @@ pub fn threshold_bytes_down(
     portable::threshold_bytes_down(table, pixels, pixel_step, mask, mask_step);
 }
 
+/// The mask of a row of YUV422 by its Cr: see `portable::threshold_cr`.
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) {
+    #[cfg(armv7em)]
+    let done = cortex_m7::threshold_cr(low, row, mask);
+    #[cfg(not(armv7em))]
+    let done = 0;
+    if done < mask.len() {
+        portable::threshold_cr(low, row, mask, done);
+    }
+}
+
+/// The mask of a row of mono pixels: see `portable::threshold_luma`.
+pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) {
+    #[cfg(armv7em)]
+    let done = cortex_m7::threshold_luma(low, span, row, mask);
+    #[cfg(not(armv7em))]
+    let done = 0;
+    if done < mask.len() {
+        portable::threshold_luma(low, span, row, mask, done);
+    }
+}
+
 /// The mask of a row of pixels through a table of bits: see `portable::threshold_bits`.
 pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32]) {
     #[cfg(armv7em)]

@@ -79,6 +79,33 @@ pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32], first:
     pack(row, mask, first, |bits, raw| bits >> 1 | rotated(raw) << 31);
 }
 
+/// The mask of a row of YUV422 (Y0 Cb Y1 Cr): bits 2·i and 2·i + 1 of a word are set where Cr of its pair i is at least
+/// `low`. `mask` has ⌈pixels / 32⌉ words; bits beyond the row, and of a pixel without its pair, become unset. Starts with
+/// word `first`.
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32], first: usize) {
+    for (word, pixels) in mask.iter_mut().zip(row.chunks(32)).skip(first) {
+        let pairs = (0..).zip(pixels.chunks_exact(2));
+        *word = pairs.fold(0, |bits, (i, pair)| {
+            let inside = (pair[1] >> 8) as u8 >= low;
+            bits | (3 * u32::from(inside)) << (2 * i)
+        });
+    }
+}
+
+/// The mask of a row of mono pixels, two in a `u16`: a bit is set where its pixel is `low` to `low + span`, counted modulo
+/// 256. `mask` has ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
+pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32], first: usize) {
+    for (word, pairs) in mask.iter_mut().zip(row.chunks(16)).skip(first) {
+        *word = (0..).zip(pairs).fold(0, |bits, (i, pair)| {
+            let inside = pair
+                .to_le_bytes()
+                .map(|luma| luma.wrapping_sub(low) <= span);
+            let [left, right] = inside.map(u32::from);
+            bits | (left | right << 1) << (2 * i)
+        });
+    }
+}
+
 /// Makes each word of `mask`, from word `first` on, of 32 pixels by shifting them in from the top; a shorter last word is
 /// moved down.
 #[inline(always)]

@@ -2,11 +2,11 @@
 
 use super::{
     CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
-    Model, ModelError, Origin, OutputKind, PixelFormat, Rest, Uncertainty, WeightWidth,
+    Model, ModelError, Origin, OutputKind, Rest, Uncertainty, WeightWidth,
     layout::{CRC, HEADER_LENGTH, MAGIC, PACKING, VERSION, padded_name},
     packing::{LOADED_AHEAD, pack},
 };
-use crate::features::Features;
+use crate::{features::Features, threshold::PixelFormat};
 use alloc::vec::Vec;
 
 /// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
@@ -156,8 +156,10 @@ fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
     bytes.extend(geometry.film_distance.0.to_le_bytes());
     bytes.extend(conditions.threshold.limits());
     bytes.push(conditions.dilations);
-    bytes.push(match conditions.pixel_format {
+    bytes.push(match conditions.threshold.format() {
         PixelFormat::Rgb565 => 0,
+        PixelFormat::Yuv422 => 1,
+        PixelFormat::Mono => 2,
     });
     bytes.push(match conditions.centroid {
         CentroidEstimator::BinaryMask => 0,

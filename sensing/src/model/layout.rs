@@ -2,13 +2,13 @@
 
 use super::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, MAX_LAYERS,
-    Model, ModelError, Origin, OutputKind, PixelFormat, Rest, curves::closed_form, layers::layers,
+    Model, ModelError, Origin, OutputKind, Rest, curves::closed_form, layers::layers,
     reader::Reader, uncertainty::uncertainty,
 };
 use crate::{
     features::{FEATURES, Features},
     geometry::{Geometry, Preset},
-    threshold::HsvBox,
+    threshold::{PixelFormat, Threshold},
     units::{MicroNewtons, Micrometres, MilliDegrees, Px},
 };
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -132,12 +132,16 @@ fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
 }
 
 fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
+    let (preset, geometry) = (preset(reader)?, geometry(reader)?);
+    let threshold_at = reader.offset;
+    let limits = reader.array()?;
+    let dilations = reader.u8_in("dilations", 3, "0 to 3")?;
+    let format = reader.choice("pixel format", &PixelFormat::ALL, "0, 1 or 2")?;
     Ok(Conditions {
-        preset: preset(reader)?,
-        geometry: geometry(reader)?,
-        threshold: threshold(reader)?,
-        dilations: reader.u8_in("dilations", 3, "0 to 3")?,
-        pixel_format: reader.choice("pixel format", &[PixelFormat::Rgb565], "0")?,
+        preset,
+        geometry,
+        threshold: threshold(format, limits, threshold_at)?,
+        dilations,
         centroid: reader.choice(
             "centroid estimator",
             &[
@@ -204,24 +208,20 @@ pub(super) fn padded_name(preset: Preset) -> [u8; NAME_LENGTH] {
     padded
 }
 
-fn threshold(reader: &mut Reader<'_>) -> Result<HsvBox, ModelError> {
-    let offset = reader.offset;
-    let threshold = HsvBox {
-        hue_low: reader.u8()?,
-        hue_high: reader.u8()?,
-        saturation_low: reader.u8()?,
-        saturation_high: reader.u8()?,
-        value_low: reader.u8()?,
-        value_high: reader.u8()?,
+fn threshold(format: PixelFormat, limits: [u8; 6], offset: usize) -> Result<Threshold, ModelError> {
+    let allowed = match format {
+        PixelFormat::Rgb565 => {
+            "hues of 0 to 179, and no lowest saturation or value above the highest"
+        }
+        PixelFormat::Yuv422 => "a lowest Cr and five zeros",
+        PixelFormat::Mono => "a lowest luma not above the highest, and four zeros",
     };
-    let allowed = "hues of 0 to 179, and no lowest saturation or value above the highest";
     let wrong = ModelError::Field {
         name: "threshold",
         offset,
         allowed,
     };
-    threshold.check().map_err(|_| wrong)?;
-    Ok(threshold)
+    Threshold::of_limits(format, limits).map_err(|_| wrong)
 }
 
 fn origin(reader: &mut Reader<'_>) -> Result<Origin, ModelError> {

@@ -38,7 +38,7 @@ use crate::{
     features::{FEATURES, Features},
     geometry::{Geometry, Preset},
     markers::pattern::{Pattern, distance},
-    threshold::HsvBox,
+    threshold::Threshold,
     units::{MicroNewtons, MilliDegrees, Px},
 };
 use core::fmt::Write;
@@ -81,10 +81,8 @@ pub struct Conditions {
     pub preset: Preset,
     /// Lens, frame and markers.
     pub geometry: Geometry,
-    /// What a pixel is.
-    pub pixel_format: PixelFormat,
-    /// The threshold that made the mask.
-    pub threshold: HsvBox,
+    /// The threshold that made the mask, and with that the pixel format.
+    pub threshold: Threshold,
     /// 3×3 dilations of the mask, 0–3.
     pub dilations: u8,
     /// How a marker's position is taken from its pixels.
@@ -95,19 +93,15 @@ pub struct Conditions {
     pub origin: Origin,
 }
 
-/// What a pixel is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum PixelFormat {
-    /// 16 bits: red in bits 15–11, green in 10–5, blue in 4–0.
-    Rgb565,
-}
-
 /// How a marker's position is taken from its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CentroidEstimator {
     /// The mean of its pixels in the mask (the paper's).
     BinaryMask,
-    /// The mean of the same pixels, each weighted with its [`redness`](crate::tables::redness).
+    /// The mean of the same pixels, each weighted with how much of it a marker covers ([`Pixels::weight`]): by the
+    /// [`redness`](crate::tables::redness) of RGB565, the Cr of YUV422, the luma of mono.
+    ///
+    /// [`Pixels::weight`]: crate::tables::Pixels::weight
     RednessWeighted,
 }
 

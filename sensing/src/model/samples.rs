@@ -2,6 +2,8 @@
 
 use super::encode::{LayerSpec, ModelSpec};
 use super::*;
+use crate::formats::{Mono, Yuv422};
+use crate::threshold::HsvBox;
 use crate::units::{Micrometres, Px};
 
 /// A model of these layer widths whose values all lie in range and differ from each other.
@@ -20,8 +22,7 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
         conditions: Conditions {
             preset: Preset::Ov7725,
             geometry: Geometry::preset(Preset::Ov7725, 320, 240),
-            pixel_format: PixelFormat::Rgb565,
-            threshold: HsvBox::RED,
+            threshold: HsvBox::RED.into(),
             dilations: 1,
             centroid: CentroidEstimator::BinaryMask,
             contact: ContactReading::Force,
@@ -136,9 +137,18 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
     c.geometry.marker_radius = Micrometres(1000 + next() % 999_001);
     c.geometry.film_distance = Micrometres(1 + next() % 1_000_000);
     c.dilations = (next() % 4) as u8;
-    c.threshold.hue_low = (next() % 180) as u8;
-    c.threshold.value_low = next() as u8;
-    c.threshold.value_high = c.threshold.value_low.saturating_add(next() as u8);
+    let low = next() as u8;
+    let high = low.saturating_add(next() as u8);
+    c.threshold = [
+        Threshold::Rgb565(HsvBox {
+            hue_low: (next() % 180) as u8,
+            value_low: low,
+            value_high: high,
+            ..HsvBox::RED
+        }),
+        Threshold::Yuv422(Yuv422 { cr_low: low }),
+        Threshold::Mono(Mono { low, high }),
+    ][next() as usize % 3];
     for (x, y) in &mut spec.rest.features.centroids {
         (*x, *y) = (Px((next() >> 7) as i32), Px((next() >> 7) as i32));
     }

@@ -39,7 +39,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 
     fn find_cropped(&mut self, window: &Rectangle) -> Result<Found, Status> {
         let settings = self.settings.scan();
-        let scan = self.scanner.finish(&self.table);
+        let scan = self.scanner.finish(&self.pixels);
         if scan.status != Status::OK {
             return Err(scan.status);
         }

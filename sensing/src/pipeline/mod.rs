@@ -10,6 +10,7 @@ use crate::{
     blob::Blob,
     features::Features,
     force::Force,
+    formats::Formats,
     geometry::{Geometry, Preset},
     markers::{Finder, Found, Marker, Trust},
     model::{CentroidEstimator, ContactReading, Model, Rest},
@@ -18,7 +19,7 @@ use crate::{
     settings::{Settings, SettingsError},
     status::Status,
     tables::{ByteTable, Table},
-    threshold::{ByteOrder, HsvBox, ThresholdError},
+    threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError},
     windows::coarse_step,
 };
 use ahead::Ahead;
@@ -39,7 +40,7 @@ pub struct Measurement {
 /// A frame has more set pixels than one in this many: no four dots look like that.
 const SATURATED_PART: u32 = 2;
 
-/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels up in a `T`.
+/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565 up in a `T`.
 ///
 /// It holds all its storage, about 74 KiB and the table (64 KiB, or 8 as a [`BitTable`](crate::tables::BitTable)), so build it where it shall stay: in a `static` as [`Sensor::new`], which is
 /// `const`, and then [`configure`](Self::configure) it in place; nothing large crosses the stack.
@@ -50,7 +51,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
     model: Option<Model<'m>>,
     tare: Option<Rest>,
-    table: T,
+    pixels: Formats<T>,
     scanner: Scanner<BLOBS>,
     network: Network,
     /// `None` until it is configured.
@@ -76,7 +77,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Sensor {
             settings: Settings {
                 geometry: Geometry::preset(Preset::Ov7725, 320, 240),
-                threshold: HsvBox::RED,
+                threshold: Threshold::red(PixelFormat::Rgb565),
                 byte_order: ByteOrder::Swapped,
                 dilations: 1,
                 min_area: 1,
@@ -84,7 +85,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             },
             model: None,
             tare: None,
-            table: T::CLOSED,
+            pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
             prepared: None,
@@ -102,7 +103,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         model: Option<Model<'m>>,
     ) -> Result<(), SettingsError> {
         settings.check()?;
-        self.table
+        self.pixels
             .set(&settings.threshold, settings.byte_order)
             .map_err(SettingsError::Threshold)?;
         self.settings = settings;
@@ -123,7 +124,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     }
 
     /// The threshold in use.
-    pub fn threshold(&self) -> HsvBox {
+    pub fn threshold(&self) -> Threshold {
         self.settings.threshold
     }
 
@@ -131,9 +132,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// force then ([`Status::MODEL_MISMATCH`]).
     ///
     /// # Errors
-    /// A box that means nothing; the threshold is then unchanged.
-    pub fn set_threshold(&mut self, threshold: HsvBox) -> Result<(), ThresholdError> {
-        self.table.set(&threshold, self.settings.byte_order)?;
+    /// A threshold that means nothing; it is then unchanged.
+    pub fn set_threshold(&mut self, threshold: Threshold) -> Result<(), ThresholdError> {
+        self.pixels.set(&threshold, self.settings.byte_order)?;
         self.settings.threshold = threshold;
         self.prepare();
         Ok(())
@@ -174,15 +175,15 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.ahead = Ahead::Nothing;
     }
 
-    /// Takes the next row of pixels, as they lie in memory: one `u16` a pixel, exactly the frame's width.
+    /// Takes the next row of pixels, as they lie in memory: a `u16` for each, or for two of mono.
     pub fn push_row(&mut self, row: &[u16]) {
-        self.scanner.push_row(&self.table, row);
+        self.scanner.push_row(&self.pixels, row);
         self.look_ahead();
     }
 
     /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than one by one.
     pub fn push_rows(&mut self, rows: &[u16]) {
-        self.scanner.push_rows(&self.table, rows);
+        self.scanner.push_rows(&self.pixels, rows);
         self.look_ahead();
     }
 
@@ -273,7 +274,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     fn end_scan(&mut self) -> Result<(), Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
-        let scan = self.scanner.finish(&self.table);
+        let scan = self.scanner.finish(&self.pixels);
         if scan.status != Status::OK {
             return Err(scan.status);
         }

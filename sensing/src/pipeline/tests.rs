@@ -1,7 +1,9 @@
 use super::*;
 use crate::{
+    formats::Mono,
     model::{Origin, encode::ModelSpec, samples::spec},
     picture::{GREY, Pattern, Picture, RED, rest_of, sensor, tared},
+    threshold::HsvBox,
     units::{MicroNewtons, Micrometres, Px},
 };
 use proptest::prelude::*;
@@ -175,9 +177,17 @@ fn a_calibrated_unit_is_not_called_simulated() {
 #[test]
 fn other_conditions_than_the_models_give_no_force() {
     type Edit = fn(&mut ModelSpec);
-    let edits: [Edit; 5] = [
+    let edits: [Edit; 7] = [
         |spec| spec.conditions.dilations = 2,
-        |spec| spec.conditions.threshold.value_low += 1,
+        |spec| {
+            let value_low = HsvBox::RED.value_low + 1;
+            spec.conditions.threshold = Threshold::Rgb565(HsvBox {
+                value_low,
+                ..HsvBox::RED
+            });
+        },
+        |spec| spec.conditions.threshold = Threshold::red(PixelFormat::Yuv422),
+        |spec| spec.conditions.threshold = Threshold::red(PixelFormat::Mono),
         |spec| spec.conditions.geometry.height = 239,
         |spec| spec.conditions.geometry.focal.0 += 1,
         |spec| spec.conditions.geometry.marker_diameter.0 += 1,
@@ -197,10 +207,10 @@ fn a_new_threshold_mismatches_until_it_is_set_back() {
         |_| {},
         |sensor| {
             let usual = sensor.threshold();
-            let darker = HsvBox {
+            let darker = Threshold::Rgb565(HsvBox {
                 value_low: 40,
-                ..usual
-            };
+                ..HsvBox::RED
+            });
             sensor.set_threshold(darker).unwrap();
             assert_eq!(sensor.threshold(), darker);
             assert!(
@@ -211,10 +221,10 @@ fn a_new_threshold_mismatches_until_it_is_set_back() {
             );
             assert!(
                 sensor
-                    .set_threshold(HsvBox {
+                    .set_threshold(Threshold::Rgb565(HsvBox {
                         hue_low: 180,
-                        ..usual
-                    })
+                        ..HsvBox::RED
+                    }))
                     .is_err()
             );
             assert_eq!(
@@ -257,9 +267,21 @@ fn wrong_settings_are_refused_and_change_nothing() {
             ..before
         },
         Settings {
-            threshold: HsvBox {
+            threshold: Threshold::Rgb565(HsvBox {
                 hue_low: 200,
                 ..HsvBox::RED
+            }),
+            ..before
+        },
+        Settings {
+            threshold: Threshold::Mono(Mono { low: 9, high: 8 }),
+            ..before
+        },
+        Settings {
+            threshold: Threshold::red(PixelFormat::Yuv422),
+            geometry: Geometry {
+                width: 319,
+                ..GEOMETRY
             },
             ..before
         },

@@ -46,7 +46,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// The table, for what tests count in it.
     #[cfg(test)]
     pub(crate) fn table(&self) -> &T {
-        &self.table
+        self.pixels.table()
     }
 
     fn measure_all(&mut self, frame: &[u16]) -> Measurement {
@@ -56,14 +56,14 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     }
 
     fn find_coarsely(&mut self, frame: &[u16]) -> Option<Found> {
-        let frame = Frame::new(&self.table, frame, self.settings.scan())?;
+        let frame = Frame::new(&self.pixels, frame, self.settings.scan())?;
         let step = self.prepared.as_ref()?.coarse_step;
         let blobs = coarse_blobs(&mut self.scanner, &frame, step)?;
         self.markers_among(&blobs)
     }
 
     fn find_tracked(&mut self, tracks: &Tracks, frame: &[u16]) -> Option<Found> {
-        let frame = Frame::new(&self.table, frame, self.settings.scan())?;
+        let frame = Frame::new(&self.pixels, frame, self.settings.scan())?;
         let blobs = tracks.blobs(&mut self.scanner, &frame)?;
         let found = self.markers_among(&blobs)?;
         tracks.fit(&found.markers).then_some(found)

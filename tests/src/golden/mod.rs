@@ -12,14 +12,15 @@ use core::ops::Range;
 
 use hivtac_sensing::features::{FEATURES, Features};
 use hivtac_sensing::force::Polar;
+use hivtac_sensing::formats::Formats;
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{AlignedFile, CentroidEstimator, Model};
 use hivtac_sensing::network::Network;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tables::{BitTable, ByteTable, Pixels, Table};
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::tables::{BitTable, ByteTable, Pixels};
+use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees, Px};
 use hivtac_sensing::windows::Tracks;
 
@@ -61,7 +62,7 @@ pub struct Buffers<'b> {
 #[derive(Clone, Copy)]
 struct Look {
     order: ByteOrder,
-    hsv_box: HsvBox,
+    threshold: Threshold,
     weighted: bool,
 }
 
@@ -71,8 +72,8 @@ pub struct Runner<'b> {
     /// Where in its buffer the model file lies.
     model_place: Range<usize>,
     look: Look,
-    table: ByteTable,
-    small_table: BitTable,
+    pixels: Formats<ByteTable>,
+    slim_pixels: Formats<BitTable>,
     scanner: Scanner<BLOBS>,
     cases: u32,
 }
@@ -85,11 +86,11 @@ impl<'b> Runner<'b> {
             model_place: 0..0,
             look: Look {
                 order: ByteOrder::Native,
-                hsv_box: HsvBox::RED,
+                threshold: Threshold::red(PixelFormat::Rgb565),
                 weighted: false,
             },
-            table: ByteTable::CLOSED,
-            small_table: BitTable::CLOSED,
+            pixels: Formats::CLOSED,
+            slim_pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             cases: 0,
         }
@@ -137,14 +138,19 @@ impl<'b> Runner<'b> {
         } else {
             ByteOrder::Native
         };
-        self.look.hsv_box = HsvBox::of_limits(limits);
-        let Look { order, hsv_box, .. } = self.look;
+        let format = PixelFormat::ALL.get(usize::from(flags >> 3));
+        let format = *format.ok_or(ScriptError::Format(flags >> 3))?;
+        self.look.threshold =
+            Threshold::of_limits(format, limits).map_err(ScriptError::Threshold)?;
+        let Look {
+            order, threshold, ..
+        } = self.look;
         if flags & 4 != 0 {
             counting_begins();
         }
-        let set = self.table.set(&hsv_box, order);
+        let set = self.pixels.set(&threshold, order);
         counting_ends();
-        set.and_then(|()| self.small_table.set(&hsv_box, order))
+        set.and_then(|()| self.slim_pixels.set(&threshold, order))
             .map_err(ScriptError::Threshold)
     }
 
@@ -165,19 +171,20 @@ impl<'b> Runner<'b> {
             max_runs: u32::MAX,
         };
         self.scanner.begin(settings).map_err(ScriptError::Scan)?;
-        let (scanner, table) = (&mut self.scanner, &self.table);
+        let (scanner, pixels) = (&mut self.scanner, &self.pixels);
         let mut tables_agree = true;
-        for_each_row(source, self.buffers.row, [width, height], |row| {
+        let words = [pixels.row_length(width), height.into()];
+        for_each_row(source, self.buffers.row, words, |row| {
             counting_begins();
-            scanner.push_row(table, row);
+            scanner.push_row(pixels, row);
             counting_ends();
-            tables_agree &= masks_agree(row, (table, &self.small_table));
+            tables_agree &= masks_agree(row, width, (pixels, &self.slim_pixels));
         })?;
         if !tables_agree {
             return Err(ScriptError::TablesDiffer);
         }
         counting_begins();
-        let scan = scanner.finish(table);
+        let scan = scanner.finish(pixels);
         counting_ends();
         say(results, self.cases, format_args!("{scan:?}"))
     }
@@ -190,9 +197,10 @@ impl<'b> Runner<'b> {
         let (width, height, frames) = (number(source)?, number(source)?, number(source)?);
         let file = &self.buffers.model.0[self.model_place.clone()];
         let mut sensor = sensor(file, self.look, [width, height])?;
+        let words = [self.pixels.row_length(width), height.into()];
         for _ in 0..frames {
             let buffers = (&mut self.buffers.row[..], &mut self.buffers.frame[..]);
-            let measurement = sense_frame(&mut sensor, source, buffers, [width, height])?;
+            let measurement = sense_frame(&mut sensor, source, buffers, words)?;
             say(results, self.cases, format_args!("{measurement:?}"))?;
             say(results, self.cases, format_args!("{:?}", sensor.blobs()))?;
         }
@@ -210,13 +218,14 @@ impl<'b> Runner<'b> {
         let file = &self.buffers.model.0[self.model_place.clone()];
         let mut sensor = sensor(file, self.look, [width, height])?;
         let mut tracks = Tracks::new();
+        let words = [self.pixels.row_length(width), height.into()];
         for number in 0..frames {
             let (row, frame) = (&mut *self.buffers.row, &mut *self.buffers.frame);
             let window = match tracked {
                 2 => cropped::window(&sensor, &tracks),
                 _ => None,
             };
-            let frame = read_frame(source, row, frame, [width, height])?;
+            let frame = read_frame(source, row, frame, words)?;
             let last = number + 1 == frames;
             if let Some(window) = window {
                 let frame = cropped::crop(frame, width, &window);
@@ -285,7 +294,7 @@ fn sensor(
         Some(model) => Settings::of_model(model, look.order),
         None => Settings::usual(Geometry::preset(Preset::Ov7725, width, height), look.order),
     };
-    settings.threshold = look.hsv_box;
+    settings.threshold = look.threshold;
     if model.is_none() && look.weighted {
         settings.centroid = CentroidEstimator::RednessWeighted;
     }
@@ -300,13 +309,12 @@ fn read_frame<'f>(
     source: &mut impl Source,
     row: &mut [u16],
     frame: &'f mut [u16],
-    [width, height]: [u16; 2],
+    words: [usize; 2],
 ) -> Result<&'f mut [u16], ScriptError> {
-    let pixels = usize::from(width) * usize::from(height);
-    let frame = frame.get_mut(..pixels);
-    let frame = frame.ok_or(ScriptError::TooLarge([width, height]))?;
-    let mut rows = frame.chunks_exact_mut(usize::from(width).max(1));
-    for_each_row(source, row, [width, height], |row| {
+    let frame = frame.get_mut(..words[0] * words[1]);
+    let frame = frame.ok_or(ScriptError::TooLarge(words))?;
+    let mut rows = frame.chunks_exact_mut(words[0].max(1));
+    for_each_row(source, row, words, |row| {
         if let Some(place) = rows.next() {
             place.copy_from_slice(row);
         }
@@ -329,16 +337,16 @@ fn sense_frame(
     sensor: &mut Sensor<'_, BLOBS>,
     source: &mut impl Source,
     (row, band): (&mut [u16], &mut [u16]),
-    [width, height]: [u16; 2],
+    [length, height]: [usize; 2],
 ) -> Result<Measurement, ScriptError> {
     let mut left = height;
     counting_begins();
     sensor.begin_frame();
     counting_ends();
     while left > 0 {
-        let rows = left.min(BAND_ROWS);
-        let band = read_frame(source, row, band, [width, rows])?;
-        if left <= BAND_ROWS {
+        let rows = left.min(usize::from(BAND_ROWS));
+        let band = read_frame(source, row, band, [length, rows])?;
+        if left <= usize::from(BAND_ROWS) {
             last_band_begins();
         }
         left -= rows;
@@ -353,32 +361,32 @@ fn sense_frame(
 }
 
 /// Whether both tables give a row the same mask.
-fn masks_agree(row: &[u16], tables: (&ByteTable, &BitTable)) -> bool {
+fn masks_agree(row: &[u16], width: u16, tables: (&Formats<ByteTable>, &Formats<BitTable>)) -> bool {
     let mut masks = [[0; MAX_ROW_PIXELS / 32]; 2];
-    let words = row.len().div_ceil(32);
+    let words = usize::from(width).div_ceil(32);
     let [by_bytes, by_bits] = &mut masks;
     tables.0.mask_row(row, &mut by_bytes[..words]);
     tables.1.mask_row(row, &mut by_bits[..words]);
     by_bytes == by_bits
 }
 
-/// Reads rows one after the other into `row`, and hands out each.
+/// Reads `height` rows of `length` words one after the other into `row`, and hands out each.
 fn for_each_row(
     source: &mut impl Source,
     row: &mut [u16],
-    [width, height]: [u16; 2],
+    [length, height]: [usize; 2],
     mut each: impl FnMut(&[u16]),
 ) -> Result<(), ScriptError> {
     let mut raw = [0; 2 * MAX_ROW_PIXELS];
     let raw = raw
-        .get_mut(..2 * usize::from(width))
-        .ok_or(ScriptError::TooWide(width))?;
+        .get_mut(..2 * length)
+        .ok_or(ScriptError::TooWide(length))?;
     for _ in 0..height {
         fill(source, raw)?;
         for (pixel, pair) in row.iter_mut().zip(raw.chunks_exact(2)) {
             *pixel = u16::from_le_bytes([pair[0], pair[1]]);
         }
-        each(&row[..usize::from(width)]);
+        each(&row[..length]);
     }
     Ok(())
 }

@@ -14,18 +14,19 @@ pub enum Kind {
     /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model file that later records
     /// use.
     Model = 1,
-    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the byte table takes), then a threshold box (6 × u8) for later frames.
+    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the byte table takes; above them the number
+    /// of the pixel format), then the threshold (6 × u8) for later frames, as a model file has it.
     Threshold = 2,
-    /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16): blobs.
+    /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16 each, or for two of mono): blobs.
     Scan = 3,
-    /// Width, height, number of frames (u16), then their pixels (u16): the whole pipeline, blobs included.
+    /// Width, height, number of frames (u16), then their pixels: the whole pipeline, blobs included.
     Sense = 4,
     /// Eleven features, then eleven of the rest position (i64): network outputs.
     Network = 5,
     /// Three numbers (i32), taken as a force vector in µN and as α, β in m° and |F| in µN.
     Force = 6,
     /// Width, height, number of frames (u16), how they are looked at (u8: 0 coarsely and then in windows, 1 in windows that
-    /// follow the markers, 2 cropped to these windows' rectangle), then the pixels (u16): the pipeline on frames that lie in
+    /// follow the markers, 2 cropped to these windows' rectangle), then the pixels: the pipeline on frames that lie in
     /// memory.
     Windows = 7,
 }
@@ -65,17 +66,19 @@ pub enum ScriptError {
     Cut,
     /// No record begins with this byte.
     UnknownKind(u8),
-    /// A frame is wider than the widest row.
-    TooWide(u16),
-    /// A frame of these columns and rows has more pixels than there is room for.
-    TooLarge([u16; 2]),
+    /// Rows of so many words are longer than the longest.
+    TooWide(usize),
+    /// A frame with rows of so many words, and so many of them, is larger than there is room for.
+    TooLarge([usize; 2]),
     /// A model needs more room than there is.
     ModelTooLarge(usize),
     /// A record needs a model, and none came before.
     NoModel,
     /// The model is not sound.
     Model(ModelError),
-    /// The threshold box means nothing.
+    /// No pixel format has this number.
+    Format(u8),
+    /// The threshold means nothing.
     Threshold(ThresholdError),
     /// The frame cannot be scanned.
     Scan(ScanError),

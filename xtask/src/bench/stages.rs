@@ -96,7 +96,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
     let (_, module) = file.rsplit_once("sensing/src/")?;
     let module = module.split(['/', '.']).next()?;
     match module {
-        "threshold" | "tables" | "hsv" => Some("threshold"),
+        "threshold" | "tables" | "formats" | "hsv" => Some("threshold"),
         "dilate" => Some("dilation"),
         "runs" | "label" | "blob" | "moments" => Some("runs, labels, moments"),
         "markers" | "geometry" => Some("markers"),

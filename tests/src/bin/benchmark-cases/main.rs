@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use anyhow::{Context, Result, bail};
-use hivtac_scene::{Preset, Scene};
+use hivtac_scene::{Format, Options, Preset, Scene};
 use hivtac_sensing::geometry::{self, Geometry};
 use hivtac_sensing::model::{CentroidEstimator, OutputKind, Rest};
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::script::Script;
 use hivtac_tests::{pictures, qemu};
@@ -66,6 +66,7 @@ struct Case {
     model: Vec<u8>,
     /// Columns and rows.
     size: [u16; 2],
+    format: PixelFormat,
 }
 
 enum Work {
@@ -94,16 +95,15 @@ impl Case {
         let file = folder.join(format!("{number}.script"));
         write(&file, self.script().bytes())?;
         let (work, size) = (self.work.description(), self.size);
-        Ok(json!({ "work": work, "file": file, "size": size, "format": "rgb565" }))
+        Ok(json!({ "work": work, "file": file, "size": size, "format": self.format.name() }))
     }
 
     fn script(&self) -> Script {
         let mut script = Script::new();
         script.model(&self.model);
+        script.threshold(Threshold::red(self.format), ByteOrder::Swapped);
         match &self.work {
-            Work::Frame { pixels, .. } => script
-                .threshold(&HsvBox::RED, ByteOrder::Swapped)
-                .sense(self.size[0], &[pixels]),
+            Work::Frame { pixels, .. } => script.sense(self.size[0], &[pixels]),
             Work::Windows {
                 tracked,
                 before,
@@ -111,13 +111,9 @@ impl Case {
             } => {
                 let frames = [before.as_slice(), pixels];
                 let frames = if *tracked { &frames[..] } else { &frames[1..] };
-                script.threshold(&HsvBox::RED, ByteOrder::Swapped).windows(
-                    self.size[0],
-                    frames,
-                    *tracked,
-                )
+                script.windows(self.size[0], frames, *tracked)
             }
-            Work::Table => script.counted_threshold(&HsvBox::RED, ByteOrder::Swapped),
+            Work::Table => script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped),
             Work::Network(_) => script.network(&models::rest(), &models::rest()),
         };
         script
@@ -137,16 +133,20 @@ impl Work {
 
 fn cases() -> Result<Vec<Case>> {
     let mut cases = Vec::new();
-    for size in SIZES {
-        let model = model(size)?;
-        let usual = usual_frame(&model, &scene("static", size)?, size)?;
+    for (format, size) in PixelFormat::ALL
+        .into_iter()
+        .flat_map(|format| SIZES.map(|size| (format, size)))
+    {
+        let model = model(format, size)?;
+        let usual = usual_frame(&model, &scene("static", format, size)?, size)?;
         let case = |(special, pixels)| Case {
             work: Work::Frame { special, pixels },
             model: model.clone(),
             size,
+            format,
         };
         cases.push(case(("", usual.clone())));
-        let before = scene("static", size)?.frame(ATTEMPTS, 1.0).pixels;
+        let before = frame(&scene("static", format, size)?, ATTEMPTS, 1.0);
         for tracked in [false, true] {
             cases.push(Case {
                 work: Work::Windows {
@@ -156,9 +156,11 @@ fn cases() -> Result<Vec<Case>> {
                 },
                 model: model.clone(),
                 size,
+                format,
             });
         }
-        if STRAINED.contains(&size) {
+        // What is special are colours, drawn in RGB565.
+        if format == PixelFormat::Rgb565 && STRAINED.contains(&size) {
             cases.extend(strained(size, &usual).map(case));
         }
     }
@@ -166,27 +168,30 @@ fn cases() -> Result<Vec<Case>> {
         work: Work::Network(widths),
         model: models::file(widths, Weights::Random, OutputKind::ForceVector, 1),
         size: [320, 240],
+        format: PixelFormat::Rgb565,
     }));
     cases.push(Case {
         work: Work::Table,
         model: Vec::new(),
         // As many values as a pixel has.
         size: [256, 256],
+        format: PixelFormat::Rgb565,
     });
     Ok(cases)
 }
 
 /// Frames of the demo's scene, of the firmware's size.
 fn demo(times: &[u64]) -> Result<Vec<Case>> {
-    let size = [320, 240];
-    let (model, scene) = (model(size)?, scene("demo", size)?);
+    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
+    let (model, scene) = (model(format, size)?, scene("demo", format, size)?);
     let case = |(number, &time): (u64, &u64)| Case {
         work: Work::Frame {
             special: "demo",
-            pixels: scene.frame(number, time as f64 * 1e-6).pixels,
+            pixels: frame(&scene, number, time as f64 * 1e-6),
         },
         model: model.clone(),
         size,
+        format,
     };
     Ok((0..).zip(times).map(case).collect())
 }
@@ -205,6 +210,8 @@ impl Board {
         match &case.work {
             Work::Windows { .. } | Work::Table => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
+            // The board's program reads RGB565.
+            Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),
             Work::Frame {
                 special,
                 pixels: frame,
@@ -253,11 +260,11 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
 /// way to a force, so that all of it is measured. In the smallest frames noise can make a marker implausible.
 fn usual_frame(model: &[u8], scene: &Scene, [width, height]: [u16; 2]) -> Result<Vec<u16>> {
     for number in 0..ATTEMPTS {
-        let pixels = scene.frame(number, 1.0).pixels;
+        let pixels = frame(&scene, number, 1.0);
         let mut script = Script::new();
         script
             .model(model)
-            .threshold(&HsvBox::RED, ByteOrder::Native)
+            .threshold(Threshold::red(format), ByteOrder::Native)
             .sense(width, &[&pixels]);
         if qemu::run_on_host(&script)?.contains("force: Some") {
             return Ok(pixels);
@@ -266,32 +273,48 @@ fn usual_frame(model: &[u8], scene: &Scene, [width, height]: [u16; 2]) -> Result
     bail!("none of {ATTEMPTS} frames of {width}x{height} has a force")
 }
 
-fn scene(name: &str, [width, height]: [u16; 2]) -> Result<Scene> {
+fn scene(name: &str, format: PixelFormat, [width, height]: [u16; 2]) -> Result<Scene> {
     let (width, height) = (u32::from(width), u32::from(height));
-    Ok(Scene::preset(name, Preset::Ov7725, width, height, 1)?)
+    let scene = Scene::preset(name, Preset::Ov7725, width, height, 1)?;
+    let format: Format = format.name().parse()?;
+    Ok(scene.with_options(Options {
+        format,
+        ..Options::default()
+    })?)
+}
+
+/// A frame as it lies in memory.
+fn frame(scene: &Scene, number: u64, seconds: f64) -> Vec<u16> {
+    scene.frame(number, seconds).words().into_owned()
 }
 
 /// The small model, for frames of a size.
-fn model(size: [u16; 2]) -> Result<Vec<u8>> {
+fn model(format: PixelFormat, size: [u16; 2]) -> Result<Vec<u8>> {
     let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
-    let pixels = scene("rest", size)?.frame(0, 0.0).pixels;
-    let rest = position(geometry, CentroidEstimator::BinaryMask, &pixels)?;
+    let pixels = frame(&scene("rest", format, size)?, 0, 0.0);
+    let rest = position(geometry, format, CentroidEstimator::BinaryMask, &pixels)?;
     let (weights, output) = (Weights::Random, OutputKind::ForceVector);
-    Ok(models::file_for(geometry, rest, &SMALL, weights, output, 1))
+    Ok(models::file_for(
+        geometry, format, rest, &SMALL, weights, output, 1,
+    ))
 }
 
 /// Where a frame shows the markers.
-fn position(geometry: Geometry, centroid: CentroidEstimator, pixels: &[u16]) -> Result<Rest> {
+fn position(
+    geometry: Geometry,
+    format: PixelFormat,
+    centroid: CentroidEstimator,
+    pixels: &[u16],
+) -> Result<Rest> {
     let mut sensor = Box::new(Sensor::<64>::new());
     let settings = Settings {
+        threshold: Threshold::red(format),
         centroid,
         ..Settings::usual(geometry, ByteOrder::Native)
     };
     sensor.configure(settings, None)?;
     sensor.begin_frame();
-    for row in pixels.chunks(usize::from(geometry.width)) {
-        sensor.push_row(row);
-    }
+    sensor.push_rows(pixels);
     let measurement = sensor.finish_frame();
     let found = measurement.features.zip(measurement.markers);
     let (features, markers) = found.context("a frame that shows where the markers are has none")?;

@@ -10,7 +10,7 @@ use hivtac_scene::Scene;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{CentroidEstimator, Rest};
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::script::Script;
 use serde_json::{Value, json};
@@ -24,6 +24,8 @@ const ESTIMATORS: [(&str, CentroidEstimator); 2] = [
 /// Every pixel as the rows arrive; a frame in memory, coarsely and then in windows; the rectangle around the windows that
 /// follow the markers, as its rows arrive.
 const SCANS: [&str; 3] = ["full", "windows", "tracked"];
+/// The format of all of them.
+const FORMAT: PixelFormat = PixelFormat::Rgb565;
 /// The size whose models are measured.
 const SIZE: [u16; 2] = [320, 240];
 
@@ -53,7 +55,7 @@ pub fn write_cases(folder: &Path) -> Result<()> {
         write(&file, script.bytes())?;
         let mut line = what;
         line["file"] = json!(file);
-        line["format"] = json!("rgb565");
+        line["format"] = json!(FORMAT.name());
         println!("{line}");
         Ok(())
     };
@@ -140,7 +142,7 @@ impl Frames {
         let geometry = Geometry::preset(here, size[0], size[1]);
         let (width, height) = (size[0].into(), size[1].into());
         let scene = |name: &str| Scene::preset(name, there, width, height, 1);
-        let rest = position(geometry, centroid.1, &scene("rest")?.frame(0, 0.0).pixels)?;
+        let rest = position(geometry, FORMAT, centroid.1, &scene("rest")?.frame(0, 0.0).pixels)?;
         let conditions = (geometry, rest, centroid.1);
         let model = models::trade_file(conditions, true, &[], Weights::Random);
         Ok(Frames {
@@ -161,7 +163,7 @@ impl Frames {
         let mut script = Script::new();
         script
             .model(model)
-            .threshold(&HsvBox::RED, ByteOrder::Swapped);
+            .threshold(Threshold::red(FORMAT), ByteOrder::Swapped);
         let (width, usual) = (self.geometry.width, &self.usual[..]);
         match scan {
             "full" => script.sense(width, &[usual]),
@@ -173,7 +175,7 @@ impl Frames {
 
     /// The model alone, on what the usual frame shows.
     fn inference(&self, model: &[u8]) -> Result<Script> {
-        let shown = position(self.geometry, self.centroid.1, &self.usual)?;
+        let shown = position(self.geometry, FORMAT, self.centroid.1, &self.usual)?;
         let (features, tare): (Features, Features) = (shown.features, self.rest.features);
         let mut script = Script::new();
         script.model(model).network(&features, &tare);
