@@ -10,7 +10,7 @@ use hivtac_sensing::pipeline;
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::threshold::{ByteOrder, HsvBox, PixelFormat};
 
 /// The sensing, with the table that is fastest on a computer.
 type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
@@ -42,6 +42,13 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let name = options.model.as_deref().unwrap_or("the built-in model");
     let model = Model::parse(file.as_deref().unwrap_or(MODEL))
         .map_err(|error| failure(format!("{name} is no usable model: {error}")))?;
+    let format = model.conditions.threshold.format();
+    if format != PixelFormat::Rgb565 {
+        return Err(failure(format!(
+            "{name} is for frames of {}, and pictures are read as rgb565; use a model for rgb565",
+            format.name()
+        )));
+    }
     let bench = Bench { options, model };
     let tare = options
         .tare
