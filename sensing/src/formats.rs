@@ -233,6 +233,18 @@ mod tests {
     }
 
     #[test]
+    fn pairs_are_weighed_as_a_whole() {
+        let row = [0, 200 << 8, 0, 150 << 8, 0, 162 << 8, 0, 90 << 8];
+        let weigh = |x0, x1| Yuv422::RED.weigh(&row, Run { x0, x1 });
+        assert_eq!(weigh(1, 4), weigh(0, 5));
+        // 64 + 2 · 38 is above the largest.
+        let (first, second, third) = (127, 64 - 2 * 12, 64);
+        let sum_x = first + second * (2 + 3) + third * (4 + 5);
+        let sum = 2 * (first + second + third);
+        assert_eq!(weigh(1, 4), Weights { sum, sum_x });
+    }
+
+    #[test]
     fn weights_grow_with_what_is_covered() {
         let cr = |cr: u16| Yuv422 { cr_low: 160 }.weight(&[0, cr << 8], 0);
         assert_eq!([120, 150, 160, 180, 250].map(cr), [0, 44, 64, 104, 127]);
