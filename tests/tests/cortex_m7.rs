@@ -172,7 +172,7 @@ fn other_formats_pass_the_same_thresholds() {
     // Every byte in every place of a word of pixels, then anything; rows with whole words of the mask and with parts.
     let places = (0..4).flat_map(|place| (0..256_u32).map(move |byte| byte << (8 * place)));
     let every: Vec<u16> = places
-        .chain((0..1024).map(|i| i * 0x0101_0101))
+        .chain((0..256).map(|byte| byte * 0x0101_0101))
         .flat_map(|word| [word as u16, (word >> 16) as u16])
         .collect();
     for threshold in thresholds {

@@ -19,6 +19,7 @@ use crate::{
     root::root,
     settings::Settings,
     status::Status,
+    threshold::PixelFormat,
     units::{MilliDegrees, Px},
 };
 
@@ -73,6 +74,8 @@ pub struct Trust {
     by_rest_width: Divisor,
     /// By half the pattern's side at rest, px in Q16.16.
     by_half_side: Divisor,
+    /// Limits that come of the pixel grid are so many times those of other formats: YUV422 has one Cr for two columns.
+    grid: i64,
     /// Largest hollowness.
     hollow: i64,
     /// Strain as the displacement of one marker that makes it, px in Q16.16; `None` against a model's rest.
@@ -87,6 +90,10 @@ impl Trust {
         let geometry = &settings.geometry;
         let at_rest = Pattern::of_centroids(rest.features.centroids);
         let dilations = i64::from(settings.dilations);
+        let grid = match settings.threshold.format() {
+            PixelFormat::Yuv422 => 2,
+            PixelFormat::Rgb565 | PixelFormat::Mono => 1,
+        };
         let displacement = match settings.centroid {
             CentroidEstimator::RednessWeighted => STRAIN_WEIGHTED,
             CentroidEstimator::BinaryMask => STRAIN_BINARY,
@@ -99,8 +106,9 @@ impl Trust {
             by_rest_width: divisor(geometry.across(geometry.rest_distance()).0.into()),
             by_half_side: divisor(at_rest.half_side),
             at_rest,
-            hollow: HOLLOW + HOLLOW_BY_DILATIONS * dilations * dilations,
-            displacement: own_rest.then_some(displacement),
+            grid,
+            hollow: grid * (HOLLOW + HOLLOW_BY_DILATIONS * dilations * dilations),
+            displacement: own_rest.then_some(grid * displacement),
             reading: Reading::of(contact),
         }
     }
@@ -163,28 +171,30 @@ impl Trust {
             }
         }
         let spread = part_of(widest - narrowest, widest);
-        let aspect = ASPECT + part_of(ASPECT_PIXELS, width) + ASPECT_TAPER * taper;
+        let aspect = ASPECT + part_of(self.grid * ASPECT_PIXELS, width) + ASPECT_TAPER * taper;
         let even = (self.reading.density_by_shift * shift) >> 8;
         let densities = found.images.each_ref().map(|image| image.density);
-        evenly_coloured(&densities, even + over_square(DENSITY_AREA, width))
-            && (self.reading.inner_density_area)
-                .is_none_or(|area| evenly_coloured(&inner_densities, over_square(area, width)))
-            && spread <= aspect + ((self.reading.aspect_by_shift * shift) >> 8)
+        evenly_coloured(
+            &densities,
+            even + over_square(self.grid * DENSITY_AREA, width),
+        ) && (self.reading.inner_density_area).is_none_or(|area| {
+            evenly_coloured(&inner_densities, over_square(self.grid * area, width))
+        }) && spread <= aspect + ((self.reading.aspect_by_shift * shift) >> 8)
     }
 
     fn image_fits(&self, image: &Image, by_across: &Divisor, edge: i64, taper: i64) -> bool {
         let Image { seen, expected, .. } = image;
-        let lopsided = LOPSIDED_PIXELS + seen.across * LOPSIDED / 256;
-        let skew = by_across.signed_quotient(SKEW_PIXELS << 16)
+        let lopsided = self.grid * LOPSIDED_PIXELS + seen.across * LOPSIDED / 256;
+        let skew = by_across.signed_quotient((self.grid * SKEW_PIXELS) << 16)
             + ((self.reading.skew_by_taper * taper) >> 8);
         // For a marker that the optics makes so wide now.
         let wider = self.by_rest_width.signed_quotient(LEAN * expected);
         let bent = (((seen.across >> 8) * (seen.across >> 8)) >> 16) * taper;
         let lean = LEAN.max(wider) + ((self.reading.lean_by_taper * bent) >> 16);
-        width_fits(*expected, seen, edge)
+        width_fits(*expected, seen, edge, self.grid)
             && seen.skew.abs() <= skew
             && image.hollow <= self.hollow
-            && seen.lean <= lean
+            && seen.lean <= self.grid * lean
             && image.lopsided <= lopsided
     }
 }
@@ -209,9 +219,9 @@ fn inner_density(image: &Image, by_across: &Divisor, edge: i64) -> i64 {
 }
 
 /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
-fn width_fits(expected: i64, seen: &Seen, edge: i64) -> bool {
+fn width_fits(expected: i64, seen: &Seen, edge: i64, grid: i64) -> bool {
     let excess = (seen.across - edge - expected).abs();
-    excess <= expected * WIDTH / 256 + WIDTH_PIXELS
+    excess <= expected * WIDTH / 256 + grid * WIDTH_PIXELS
 }
 
 /// A length as a part of another, of 65,536.
