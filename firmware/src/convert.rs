@@ -46,13 +46,13 @@ pub fn threshold_to_wire(from: threshold::Threshold) -> message::HsvBox {
 }
 
 /// A threshold from the wire, unchecked.
-pub fn threshold_from_wire(from: message::HsvBox) -> threshold::Threshold {
-    threshold::Threshold::Rgb565(threshold::HsvBox {
+pub fn threshold_from_wire(from: message::HsvBox) -> threshold::HsvBox {
+    threshold::HsvBox {
         hue_low: from.hue_low,
         hue_high: from.hue_high,
         saturation_low: from.saturation_low,
         saturation_high: from.saturation_high,
         value_low: from.value_low,
         value_high: from.value_high,
-    })
+    }
 }

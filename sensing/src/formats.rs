@@ -37,6 +37,21 @@ impl<T: Table> Formats<T> {
         Ok(())
     }
 
+    /// Sets RGB565 and a box whose table was made elsewhere: `install` puts it in place.
+    ///
+    /// # Errors
+    /// Those of [`HsvBox::check`]; nothing is then changed, and `install` not called.
+    pub fn set_made(
+        &mut self,
+        hsv_box: HsvBox,
+        install: impl FnOnce(&mut T),
+    ) -> Result<(), ThresholdError> {
+        hsv_box.check()?;
+        install(&mut self.table);
+        self.threshold = Threshold::Rgb565(hsv_box);
+        Ok(())
+    }
+
     /// The threshold in use.
     pub fn threshold(&self) -> &Threshold {
         &self.threshold

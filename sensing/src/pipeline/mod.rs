@@ -19,7 +19,7 @@ use crate::{
     settings::{Settings, SettingsError},
     status::Status,
     tables::{ByteTable, Table},
-    threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError},
+    threshold::{ByteOrder, HsvBox, PixelFormat, Threshold, ThresholdError},
     windows::coarse_step,
 };
 use ahead::Ahead;
@@ -140,19 +140,19 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// Sets the threshold to one whose table was made elsewhere while frames went on: `install` puts that table in place. Do
-    /// it between frames; all else is as with [`set_threshold`](Self::set_threshold).
+    /// Sets a threshold of RGB565 whose table was made elsewhere while frames went on: `install` puts that table in place.
+    /// Do it between frames; all else is as with [`set_threshold`](Self::set_threshold).
     ///
     /// # Errors
     /// A box that means nothing; the threshold is then unchanged, and `install` not called.
     pub fn set_made_threshold(
         &mut self,
-        threshold: HsvBox,
+        hsv_box: HsvBox,
         install: impl FnOnce(&mut T),
     ) -> Result<(), ThresholdError> {
-        threshold.check()?;
-        install(&mut self.table);
-        self.settings.threshold = threshold;
+        self.pixels.set_made(hsv_box, install)?;
+        self.settings.threshold = Threshold::Rgb565(hsv_box);
+        self.prepare();
         Ok(())
     }
 
