@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use hivtac_calibration::conditions::Conditions;
+use hivtac_calibration::conditions::{Conditions, PixelName};
 use hivtac_calibration::dataset::Split;
 use hivtac_calibration::import::parse;
 use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
@@ -28,7 +28,7 @@ fn q16(features: &[f64; INPUTS]) -> [i64; INPUTS] {
 fn weights(network: Network) -> Weights {
     Weights {
         format: Weights::format(),
-        conditions: Conditions::simulated(Preset::Ov7725, 320, 240),
+        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565),
         rest: Rest {
             features_q16: q16(&REST),
             areas_px: [190; 4],

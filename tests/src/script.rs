@@ -67,12 +67,7 @@ impl Script {
         self.push_threshold(threshold.into(), order, 2)
     }
 
-    fn push_threshold(
-        &mut self,
-        threshold: Threshold,
-        order: ByteOrder,
-        flags: u8,
-    ) -> &mut Script {
+    fn push_threshold(&mut self, threshold: Threshold, order: ByteOrder, flags: u8) -> &mut Script {
         (self.order, self.format) = (order, threshold.format());
         let number = PixelFormat::ALL.iter().position(|it| *it == self.format);
         let flags = flags | u8::from(order == ByteOrder::Swapped);

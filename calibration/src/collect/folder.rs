@@ -348,7 +348,12 @@ mod tests {
     fn conditions() -> Conditions {
         Conditions {
             origin: OriginName::unit([7; 12]),
-            ..Conditions::simulated(hivtac_sensing::geometry::Preset::Ov7725, 320, 240)
+            ..Conditions::simulated(
+                hivtac_sensing::geometry::Preset::Ov7725,
+                320,
+                240,
+                PixelName::Rgb565,
+            )
         }
     }
 
