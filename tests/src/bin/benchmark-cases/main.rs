@@ -113,7 +113,9 @@ impl Case {
                 let frames = if *tracked { &frames[..] } else { &frames[1..] };
                 script.windows(self.size[0], frames, *tracked)
             }
-            Work::Table => script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped),
+            Work::Table => {
+                script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped)
+            }
             Work::Network(_) => script.network(&models::rest(), &models::rest()),
         };
         script
@@ -138,7 +140,7 @@ fn cases() -> Result<Vec<Case>> {
         .flat_map(|format| SIZES.map(|size| (format, size)))
     {
         let model = model(format, size)?;
-        let usual = usual_frame(&model, &scene("static", format, size)?, size)?;
+        let usual = usual_frame(&model, format, &scene("static", format, size)?, size)?;
         let case = |(special, pixels)| Case {
             work: Work::Frame { special, pixels },
             model: model.clone(),
@@ -258,9 +260,14 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
 
 /// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first frame that goes all the
 /// way to a force, so that all of it is measured. In the smallest frames noise can make a marker implausible.
-fn usual_frame(model: &[u8], scene: &Scene, [width, height]: [u16; 2]) -> Result<Vec<u16>> {
+fn usual_frame(
+    model: &[u8],
+    format: PixelFormat,
+    scene: &Scene,
+    [width, height]: [u16; 2],
+) -> Result<Vec<u16>> {
     for number in 0..ATTEMPTS {
-        let pixels = frame(&scene, number, 1.0);
+        let pixels = frame(scene, number, 1.0);
         let mut script = Script::new();
         script
             .model(model)

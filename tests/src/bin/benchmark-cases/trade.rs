@@ -142,13 +142,18 @@ impl Frames {
         let geometry = Geometry::preset(here, size[0], size[1]);
         let (width, height) = (size[0].into(), size[1].into());
         let scene = |name: &str| Scene::preset(name, there, width, height, 1);
-        let rest = position(geometry, FORMAT, centroid.1, &scene("rest")?.frame(0, 0.0).pixels)?;
+        let rest = position(
+            geometry,
+            FORMAT,
+            centroid.1,
+            &scene("rest")?.frame(0, 0.0).pixels,
+        )?;
         let conditions = (geometry, rest, centroid.1);
         let model = models::trade_file(conditions, true, &[], Weights::Random);
         Ok(Frames {
             geometry,
             centroid,
-            usual: usual_frame(&model, &scene("static")?, size)?,
+            usual: usual_frame(&model, FORMAT, &scene("static")?, size)?,
             before: scene("static")?.frame(ATTEMPTS, 1.0).pixels,
             rest,
         })
