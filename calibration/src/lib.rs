@@ -15,8 +15,10 @@
 //! | `quantize` | weights to a model file, the same bytes on every machine |
 //! | `uncertainty` | what a model's errors say of its next ones |
 //! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
-//! | `plot`, `loss_plot` | SVG |
+//! | `peers` | beside the paper's own pipeline, on the same frames |
 //! | `tradeoff` | speed against accuracy: a sweep, its Pareto front, the best under limits |
+//! | `plot`, `loss_plot`, `document` | SVG; tables in documents |
+//! | `progress` | bars on the terminal |
 //! | `scene` | pictures and figures of the simulated sensor |
 
 pub mod check;
@@ -24,6 +26,7 @@ pub mod closed_form;
 pub mod collect;
 pub mod conditions;
 pub mod dataset;
+pub mod document;
 pub mod errors;
 pub mod evaluate;
 pub mod fit;
@@ -31,7 +34,9 @@ pub mod import;
 pub mod loads;
 pub mod loss_plot;
 pub mod network;
+pub mod peers;
 pub mod plot;
+pub mod progress;
 pub mod quantize;
 pub mod scene;
 pub mod tradeoff;

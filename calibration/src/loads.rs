@@ -1,7 +1,10 @@
 //! Which loads a data set shows.
 
+use std::sync::LazyLock;
+
 use anyhow::Result;
 use hivtac_scene::Load;
+use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -65,6 +68,19 @@ impl PaperPoses {
     /// The number of the pose with these angles, when it is one of them.
     pub fn numbered([alpha, beta]: [f64; 2]) -> Option<usize> {
         (0..Self::COUNT).find(|&pose| Self::angles_deg(pose) == [alpha, beta])
+    }
+
+    /// The poses that comparisons train on, and the fifth of all that they hold out, each in order; always the same.
+    pub fn parts() -> &'static [Vec<usize>; 2] {
+        static PARTS: LazyLock<[Vec<usize>; 2]> = LazyLock::new(|| {
+            let mut poses: Vec<usize> = (0..PaperPoses::COUNT).collect();
+            poses.shuffle(&mut ChaCha8Rng::seed_from_u64(2022));
+            let mut training = poses.split_off(PaperPoses::COUNT / 5);
+            training.sort_unstable();
+            poses.sort_unstable();
+            [training, poses]
+        });
+        &PARTS
     }
 
     /// The load of a row in a pose below [`Self::COUNT`].
@@ -154,6 +170,15 @@ mod tests {
         assert_eq!(PaperPoses::angles_deg(356), [10.0, 8.0]);
         assert_eq!(PaperPoses::numbered([-10.0, -7.0]), Some(1));
         assert_eq!(PaperPoses::numbered([0.5, 0.0]), None);
+    }
+
+    #[test]
+    fn a_fifth_of_the_poses_is_held_out() {
+        let [training, held_out] = PaperPoses::parts();
+        assert_eq!((training.len(), held_out.len()), (286, 71));
+        let mut all = [&training[..], held_out].concat();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..PaperPoses::COUNT));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use hivtac_calibration::check::check;
 use hivtac_calibration::collect::CollectCommand;
 use hivtac_calibration::conditions::{CentroidName, PixelName, preset};
@@ -14,12 +14,13 @@ use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, Spread, generat
 use hivtac_calibration::evaluate::Evaluation;
 use hivtac_calibration::fit::Kind;
 use hivtac_calibration::fit::quick::quick;
+use hivtac_calibration::peers::PeersArgs;
+use hivtac_calibration::progress::bar;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::scene::SceneCommand;
 use hivtac_calibration::tradeoff::{Step, TradeoffArgs};
 use hivtac_calibration::weights::{Range, Weights};
 use hivtac_scene::Contact;
-use indicatif::{ProgressBar, ProgressStyle};
 
 /// From data to a model on the chip: data sets, training, quantization, a check.
 #[derive(Parser)]
@@ -157,6 +158,9 @@ enum Command {
     /// Speed against accuracy: sweep frame sizes, estimators, arithmetics and scans, and write docs/tradeoff.md; or pick the best
     /// under limits. An interrupted sweep goes on.
     Tradeoff(TradeoffArgs),
+    /// Compare with the paper's own pipeline (OpenCV, a float network 3×512) on the same rendered frames. What it renders and
+    /// trains is kept in a folder: an interrupted run goes on where it was.
+    Peers(PeersArgs),
     /// Look at the simulated sensor: frames, its film, what each of its effects does.
     #[command(subcommand)]
     Scene(SceneCommand),
@@ -190,6 +194,9 @@ struct RecipeArgs {
     /// Instead: as many loads for each of the paper's 357 poses.
     #[arg(long)]
     per_pose: Option<usize>,
+    /// Which of those poses: all, or the four fifths or the fifth that comparisons train on and hold out.
+    #[arg(long, value_enum, default_value_t, requires = "per_pose")]
+    poses: PosesArg,
     /// Instead: as many frames of each of ten tilted loads, for `quick`.
     #[arg(long, conflicts_with = "per_pose")]
     known_loads: Option<usize>,
@@ -211,6 +218,14 @@ struct RecipeArgs {
     /// Decides forces, sessions and noise.
     #[arg(long = "data-seed", visible_alias = "seed", default_value_t = 1)]
     data_seed: u64,
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum PosesArg {
+    #[default]
+    All,
+    Training,
+    HeldOut,
 }
 
 #[derive(Args)]
@@ -236,7 +251,11 @@ impl RecipeArgs {
             centroid: self.centroid,
             contact: self.contact,
             loads: match (self.per_pose, self.known_loads) {
-                (Some(each), _) => Loads::PaperPoses(each),
+                (Some(each), _) => match self.poses {
+                    PosesArg::All => Loads::PaperPoses(each),
+                    PosesArg::Training => Loads::TrainingPoses(each),
+                    PosesArg::HeldOut => Loads::HeldOutPoses(each),
+                },
                 (None, Some(each)) => Loads::Known(each),
                 (None, None) => Loads::Random(self.samples),
             },
@@ -309,6 +328,7 @@ fn main() -> Result<()> {
             out_dir,
         } => default_model(&recipe, &options, &out_dir),
         Command::Tradeoff(args) => args.run(sweep_bars),
+        Command::Peers(args) => args.run(),
         Command::Scene(command) => command.run(),
     }
 }
@@ -404,15 +424,5 @@ fn sweep_bars([frames, trainings]: [usize; 2]) -> impl Fn(Step) + Sync {
     move |step| match step {
         Step::Frame => rendering.inc(1),
         Step::Training => training.inc(1),
-    }
-}
-
-/// A progress bar on the terminal's error stream; nothing when that is no terminal.
-fn bar(what: &'static str, steps: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} {eta} {msg}");
-    let bar = ProgressBar::new(steps as u64).with_prefix(what);
-    match style {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
     }
 }

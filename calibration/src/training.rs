@@ -82,7 +82,8 @@ fn named<T: DeserializeOwned>(name: &str) -> Result<T, String> {
 pub fn run(dataset: &Dataset, args: &OptionArgs, kind: Kind) -> Result<Weights> {
     let options = args.options()?;
     let mut plot = LossPlot::default();
-    let bar = crate::bar("training", options.epochs + options.rounded_epochs);
+    let bar =
+        hivtac_calibration::progress::bar("training", options.epochs + options.rounded_epochs);
     let fitted = fit(
         dataset,
         args.held_out,

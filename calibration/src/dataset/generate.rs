@@ -2,17 +2,12 @@
 
 use std::ops::Range;
 
-use anyhow::{Result, anyhow};
-use hivtac_scene::{Frame, Scene};
-use hivtac_sensing::features::Features;
-use hivtac_sensing::geometry::Geometry;
-use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::status::Status;
-use hivtac_sensing::threshold::{ByteOrder, Threshold};
+use anyhow::Result;
+use hivtac_scene::Scene;
 use rayon::prelude::*;
 
-use super::{Dataset, Observation, Recipe, Row};
+use super::eye::{Pool, Sensing};
+use super::{Dataset, Recipe, Row};
 
 /// Renders the frames of a recipe on all cores and looks at each with the pipeline. `progress` is called once for
 /// each frame, from any thread.
@@ -20,10 +15,17 @@ use super::{Dataset, Observation, Recipe, Row};
 /// # Errors
 /// When the recipe asks for what the scene or the pipeline cannot do.
 pub fn generate(recipe: &Recipe, progress: impl Fn() + Sync) -> Result<Dataset> {
+    let pool = sensing(recipe);
+    let rows = Renderer::new(recipe)?.rows(0..recipe.rows(), &pool, progress)?;
     Ok(Dataset {
-        rows: Renderer::new(recipe)?.rows(0..recipe.rows(), progress)?,
+        rows: rows.into_iter().flatten().collect(),
         about: recipe.about()?,
     })
+}
+
+/// The pipeline, which knows no model yet.
+pub(super) fn sensing(recipe: &Recipe) -> Pool<'_> {
+    Pool::new(|| Ok(vec![Box::new(Sensing::unmodelled(recipe)?)]))
 }
 
 /// Rows of a recipe, each by itself.
@@ -42,68 +44,28 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Some of the rows, in order.
-    pub fn rows(&self, rows: Range<usize>, progress: impl Fn() + Sync) -> Result<Vec<Row>> {
-        let eyes = || unmodelled_sensor(self.recipe);
-        let rendered = rows.into_par_iter().map_init(eyes, |sensor, row| {
-            let sensor = sensor.as_mut().map_err(|error| anyhow!("{error}"))?;
+    /// Some of the rows, in order, each as all eyes of the pool see it.
+    pub fn rows(
+        &self,
+        rows: Range<usize>,
+        pool: &Pool<'_>,
+        progress: impl Fn() + Sync,
+    ) -> Result<Vec<Vec<Row>>> {
+        let rendered = rows.into_par_iter().map(|row| {
             let place = self.recipe.place(row);
-            let frame =
-                self.scenes[place.session].render_load(&self.recipe.load(row)?, row as u64)?;
+            let scene = &self.scenes[place.session];
+            let frame = scene.render_load(&self.recipe.load(row)?, row as u64)?;
+            let seen = pool.look(&frame)?;
             progress();
-            Ok(Row {
+            let row = |seen| Row {
                 place,
                 force_n: frame.truth.force.vector_n(),
-                seen: observe(sensor, &frame),
-            })
+                seen,
+            };
+            Ok(seen.into_iter().map(row).collect())
         });
         rendered.collect()
     }
-}
-
-/// A sensor that finds markers and features but knows no model yet.
-fn unmodelled_sensor(recipe: &Recipe) -> Result<Box<Sensor<'static>>> {
-    let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
-    let mut sensor = Box::new(Sensor::new());
-    let settings = Settings {
-        threshold: Threshold::red(recipe.format.to_model()),
-        centroid: recipe.centroid.to_model(),
-        ..Settings::usual(geometry, ByteOrder::Native)
-    };
-    sensor
-        .configure(settings, None)
-        .map_err(|error| anyhow!("{error}"))?;
-    Ok(sensor)
-}
-
-/// Shows a frame to a sensor.
-pub(crate) fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
-    sensor.begin_frame();
-    sensor.push_rows(&frame.words());
-    sensor.finish_frame()
-}
-
-fn observe(sensor: &mut Sensor<'_>, frame: &Frame) -> Result<Observation, String> {
-    let measurement = measure(sensor, frame);
-    match (measurement.markers, measurement.features) {
-        (Some(markers), Some(features)) => Ok(Observation {
-            features_q16: Features::to_array(&features),
-            areas_px: markers.map(|m| m.area),
-        }),
-        _ => Err(reasons(measurement.status)),
-    }
-}
-
-/// The names of the status bits that forbid a force, but not the missing model.
-pub(crate) fn reasons(status: Status) -> String {
-    let forbids = |name: &&str| {
-        let bit = Status::NAMES
-            .iter()
-            .find(|(_, n)| n == name)
-            .map_or(Status::OK, |(bit, _)| *bit);
-        Status::NO_FORCE.contains(bit) && bit != Status::MODEL_MISSING
-    };
-    status.names().filter(forbids).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -242,11 +204,5 @@ mod tests {
             },
             "321",
         );
-    }
-
-    #[test]
-    fn reasons_leave_out_what_is_no_reason() {
-        let status = Status::MARKERS_MISSING | Status::TARE_MISSING | Status::MODEL_MISSING;
-        assert_eq!(reasons(status), "markers_missing");
     }
 }

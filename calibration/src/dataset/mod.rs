@@ -1,5 +1,6 @@
 //! Data sets: forces with the features that `sensing` found in the frames.
 
+mod eye;
 mod file;
 mod generate;
 mod recipe;
@@ -16,10 +17,11 @@ use serde::{Deserialize, Serialize};
 use crate::conditions::Conditions;
 use crate::weights::{Range, Rest};
 
+pub use eye::{Eye, Eyes, Seen, Sensing};
+pub(crate) use eye::{measure, reasons};
 pub use generate::generate;
-pub(crate) use generate::{measure, reasons};
 pub use recipe::{Loads, Recipe};
-pub use resume::generate_file;
+pub use resume::{generate_file, generate_files};
 pub use session::Spread;
 pub use split::Split;
 

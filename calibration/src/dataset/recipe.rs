@@ -19,6 +19,10 @@ pub enum Loads {
     Random(usize),
     /// As many for each of the paper's 357 poses, with the force uniform within the range.
     PaperPoses(usize),
+    /// As many for each of the 286 of them that comparisons train on.
+    TrainingPoses(usize),
+    /// As many for each of the 71 that they hold out.
+    HeldOutPoses(usize),
     /// As many frames of each of ten loads that are enough for a closed form.
     Known(usize),
     /// What was measured with a unit, in so many poses; nothing to render.
@@ -79,6 +83,41 @@ impl Default for Recipe {
     }
 }
 
+impl Loads {
+    /// The paper's poses among them, and how many loads each has.
+    fn poses(self) -> Option<(Poses, usize)> {
+        let [training, held_out] = PaperPoses::parts();
+        match self {
+            Loads::PaperPoses(each) => Some((Poses::All, each)),
+            Loads::TrainingPoses(each) => Some((Poses::Some(training), each)),
+            Loads::HeldOutPoses(each) => Some((Poses::Some(held_out), each)),
+            Loads::Random(_) | Loads::Known(_) | Loads::Measured(_) => None,
+        }
+    }
+}
+
+/// Some of the paper's poses, by number.
+enum Poses {
+    All,
+    Some(&'static [usize]),
+}
+
+impl Poses {
+    fn count(&self) -> usize {
+        match self {
+            Poses::All => PaperPoses::COUNT,
+            Poses::Some(poses) => poses.len(),
+        }
+    }
+
+    fn at(&self, index: usize) -> usize {
+        match self {
+            Poses::All => index,
+            Poses::Some(poses) => poses[index],
+        }
+    }
+}
+
 impl Recipe {
     /// Many sessions of a few random loads each, none of them this recipe's own: what a model made from this one does not know,
     /// and its uncertainties must.
@@ -96,9 +135,10 @@ impl Recipe {
     pub fn session_rows(&self) -> usize {
         let loads = match self.loads {
             Loads::Random(count) => count,
-            Loads::PaperPoses(each) => each.saturating_mul(PaperPoses::COUNT),
             Loads::Known(each) => each.saturating_mul(KnownLoads::COUNT),
-            Loads::Measured(_) => 0,
+            loads => loads
+                .poses()
+                .map_or(0, |(poses, each)| each.saturating_mul(poses.count())),
         };
         loads.saturating_add(self.rest)
     }
@@ -155,11 +195,12 @@ impl Recipe {
     /// Where a row stands: its session and, among the paper's poses, its pose.
     pub fn place(&self, row: usize) -> Place {
         let (session, within) = (row / self.session_rows(), row % self.session_rows());
-        let pose = match self.loads {
-            Loads::PaperPoses(each) if within >= self.rest => Some((within - self.rest) / each),
-            _ => None,
-        };
-        Place { session, pose }
+        let loaded = within.checked_sub(self.rest);
+        let pose = self.loads.poses().zip(loaded);
+        Place {
+            session,
+            pose: pose.map(|((poses, each), row)| poses.at(row / each)),
+        }
     }
 
     /// The load of a row.
@@ -173,18 +214,20 @@ impl Recipe {
         }
         let (range, seed) = (self.range, self.seed);
         let force_n = range.force_n;
-        match self.loads {
-            Loads::Random(_) => RandomLoads { range, seed }.load(row),
-            Loads::PaperPoses(each) => {
-                PaperPoses { force_n, seed }.load((within - self.rest) / each, row)
-            }
-            Loads::Known(each) => KnownLoads { force_n }.load((within - self.rest) / each),
-            Loads::Measured(_) => Ok(Load::REST),
+        match (self.loads, self.place(row).pose) {
+            (Loads::Known(each), _) => KnownLoads { force_n }.load((within - self.rest) / each),
+            (Loads::Measured(_), _) => Ok(Load::REST),
+            (_, Some(pose)) => PaperPoses { force_n, seed }.load(pose, row),
+            (_, None) => RandomLoads { range, seed }.load(row),
         }
         .with_context(|| format!("row {row}"))
     }
 
-    pub(crate) fn about(&self) -> Result<About> {
+    /// What the file of its data set says about it.
+    ///
+    /// # Errors
+    /// When the scene has no such preset or frame size.
+    pub fn about(&self) -> Result<About> {
         let scene = self.scene(0)?;
         let options: &Options = scene.options();
         Ok(About {

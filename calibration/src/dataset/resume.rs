@@ -1,17 +1,24 @@
 //! Data sets that go on where they were interrupted.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, OpenOptions};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
+use super::eye::{Eyes, Pool};
 use super::file::{lines, opening};
-use super::generate::Renderer;
-use super::{Dataset, Recipe};
+use super::generate::{Renderer, sensing};
+use super::{About, Dataset, Recipe};
 
 /// Rows that are rendered before they are written.
 const BLOCK: usize = 512;
+
+/// A data set on its way into a file.
+struct Target {
+    path: PathBuf,
+    opening: String,
+}
 
 /// Writes the data set of a recipe to a file, block by block, and reads it back. What an interrupted run left there is
 /// kept: the file ends up the same. `progress` is told the number of rows that are done, from any thread.
@@ -23,53 +30,117 @@ pub fn generate_file(
     path: &Path,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Dataset> {
-    let opening = opening(&recipe.about()?)?;
-    let renderer = Renderer::new(recipe)?;
-    let done = resume(path, &opening, recipe.rows())
-        .with_context(|| format!("cannot go on with {}", path.display()))?;
-    progress(done as u64);
-    let mut file = OpenOptions::new().append(true).open(path)?;
-    for first in (done..recipe.rows()).step_by(BLOCK) {
-        let rows = renderer.rows(first..(first + BLOCK).min(recipe.rows()), || progress(1))?;
-        file.write_all(&lines(&rows)?)
-            .with_context(|| format!("cannot write {}", path.display()))?;
-    }
+    let target = Target {
+        path: path.into(),
+        opening: opening(&recipe.about()?)?,
+    };
+    write(recipe, &[target], &sensing(recipe), progress)?;
     Dataset::load(path)
 }
 
-/// Makes the file hold its opening and whole rows only; how many.
-fn resume(path: &Path, opening: &str, rows: usize) -> Result<usize> {
-    let bytes = match fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-        Err(error) => return Err(error.into()),
+/// The same with eyes of its own, which look at the same frames: each has its file, and says in `files` what its rows are.
+///
+/// # Errors
+/// As [`generate_file`], and when eyes cannot be opened or are not as many as files.
+pub fn generate_files<'a>(
+    recipe: &Recipe,
+    files: Vec<(PathBuf, About)>,
+    open: impl Fn() -> Result<Eyes<'a>> + Sync + 'a,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Dataset>> {
+    let target = |(path, about): (PathBuf, About)| {
+        Ok(Target {
+            path,
+            opening: opening(&about)?,
+        })
     };
-    // An interrupted run may have left a part of the opening, too.
-    if opening.as_bytes().starts_with(&bytes) {
-        fs::write(path, opening)?;
-        return Ok(0);
+    let targets: Vec<Target> = files.into_iter().map(target).collect::<Result<_>>()?;
+    write(recipe, &targets, &Pool::new(open), progress)?;
+    targets.iter().map(|t| Dataset::load(&t.path)).collect()
+}
+
+fn write(
+    recipe: &Recipe,
+    targets: &[Target],
+    pool: &Pool<'_>,
+    progress: impl Fn(u64) + Sync,
+) -> Result<()> {
+    let renderer = Renderer::new(recipe)?;
+    let mut done = recipe.rows();
+    for target in targets {
+        let rows = target.begin(recipe.rows());
+        done = rows.with_context(|| target.stuck())?.min(done);
     }
-    ensure!(
-        bytes.starts_with(opening.as_bytes()),
-        "it is there and holds something else: remove it, or use another name"
-    );
-    let whole = bytes
-        .iter()
-        .rposition(|&byte| byte == b'\n')
-        .map_or(0, |end| end + 1);
-    let done = bytes[opening.len()..whole]
-        .iter()
-        .filter(|&&byte| byte == b'\n')
-        .count();
-    ensure!(done <= rows, "it has {done} rows, and {rows} are wanted");
-    let file: File = OpenOptions::new().write(true).open(path)?;
-    file.set_len(whole as u64)?;
-    Ok(done)
+    for target in targets {
+        target.cut(done).with_context(|| target.stuck())?;
+    }
+    progress(done as u64);
+    for first in (done..recipe.rows()).step_by(BLOCK) {
+        let range = first..(first + BLOCK).min(recipe.rows());
+        let rows = renderer.rows(range, pool, || progress(1))?;
+        for (i, target) in targets.iter().enumerate() {
+            let seen = rows.iter().map(|row| row.get(i).cloned());
+            let rows: Option<Vec<_>> = seen.collect();
+            let rows = rows.context("there are fewer eyes than files")?;
+            let mut file = OpenOptions::new().append(true).open(&target.path)?;
+            file.write_all(&lines(&rows)?)
+                .with_context(|| format!("cannot write {}", target.path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+impl Target {
+    fn stuck(&self) -> String {
+        format!("cannot go on with {}", self.path.display())
+    }
+
+    /// Makes the file begin with its opening; how many whole rows it has.
+    fn begin(&self, rows: usize) -> Result<usize> {
+        let bytes = match fs::read(&self.path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(error.into()),
+        };
+        // An interrupted run may have left a part of the opening, too.
+        if self.opening.as_bytes().starts_with(&bytes) {
+            fs::write(&self.path, &self.opening)?;
+            return Ok(0);
+        }
+        ensure!(
+            bytes.starts_with(self.opening.as_bytes()),
+            "it is there and holds something else: remove it, or use another name"
+        );
+        let done = ends(&bytes[self.opening.len()..]).count();
+        ensure!(done <= rows, "it has {done} rows, and {rows} are wanted");
+        Ok(done)
+    }
+
+    /// Leaves the first rows only.
+    fn cut(&self, rows: usize) -> Result<()> {
+        let bytes = fs::read(&self.path)?;
+        let start = self.opening.len();
+        let end = match rows.checked_sub(1) {
+            None => Some(0),
+            Some(last) => ends(&bytes[start..]).nth(last),
+        };
+        let end = end.context("it has changed meanwhile")?;
+        let file = OpenOptions::new().write(true).open(&self.path)?;
+        file.set_len((start + end) as u64)?;
+        Ok(())
+    }
+}
+
+/// Where each whole line ends.
+fn ends(bytes: &[u8]) -> impl Iterator<Item = usize> {
+    let ends = bytes.iter().enumerate();
+    ends.filter(|(_, byte)| **byte == b'\n').map(|(i, _)| i + 1)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Loads;
+    use super::super::eye::Sensing;
+    use super::super::{Loads, generate};
     use super::*;
 
     fn recipe() -> Recipe {
@@ -96,6 +167,32 @@ mod tests {
                 "cut after {length} bytes"
             );
         }
+    }
+
+    /// Two eyes on the same frames: files that were cut in different places end up the same.
+    #[test]
+    fn files_of_several_eyes_go_on_together() {
+        let directory = tempfile::tempdir().unwrap();
+        let recipe = recipe();
+        let path = |name: &str| directory.path().join(name);
+        let make = || {
+            let about = recipe.about().unwrap();
+            let mut other = about.clone();
+            other.scene.push_str(", seen otherwise");
+            let files = vec![(path("a.csv"), about), (path("b.csv"), other)];
+            let open = || -> Result<Eyes<'static>> {
+                let eye = || Sensing::unmodelled(&recipe);
+                Ok(vec![Box::new(eye()?), Box::new(eye()?)])
+            };
+            generate_files(&recipe, files, open, |_| ()).unwrap()
+        };
+        let whole = make();
+        assert_eq!(whole[0].rows, generate(&recipe, || ()).unwrap().rows);
+        assert_eq!(whole[0].rows, whole[1].rows);
+        let bytes = fs::read(path("a.csv")).unwrap();
+        fs::write(path("a.csv"), &bytes[..bytes.len() / 2]).unwrap();
+        assert_eq!(make(), whole);
+        assert!(fs::read(path("a.csv")).unwrap() == bytes);
     }
 
     #[test]

@@ -8,7 +8,7 @@ mod figures;
 mod film;
 mod overlay;
 mod render;
-mod size;
+pub(crate) mod size;
 
 use anyhow::Result;
 use clap::Subcommand;

@@ -14,8 +14,8 @@ use crate::numbers::decimal;
 use crate::toolchain::cargo;
 use crate::{artifacts, process, workspace};
 
-/// What pip calls OpenCV without windows.
-const OPENCV: &str = "opencv-python-headless";
+/// Where the paper's pipeline is, and what makes a Python that has OpenCV.
+const PYTHON: &str = "calibration/python";
 /// Lets OpenCV keep the memory that it frees: on a busy computer, getting its pages anew costs it as much as the work.
 const KEEP_MEMORY: [(&str, &str); 2] = [
     ("MALLOC_MMAP_THRESHOLD_", "4000000000"),
@@ -52,9 +52,7 @@ pub fn run(write_docs: bool) -> Result<()> {
     let python = match python(&folder) {
         Ok(python) => python,
         Err(error) => {
-            eprintln!(
-                "the comparison with OpenCV is skipped, as {OPENCV} cannot be had: {error:#}"
-            );
+            eprintln!("the comparison with OpenCV is skipped, as it cannot be had: {error:#}");
             return Ok(());
         }
     };
@@ -69,18 +67,10 @@ pub fn run(write_docs: bool) -> Result<()> {
 
 /// A Python that has OpenCV, in a virtual environment of its own.
 fn python(folder: &Path) -> Result<PathBuf> {
-    let python = folder.join("venv/bin/python");
-    let works = || process::succeeds(Command::new(&python).args(["-c", "import cv2"]));
-    if !works() {
-        process::run(
-            Command::new("python3")
-                .args(["-m", "venv"])
-                .arg(folder.join("venv")),
-        )?;
-        process::run(Command::new(&python).args(["-m", "pip", "install", "--quiet", OPENCV]))?;
-        ensure!(works(), "it is installed and cannot be imported");
-    }
-    Ok(python)
+    let script = workspace::folder(PYTHON).join("opencv_environment.py");
+    let mut command = Command::new("python3");
+    let path = process::output(command.arg(script).arg(folder.join("venv")))?;
+    Ok(PathBuf::from(path.trim()))
 }
 
 fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>> {
@@ -94,6 +84,7 @@ fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>> {
         let input = File::open(&list).with_context(|| format!("reading {}", list.display()))?;
         let mut opencv = Command::new(python);
         opencv.arg(script).stdin(input).envs(KEEP_MEMORY);
+        opencv.env("PYTHONPATH", workspace::folder(PYTHON));
         let theirs = process::output(&mut opencv)?;
         let round = timed(&frames)?.into_iter().zip(timed(&theirs)?);
         let round = round.map(|(ours, theirs)| Comparison { ours, theirs });

@@ -1,10 +1,11 @@
 //! The table of effects as text, Markdown and JSON.
 
-use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use serde_json::{Value, json};
+
+use crate::document;
 
 use super::compare::{Change, Spread};
 use super::{EffectsArgs, Row};
@@ -157,38 +158,10 @@ impl Table {
     /// When the document cannot be read or written, or has no such lines.
     pub fn write_into(&self, file: &Path) -> Result<()> {
         let name = format!("effects {}", self.conditions);
-        let shown = file.display();
-        let before = fs::read_to_string(file).with_context(|| format!("cannot read {shown}"))?;
-        let after = replaced(&before, &name, &self.to_markdown())
-            .with_context(|| format!("{shown} has no lines `<!-- {name}: begin … -->` and end"))?;
-        fs::write(file, after).with_context(|| format!("cannot write {shown}"))?;
-        println!("wrote {shown}");
-        Ok(())
+        document::write_into(file, &name, &self.to_markdown())
     }
 }
 
 fn usual(row: &Row) -> &'static str {
     if row.in_default { "on" } else { "off" }
-}
-
-fn replaced(document: &str, name: &str, text: &str) -> Option<String> {
-    let begin = document.find(&format!("<!-- {name}: begin"))?;
-    let start = begin + document[begin..].find("-->")? + "-->".len();
-    let end = start + document[start..].find(&format!("<!-- {name}: end -->"))?;
-    let (head, tail) = (&document[..start], &document[end..]);
-    Some(format!("{head}\n\n{}\n\n{tail}", text.trim()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_what_lies_between_the_marks_changes() {
-        let document = "one\n<!-- a: begin, by x -->\nold\n<!-- a: end -->\ntwo\n";
-        let expected = document.replace("\nold\n", "\n\nnew\n\n");
-        assert_eq!(replaced(document, "a", "new\n"), Some(expected.clone()));
-        assert_eq!(replaced(&expected, "a", "new"), Some(expected));
-        assert_eq!(replaced(document, "b", "new"), None);
-    }
 }

@@ -1,0 +1,139 @@
+//! What looks at rendered frames: `sensing`, or something that it is compared with.
+
+use std::sync::Mutex;
+
+use anyhow::{Result, anyhow};
+use hivtac_scene::Frame;
+use hivtac_sensing::features::Features;
+use hivtac_sensing::geometry::Geometry;
+use hivtac_sensing::model::Model;
+use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::status::Status;
+use hivtac_sensing::threshold::{ByteOrder, Threshold};
+
+use super::{Observation, Recipe};
+
+/// What was seen in a frame, or why nothing was.
+pub type Seen = Result<Observation, String>;
+
+/// Finds markers in frames.
+pub trait Eye: Send {
+    /// Looks at a frame.
+    ///
+    /// # Errors
+    /// When it cannot look at all; a frame without markers is no error.
+    fn look(&mut self, frame: &Frame) -> Result<Seen>;
+}
+
+/// Eyes that look at the same frames: each gives a data set of its own.
+pub type Eyes<'a> = Vec<Box<dyn Eye + 'a>>;
+
+/// `sensing` as an eye.
+pub struct Sensing<'m>(Box<Sensor<'m>>);
+
+impl Sensing<'static> {
+    /// Finds markers and features but knows no model: refuses only what cannot be markers.
+    ///
+    /// # Errors
+    /// When there are no such frames.
+    pub fn unmodelled(recipe: &Recipe) -> Result<Self> {
+        let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
+        let mut sensor = Box::new(Sensor::new());
+        let settings = Settings {
+            threshold: Threshold::red(recipe.format.to_model()),
+            centroid: recipe.centroid.to_model(),
+            ..Settings::usual(geometry, ByteOrder::Native)
+        };
+        let configured = sensor.configure(settings, None);
+        configured.map_err(|error| anyhow!("{error}"))?;
+        Ok(Self(sensor))
+    }
+}
+
+impl<'m> Sensing<'m> {
+    /// With a model, tared at the model's own rest position: refuses what the chip refuses.
+    ///
+    /// # Errors
+    /// When the model's frames cannot be read.
+    pub fn tared(model: &Model<'m>) -> Result<Self> {
+        let mut sensor = Box::new(Sensor::new());
+        let settings = Settings::of_model(model, ByteOrder::Native);
+        let configured = sensor.configure(settings, Some(*model));
+        configured.map_err(|error| anyhow!("{error}"))?;
+        sensor.set_tare(Some(model.rest));
+        Ok(Self(sensor))
+    }
+}
+
+impl Eye for Sensing<'_> {
+    fn look(&mut self, frame: &Frame) -> Result<Seen> {
+        let measurement = measure(&mut self.0, frame);
+        let refused = reasons(measurement.status);
+        Ok(match (measurement.markers, measurement.features) {
+            (Some(markers), Some(features)) if refused.is_empty() => Ok(Observation {
+                features_q16: Features::to_array(&features),
+                areas_px: markers.map(|m| m.area),
+            }),
+            _ => Err(refused),
+        })
+    }
+}
+
+/// Shows a frame to a sensor.
+pub(crate) fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
+    sensor.begin_frame();
+    sensor.push_rows(&frame.words());
+    sensor.finish_frame()
+}
+
+/// The names of the status bits that forbid a force, but not the missing model.
+pub(crate) fn reasons(status: Status) -> String {
+    let forbids = |name: &&str| {
+        let bit = Status::NAMES
+            .iter()
+            .find(|(_, n)| n == name)
+            .map_or(Status::OK, |(bit, _)| *bit);
+        Status::NO_FORCE.contains(bit) && bit != Status::MODEL_MISSING
+    };
+    status.names().filter(forbids).collect::<Vec<_>>().join(" ")
+}
+
+/// Opens eyes.
+type Open<'a> = dyn Fn() -> Result<Eyes<'a>> + Sync + 'a;
+
+/// Eyes for as many threads as look at a time, opened as they are needed.
+pub(super) struct Pool<'a> {
+    open: Box<Open<'a>>,
+    idle: Mutex<Vec<Eyes<'a>>>,
+}
+
+impl<'a> Pool<'a> {
+    pub fn new(open: impl Fn() -> Result<Eyes<'a>> + Sync + 'a) -> Self {
+        Self {
+            open: Box::new(open),
+            idle: Mutex::default(),
+        }
+    }
+
+    /// Lets all eyes of a set look at a frame.
+    pub fn look(&self, frame: &Frame) -> Result<Vec<Seen>> {
+        let idle = || self.idle.lock().map_err(|error| anyhow!("{error}"));
+        let ready = idle()?.pop();
+        let mut eyes = ready.map_or_else(&self.open, Ok)?;
+        let seen = eyes.iter_mut().map(|eye| eye.look(frame)).collect();
+        idle()?.push(eyes);
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_leave_out_what_is_no_reason() {
+        let status = Status::MARKERS_MISSING | Status::TARE_MISSING | Status::MODEL_MISSING;
+        assert_eq!(reasons(status), "markers_missing");
+    }
+}

@@ -1,0 +1,109 @@
+//! The frames: rendered once, seen by the sensing and by its peer.
+
+use anyhow::{Context, Result, anyhow};
+use hivtac_scene::Contact;
+use hivtac_sensing::model::Model;
+
+use super::PeersArgs;
+use crate::conditions::CentroidName;
+use crate::dataset::{Dataset, Eye, Eyes, Loads, Recipe, Sensing, Split, generate_files};
+use crate::fit::fit_closed_form;
+use crate::quantize::export;
+use crate::scene::size::Size;
+use crate::weights::Range;
+
+/// Opens a peer's eye for frames of so many columns and rows.
+pub type Open<'a> = dyn Fn(u16, u16) -> Result<Box<dyn Eye>> + Sync + 'a;
+
+/// Seeds of loads and noise.
+const TRAINING_SEED: u64 = 11;
+const TEST_SEED: u64 = 12;
+
+/// What one of the two saw.
+pub struct Sets {
+    /// Four fifths of the poses.
+    pub training: Dataset,
+    /// The others.
+    pub test: Dataset,
+}
+
+/// What both saw of the same frames.
+pub struct Frames {
+    /// The sensing, with centroids weighted with redness.
+    pub ours: Sets,
+    /// The peer.
+    pub theirs: Sets,
+}
+
+impl Frames {
+    /// Renders them, or goes on with what is there.
+    pub fn make(args: &PeersArgs, contact: Contact, size: Size, eye: &Open) -> Result<Self> {
+        let recipe = |loads: Loads, rest: usize, seed: u64| -> Result<Recipe> {
+            Ok(Recipe {
+                preset: args.preset,
+                width: u16::try_from(size.width)?,
+                height: u16::try_from(size.height)?,
+                centroid: CentroidName::RednessWeighted,
+                contact,
+                loads,
+                rest,
+                range: Range::default(),
+                seed,
+                ..Recipe::default()
+            })
+        };
+        let rest = Recipe::default().rest;
+        let training = recipe(Loads::TrainingPoses(args.training), rest, TRAINING_SEED)?;
+        let test = recipe(Loads::HeldOutPoses(args.test), 0, TEST_SEED)?;
+        let see = |recipe: &Recipe, part: &str, model: Option<&Model<'_>>| {
+            let mut about = recipe.about()?;
+            let ours = (
+                args.file(contact, size, &format!("{part}.csv")),
+                about.clone(),
+            );
+            about.conditions.centroid = CentroidName::BinaryMask;
+            about.scene.push_str("; markers by the peer");
+            let theirs = args.file(contact, size, &format!("{part}-peer.csv"));
+            let files = vec![ours, (theirs, about)];
+            let open = || -> Result<Eyes<'_>> {
+                let sensing = match model {
+                    None => Sensing::unmodelled(recipe)?,
+                    Some(model) => Sensing::tared(model)?,
+                };
+                Ok(vec![Box::new(sensing), eye(recipe.width, recipe.height)?])
+            };
+            let bar = crate::progress::bar(&format!("{contact} {size} {part}"), recipe.rows());
+            let made = generate_files(recipe, files, open, |rows| bar.inc(rows))?;
+            bar.finish_and_clear();
+            let made: [Dataset; 2] = made.try_into().map_err(|_| anyhow!("two files"))?;
+            Ok::<_, anyhow::Error>(made)
+        };
+        let [ours, theirs] = see(&training, "training", None)?;
+        // Any model of these frames: what is refused depends on its rest position and contact reading only.
+        let bytes = export(&fit_closed_form(&ours, Split::WithinPose, 1)?.weights)?;
+        let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"));
+        let model = model.context("the model that tells what the chip refuses")?;
+        let [our_test, their_test] = see(&test, "test", Some(&model))?;
+        Ok(Self {
+            ours: Sets {
+                training: ours,
+                test: our_test,
+            },
+            theirs: Sets {
+                training: theirs,
+                test: their_test,
+            },
+        })
+    }
+}
+
+/// The numbers of the test frames that everyone accepts at every size.
+pub fn seen_everywhere(sizes: &[Frames]) -> Vec<usize> {
+    let tests = || {
+        let both = sizes.iter().map(|f| [&f.ours.test, &f.theirs.test]);
+        both.flatten()
+    };
+    let rows = tests().map(|test| test.rows.len()).min().unwrap_or(0);
+    let seen = |row: &usize| tests().all(|test| test.rows[*row].seen.is_ok());
+    (0..rows).filter(seen).collect()
+}

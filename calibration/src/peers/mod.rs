@@ -1,0 +1,140 @@
+//! `hivtac-calibrate peers`: the sensing and its models beside the paper's own pipeline, on the same rendered frames.
+//!
+//! The paper's pipeline is its Section 5: OpenCV's HSV, threshold, dilation, contours and moments, and a float network of
+//! three hidden layers of 512 that answers with angles and |F|. Both are trained on the same frames of four fifths of the
+//! paper's poses and judged on the same frames of the others.
+
+mod errors;
+mod frames;
+mod models;
+mod opencv;
+mod table;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use hivtac_scene::Contact;
+use hivtac_sensing::geometry::Preset;
+
+use crate::document;
+use crate::scene::size::Size;
+use frames::{Frames, Open};
+use opencv::Python;
+use table::{Cell, Comparison};
+
+/// What to compare.
+#[derive(Args, Clone, Debug)]
+pub struct PeersArgs {
+    /// What the labels mean, one comparison each.
+    #[arg(long, value_delimiter = ',', default_values = ["force", "stick", "slip:0.6"])]
+    contacts: Vec<Contact>,
+    /// Frame sizes; the paper's pipeline at the first is what the goals compare with.
+    #[arg(long, value_delimiter = ',', default_values = ["800x600", "320x240"])]
+    sizes: Vec<Size>,
+    /// Geometry preset: paper or ov7725.
+    #[arg(long, default_value = "paper", value_parser = preset)]
+    preset: Preset,
+    /// Frames to train on for each of 286 poses.
+    #[arg(long, default_value_t = 42)]
+    training: usize,
+    /// Frames to judge on for each of the other 71.
+    #[arg(long, default_value_t = 282)]
+    test: usize,
+    /// Passes of the paper's network over its data (the paper: 100).
+    #[arg(long, default_value_t = 100)]
+    epochs: usize,
+    /// Its hidden layers.
+    #[arg(long, value_delimiter = ',', default_values_t = [512, 512, 512])]
+    hidden: Vec<usize>,
+    /// Passes of our networks in floats.
+    #[arg(long, default_value_t = 150)]
+    our_epochs: usize,
+    /// And with the chip's rounding.
+    #[arg(long, default_value_t = 100)]
+    our_rounded_epochs: usize,
+    /// Where Python, frames and networks are kept.
+    #[arg(long, default_value = "target/peers")]
+    folder: PathBuf,
+    /// Write the figures as JSON, too.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the tables into this document, between its lines `<!-- peers: begin … -->` and `<!-- peers: end -->`.
+    #[arg(long)]
+    document: Option<PathBuf>,
+}
+
+fn preset(name: &str) -> Result<Preset, String> {
+    crate::conditions::preset(name).map_err(|error| error.to_string())
+}
+
+impl PeersArgs {
+    /// Does it, and prints the tables.
+    ///
+    /// # Errors
+    /// When OpenCV cannot be had, files are of another run, or the scene cannot render what is asked for.
+    pub fn run(&self) -> Result<()> {
+        let python = Python::in_folder(&self.folder)
+            .context("without OpenCV there is nothing to compare with")?;
+        let eye: &Open = &|width, height| Ok(Box::new(python.eye(width, height)?));
+        let comparisons = self.compare(eye)?;
+        let text = table::markdown(&comparisons);
+        println!("{text}");
+        if let Some(path) = &self.json {
+            let json = serde_json::to_string_pretty(&comparisons)? + "\n";
+            fs::write(path, json).with_context(|| format!("cannot write {}", path.display()))?;
+        }
+        match &self.document {
+            Some(file) => document::write_into(file, "peers", &text),
+            None => Ok(()),
+        }
+    }
+
+    /// Compares with whatever finds the markers for the paper's network.
+    fn compare(&self, eye: &Open) -> Result<Vec<Comparison>> {
+        ensure!(!self.sizes.is_empty(), "name at least one frame size");
+        self.contacts
+            .iter()
+            .map(|&contact| self.reading(contact, eye))
+            .collect()
+    }
+
+    fn reading(&self, contact: Contact, eye: &Open) -> Result<Comparison> {
+        let seen = |size: &Size| Frames::make(self, contact, *size, eye);
+        let sizes: Vec<Frames> = self.sizes.iter().map(seen).collect::<Result<_>>()?;
+        let everywhere = frames::seen_everywhere(&sizes);
+        let mut cells = Vec::new();
+        for (size, frames) in self.sizes.iter().zip(&sizes) {
+            for model in models::all(self, contact, *size, frames)? {
+                let errors = errors::Sums::of(&model.answers(frames)?, &everywhere);
+                cells.push(Cell::new(*size, &model, &errors, frames));
+            }
+        }
+        Ok(Comparison {
+            contact: contact.to_string(),
+            preset: self.preset.name().to_owned(),
+            training_frames: sizes[0].ours.training.rows.len(),
+            test_frames: sizes[0].ours.test.rows.len(),
+            common_frames: everywhere.len(),
+            epochs: self.epochs,
+            cells,
+        })
+    }
+
+    /// A file of this study.
+    fn file(&self, contact: Contact, size: Size, name: &str) -> PathBuf {
+        let contact = contact.to_string().replace(':', "-");
+        let preset = self.preset.name();
+        self.folder
+            .join(format!("{contact}-{preset}-{size}-{name}"))
+    }
+}
+
+/// Whether a file is there.
+fn there(path: &Path) -> bool {
+    path.try_exists().unwrap_or(false)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,110 @@
+//! Figures side by side.
+
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use super::errors::Sums;
+use super::frames::Frames;
+use super::models::{How, Model};
+use crate::scene::size::Size;
+
+/// One contact reading.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    pub contact: String,
+    pub preset: String,
+    pub training_frames: usize,
+    pub test_frames: usize,
+    /// Test frames that everyone accepted at every size: the errors are theirs.
+    pub common_frames: usize,
+    /// Passes of the paper's network.
+    pub epochs: usize,
+    pub cells: Vec<Cell>,
+}
+
+/// One model at one size.
+#[derive(Clone, Debug, Serialize)]
+pub struct Cell {
+    pub size: String,
+    pub model: &'static str,
+    pub direction_deg: f64,
+    pub strong_direction_deg: f64,
+    pub force_rmse_mn: f64,
+    /// Test frames that it refused.
+    pub rejected: usize,
+}
+
+impl Cell {
+    pub fn new(size: Size, model: &Model, errors: &Sums, frames: &Frames) -> Self {
+        let test = match model.how {
+            How::Paper => &frames.theirs.test,
+            How::Float | How::Chip => &frames.ours.test,
+        };
+        Self {
+            size: size.to_string(),
+            model: model.name,
+            direction_deg: errors.direction_deg,
+            strong_direction_deg: errors.strong_deg,
+            force_rmse_mn: 1e3 * errors.force_rmse_n,
+            rejected: test.rejected().values().sum(),
+        }
+    }
+
+    fn ratios(&self, peer: &Cell) -> String {
+        let ratio = |value: fn(&Cell) -> f64| format!("{:.2}", value(self) / value(peer));
+        format!(
+            "{}, {}, {}",
+            ratio(|c| c.direction_deg),
+            ratio(|c| c.strong_direction_deg),
+            ratio(|c| c.force_rmse_mn)
+        )
+    }
+}
+
+impl Comparison {
+    /// The paper's pipeline at a size.
+    fn paper(&self, size: &str) -> Option<&Cell> {
+        self.cells
+            .iter()
+            .find(|c| c.size == size && c.model == "the paper's")
+    }
+
+    fn markdown(&self) -> String {
+        let mut text = format!(
+            "Contact reading `{}`, preset `{}`: trained on {} frames, judged on {} of the {} frames of the held-out poses \
+             that everyone accepted. The paper's network: {} passes.\n\n| frame | model | direction | \\|F\\| ≥ 50 mN | RMSE of \
+             \\|F\\| | rejected | times the paper's at {} | times the paper's at this size |\n|---|---|--:|--:|--:|--:|---|---|\n",
+            self.contact,
+            self.preset,
+            self.training_frames,
+            self.common_frames,
+            self.test_frames,
+            self.epochs,
+            self.cells.first().map_or("", |cell| &cell.size)
+        );
+        let first = self.cells.first();
+        for cell in &self.cells {
+            let beside = |peer: Option<&Cell>| peer.map_or(String::new(), |peer| cell.ratios(peer));
+            let _ = writeln!(
+                text,
+                "| {} | {} | {:.3}° | {:.3}° | {:.3} mN | {} | {} | {} |",
+                cell.size,
+                cell.model,
+                cell.direction_deg,
+                cell.strong_direction_deg,
+                cell.force_rmse_mn,
+                cell.rejected,
+                beside(first),
+                beside(self.paper(&cell.size))
+            );
+        }
+        text
+    }
+}
+
+/// All comparisons as Markdown. A cell with three ratios has direction, direction from 50 mN up, and RMSE of |F|.
+pub fn markdown(comparisons: &[Comparison]) -> String {
+    let texts: Vec<_> = comparisons.iter().map(Comparison::markdown).collect();
+    texts.join("\n")
+}

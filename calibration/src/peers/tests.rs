@@ -1,0 +1,51 @@
+use super::*;
+use crate::dataset::{Eye, Recipe, Sensing};
+
+/// The whole study, small, without OpenCV: the sensing with the paper's binary centroids stands in for it.
+#[test]
+fn a_small_comparison_runs_and_goes_on_where_it_was() {
+    let directory = tempfile::tempdir().unwrap();
+    let args = PeersArgs {
+        contacts: vec![Contact::Force],
+        sizes: vec!["320x240".parse().unwrap(), "160x120".parse().unwrap()],
+        preset: Preset::Paper,
+        training: 2,
+        test: 2,
+        epochs: 12,
+        hidden: vec![24, 24],
+        our_epochs: 12,
+        our_rounded_epochs: 4,
+        folder: directory.path().into(),
+        json: None,
+        document: None,
+    };
+    let eye = |width, height| -> Result<Box<dyn Eye>> {
+        let recipe = Recipe {
+            preset: Preset::Paper,
+            width,
+            height,
+            centroid: crate::conditions::CentroidName::BinaryMask,
+            ..Recipe::default()
+        };
+        Ok(Box::new(Sensing::unmodelled(&recipe)?))
+    };
+    let comparisons = args.compare(&eye).unwrap();
+    let [comparison] = &comparisons[..] else {
+        panic!("one reading")
+    };
+    assert_eq!((comparison.test_frames, comparison.cells.len()), (142, 12));
+    assert!(comparison.common_frames > 100, "{comparison:?}");
+    let form = |size: &str| {
+        let mut cells = comparison.cells.iter();
+        cells
+            .find(|c| c.size == size && c.model == "closed form")
+            .unwrap()
+    };
+    assert!(form("320x240").strong_direction_deg < 0.5, "{comparison:?}");
+    assert!(form("320x240").direction_deg < form("160x120").direction_deg);
+    let text = table::markdown(&comparisons);
+    assert!(text.contains("| 160x120 | the paper's |"), "{text}");
+
+    let again = args.compare(&eye).unwrap();
+    assert_eq!(table::markdown(&again), text);
+}
