@@ -59,10 +59,10 @@ impl Meaning {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Arithmetic {
-    /// int8 weights with a scale for each output of a layer.
+    /// int8 weights with a scale for each output of a layer, but int16 in the first and the last.
     #[default]
     Int8PerChannel,
-    /// int8 weights with one scale for a layer.
+    /// The same with one scale for a layer.
     Int8PerTensor,
     /// int16 weights with a scale for each output of a layer, and activations of twelve bits.
     Int16,
@@ -102,7 +102,7 @@ impl Layer {
 /// What is smaller is no deviation but the rounding of a mean.
 const NO_SIGMA: f64 = 1e-9;
 /// The σ of an answer that does not vary, in N or degrees: smaller than any use, and large enough for the chip's numbers.
-const CONSTANT_ANSWER: f64 = 1e-5;
+pub(crate) const CONSTANT_ANSWER: f64 = 1e-5;
 
 /// Mean and standard deviation, component by component.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! Floats to the chip's integers (`docs/architecture.md`, model file).
 //!
 //! Weights become integers with a scale for each output (int8 and activations of seven bits, or int16 and twelve; the first
-//! layer is always int16), biases the accumulator's unit, and what is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in a fixed order: the same
+//! layer and the last are always int16), biases the accumulator's unit, and what is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in a fixed order: the same
 //! weights give the same bytes on every machine.
 
 use anyhow::{Context, Result, ensure};
@@ -132,15 +132,18 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
         width: WeightWidth::Int16,
         one_scale: network.arithmetic == Arithmetic::Int8PerTensor,
     };
-    let (width, largest) = match network.arithmetic {
-        Arithmetic::Int8PerChannel | Arithmetic::Int8PerTensor => {
+    // A layer's weights and its largest input. The output layer has three rows only: int16 costs nothing there, and
+    // spares the last activations and the answer itself the coarse steps.
+    let held = |layer: usize| match network.arithmetic {
+        Arithmetic::Int8PerChannel | Arithmetic::Int8PerTensor if layer < last => {
             (WeightWidth::Int8, LARGEST_ACTIVATION8)
         }
-        Arithmetic::Int16 => (WeightWidth::Int16, LARGEST_ACTIVATION16),
+        _ => (WeightWidth::Int16, LARGEST_ACTIVATION16),
     };
     let mut layers = Vec::with_capacity(network.layers.len());
     for (i, layer) in network.layers.iter().enumerate() {
         let quantized = if i < last {
+            let (width, largest) = held(i + 1);
             let next = network.activation_max[i] / f64::from(largest);
             let output = |_| Output {
                 factor: 1.0 / next,

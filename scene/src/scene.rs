@@ -125,6 +125,16 @@ impl Scene {
         self.truth_of(&exposure, &self.marker_images(&exposure))
     }
 
+    /// What is true under any constant load, whatever the scene's motion, without rendering.
+    ///
+    /// # Errors
+    /// When the film cannot take the load.
+    pub fn truth_under(&self, load: &Load) -> Result<Truth, SceneError> {
+        self.options.film.check(&self.film, load)?;
+        let exposure = self.exposure(|_| *load);
+        Ok(self.truth_of(&exposure, &self.marker_images(&exposure)))
+    }
+
     /// A frame under any constant load, whatever the scene's motion; the number selects its noise.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 ///
 /// # Errors
 /// When the rows do not determine x.
-pub(super) fn solve(rows: &[(Vec<f64>, f64, f64)]) -> Result<Vec<f64>> {
+pub(crate) fn solve(rows: &[(Vec<f64>, f64, f64)]) -> Result<Vec<f64>> {
     let n = rows.first().map_or(0, |row| row.0.len());
     let mut system = vec![vec![0.0; n + 1]; n];
     for (a, b, weight) in rows {

@@ -5,7 +5,7 @@
 //! polynomials of r. It needs a few known loads, where a network needs thousands.
 
 mod fit;
-mod least_squares;
+pub(crate) mod least_squares;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::closed_form::{LARGEST_KNOT, ONE};

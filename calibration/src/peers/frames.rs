@@ -33,6 +33,8 @@ pub struct Frames {
     pub ours: Sets,
     /// The peer.
     pub theirs: Sets,
+    /// How the test frames are made.
+    pub test_recipe: Recipe,
 }
 
 impl Frames {
@@ -93,6 +95,7 @@ impl Frames {
                 training: theirs,
                 test: their_test,
             },
+            test_recipe: test,
         })
     }
 }

@@ -6,6 +6,7 @@
 
 mod errors;
 mod frames;
+mod limit;
 mod models;
 mod opencv;
 mod table;
@@ -21,6 +22,7 @@ use hivtac_sensing::geometry::Preset;
 use crate::document;
 use crate::scene::size::Size;
 use frames::{Frames, Open};
+use models::How;
 use opencv::Python;
 use table::{Cell, Comparison};
 
@@ -49,7 +51,7 @@ pub struct PeersArgs {
     #[arg(long, value_delimiter = ',', default_values_t = [512, 512, 512])]
     hidden: Vec<usize>,
     /// Passes of our networks in floats.
-    #[arg(long, default_value_t = 150)]
+    #[arg(long, default_value_t = 300)]
     our_epochs: usize,
     /// And with the chip's rounding.
     #[arg(long, default_value_t = 100)]
@@ -104,12 +106,19 @@ impl PeersArgs {
         let seen = |size: &Size| Frames::make(self, contact, *size, eye);
         let sizes: Vec<Frames> = self.sizes.iter().map(seen).collect::<Result<_>>()?;
         let everywhere = frames::seen_everywhere(&sizes);
-        let mut cells = Vec::new();
+        let (mut cells, mut limits) = (Vec::new(), Vec::new());
         for (size, frames) in self.sizes.iter().zip(&sizes) {
+            let mut ours = Vec::new();
             for model in models::all(self, contact, *size, frames)? {
-                let errors = errors::Sums::of(&model.answers(frames)?, &everywhere);
+                let answers = model.answers(frames)?;
+                let errors = errors::Sums::of(&answers, &everywhere);
                 cells.push(Cell::new(*size, &model, &errors, frames));
+                if model.how == How::Chip {
+                    ours.push((model.name, answers));
+                }
             }
+            let tenths = limit::tenths(frames, &everywhere, &ours)?;
+            limits.push((size.to_string(), tenths));
         }
         Ok(Comparison {
             contact: contact.to_string(),
@@ -119,6 +128,7 @@ impl PeersArgs {
             common_frames: everywhere.len(),
             epochs: self.epochs,
             cells,
+            limits,
         })
     }
 

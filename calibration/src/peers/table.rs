@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::errors::Sums;
 use super::frames::Frames;
+use super::limit::Tenth;
 use super::models::{How, Model};
 use crate::scene::size::Size;
 
@@ -21,6 +22,8 @@ pub struct Comparison {
     /// Passes of the paper's network.
     pub epochs: usize,
     pub cells: Vec<Cell>,
+    /// What the centroids allow, for each size.
+    pub limits: Vec<(String, Vec<Tenth>)>,
 }
 
 /// One model at one size.
@@ -99,8 +102,44 @@ impl Comparison {
                 beside(self.paper(&cell.size))
             );
         }
+        for (size, tenths) in &self.limits {
+            let _ = write!(text, "\n{}", limits(&self.contact, size, tenths));
+        }
         text
     }
+}
+
+/// Our models beside the Cramér–Rao bound, as multiples of it.
+fn limits(contact: &str, size: &str, tenths: &[Tenth]) -> String {
+    let Some(first) = tenths.first() else {
+        return String::new();
+    };
+    let names: Vec<_> = first.found.iter().map(|(name, _)| *name).collect();
+    let mut text = format!(
+        "The limit, `{contact}`, {size}: root mean squares by tenths of the frames, direction and \\|F\\|; models as multiples of \
+         the bound.\n\n| \\|F\\|, mN | scatter, px | noise alone | bound | bound of noise alone | {} |\n|---|--:|--:|---|---|{}\n",
+        names.join(" | "),
+        "---|".repeat(names.len())
+    );
+    for tenth in tenths {
+        let [low, high] = tenth.force_mn;
+        let pair = |[direction, force]: [f64; 2]| format!("{direction:.3}°, {force:.3} mN");
+        let over = |(_, found): &(&str, [f64; 2])| {
+            let [direction, force] = [0, 1].map(|i| found[i] / tenth.bound[i]);
+            format!("{direction:.2}, {force:.2}")
+        };
+        let found: Vec<_> = tenth.found.iter().map(over).collect();
+        let _ = writeln!(
+            text,
+            "| {low:.0}–{high:.0} | {:.3} | {:.3} | {} | {} | {} |",
+            tenth.scatter_px,
+            tenth.repeat_px,
+            pair(tenth.bound),
+            pair(tenth.noise_bound),
+            found.join(" | ")
+        );
+    }
+    text
 }
 
 /// All comparisons as Markdown. A cell with three ratios has direction, direction from 50 mN up, and RMSE of |F|.

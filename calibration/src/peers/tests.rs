@@ -43,6 +43,12 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
     };
     assert!(form("320x240").strong_direction_deg < 0.5, "{comparison:?}");
     assert!(form("320x240").direction_deg < form("160x120").direction_deg);
+    let limits = &comparison.limits[0].1;
+    assert_eq!(
+        (comparison.limits.len(), limits.len()),
+        (2, 0),
+        "too few frames for a limit"
+    );
     let text = table::markdown(&comparisons);
     assert!(text.contains("| 160x120 | the paper's |"), "{text}");
 

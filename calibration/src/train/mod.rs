@@ -12,7 +12,7 @@ mod state;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::network::{INPUTS, Network, OUTPUTS, Standardization};
+use crate::network::{CONSTANT_ANSWER, INPUTS, Meaning, Network, OUTPUTS, Standardization};
 pub use options::Options;
 use state::{Phase, State};
 
@@ -121,12 +121,25 @@ impl Samples {
     }
 }
 
+/// What a component's deviation may be above the common one: more is no force that anyone tilts.
+const MOST_APART: f64 = 16.0;
+
 /// Scaling of features and answers, from the data.
-fn scaling(training: &Samples) -> Result<[Standardization; 2]> {
-    Ok([
-        Standardization::of(&training.features)?,
-        Standardization::of_answers(&training.answers)?,
-    ])
+///
+/// The components of a force that vary share the smallest of their deviations, so that a millinewton counts the same in each:
+/// F_z varies several times as much as F_x and F_y, and would be learnt as much more coarsely with a deviation of its own.
+fn scaling(training: &Samples, meaning: Meaning) -> Result<[Standardization; 2]> {
+    let mut answers = Standardization::of_answers(&training.answers)?;
+    if meaning == Meaning::ForceVector {
+        let varying = |sigma: &&mut f64| **sigma > CONSTANT_ANSWER;
+        let most = answers.sigma.iter().copied().fold(0.0, f64::max);
+        let shared = answers.sigma.iter_mut().filter(varying);
+        let least = shared.fold(most, |least, sigma| least.min(*sigma));
+        let common = least.max(most / MOST_APART);
+        let shared = answers.sigma.iter_mut().filter(varying);
+        shared.for_each(|sigma| *sigma = common);
+    }
+    Ok([Standardization::of(&training.features)?, answers])
 }
 
 #[cfg(test)]

@@ -256,7 +256,7 @@ fn mean_square(outputs: &[f32], targets: &[f32]) -> f64 {
 
 /// A network without layers: scaling from the data.
 fn blank(training: &Samples, options: &Options) -> Result<Network> {
-    let [input, output] = scaling(training)?;
+    let [input, output] = scaling(training, options.meaning)?;
     Ok(Network {
         meaning: options.meaning,
         arithmetic: options.arithmetic,

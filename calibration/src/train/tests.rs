@@ -49,7 +49,7 @@ fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
         ..Options::default()
     };
     let mlp = Mlp::random(&[INPUTS, 16, 16, OUTPUTS], &mut random);
-    let [input, _] = scaling(&samples).unwrap();
+    let [input, _] = scaling(&samples, Meaning::ForceVector).unwrap();
     let output = Standardization {
         mean: vec![0.1; OUTPUTS],
         sigma: vec![0.05; OUTPUTS],
