@@ -1,10 +1,13 @@
 //! The frames: rendered once, seen by the sensing and by its peer.
 
+use std::collections::BTreeSet;
+
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::Contact;
 use hivtac_sensing::model::Model;
 
 use super::PeersArgs;
+use super::models::How;
 use crate::conditions::CentroidName;
 use crate::dataset::{Dataset, Eye, Eyes, Loads, Recipe, Sensing, Split, generate_files};
 use crate::fit::fit_closed_form;
@@ -66,6 +69,9 @@ impl Frames {
             about.conditions.centroid = CentroidName::BinaryMask;
             about.scene.push_str("; markers by the peer");
             let theirs = args.file(contact, size, &format!("{part}-peer.csv"));
+            if args.kept_frames {
+                return Ok([Dataset::load(&ours.0)?, Dataset::load(&theirs)?]);
+            }
             let files = vec![ours, (theirs, about)];
             let open = || -> Result<Eyes<'_>> {
                 let sensing = match model {
@@ -98,15 +104,37 @@ impl Frames {
             test_recipe: test,
         })
     }
+
+    /// How many of the first test frames were refused.
+    pub fn rejected(&self, how: How, rows: usize) -> usize {
+        let test = match how {
+            How::Paper => &self.theirs.test,
+            How::Float | How::Chip => &self.ours.test,
+        };
+        let rows = test.rows.iter().take(rows);
+        rows.filter(|row| row.seen.is_err()).count()
+    }
 }
 
-/// The numbers of the test frames that everyone accepts at every size.
+fn tests(sizes: &[Frames]) -> impl Iterator<Item = &Dataset> {
+    let both = sizes.iter().map(|f| [&f.ours.test, &f.theirs.test]);
+    both.flatten()
+}
+
+/// The test frames that there are at every size: the first ones, when some were interrupted.
+pub fn rendered_everywhere(sizes: &[Frames]) -> usize {
+    let rows = tests(sizes).map(|test| test.rows.len());
+    rows.min().unwrap_or(0)
+}
+
+/// Their numbers, of those that everyone accepts at every size.
 pub fn seen_everywhere(sizes: &[Frames]) -> Vec<usize> {
-    let tests = || {
-        let both = sizes.iter().map(|f| [&f.ours.test, &f.theirs.test]);
-        both.flatten()
-    };
-    let rows = tests().map(|test| test.rows.len()).min().unwrap_or(0);
-    let seen = |row: &usize| tests().all(|test| test.rows[*row].seen.is_ok());
-    (0..rows).filter(seen).collect()
+    let seen = |row: &usize| tests(sizes).all(|test| test.rows[*row].seen.is_ok());
+    (0..rendered_everywhere(sizes)).filter(seen).collect()
+}
+
+/// Of how many poses the frames of these numbers are.
+pub fn poses(frames: &Frames, numbers: &[usize]) -> usize {
+    let pose = |&i: &usize| frames.ours.test.rows[i].place.pose;
+    numbers.iter().map(pose).collect::<BTreeSet<_>>().len()
 }

@@ -59,6 +59,9 @@ pub struct PeersArgs {
     /// Where Python, frames and networks are kept.
     #[arg(long, default_value = "target/peers")]
     folder: PathBuf,
+    /// Render nothing more: judge on the test frames that an interrupted run left in the folder.
+    #[arg(long)]
+    kept_frames: bool,
     /// Write the figures as JSON, too.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -105,6 +108,7 @@ impl PeersArgs {
     fn reading(&self, contact: Contact, eye: &Open) -> Result<Comparison> {
         let seen = |size: &Size| Frames::make(self, contact, *size, eye);
         let sizes: Vec<Frames> = self.sizes.iter().map(seen).collect::<Result<_>>()?;
+        let rendered = frames::rendered_everywhere(&sizes);
         let everywhere = frames::seen_everywhere(&sizes);
         let (mut cells, mut limits) = (Vec::new(), Vec::new());
         for (size, frames) in self.sizes.iter().zip(&sizes) {
@@ -112,7 +116,12 @@ impl PeersArgs {
             for model in models::all(self, contact, *size, frames)? {
                 let answers = model.answers(frames)?;
                 let errors = errors::Sums::of(&answers, &everywhere);
-                cells.push(Cell::new(*size, &model, &errors, frames));
+                cells.push(Cell::new(
+                    *size,
+                    &model,
+                    &errors,
+                    frames.rejected(model.how, rendered),
+                ));
                 if model.how == How::Chip {
                     ours.push((model.name, answers));
                 }
@@ -124,7 +133,8 @@ impl PeersArgs {
             contact: contact.to_string(),
             preset: self.preset.name().to_owned(),
             training_frames: sizes[0].ours.training.rows.len(),
-            test_frames: sizes[0].ours.test.rows.len(),
+            test_frames: rendered,
+            poses: frames::poses(&sizes[0], &everywhere),
             common_frames: everywhere.len(),
             epochs: self.epochs,
             cells,

@@ -5,9 +5,8 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::errors::Sums;
-use super::frames::Frames;
 use super::limit::Tenth;
-use super::models::{How, Model};
+use super::models::Model;
 use crate::scene::size::Size;
 
 /// One contact reading.
@@ -17,6 +16,8 @@ pub struct Comparison {
     pub preset: String,
     pub training_frames: usize,
     pub test_frames: usize,
+    /// Held-out poses that the common frames are of.
+    pub poses: usize,
     /// Test frames that everyone accepted at every size: the errors are theirs.
     pub common_frames: usize,
     /// Passes of the paper's network.
@@ -39,18 +40,14 @@ pub struct Cell {
 }
 
 impl Cell {
-    pub fn new(size: Size, model: &Model, errors: &Sums, frames: &Frames) -> Self {
-        let test = match model.how {
-            How::Paper => &frames.theirs.test,
-            How::Float | How::Chip => &frames.ours.test,
-        };
+    pub fn new(size: Size, model: &Model, errors: &Sums, rejected: usize) -> Self {
         Self {
             size: size.to_string(),
             model: model.name,
             direction_deg: errors.direction_deg,
             strong_direction_deg: errors.strong_deg,
             force_rmse_mn: 1e3 * errors.force_rmse_n,
-            rejected: test.rejected().values().sum(),
+            rejected,
         }
     }
 
@@ -75,7 +72,7 @@ impl Comparison {
 
     fn markdown(&self) -> String {
         let mut text = format!(
-            "Contact reading `{}`, preset `{}`: trained on {} frames, judged on {} of the {} frames of the held-out poses \
+            "Contact reading `{}`, preset `{}`: trained on {} frames, judged on {} of {} frames of {} held-out poses \
              that everyone accepted. The paper's network: {} passes.\n\n| frame | model | direction | \\|F\\| ≥ 50 mN | RMSE of \
              \\|F\\| | rejected | times the paper's at {} | times the paper's at this size |\n|---|---|--:|--:|--:|--:|---|---|\n",
             self.contact,
@@ -83,6 +80,7 @@ impl Comparison {
             self.training_frames,
             self.common_frames,
             self.test_frames,
+            self.poses,
             self.epochs,
             self.cells.first().map_or("", |cell| &cell.size)
         );

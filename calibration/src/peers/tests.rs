@@ -16,6 +16,7 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
         our_epochs: 12,
         our_rounded_epochs: 4,
         folder: directory.path().into(),
+        kept_frames: false,
         json: None,
         document: None,
     };
@@ -54,4 +55,10 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
 
     let again = args.compare(&eye).unwrap();
     assert_eq!(table::markdown(&again), text);
+    let blind = |_, _| -> Result<Box<dyn Eye>> { anyhow::bail!("nothing is rendered") };
+    let kept = PeersArgs {
+        kept_frames: true,
+        ..args
+    };
+    assert_eq!(table::markdown(&kept.compare(&blind).unwrap()), text);
 }
