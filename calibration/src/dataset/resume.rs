@@ -180,7 +180,7 @@ mod tests {
             let mut other = about.clone();
             other.scene.push_str(", seen otherwise");
             let files = vec![(path("a.csv"), about), (path("b.csv"), other)];
-            let open = || -> Result<Eyes<'static>> {
+            let open = || -> Result<Eyes<'_>> {
                 let eye = || Sensing::unmodelled(&recipe);
                 Ok(vec![Box::new(eye()?), Box::new(eye()?)])
             };
