@@ -90,7 +90,7 @@ fn a_second_one_waits_its_turn_and_nonsense_is_refused() {
         hue_high: 10,
         ..GREEN
     };
-    let run = Setup::new(firmware(), 460)
+    let run = Setup::new(firmware(), 520)
         .at(300, set(1001, GREEN))
         .at(301, set(1002, red))
         .at(302, set(1003, nonsense))

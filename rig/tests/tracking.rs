@@ -62,7 +62,7 @@ fn a_moving_tip_is_followed() {
 #[test]
 fn what_jumps_is_lost_counted_and_found_again() {
     let setup = Setup {
-        scene: "catch",
+        scene: "tests/catch.toml",
         ..Setup::new(bug("tracking"), 600)
     };
     let run = setup.run();

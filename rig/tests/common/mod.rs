@@ -7,7 +7,7 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use std::num::NonZeroU64;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -88,6 +88,7 @@ pub fn instructions_per_second() -> u64 {
 /// A run under a scripted host that opens the port, says hello, starts the stream, and asks for counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
+    /// A scene's name, or its file from the package's folder.
     pub scene: &'static str,
     pub seed: u64,
     pub faults: Vec<&'static str>,
@@ -133,7 +134,14 @@ impl Setup {
         )
     }
 
-    pub fn try_run(self, truth: &std::path::Path) -> anyhow::Result<Outcome> {
+    fn source(&self) -> anyhow::Result<SceneSource> {
+        if self.scene.ends_with(".toml") {
+            return SceneSource::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(self.scene));
+        }
+        SceneSource::new(self.scene, "ov7725", self.seed)
+    }
+
+    pub fn try_run(self, truth: &Path) -> anyhow::Result<Outcome> {
         let ms = |ms: u64| ms * 1_000_000;
         let mut actions = vec![
             (0, Action::Open),
@@ -144,10 +152,11 @@ impl Setup {
                 Action::Send(command(2, Request::GetInfo)),
             ),
         ];
+        let source = Box::new(self.source()?);
         actions.extend(self.actions);
         run(Options {
             elf: self.elf,
-            source: Box::new(SceneSource::new(self.scene, "ov7725", self.seed)?),
+            source,
             truth: TruthLog::create(truth)?,
             faults: Faults::new(
                 self.faults

@@ -145,7 +145,7 @@ mod tests {
                     let size = f64::from(step) / 1000.0;
                     let found = table.sums(size, &ones)[curve.output.index()][0];
                     let error = (found - coefficient(curve, size)).abs();
-                    assert!(error < 2e-4, "{curve:?}: {error} at {size}");
+                    assert!(error < 3e-4, "{curve:?}: {error} at {size}");
                 }
             }
         }
