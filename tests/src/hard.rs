@@ -32,14 +32,14 @@ pub struct Outcome {
 impl Outcome {
     /// How far a marker may be from the truth here, px. Under four-fold noise 1; under other noise that lies within the
     /// markers (compression, white pixels, motion), which no rule tells from an honest frame, 0.15 px more than usual.
-    /// Limits are wider for a tip that sticks or slips: 0.1 px more.
+    /// Limits are wider for a tip that sticks or slips: 0.15 px more.
     pub fn tolerance_px(&self) -> f64 {
         let case = self.case.tolerance_px(self.view.size[0]);
         let noisy = ["jpeg-", "salt-", "motion-"];
         let noisy = noisy.iter().any(|name| self.case.name.starts_with(name));
         let moves_along = self.view.contact != Contact::Force;
         let more = |yes: bool, px: f64| if yes { px } else { 0.0 };
-        (self.view.tolerance_px() + more(noisy, 0.15) + more(moves_along, 0.1)).max(case)
+        (self.view.tolerance_px() + more(noisy, 0.15) + more(moves_along, 0.15)).max(case)
     }
 
     /// Whether a frame's markers were wrong without anybody saying so.

@@ -149,7 +149,7 @@ fn a_unit_gets_a_model_of_its_own() {
         &["quick", "--data", "loads.csv", "--out", "unit.weights"],
         "",
     );
-    assert!(quick.contains("expect F_x and F_y within"), "{quick}");
+    assert!(quick.contains("expect forces within"), "{quick}");
     calibrate(
         here,
         &["export", "--weights", "unit.weights", "--out", "unit.hvtm"],
