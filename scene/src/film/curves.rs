@@ -261,7 +261,7 @@ pub fn to_diagonal([x, y]: [f64; 2], [corner_x, corner_y]: [f64; 2]) -> [f64; 2]
 }
 
 /// The way back.
-fn from_diagonal([r, t]: [f64; 2], [corner_x, corner_y]: [f64; 2]) -> [f64; 2] {
+pub(super) fn from_diagonal([r, t]: [f64; 2], [corner_x, corner_y]: [f64; 2]) -> [f64; 2] {
     let half = std::f64::consts::FRAC_1_SQRT_2;
     [
         half * (r - t) * corner_x.signum(),
