@@ -1,10 +1,10 @@
 //! MDMA channel 0: bands from AXI SRAM into DTCM, where the core reads them without waiting.
 //!
 //! # Design
-//! Two buffers: while the core scans one band, the next one is copied when it is there already. The core asks for a
-//! band when it knows that it is finished, so it waits for a copy only when it had nothing to do: one band of
-//! 320 × 4 pixels moves in about 3 µs (320 reads of 8 bytes and 640 writes of 4 at the 240 MHz of the bus; an
-//! estimate, not measured).
+//! Three buffers: while the core scans one band, the next one is copied when it is there already, and the one before
+//! stays, as its last rows may have to be weighed yet. The core asks for a band when it knows that it is finished, so it
+//! waits for a copy only when it had nothing to do: one band of 320 × 4 pixels moves in about 3 µs (320 reads of 8 bytes
+//! and 640 writes of 4 at the 240 MHz of the bus; an estimate, not measured).
 //!
 //! # Note
 //! Coherence: the MDMA reads AXI SRAM past the caches, where the camera's DMA has written past them; it writes DTCM,
@@ -27,16 +27,30 @@ const PATIENCE: u32 = 100_000;
 #[repr(C, align(128))]
 struct Rows([u16; BAND_PIXELS]);
 
-static BUFFERS: ConstStaticCell<[Rows; 2]> = ConstStaticCell::new([Rows([0; BAND_PIXELS]); 2]);
+/// The one being scanned, the one before it, and the next.
+const COUNT: usize = 3;
 
-/// The channel and its two buffers.
+static BUFFERS: ConstStaticCell<[Rows; COUNT]> =
+    ConstStaticCell::new([Rows([0; BAND_PIXELS]); COUNT]);
+
+/// The channel and its buffers.
 pub struct BandCopy {
     _channel: Peri<'static, peripherals::MDMA_CH0>,
-    buffers: &'static mut [Rows; 2],
+    buffers: &'static mut [Rows; COUNT],
     /// The buffer of the copy under way, or the next one.
     next: usize,
     /// The band that is being copied, or was copied ahead.
     ahead: Option<(u32, Window)>,
+    /// The band that was fetched last, when it was intact.
+    before: Option<(u32, Window)>,
+}
+
+/// A band in memory, row by row.
+pub struct Fetched<'b> {
+    /// Its pixels.
+    pub rows: &'b [u16],
+    /// Those of the band before it; none when that is not there.
+    pub above: &'b [u16],
 }
 
 impl BandCopy {
@@ -48,32 +62,45 @@ impl BandCopy {
             buffers: BUFFERS.take(),
             next: 0,
             ahead: None,
+            before: None,
         }
     }
 
-    /// The pixels of a finished band, row by row. `finished` tells how many bands are finished by now; when there is
-    /// one more already, its copy begins. `None` when the band was overwritten meanwhile, or could not be copied.
-    pub fn fetch(&mut self, band: &Band, finished: impl Fn() -> u32) -> Option<&[u16]> {
+    /// A finished band. `finished` tells how many bands are finished by now; when there is one more already, its copy
+    /// begins. `None` when the band was overwritten meanwhile, or could not be copied.
+    pub fn fetch(&mut self, band: &Band, finished: impl Fn() -> u32) -> Option<Fetched<'_>> {
         let wanted = (band.sequence, band.window);
         if self.ahead.take() != Some(wanted) {
             self.start(band.sequence, band.window);
         }
         let copied = wait();
         let finished = finished();
-        let buffer = self.next;
-        self.next ^= 1;
+        let (buffer, buffer_before) = (self.next, (self.next + COUNT - 1) % COUNT);
+        self.next = (self.next + 1) % COUNT;
         let following = band.sequence.wrapping_add(1);
         if following != finished {
             self.start(following, band.window);
             self.ahead = Some((following, band.window));
         }
-        let pixels = usize::from(band.window.width) * usize::from(ROWS);
         let intact = copied && SHAPE.intact(band.sequence, finished);
-        if intact {
-            self.buffers[buffer].0.get(..pixels)
-        } else {
-            None
+        let before = self.before.take();
+        if !intact {
+            return None;
         }
+        self.before = Some(wanted);
+        let pixels = usize::from(band.window.width) * usize::from(ROWS);
+        let above = match before {
+            Some((sequence, window))
+                if sequence.wrapping_add(1) == band.sequence && window == band.window =>
+            {
+                self.buffers[buffer_before].0.get(..pixels)
+            }
+            _ => None,
+        };
+        Some(Fetched {
+            rows: self.buffers[buffer].0.get(..pixels)?,
+            above: above.unwrap_or_default(),
+        })
     }
 
     /// Begins to copy a band into the next buffer. What was under way is given up.

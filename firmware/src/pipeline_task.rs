@@ -146,10 +146,11 @@ impl PipelineTask {
             self.busy_us = 0;
             self.follow.begin(self.sensor, band.window);
         }
-        let pixels = self.bands.fetch(band, capture::finished);
-        self.sensor.push_rows(pixels.unwrap_or_default());
-        let intact = pixels.is_some();
-        self.follower.scanned(intact);
+        let fetched = self.bands.fetch(band, capture::finished);
+        if let Some(band) = &fetched {
+            self.sensor.push_rows_below(band.above, band.rows);
+        }
+        self.follower.scanned(fetched.is_some());
         self.busy_us += begun.elapsed().as_micros() as u32;
     }
 

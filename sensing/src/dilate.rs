@@ -6,10 +6,8 @@
 //! Most rows of a frame are empty, and most words of the others: rows come several at a time, and what is looked at again are the
 //! words near one that is set in any of them.
 
-use core::ops::Range;
-
 #[cfg(armv7em)]
-use crate::kernels::{Near, dilate_edges};
+use crate::kernels::dilate_edges;
 use crate::{
     mask::{MAX_WORDS, any_set, last_word_bits, words_of},
     runs::Edges,
@@ -96,74 +94,79 @@ impl Dilation {
     }
 
     /// The edges of a dilated row: for row `i` of those that were written, the row [`radius`](Self::radius) rows above it.
-    pub fn edges(&self, i: usize, edges: &mut Edges) {
+    /// `near` is [that](Self::near) of all of them.
+    #[inline(always)]
+    pub fn edges(&self, i: usize, near: &Near, edges: &mut Edges) {
         edges.clear();
-        let near = self.near();
         #[cfg(armv7em)]
         if self.radius == 1 {
-            let rows = self.mask.get(i * self.words + near.start..);
+            let rows = self.mask.get(i * self.words + near.first..);
             let rows = rows.unwrap_or_default();
-            let words = Near {
-                first: near.start,
-                words: near.len(),
-                last: self.last_bits(near.end),
-            };
-            edges.fill(|edges| dilate_edges(rows, self.words, words, edges));
+            edges.fill(|edges| dilate_edges(rows, self.words, near, edges));
             return edges.end(32 * self.words as u16);
         }
         self.spread(i, near, edges);
     }
 
-    /// The bits of the word before word `end` that lie in the row.
-    fn last_bits(&self, end: usize) -> u32 {
-        if end == self.words {
-            last_word_bits(self.width)
-        } else {
-            u32::MAX
-        }
-    }
-
     /// The edges of row `i` within its words `near`.
-    fn spread(&self, i: usize, near: Range<usize>, edges: &mut Edges) {
+    fn spread(&self, i: usize, near: &Near, edges: &mut Edges) {
         let rows = self.mask[i * self.words..].chunks_exact(self.words);
         let mut columns = [0; MAX_WORDS];
-        let columns = &mut columns[..near.len()];
+        let columns = &mut columns[..near.words];
         for row in rows.take(2 * usize::from(self.radius) + 1) {
-            let all = columns.iter_mut().zip(&row[near.clone()]);
+            let all = columns.iter_mut().zip(&row[near.first..]);
             all.for_each(|(all, word)| *all |= word);
         }
         let mut left = 0;
         for (i, &word) in columns.iter().enumerate() {
             let right = columns.get(i + 1).copied().unwrap_or(0);
             if left | word | right != 0 {
-                let at = near.start + i;
                 let spread = spread_word(left, word, right, self.radius);
-                edges.take(32 * at as u16, spread & self.last_bits(at + 1));
+                let inside = if i + 1 < near.words {
+                    u32::MAX
+                } else {
+                    near.last
+                };
+                edges.take(32 * (near.first + i) as u16, spread & inside);
             }
             left = word;
         }
         edges.end(32 * self.words as u16);
     }
 
-    /// The words in which a dilated row may have set bits: from the first to before the last that is next to an occupied one.
-    fn near(&self) -> Range<usize> {
+    /// The words in which dilated rows may have set bits: from the first to before the last that is next to an occupied one.
+    pub fn near(&self) -> Near {
         let first = self.occupied.trailing_zeros() as usize;
         let end = 32 - self.occupied.leading_zeros() as usize;
-        first.saturating_sub(1).min(end)..(end + 1).min(self.words)
+        let (first, end) = (first.saturating_sub(1).min(end), (end + 1).min(self.words));
+        Near {
+            first,
+            words: end - first,
+            last: if end == self.words {
+                last_word_bits(self.width)
+            } else {
+                u32::MAX
+            },
+        }
     }
 
     /// Moves on: of the rows that were kept or written, only the last 2n are still needed.
     pub fn advance(&mut self, rows: usize) {
-        if self.is_empty() {
+        // In all of them, words that are not occupied are empty.
+        let occupied = self.occupied;
+        self.occupied = 0;
+        if occupied == 0 {
             return;
         }
-        let kept = self.kept();
-        let from = rows * self.words;
-        self.mask.copy_within(from..from + kept, 0);
-        self.occupied = 0;
-        for row in self.mask[..kept].chunks_exact(self.words) {
-            for (i, word) in row.iter().enumerate() {
-                self.occupied |= u32::from(*word != 0) << i;
+        let (first, end) = (
+            occupied.trailing_zeros() as usize,
+            32 - occupied.leading_zeros() as usize,
+        );
+        for row in 0..2 * usize::from(self.radius) {
+            for i in first..end {
+                let word = self.mask[(rows + row) * self.words + i];
+                self.mask[row * self.words + i] = word;
+                self.occupied |= u32::from(word != 0) << i;
             }
         }
     }
@@ -172,6 +175,17 @@ impl Dilation {
     fn kept(&self) -> usize {
         2 * usize::from(self.radius) * self.words
     }
+}
+
+/// Words of a row beside each other.
+#[derive(Clone, Copy, Debug)]
+pub struct Near {
+    /// Which word of the row is their first.
+    pub first: usize,
+    /// How many.
+    pub words: usize,
+    /// Those bits of the last one that lie in the row.
+    pub last: u32,
 }
 
 /// One word of a row, spread by `radius` < 32 columns, given its neighbours.
@@ -219,7 +233,7 @@ mod tests {
             assert_eq!(dilation.look(band.len()), count);
             for i in 0..band.len() {
                 let mut edges = Edges::new();
-                dilation.edges(i, &mut edges);
+                dilation.edges(i, &dilation.near(), &mut edges);
                 let runs: Vec<_> = edges.runs().iter().map(|[x, end]| (*x, end - 1)).collect();
                 assert!(!dilation.is_empty() || runs.is_empty());
                 out.push(runs);

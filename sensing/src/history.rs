@@ -5,40 +5,54 @@ use crate::{dilate::MAX_DILATIONS, mask::MAX_WIDTH};
 /// Rows that the dilation holds back at most.
 const ROWS: u16 = MAX_DILATIONS as u16;
 
-/// The rows of a frame that came last: [`MAX_DILATIONS`] of them.
+/// The rows of a frame that came last, and that may no longer be where they were: [`MAX_DILATIONS`] of them.
 #[derive(Clone, Debug)]
 pub struct History {
     rows: [[u16; MAX_WIDTH as usize]; ROWS as usize],
+    /// Which row of the frame each of them is.
+    numbers: [u16; ROWS as usize],
 }
+
+/// No row of any frame.
+const NONE: u16 = u16::MAX;
 
 impl History {
     /// For no frame yet.
     pub const fn new() -> History {
         History {
             rows: [[0; MAX_WIDTH as usize]; ROWS as usize],
+            numbers: [NONE; ROWS as usize],
         }
     }
 
-    /// Row `y`, which must be among the last rows kept; what lies beyond the frame's width is undefined.
-    pub fn row(&self, y: u16) -> &[u16] {
-        &self.rows[usize::from(y % ROWS)]
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        self.numbers = [NONE; ROWS as usize];
     }
 
-    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] rows before row `end` that are in the band; rows have at most 800 pixels.
+    /// Row `y` of the frame, when it was kept; what lies beyond the frame's width is undefined.
+    pub fn row(&self, y: u16) -> Option<&[u16]> {
+        let place = usize::from(y % ROWS);
+        let kept = self.numbers[place] == y;
+        kept.then_some(&self.rows[place][..])
+    }
+
+    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] rows before row `end` that are in memory; rows have at most 800 pixels.
     pub fn keep(&mut self, band: &Band<'_>, end: u16, count: u8) {
         for y in end.saturating_sub(u16::from(count))..end {
-            let kept = &mut self.rows[usize::from(y % ROWS)];
+            let place = usize::from(y % ROWS);
             let Some(row) = band.row(y) else {
                 continue;
             };
-            if let Some(kept) = kept.get_mut(..row.len()) {
+            if let Some(kept) = self.rows[place].get_mut(..row.len()) {
                 kept.copy_from_slice(row);
+                self.numbers[place] = y;
             }
         }
     }
 }
 
-/// Rows that are in memory together.
+/// Rows that are in memory together, and those right above them where these still are, too.
 #[derive(Clone, Copy, Debug)]
 pub struct Band<'p> {
     /// Which row of the frame is its first.
@@ -49,15 +63,27 @@ pub struct Band<'p> {
     pub stride: usize,
     /// The rows.
     pub pixels: &'p [u16],
+    /// The rows above, which lie one after the other, to the one before the first.
+    pub above: &'p [u16],
 }
 
 impl<'p> Band<'p> {
+    /// All rows of a frame that comes as masks: without pixels.
+    pub const WITHOUT_PIXELS: Band<'static> = Band {
+        first: 0,
+        row_length: 0,
+        stride: 0,
+        pixels: &[],
+        above: &[],
+    };
+
     /// Without rows.
     pub const EMPTY: Band<'static> = Band {
         first: u16::MAX,
         row_length: 1,
         stride: 1,
         pixels: &[],
+        above: &[],
     };
 
     /// So many rows ≥ 1 from row `y` of the frame on, all of which are in the band.
@@ -67,9 +93,18 @@ impl<'p> Band<'p> {
         self.pixels.get(start..end).unwrap_or_default()
     }
 
-    /// Row `y` of the frame; `None` when it is not in the band.
+    /// Row `y` of the frame; `None` when it is neither in the band nor right above it.
     pub fn row(&self, y: u16) -> Option<&'p [u16]> {
-        let start = usize::from(y.checked_sub(self.first)?) * self.stride;
-        self.pixels.get(start..start + self.row_length)
+        match y.checked_sub(self.first) {
+            Some(below) => {
+                let start = usize::from(below) * self.stride;
+                self.pixels.get(start..start + self.row_length)
+            }
+            None => {
+                let upwards = usize::from(self.first - y) * self.row_length;
+                let start = self.above.len().checked_sub(upwards)?;
+                self.above.get(start..start + self.row_length)
+            }
+        }
     }
 }

@@ -12,7 +12,7 @@ use heapless::Vec;
 
 use crate::{
     blob::Blob,
-    dilate::Dilation,
+    dilate::{Dilation, Near},
     mask::MAX_WIDTH,
     moments::Moments,
     runs::{Edges, Run},
@@ -86,12 +86,12 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed = false;
     }
 
-    /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i`. Rows come in order, from 0 to at most 799; empty ones may be
+    /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i` and with `near`. Rows come in order, from 0 to at most 799; empty ones may be
     /// left out while the labeller is [idle](Self::is_idle).
-    pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize) {
+    pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize, near: &Near) {
         self.last = 1 - self.last;
         let edges = &mut self.rows[self.last].edges;
-        dilation.edges(i, edges);
+        dilation.edges(i, near, edges);
         let count = edges.runs().len() as u32;
         self.runs_left = self.runs_left.and_then(|left| left.checked_sub(count));
         self.overflowed |= self.runs_left.is_none();

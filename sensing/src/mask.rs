@@ -18,8 +18,5 @@ pub const fn last_word_bits(width: u16) -> u32 {
 /// Whether a word is not 0.
 #[inline(always)]
 pub fn any_set(words: &[u32]) -> bool {
-    let (eights, rest) = words.as_chunks();
-    let rest = rest.iter().fold(0, |all, word| all | word);
-    let eight = |[a, b, c, d, e, f, g, h]: &[u32; 8]| ((a | b) | (c | d)) | ((e | f) | (g | h));
-    eights.iter().fold(rest, |all, words| all | eight(words)) != 0
+    words.iter().fold(0, |all, word| all | word) != 0
 }

@@ -111,7 +111,7 @@ pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
     dilation: Dilation,
     labels: Labeller<BLOBS>,
-    /// The pixels of rows that the dilation still holds, when they are weighed.
+    /// The pixels of rows that the dilation still holds, when they are weighed and may not stay where they are.
     history: History,
     /// Rows taken so far.
     rows_in: u16,
@@ -180,6 +180,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
         self.settings = settings;
         self.dilation.begin(settings.width, settings.dilations);
+        self.history.clear();
         self.status = Status::OK;
         self.active = true;
         Ok(())
@@ -190,7 +191,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
         let length = pixels.row_length(self.settings.width);
         if row.len() == length {
-            self.push_apart(pixels, row, length, 1);
+            let band = self.band(pixels, row, length);
+            self.push_band(pixels, &band, 1, Stay::Gone);
         } else {
             self.status |= Status::FRAME_INCOMPLETE;
         }
@@ -198,16 +200,33 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
 
     /// Takes the next rows of pixels, as they lie in memory one after the other. What is no whole row, or too many,
     /// is left out and makes the frame incomplete. The more rows at a time, the less each of them costs.
+    ///
+    /// Where pixels are weighed, as many rows as there are dilations are copied, as the next ones may need them.
     pub fn push_rows(&mut self, pixels: &impl Pixels, rows: &[u16]) {
+        self.push_whole(pixels, &[], rows, Stay::Gone);
+    }
+
+    /// The same without copying: the rows that came last are still in memory when the next ones come, and are then `above`:
+    /// all of the frame, or at least as many as there are dilations, one after the other. With fewer, a frame whose pixels
+    /// are weighed becomes incomplete where one of them would have been needed.
+    pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
+        self.push_whole(pixels, above, rows, Stay::Here);
+    }
+
+    fn push_whole(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16], stay: Stay) {
         let length = pixels.row_length(self.settings.width).max(1);
         let count = rows.len() / length;
         if count * length < rows.len() {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        self.push_apart(pixels, rows, length, count);
+        let band = Band {
+            above,
+            ..self.band(pixels, rows, length)
+        };
+        self.push_band(pixels, &band, count, stay);
     }
 
-    /// Takes the next `count` rows, which begin every `stride` `u16`s.
+    /// Takes the next `count` rows, which begin every `stride` `u16`s, and behind which there is no other of the frame.
     pub(crate) fn push_apart(
         &mut self,
         pixels: &impl Pixels,
@@ -215,12 +234,23 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         stride: usize,
         count: usize,
     ) {
-        let band = Band {
+        let band = self.band(pixels, rows, stride);
+        self.push_band(pixels, &band, count, Stay::Here);
+    }
+
+    /// The next rows, which begin every `stride` `u16`s.
+    fn band<'p>(&self, pixels: &impl Pixels, rows: &'p [u16], stride: usize) -> Band<'p> {
+        Band {
             first: self.rows_in,
             row_length: pixels.row_length(self.settings.width),
             stride,
             pixels: rows,
-        };
+            above: &[],
+        }
+    }
+
+    /// Takes the first `count` rows of a band.
+    fn push_band(&mut self, pixels: &impl Pixels, band: &Band<'_>, count: usize, stay: Stay) {
         let room = self.room();
         if count > room {
             self.status |= Status::FRAME_INCOMPLETE;
@@ -232,12 +262,14 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
                 let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
                 pixels.mask_rows(part, band.stride, width, self.dilation.incoming(rows));
             }
-            self.take(pixels, &band, rows);
+            self.take(pixels, band, rows);
             left -= rows;
         }
-        if self.settings.weighted {
+        // What ends a frame is weighed when it is finished.
+        let ends = self.rows_in == self.settings.height && !self.is_quiet();
+        if self.settings.weighted && (stay == Stay::Gone || ends) {
             self.history
-                .keep(&band, self.rows_in, self.settings.dilations);
+                .keep(band, self.rows_in, self.settings.dilations);
         }
     }
 
@@ -253,7 +285,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
         }
-        self.take(&(), &Band::EMPTY, 1);
+        self.take(&(), &Band::WITHOUT_PIXELS, 1);
     }
 
     /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no successful `begin`
@@ -307,6 +339,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// Passes rows through the dilation to the labels, where the pixels of their runs are weighed.
     fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
         let late = u16::from(self.dilation.radius());
+        let near = self.dilation.near();
         for i in 0..rows {
             if self.is_quiet() {
                 return;
@@ -314,10 +347,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             let Some(y) = (self.rows_in + i as u16).checked_sub(late) else {
                 continue;
             };
-            self.labels.push(y, &self.dilation, i);
+            self.labels.push(y, &self.dilation, i, &near);
             if self.settings.weighted && !self.labels.is_idle() {
-                let row = band.row(y).unwrap_or_else(|| self.history.row(y));
-                self.labels.weigh(y, |run| pixels.weigh(row, run));
+                match band.row(y).or_else(|| self.history.row(y)) {
+                    Some(row) => self.labels.weigh(y, |run| pixels.weigh(row, run)),
+                    None => self.status |= Status::FRAME_INCOMPLETE,
+                }
             }
             if self.labels.is_exhausted() {
                 return;
@@ -334,13 +369,26 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         let late = usize::from(self.dilation.radius());
         if !self.labels.is_exhausted() {
             self.dilation.incoming(late).fill(0);
-            self.label(pixels, &Band::EMPTY, late);
+            let band = match pixels.row_length(self.settings.width) {
+                0 => Band::WITHOUT_PIXELS,
+                _ => Band::EMPTY,
+            };
+            self.label(pixels, &band, late);
         }
         self.labels.finish(self.rows_in);
         if self.labels.overflowed() {
             self.status |= Status::BLOB_OVERFLOW;
         }
     }
+}
+
+/// What becomes of the rows of a band.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stay {
+    /// They may not be there any more when the next ones come.
+    Gone,
+    /// They stay until then, or no others come.
+    Here,
 }
 
 impl<const BLOBS: usize> Default for Scanner<BLOBS> {

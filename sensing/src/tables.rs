@@ -216,15 +216,12 @@ impl Pixels for BitTable {
     }
 }
 
-/// One byte per `u16` as it lies in memory: bit 7 is set where its colour lies in the box, bits 0–6 are its
+/// One byte per `u16` as it lies in memory: bit 0 is set where its colour lies in the box, bits 1–7 are its
 /// [`redness`]. 64 KiB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ByteTable {
     bytes: [u8; 65_536],
 }
-
-/// The bit of a [`ByteTable`]'s byte that says "in the box".
-const INSIDE: u8 = 0x80;
 
 impl ByteTable {
     /// Values of a pixel.
@@ -247,7 +244,7 @@ impl ByteTable {
         for (raw, byte) in bytes.take(part.end).skip(part.start) {
             let pixel = order.pixel(raw as u16);
             let inside = hsv_box.contains(Hsv::from_rgb565(pixel));
-            *byte = redness(pixel) | if inside { INSIDE } else { 0 };
+            *byte = redness(pixel) << 1 | u8::from(inside);
         }
     }
 
@@ -273,7 +270,7 @@ impl Table for ByteTable {
     }
 
     fn accepts(&self, raw: u16) -> bool {
-        self.byte(raw) & INSIDE != 0
+        self.byte(raw) & 1 == 1
     }
 }
 
@@ -302,7 +299,31 @@ impl Pixels for ByteTable {
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         let raw = row.get(usize::from(column));
-        raw.map_or(0, |raw| self.byte(*raw) & !INSIDE)
+        raw.map_or(0, |raw| self.byte(*raw) >> 1)
+    }
+
+    /// From right to left, so that the sum of all sums so far counts each weight once for its own column of the run and each
+    /// one to its left.
+    fn weigh(&self, row: &[u16], run: Run) -> Weights {
+        let (x0, x1) = (usize::from(run.x0), usize::from(run.x1));
+        let pixels = row.get(x0..row.len().min(x1 + 1)).unwrap_or_default();
+        let (mut sum, mut sums) = (0, 0);
+        let mut add = |byte: u8| {
+            sum += u32::from(byte >> 1);
+            sums += sum;
+        };
+        // Four are looked up before they are added, so that no addition waits for memory.
+        let (rest, fours) = pixels.as_rchunks::<4>();
+        for four in fours.iter().rev() {
+            let [a, b, c, d] = four.map(|raw| self.byte(raw));
+            [d, c, b, a].into_iter().for_each(&mut add);
+        }
+        rest.iter().rev().for_each(|raw| add(self.byte(*raw)));
+        Weights {
+            sum,
+            // Σw·x = x0·Σw + Σw·(x − x0 + 1) − Σw.
+            sum_x: u32::from(run.x0) * sum + sums - sum,
+        }
     }
 }
 

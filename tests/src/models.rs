@@ -72,18 +72,18 @@ pub fn weighted_file(
     encoded(&spec)
 }
 
-/// The same as [`file`] for frames of another geometry and pixel format, with the rest position that they show.
+/// A model of int8 weights with these layer widths, for frames of another geometry and pixel format, with the rest position
+/// that they show to this estimator.
 pub fn file_for(
     geometry: Geometry,
     format: PixelFormat,
-    rest: Rest,
+    (centroid, rest): (CentroidEstimator, Rest),
     widths: &[u16],
-    weights: Weights,
-    output: OutputKind,
-    seed: u64,
 ) -> Vec<u8> {
-    let mut spec = spec(geometry, rest, widths, weights, output, seed);
+    let (weights, output) = (Weights::Random, OutputKind::ForceVector);
+    let mut spec = spec(geometry, rest, widths, weights, output, 1);
     spec.conditions.threshold = Threshold::red(format);
+    spec.conditions.centroid = centroid;
     encoded(&spec)
 }
 

@@ -54,18 +54,6 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
     portable::activate(layer, sums, inputs.values_mut(), done);
 }
 
-/// Some words of a row of the mask.
-#[cfg(armv7em)]
-#[derive(Clone, Copy, Debug)]
-pub struct Near {
-    /// Which word of the row is their first.
-    pub first: usize,
-    /// How many.
-    pub words: usize,
-    /// Those bits of the last one that lie in the row.
-    pub last: u32,
-}
-
 /// The mask of a row of pixels through a table of bytes: see `portable::threshold_bytes`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {
     #[cfg(armv7em)]

@@ -45,11 +45,11 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, activations: &mut [i16; MAX_WIDT
     }
 }
 
-/// The mask of a row: bit i of word w is bit 7 of the byte that `table` has for pixel 32·w + i. `mask` has
+/// The mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w + i. `mask` has
 /// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], first: usize) {
     pack(row, mask, first, |bits, raw| {
-        bits >> 1 | u32::from(table[usize::from(raw)] & 0x80) << 24
+        bits >> 1 | u32::from(table[usize::from(raw)]) << 31
     });
 }
 

@@ -187,6 +187,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.look_ahead();
     }
 
+    /// The same when the rows that came last are still in memory, one after the other, as `above`: all of the frame, or at
+    /// least as many as there are [`Settings::dilations`]. Nothing is copied then
+    /// ([`Scanner::push_rows_below`]).
+    pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
+        self.scanner.push_rows_below(&self.pixels, above, rows);
+        self.look_ahead();
+    }
+
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
         if let Err(reason) = self.end_scan() {

@@ -58,13 +58,15 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     fn find_coarsely(&mut self, frame: &[u16]) -> Option<Found> {
         let frame = Frame::new(&self.pixels, frame, self.settings.scan())?;
         let step = self.prepared.as_ref()?.coarse_step;
-        let blobs = coarse_blobs(&mut self.scanner, &frame, step)?;
+        let mut blobs = Blobs::new();
+        coarse_blobs(&mut self.scanner, &frame, step, &mut blobs)?;
         self.markers_among(&blobs)
     }
 
     fn find_tracked(&mut self, tracks: &Tracks, frame: &[u16]) -> Option<Found> {
         let frame = Frame::new(&self.pixels, frame, self.settings.scan())?;
-        let blobs = tracks.blobs(&mut self.scanner, &frame)?;
+        let mut blobs = Blobs::new();
+        tracks.blobs(&mut self.scanner, &frame, &mut blobs)?;
         let found = self.markers_among(&blobs)?;
         tracks.fit(&found.markers).then_some(found)
     }

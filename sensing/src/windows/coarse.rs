@@ -29,21 +29,22 @@ pub(crate) fn step(geometry: &Geometry) -> u16 {
     (across / STEPS_ACROSS).clamp(1, LONGEST_STEP) as u16
 }
 
-/// The whole blobs of a frame that every `step`-th row hits, each of at least the minimum area, and perhaps others.
-/// `None` when a full scan is no slower.
+/// Adds the whole blobs of a frame that every `step`-th row hits, each of at least the minimum area, and perhaps others, to
+/// `found`. `None` when a full scan is no slower.
 pub(crate) fn coarse_blobs<P: Pixels, const BLOBS: usize>(
     scanner: &mut Scanner<BLOBS>,
     frame: &Frame<'_, P>,
     step: u16,
-) -> Option<Blobs> {
-    let windows = hits(frame, step)?;
-    whole_blobs(scanner, frame, windows)
+    found: &mut Blobs,
+) -> Option<()> {
+    let mut windows = Windows::default();
+    hits(frame, step, &mut windows)?;
+    whole_blobs(scanner, frame, &mut windows, found)
 }
 
-/// Windows around all that the coarse rows hit; `None` when there are too many.
-fn hits<P: Pixels>(frame: &Frame<'_, P>, step: u16) -> Option<Windows> {
+/// Adds windows around all that the coarse rows hit; `None` when there are too many.
+fn hits<P: Pixels>(frame: &Frame<'_, P>, step: u16, windows: &mut Windows) -> Option<()> {
     let width = frame.settings().width;
-    let mut windows = Windows::default();
     let mut room = Ok(());
     let mut mask = [0; MAX_WORDS];
     for y in (step / 2..frame.settings().height).step_by(usize::from(step)) {
@@ -64,7 +65,7 @@ fn hits<P: Pixels>(frame: &Frame<'_, P>, step: u16) -> Option<Windows> {
         });
         room.ok()?;
     }
-    Some(windows)
+    Some(())
 }
 
 /// A blob that is hit in this run goes on at most so far, when it is a disc: to just before the next coarse rows, and

@@ -142,25 +142,25 @@ pub(crate) fn scan_window<P: Pixels, const BLOBS: usize>(
     Some(())
 }
 
-/// All whole blobs in and around windows: each window grows until it cuts none. `None` when that leads too far.
+/// Adds all whole blobs in and around windows to `found`: each window grows until it cuts none. `None` when that leads too far.
 pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
     scanner: &mut Scanner<BLOBS>,
     frame: &Frame<'_, P>,
-    mut windows: Windows,
-) -> Option<Blobs> {
+    windows: &mut Windows,
+    found: &mut Blobs,
+) -> Option<()> {
     let mut budget = Budget::of(frame);
     let mut settled = Windows::default();
-    let mut found = Blobs::new();
     let whole_frame = frame.rectangle();
     while let Some(window) = windows.pop() {
         let mut grown = window;
-        let mut whole = Blobs::new();
+        let before = found.len();
         let mut full = false;
         scan_window(scanner, frame, &window, &mut budget, |blob| {
             if !frame.is_whole(&blob, &window) {
                 grown = grown.joined(&room_for(&blob, frame));
             } else if blob.area >= frame.settings().min_area {
-                full |= whole.push(blob).is_err();
+                full |= found.push(blob).is_err();
             }
         })?;
         if full {
@@ -168,9 +168,9 @@ pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
         }
         if grown == window {
             settled.add(window, whole_frame).ok()?;
-            found.extend_from_slice(&whole).ok()?;
             continue;
         }
+        found.truncate(before);
         // What it has grown over is scanned again as its part.
         while let Some(other) = settled.take_overlapping(&grown.in_words(whole_frame)) {
             grown = grown.joined(&other);
@@ -178,7 +178,7 @@ pub(crate) fn whole_blobs<P: Pixels, const BLOBS: usize>(
         found.retain(|blob| !grown.contains(&Rectangle::of_blob(blob)));
         windows.add(grown, whole_frame).ok()?;
     }
-    Some(found)
+    Some(())
 }
 
 /// Where a cut blob probably ends: as far again as it is seen.

@@ -61,19 +61,20 @@ impl Tracks {
         Some(all.in_columns(frame))
     }
 
-    /// The whole blobs in the markers' windows; `None` when it is not known where the markers were, or one is cut.
+    /// Adds the whole blobs in the markers' windows to `found`; `None` when it is not known where the markers were, or one is
+    /// cut.
     pub(crate) fn blobs<P: Pixels, const BLOBS: usize>(
         &self,
         scanner: &mut Scanner<BLOBS>,
         frame: &Frame<'_, P>,
-    ) -> Option<Blobs> {
+        found: &mut Blobs,
+    ) -> Option<()> {
         let mut windows = Windows::default();
         for marker in self.before.as_ref()? {
             let window = window(marker, frame.settings().dilations, frame.rectangle());
             windows.add(window, frame.rectangle()).ok()?;
         }
         let mut budget = Budget::of(frame);
-        let mut found = Blobs::new();
         let mut all_whole = true;
         while let Some(window) = windows.pop() {
             scan_window(scanner, frame, &window, &mut budget, |blob| {
@@ -83,7 +84,7 @@ impl Tracks {
                 }
             })?;
         }
-        all_whole.then_some(found)
+        all_whole.then_some(())
     }
 
     /// Whether markers that were found in the windows are those of the frame before.

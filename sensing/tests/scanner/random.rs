@@ -143,5 +143,19 @@ proptest! {
         let scan = scanner.finish(&*bytes);
         prop_assert_eq!(scan.status, Status::OK);
         prop_assert_eq!(scan.blobs, expected.as_slice());
+        // Rows that stay in memory, all of them or just enough.
+        for enough in [height, usize::from(dilations)] {
+            scanner.begin(settings).unwrap();
+            let mut y = 0;
+            for rows in &bands {
+                let next = height.min(y + rows);
+                let above = &pixels[y.saturating_sub(enough) * width..y * width];
+                scanner.push_rows_below(&*bytes, above, &pixels[y * width..next * width]);
+                y = next;
+            }
+            let scan = scanner.finish(&*bytes);
+            prop_assert_eq!(scan.status, Status::OK);
+            prop_assert_eq!(scan.blobs, expected.as_slice());
+        }
     }
 }

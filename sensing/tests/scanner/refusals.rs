@@ -57,6 +57,39 @@ fn pixel_rows_of_another_width_make_a_frame_incomplete() {
 }
 
 #[test]
+fn a_row_to_be_weighed_that_did_not_stay_in_memory_makes_a_frame_incomplete() {
+    let table = BitTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
+    let mut pixels = [0; 40 * 6];
+    pixels[40 * 3 + 7] = 0xf800;
+    let (above, below) = pixels.split_at(40 * 3);
+    for dilations in 0..=3 {
+        let mask = Mask::from_fn(40, 6, |_, _| false);
+        let settings = ScanSettings {
+            weighted: true,
+            ..settings(&mask, dilations, 1)
+        };
+        let mut scanner = Scanner::<4>::new();
+        let mut status = |stayed: &[u16]| {
+            scanner.begin(settings).unwrap();
+            scanner.push_rows_below(&table, &[], above);
+            scanner.push_rows_below(&table, stayed, below);
+            scanner.finish(&table).status
+        };
+        assert_eq!(status(above), Status::OK);
+        assert_eq!(
+            status(&above[40 * (3 - usize::from(dilations))..]),
+            Status::OK
+        );
+        if dilations > 0 {
+            assert_eq!(
+                status(&above[40 * (4 - usize::from(dilations))..]),
+                Status::FRAME_INCOMPLETE
+            );
+        }
+    }
+}
+
+#[test]
 fn rows_without_a_frame_are_refused() {
     let mut scanner = Scanner::<4>::new();
     scanner.push_mask_row(&[]);

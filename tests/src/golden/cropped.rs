@@ -49,11 +49,13 @@ pub(super) fn measure(
         counting_begins();
     }
     sensor.begin_cropped(*window);
+    let mut above: &[u16] = &[];
     while let Some(band) = bands.next() {
         if bands.peek().is_none() {
             last_band_begins();
         }
-        sensor.push_rows(band);
+        sensor.push_rows_below(above, band);
+        above = band;
     }
     let measurement = sensor.finish_cropped(tracks, *window);
     counting_ends();

@@ -336,23 +336,28 @@ fn say(results: &mut impl Write, case: u32, result: fmt::Arguments<'_>) -> Resul
 fn sense_frame(
     sensor: &mut Sensor<'_, BLOBS>,
     source: &mut impl Source,
-    (row, band): (&mut [u16], &mut [u16]),
+    (row, frame): (&mut [u16], &mut [u16]),
     [length, height]: [usize; 2],
 ) -> Result<Measurement, ScriptError> {
     let mut left = height;
+    // As in the firmware, a band stays in memory until the next one was pushed.
+    let (mut above, mut below) = frame.split_at_mut(frame.len() / 2);
+    let mut above_length = 0;
     counting_begins();
     sensor.begin_frame();
     counting_ends();
     while left > 0 {
         let rows = left.min(usize::from(BAND_ROWS));
-        let band = read_frame(source, row, band, [length, rows])?;
+        let band = read_frame(source, row, below, [length, rows])?;
         if left <= usize::from(BAND_ROWS) {
             last_band_begins();
         }
         left -= rows;
         counting_begins();
-        sensor.push_rows(band);
+        sensor.push_rows_below(&above[..above_length], band);
         counting_ends();
+        above_length = band.len();
+        core::mem::swap(&mut above, &mut below);
     }
     counting_begins();
     let measurement = sensor.finish_frame();

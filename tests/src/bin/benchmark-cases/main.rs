@@ -12,7 +12,8 @@ use std::{env, fs};
 use anyhow::{Context, Result, bail};
 use hivtac_scene::{Format, Options, Preset, Scene};
 use hivtac_sensing::geometry::{self, Geometry};
-use hivtac_sensing::model::{CentroidEstimator, OutputKind, Rest};
+use hivtac_sensing::model::CentroidEstimator::{self, BinaryMask, RednessWeighted};
+use hivtac_sensing::model::{OutputKind, Rest};
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
@@ -139,7 +140,9 @@ fn cases() -> Result<Vec<Case>> {
         .into_iter()
         .flat_map(|format| SIZES.map(|size| (format, size)))
     {
-        let model = model(format, size)?;
+        let [model, weighted_model] =
+            [BinaryMask, RednessWeighted].map(|it| model(format, size, it));
+        let model = model?;
         let usual = usual_frame(&model, format, &scene("static", format, size)?, size)?;
         let case = |(special, pixels)| Case {
             work: Work::Frame { special, pixels },
@@ -148,6 +151,10 @@ fn cases() -> Result<Vec<Case>> {
             format,
         };
         cases.push(case(("", usual.clone())));
+        cases.push(Case {
+            model: weighted_model?,
+            ..case(("weighted", usual.clone()))
+        });
         let before = frame(&scene("static", format, size)?, ATTEMPTS, 1.0);
         for tracked in [false, true] {
             cases.push(Case {
@@ -185,7 +192,8 @@ fn cases() -> Result<Vec<Case>> {
 /// Frames of the demo's scene, of the firmware's size.
 fn demo(times: &[u64]) -> Result<Vec<Case>> {
     let (format, size) = (PixelFormat::Rgb565, [320, 240]);
-    let (model, scene) = (model(format, size)?, scene("demo", format, size)?);
+    let model = model(format, size, BinaryMask)?;
+    let scene = scene("demo", format, size)?;
     let case = |(number, &time): (u64, &u64)| Case {
         work: Work::Frame {
             special: "demo",
@@ -296,14 +304,11 @@ fn frame(scene: &Scene, number: u64, seconds: f64) -> Vec<u16> {
 }
 
 /// The small model, for frames of a size.
-fn model(format: PixelFormat, size: [u16; 2]) -> Result<Vec<u8>> {
+fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Result<Vec<u8>> {
     let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
     let pixels = frame(&scene("rest", format, size)?, 0, 0.0);
-    let rest = position(geometry, format, CentroidEstimator::BinaryMask, &pixels)?;
-    let (weights, output) = (Weights::Random, OutputKind::ForceVector);
-    Ok(models::file_for(
-        geometry, format, rest, &SMALL, weights, output, 1,
-    ))
+    let rest = position(geometry, format, centroid, &pixels)?;
+    Ok(models::file_for(geometry, format, (centroid, rest), &SMALL))
 }
 
 /// Where a frame shows the markers.
