@@ -2,8 +2,8 @@
 
 use crate::shape::Shape;
 
-/// Windows begin and end at multiples of so many columns. With bands of 4 rows that makes a band a multiple of 128 bytes,
-/// which is what DMA moves at once; and rows are whole words.
+/// Windows begin and end at multiples of so many columns. With bands of a multiple of 4 rows that makes a band a multiple of
+/// 128 bytes, which is what DMA moves at once; and rows are whole words.
 const COLUMNS: u16 = 16;
 
 /// A rectangle of a frame, in pixels: the whole frame, or what the camera interface crops it to.

@@ -3,8 +3,8 @@
 //! # Design
 //! Three buffers: while the core scans one band, the next one is copied when it is there already, and the one before
 //! stays, as its last rows may have to be weighed yet. The core asks for a band when it knows that it is finished, so it
-//! waits for a copy only when it had nothing to do: one band of 320 × 4 pixels moves in about 3 µs (320 reads of 8 bytes
-//! and 640 writes of 4 at the 240 MHz of the bus; an estimate, not measured).
+//! waits for a copy only when it had nothing to do: one band of 320 × 8 pixels moves in about 6 µs (640 reads of 8 bytes
+//! and 1280 writes of 4 at the 240 MHz of the bus; an estimate, not measured).
 //!
 //! # Note
 //! Coherence: the MDMA reads AXI SRAM past the caches, where the camera's DMA has written past them; it writes DTCM,

@@ -6,10 +6,10 @@ use crate::camera::{HEIGHT, WIDTH};
 use core::mem::MaybeUninit;
 use hivtac_capture::{Shape, Window};
 
-/// Rows of a band.
-pub const ROWS: u16 = 4;
+/// Rows of a band: as many as the sensing takes at a time, for each time costs it some hundred cycles.
+pub const ROWS: u16 = 8;
 /// Bands in the ring: at 320 × 240 a little more than a frame.
-pub const SLOTS: u16 = 64;
+pub const SLOTS: u16 = 32;
 /// Both.
 pub const SHAPE: Shape = Shape::new(ROWS, SLOTS);
 /// A whole frame.

@@ -1,7 +1,7 @@
 //! The camera interface (DCMI) in continuous mode: every frame, whatever the camera does.
 //!
 //! # Design
-//! DCMI and its DMA run without a pause. The DMA writes *bands* of 4 rows into a ring of 64 slots in AXI SRAM
+//! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots in AXI SRAM
 //! (`bands`), at 320 × 240 a little more than a frame, at 800 × 600 four tenths of one. Each finished band is one
 //! interrupt; so are the end of a frame (the VSYNC pulse, or the last row of a crop window) and an overrun. The handlers
 //! do what `hivtac_capture::Tracker` says, and pass its events to the pipeline, which has finished bands copied to DTCM
@@ -14,15 +14,15 @@
 //! # Note
 //! Coherence: the core never reads the ring (see `band_copy`).
 //!
-//! Deadlines, for 39 frames a second (line 92 µs, band 369 µs, frame 25.6 ms; at 150 frames a second all but the FIFO's
+//! Deadlines, for 39 frames a second (line 92 µs, band 738 µs, frame 25.6 ms; at 150 frames a second all but the FIFO's
 //! are four times shorter):
 //! - *The DMA*: DCMI's FIFO holds 4 words, 1.3 µs at 12.5 MB/s. When missed, DCMI reports an overrun: the frame is
 //!   dropped and counted.
-//! - *The handler of a band*: until the end of the next band, 369 µs. When missed, the DMA writes over a band; the
+//! - *The handler of a band*: until the end of the next band, 738 µs. When missed, the DMA writes over a band; the
 //!   handler sees that it has changed its target twice, or the frame's number of bands is wrong: the frame is dropped.
 //! - *The handler of a frame's end*: within the VSYNC pulse, 370 µs. When missed after a good frame, the frame counts as
 //!   dropped; when missed after a bad one, the next frame is not captured either.
-//! - *The pipeline*: a band is overwritten 62 bands after it was finished, 23 ms. When missed, its frame is dropped and
+//! - *The pipeline*: a band is overwritten 30 bands after it was finished, 22 ms. When missed, its frame is dropped and
 //!   counted as `dropped_busy`; the camera never waits.
 //!
 //! # Limitations

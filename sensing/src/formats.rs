@@ -93,6 +93,7 @@ impl<T: Table> Pixels for Formats<T> {
         }
     }
 
+    #[inline(always)]
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         match &self.threshold {
             Threshold::Rgb565(_) => self.table.weigh(row, run),

@@ -5,7 +5,7 @@
 
 use crate::{
     hsv::{Hsv, rgb888},
-    kernels::{threshold_bits, threshold_bytes, threshold_bytes_down},
+    kernels::{threshold_bits, threshold_bytes, threshold_bytes_down, weigh_bytes},
     mask::words_of,
     threshold::{ByteOrder, HsvBox, ThresholdError},
 };
@@ -34,6 +34,7 @@ pub trait Pixels {
     fn weight(&self, row: &[u16], column: u16) -> u8;
 
     /// The weights of the pixels of a run, summed.
+    #[inline(never)]
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let columns = (run.x0..=run.x1).map(|x| (u32::from(x), self.weight(row, x)));
         columns.fold(Weights::NONE, |sums, (x, weight)| sums.with(x, weight))
@@ -302,26 +303,14 @@ impl Pixels for ByteTable {
         raw.map_or(0, |raw| self.byte(*raw) >> 1)
     }
 
-    /// From right to left, so that the sum of all sums so far counts each weight once for its own column of the run and each
-    /// one to its left.
+    #[inline(always)]
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let (x0, x1) = (usize::from(run.x0), usize::from(run.x1));
         let pixels = row.get(x0..row.len().min(x1 + 1)).unwrap_or_default();
-        let (mut sum, mut sums) = (0, 0);
-        let mut add = |byte: u8| {
-            sum += u32::from(byte >> 1);
-            sums += sum;
-        };
-        // Four are looked up before they are added, so that no addition waits for memory.
-        let (rest, fours) = pixels.as_rchunks::<4>();
-        for four in fours.iter().rev() {
-            let [a, b, c, d] = four.map(|raw| self.byte(raw));
-            [d, c, b, a].into_iter().for_each(&mut add);
-        }
-        rest.iter().rev().for_each(|raw| add(self.byte(*raw)));
+        let [sum, sums] = weigh_bytes(&self.bytes, pixels);
         Weights {
             sum,
-            // Σw·x = x0·Σw + Σw·(x − x0 + 1) − Σw.
+            // Σw·x = (x0 − 1)·Σw + Σw·(x − x0 + 1).
             sum_x: u32::from(run.x0) * sum + sums - sum,
         }
     }

@@ -15,8 +15,8 @@ pub const COMMAND: &str = "cargo xtask bench --tradeoff";
 pub const CLOCK_MHZ: f64 = 480.0;
 /// A model of at most so many bytes is copied to DTCM, a larger one stays in flash (`firmware/src/model.rs`).
 const NEAR_LIMIT: u64 = 12 * 1024;
-/// For each column of a frame: a ring of 64 bands and two bands more, of 4 rows and 2 bytes a pixel (`firmware/src/bands.rs`).
-const BAND_BYTES_OF_A_COLUMN: i64 = (64 + 2) * 4 * 2;
+/// For each column of a frame: a ring of 32 bands and three bands more, of 8 rows and 2 bytes a pixel (`firmware/src/bands.rs`).
+const BAND_BYTES_OF_A_COLUMN: i64 = (32 + 3) * 8 * 2;
 /// AXI SRAM, where a whole frame would lie, bytes.
 const FRAME_MEMORY: i64 = 512 * 1024;
 /// Memories that hold data; the code's copy in ITCM is none.

@@ -71,6 +71,17 @@ pub fn threshold_bytes_down(
     }
 }
 
+/// Of the bytes that `table` has for the pixels of a run, bits 1–7 are weights: their sum, and the sum of all sums so far, from
+/// right to left: it counts each weight once for its own column and once for each one to the left of that.
+#[cfg(not(armv7em))]
+pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
+    let weights = run.iter().rev().map(|raw| table[usize::from(*raw)] >> 1);
+    weights.fold([0, 0], |[sum, sums], weight| {
+        let sum = sum + u32::from(weight);
+        [sum, sums + sum]
+    })
+}
+
 /// The mask of a row: bit i of word w is bit p % 32 of word p / 32 of `table`, with p = pixel 32·w + i. `mask` has
 /// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
 pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32], first: usize) {

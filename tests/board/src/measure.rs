@@ -18,7 +18,7 @@ type Sensor = pipeline::Sensor<'static, 64, BitTable>;
 /// Widest row, in pixels.
 const ROW: usize = MAX_WIDTH as usize;
 /// Rows that arrive at once: those of the firmware's bands.
-const BAND_ROWS: usize = 4;
+const BAND_ROWS: usize = 8;
 /// Room for a model in DTCM.
 const MODEL: usize = 16 * 1024;
 /// The first time caches are cold.

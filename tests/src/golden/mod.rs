@@ -44,7 +44,7 @@ pub const MAX_ROW_PIXELS: usize = MAX_WIDTH as usize;
 /// Room for the largest frame that is looked at in windows.
 pub const MAX_FRAME_PIXELS: usize = 800 * 600;
 /// Rows that arrive at once: those of the firmware's bands.
-pub const BAND_ROWS: u16 = 4;
+pub const BAND_ROWS: u16 = 8;
 /// Blobs that a scan keeps.
 pub const BLOBS: usize = 64;
 

@@ -114,6 +114,7 @@ fn stage_of_name(name: &str) -> Option<&'static str> {
     let work = name.strip_prefix("hivtac_")?;
     let stages = [
         ("threshold", "threshold"),
+        ("weigh", "threshold"),
         ("dilate", "dilation"),
         ("dot", "network"),
         ("expand", "network"),
