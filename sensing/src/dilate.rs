@@ -9,7 +9,8 @@
 #[cfg(armv7em)]
 use crate::kernels::dilate_edges;
 use crate::{
-    mask::{MAX_WORDS, any_set, last_word_bits, words_of},
+    kernels::any_set,
+    mask::{MAX_WORDS, last_word_bits, words_of},
     runs::Edges,
 };
 
@@ -27,6 +28,8 @@ pub struct Dilation {
     mask: [u32; (MAX_KEPT + MAX_ROWS) * MAX_WORDS],
     /// Bit i is set when one of these rows may have a set bit in word i.
     occupied: u32,
+    /// Bit i is set when row i of these has a set bit.
+    set_rows: u32,
     /// n.
     radius: u8,
     width: u16,
@@ -40,6 +43,7 @@ impl Dilation {
         Dilation {
             mask: [0; (MAX_KEPT + MAX_ROWS) * MAX_WORDS],
             occupied: 0,
+            set_rows: 0,
             radius: 0,
             width: 1,
             words: 1,
@@ -52,6 +56,7 @@ impl Dilation {
         self.width = width;
         self.words = words_of(width);
         self.occupied = 0;
+        self.set_rows = 0;
         let kept = self.kept();
         self.mask[..kept].fill(0);
     }
@@ -77,20 +82,29 @@ impl Dilation {
             // As most are.
             return 0;
         }
-        let (mut count, mut occupied) = (0, 0);
-        for row in incoming.chunks_exact(row_words) {
+        let (mut count, mut occupied, mut set_rows) = (0, 0, 0);
+        for (y, row) in incoming.chunks_exact(row_words).enumerate() {
+            let before = count;
             for (i, word) in row.iter().enumerate().filter(|(_, word)| **word != 0) {
                 count += word.count_ones();
                 occupied |= 1 << i;
             }
+            set_rows |= u32::from(count > before) << y;
         }
         self.occupied |= occupied;
+        self.set_rows |= set_rows << self.kept_rows();
         count
     }
 
     /// Whether no row that is still needed has a set bit.
     pub fn is_empty(&self) -> bool {
-        self.occupied == 0
+        self.set_rows == 0
+    }
+
+    /// Whether the dilated row of [`edges`](Self::edges) at `i` is empty.
+    #[inline(always)]
+    pub fn is_empty_row(&self, i: usize) -> bool {
+        (self.set_rows >> i) & ((2 << self.kept_rows()) - 1) == 0
     }
 
     /// The edges of a dilated row: for row `i` of those that were written, the row [`radius`](Self::radius) rows above it.
@@ -152,28 +166,31 @@ impl Dilation {
 
     /// Moves on: of the rows that were kept or written, only the last 2n are still needed.
     pub fn advance(&mut self, rows: usize) {
-        // In all of them, words that are not occupied are empty.
-        let occupied = self.occupied;
-        self.occupied = 0;
-        if occupied == 0 {
+        if self.is_empty() {
             return;
         }
-        let (first, end) = (
-            occupied.trailing_zeros() as usize,
-            32 - occupied.leading_zeros() as usize,
-        );
-        for row in 0..2 * usize::from(self.radius) {
-            for i in first..end {
-                let word = self.mask[(rows + row) * self.words + i];
-                self.mask[row * self.words + i] = word;
-                self.occupied |= u32::from(word != 0) << i;
-            }
+        // In all of them, words that are not occupied are empty.
+        let first = self.occupied.trailing_zeros() as usize;
+        let end = 32 - self.occupied.leading_zeros() as usize;
+        for row in 0..self.kept_rows() {
+            let (to, from) = self.mask.split_at_mut((row + rows) * self.words);
+            let to = to[row * self.words..].iter_mut().skip(first);
+            to.zip(&from[first..end]).for_each(|(to, from)| *to = *from);
         }
+        self.set_rows >>= rows;
+        if self.is_empty() {
+            self.occupied = 0;
+        }
+    }
+
+    /// 2n.
+    fn kept_rows(&self) -> usize {
+        2 * usize::from(self.radius)
     }
 
     /// Words of the rows that are kept.
     fn kept(&self) -> usize {
-        2 * usize::from(self.radius) * self.words
+        self.kept_rows() * self.words
     }
 }
 
@@ -235,7 +252,8 @@ mod tests {
                 let mut edges = Edges::new();
                 dilation.edges(i, &dilation.near(), &mut edges);
                 let runs: Vec<_> = edges.runs().iter().map(|[x, end]| (*x, end - 1)).collect();
-                assert!(!dilation.is_empty() || runs.is_empty());
+                assert!(!dilation.is_empty() || dilation.is_empty_row(i));
+                assert!(!dilation.is_empty_row(i) || runs.is_empty());
                 out.push(runs);
             }
             dilation.advance(band.len());

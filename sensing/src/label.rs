@@ -101,6 +101,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     }
 
     /// Weighs the runs of row `y`, which was pushed last.
+    #[inline(always)]
     pub fn weigh(&mut self, y: u16, weigh: impl Fn(Run) -> Weights) {
         let (left, y) = (self.origin.0, y + self.origin.1);
         let Row { edges, labels } = &self.rows[self.last];

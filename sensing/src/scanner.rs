@@ -341,12 +341,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         let late = u16::from(self.dilation.radius());
         let near = self.dilation.near();
         for i in 0..rows {
-            if self.is_quiet() {
-                return;
-            }
             let Some(y) = (self.rows_in + i as u16).checked_sub(late) else {
                 continue;
             };
+            if self.labels.is_idle() && self.dilation.is_empty_row(i) {
+                continue;
+            }
             self.labels.push(y, &self.dilation, i, &near);
             if self.settings.weighted && !self.labels.is_idle() {
                 match band.row(y).or_else(|| self.history.row(y)) {

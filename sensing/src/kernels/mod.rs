@@ -7,10 +7,10 @@
 #[allow(unsafe_code)]
 mod cortex_m7;
 #[cfg(armv7em)]
-pub use cortex_m7::{dilate_edges, weigh_bytes};
+pub use cortex_m7::{any_set, dilate_edges, weigh_bytes};
 mod portable;
 #[cfg(not(armv7em))]
-pub use portable::weigh_bytes;
+pub use {crate::mask::any_set, portable::weigh_bytes};
 
 use crate::model::{Layer, MAX_WIDTH};
 
