@@ -11,7 +11,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Weights};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, Origin, OutputKind};
-use hivtac_sensing::threshold::HsvBox;
+use hivtac_sensing::threshold::{HsvBox, PixelFormat, Threshold};
 
 fn models() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("models")
@@ -21,14 +21,38 @@ fn committed() -> Vec<u8> {
     fs::read(models().join("default.hvtm")).unwrap()
 }
 
+/// The same for cameras that send YUV422.
+fn committed_for_yuv422() -> Vec<u8> {
+    fs::read(models().join("yuv422/default.hvtm")).unwrap()
+}
+
 #[test]
-fn committed_weights_give_the_committed_model() {
-    let weights = Weights::load(&models().join("default.weights")).unwrap();
-    let bytes = export(&weights).unwrap();
-    assert!(
-        bytes == committed(),
-        "run `hivtac-calibrate export` on the committed weights and commit the result"
-    );
+fn committed_weights_give_the_committed_models() {
+    for (weights, committed) in [
+        ("default.weights", committed()),
+        ("yuv422/default.weights", committed_for_yuv422()),
+    ] {
+        let bytes = export(&Weights::load(&models().join(weights)).unwrap()).unwrap();
+        assert!(
+            bytes == committed,
+            "run `hivtac-calibrate export` on the committed {weights} and commit the result"
+        );
+    }
+}
+
+#[test]
+fn the_model_for_yuv422_is_made_for_the_same_unit_and_measures_its_frames() {
+    let (bytes, usual) = (committed_for_yuv422(), committed());
+    let conditions = Model::parse(&bytes).unwrap().conditions;
+    let mut expected = Model::parse(&usual).unwrap().conditions;
+    expected.threshold = Threshold::red(PixelFormat::Yuv422);
+    assert_eq!(conditions, expected);
+    let report = check(&bytes, 400, 77, 0.6, || ()).unwrap();
+    let errors = &report.errors;
+    assert_eq!(errors.count(), 400, "rejected: {:?}", report.rejected);
+    // It sees half as many columns in colour.
+    assert!(errors.mean_strong_direction_deg() < 0.3, "{report}");
+    assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
 }
 
 #[test]
