@@ -3,16 +3,27 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use hivtac_scene::{Format, Preset, Scene};
+use hivtac_scene::{Format, Options, Preset, Scene};
 use serde_json::{Value, json};
 
-/// A picture of the whole pixel array, RGB565 in native order.
+/// How a picture's pixels are coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coding {
+    /// RGB565 in native order.
+    Rgb565,
+    /// Luma in the low byte; in the high byte Cb in even columns, and Cr in odd ones, of the pair.
+    Yuv422,
+}
+
+/// A picture of the whole pixel array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Columns.
+    /// Columns; even.
     pub width: u32,
     /// Rows.
     pub height: u32,
+    /// What the pixels are.
+    pub coding: Coding,
     /// Row by row.
     pub pixels: Vec<u16>,
 }
@@ -20,7 +31,8 @@ pub struct Picture {
 /// What stands before the camera.
 pub trait FrameSource: Send + std::fmt::Debug {
     /// The picture of one exposure; `exposure` counts from 1 since the run began, `time_s` is the run's virtual time.
-    fn picture(&self, exposure: u64, time_s: f64) -> Picture;
+    /// `wanted` is what the sensor sends; a source that knows only RGB565 gives that.
+    fn picture(&self, exposure: u64, time_s: f64, wanted: Coding) -> Picture;
 
     /// What is true then, for the truth log.
     fn truth(&self, time_s: f64) -> Value;
@@ -31,7 +43,7 @@ pub trait FrameSource: Send + std::fmt::Debug {
 pub struct TestPicture;
 
 impl FrameSource for TestPicture {
-    fn picture(&self, exposure: u64, _time_s: f64) -> Picture {
+    fn picture(&self, exposure: u64, _time_s: f64, _wanted: Coding) -> Picture {
         let square = [40 + exposure * 3 % 240, 40 + exposure * 2 % 160];
         let pixel = |x: u64, y: u64| {
             let inside = x.abs_diff(square[0]) < 12 && y.abs_diff(square[1]) < 12;
@@ -47,6 +59,7 @@ impl FrameSource for TestPicture {
         Picture {
             width: 320,
             height: 240,
+            coding: Coding::Rgb565,
             pixels,
         }
     }
@@ -56,9 +69,12 @@ impl FrameSource for TestPicture {
     }
 }
 
-/// A simulated sensor.
+/// A simulated sensor, under the eyes of a camera that codes its pixels either way.
 #[derive(Debug)]
-pub struct SceneSource(Scene);
+pub struct SceneSource {
+    rgb565: Scene,
+    yuv422: Scene,
+}
 
 impl SceneSource {
     /// The scene of a file (`docs/scene-file.md`), whose frames must be 320 × 240.
@@ -80,11 +96,11 @@ impl SceneSource {
         }
         if frame.pixels.is_empty() || frame.format == Format::Yuv422 {
             bail!(
-                "--scene {}: this camera takes its pixels from frames in RGB565 (format = \"rgb565\")",
+                "--scene {}: the camera's registers say what its pixels are: leave `format` out",
                 path.display()
             );
         }
-        Ok(Self(scene))
+        Self::of(scene).with_context(context)
     }
 
     /// A scene by name under a geometry preset, at 320 × 240.
@@ -93,24 +109,37 @@ impl SceneSource {
     /// When there is no such scene or preset.
     pub fn new(name: &str, preset: &str, seed: u64) -> anyhow::Result<Self> {
         let preset: Preset = preset.parse().context("--preset")?;
-        Ok(Self(
-            Scene::preset(name, preset, 320, 240, seed).context("--scene")?,
-        ))
+        let scene = Scene::preset(name, preset, 320, 240, seed);
+        Self::of(scene.context("--scene")?)
+    }
+
+    fn of(rgb565: Scene) -> anyhow::Result<Self> {
+        let options = Options {
+            format: Format::Yuv422,
+            ..rgb565.options().clone()
+        };
+        let yuv422 = rgb565.clone().with_options(options)?;
+        Ok(Self { rgb565, yuv422 })
     }
 }
 
 impl FrameSource for SceneSource {
-    fn picture(&self, exposure: u64, time_s: f64) -> Picture {
-        let frame = self.0.frame(exposure, time_s);
+    fn picture(&self, exposure: u64, time_s: f64, wanted: Coding) -> Picture {
+        let scene = match wanted {
+            Coding::Rgb565 => &self.rgb565,
+            Coding::Yuv422 => &self.yuv422,
+        };
+        let frame = scene.frame(exposure, time_s);
         Picture {
             width: frame.width,
             height: frame.height,
+            coding: wanted,
             pixels: frame.pixels,
         }
     }
 
     fn truth(&self, time_s: f64) -> Value {
-        let truth = self.0.truth(time_s);
+        let truth = self.rgb565.truth(time_s);
         let force = truth.force.vector_n();
         let markers: Vec<Value> = (truth.markers.iter())
             .map(|marker| match marker {

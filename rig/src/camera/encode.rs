@@ -1,13 +1,15 @@
 //! Pixels as bytes on the sensor's data lines.
 
 use super::output::{Format, Output};
-use crate::frame_source::Picture;
+use crate::frame_source::{Coding, Picture};
 
 /// COM3 bits.
 const FLIP: u8 = 0x80;
 const MIRROR: u8 = 0x40;
 const SWAP_RED_BLUE: u8 = 0x20;
-const SWAP_Y_UV: u8 = 0x10;
+/// Luma before chroma. The data sheet calls it "swap Y/UV" and leaves open from what; common drivers of the sensor set
+/// it for Y Cb Y Cr, and it is set after power-up.
+const LUMA_FIRST: u8 = 0x10;
 const REVERSE_BITS: u8 = 0x08;
 const COLOUR_BARS: u8 = 0x01;
 
@@ -25,11 +27,20 @@ const BARS: [[u8; 3]; 8] = [
 
 /// The bytes of one row, as `output` says, of a picture of the whole pixel array.
 pub fn row(output: &Output, picture: &Picture, row: u32) -> Vec<u8> {
-    let columns = output.window.output[0];
-    let pixels: Vec<[u8; 3]> = (0..columns)
-        .map(|column| pixel(output, picture, column, row))
-        .collect();
-    let mut bytes = encode(output, &pixels, row);
+    let columns = 0..output.window.output[0];
+    let bars = output.com3 & COLOUR_BARS != 0;
+    let mut bytes = match (output.format, picture.coding) {
+        (Format::Yuv, Coding::Yuv422) if !bars => yuv(
+            output,
+            columns.map(|column| luma_and_chroma(output, picture, column, row)),
+        ),
+        _ => {
+            let pixels: Vec<[u8; 3]> = columns
+                .map(|column| pixel(output, picture, column, row))
+                .collect();
+            encode(output, &pixels, row)
+        }
+    };
     for byte in &mut bytes {
         if output.com3 & REVERSE_BITS != 0 {
             *byte = byte.reverse_bits();
@@ -43,10 +54,29 @@ pub fn row(output: &Output, picture: &Picture, row: u32) -> Vec<u8> {
 
 /// Red, green, blue of one output pixel. Outside the array it is black.
 fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
-    let [columns, rows] = output.window.output;
     if output.com3 & COLOUR_BARS != 0 {
-        return BARS[(column * 8 / columns) as usize];
+        return BARS[(column * 8 / output.window.output[0]) as usize];
     }
+    match place(output, picture, column, row) {
+        Some(place) => rgb888(picture.pixels[place]),
+        None => [0; 3],
+    }
+}
+
+/// Luma of one output pixel, and Cb and Cr of its pair, of a picture that has them. Outside the array it is black.
+fn luma_and_chroma(output: &Output, picture: &Picture, column: u32, row: u32) -> (u8, [u8; 2]) {
+    let Some(place) = place(output, picture, column, row) else {
+        return (0, [128; 2]);
+    };
+    let bytes = |place: usize| picture.pixels[place].to_le_bytes();
+    let chroma = [place & !1, place | 1].map(|place| bytes(place)[1]);
+    (bytes(place)[0], chroma)
+}
+
+/// Which pixel of the picture is sent; `None` outside the array.
+fn place(output: &Output, picture: &Picture, column: u32, row: u32) -> Option<usize> {
+    let window = &output.window;
+    let [columns, rows] = window.output;
     let column = if output.com3 & MIRROR != 0 {
         columns - 1 - column
     } else {
@@ -58,21 +88,16 @@ fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
     } else {
         row
     };
-    let place = |at: u32, axis: usize, size: u32| -> Option<u32> {
-        let window = &output.window;
+    let along = |at: u32, axis: usize, size: u32| -> Option<u32> {
         let array = window.start[axis] + (at * window.size[axis] / window.output[axis]) as i32;
         let array = u32::try_from(array)
             .ok()
             .filter(|&a| a < window.array[axis])?;
         Some(array * size / window.array[axis])
     };
-    match (
-        place(column, 0, picture.width),
-        place(row, 1, picture.height),
-    ) {
-        (Some(x), Some(y)) => rgb888(picture.pixels[(y * picture.width + x) as usize]),
-        _ => [0; 3],
-    }
+    let x = along(column, 0, picture.width)?;
+    let y = along(row, 1, picture.height)?;
+    Some((y * picture.width + x) as usize)
 }
 
 fn encode(output: &Output, pixels: &[[u8; 3]], row: u32) -> Vec<u8> {
@@ -86,7 +111,7 @@ fn encode(output: &Output, pixels: &[[u8; 3]], row: u32) -> Vec<u8> {
     let word =
         |p: &[u8; 3], pack: fn([u16; 3]) -> u16| pack(ordered(p).map(u16::from)).to_be_bytes();
     match output.format {
-        Format::Yuv => yuv(output, pixels),
+        Format::Yuv => yuv(output, pixels.iter().map(|pixel| ycbcr(*pixel))),
         Format::Rgb565 => pixels
             .iter()
             .flat_map(|p| word(p, |[r, g, b]| r >> 3 << 11 | g >> 2 << 5 | b >> 3))
@@ -114,26 +139,34 @@ fn encode(output: &Output, pixels: &[[u8; 3]], row: u32) -> Vec<u8> {
     }
 }
 
-/// ITU-R BT.601, full range; chroma is that of the first pixel of a pair.
-fn yuv(output: &Output, pixels: &[[u8; 3]]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(pixels.len() * 2);
+/// Pixels as they travel, from the luma of each and Cb and Cr; those of the first pixel of a pair are sent.
+fn yuv(output: &Output, pixels: impl Iterator<Item = (u8, [u8; 2])>) -> Vec<u8> {
+    let mut bytes = Vec::new();
     let mut chroma = [128; 2];
-    for (i, &pixel) in pixels.iter().enumerate() {
-        let [r, g, b] = pixel.map(i32::from);
-        let y = (19_595 * r + 38_470 * g + 7_471 * b + 32_768) >> 16;
+    for (i, (luma, own)) in pixels.enumerate() {
         if i % 2 == 0 {
-            let u = (-11_059 * r - 21_709 * g + 32_768 * b + 32_768) >> 16;
-            let v = (32_768 * r - 27_439 * g - 5_329 * b + 32_768) >> 16;
-            chroma = [u + 128, v + 128];
+            chroma = own;
+            if output.cr_first {
+                chroma.reverse();
+            }
         }
-        let pair = [y, chroma[i % 2]].map(|v| v.clamp(0, 255) as u8);
-        bytes.extend(if output.com3 & SWAP_Y_UV != 0 {
-            [pair[1], pair[0]]
-        } else {
-            pair
+        let chroma = chroma[i % 2];
+        bytes.extend(match output.com3 & LUMA_FIRST {
+            0 => [chroma, luma],
+            _ => [luma, chroma],
         });
     }
     bytes
+}
+
+/// Luma, and Cb and Cr: ITU-R BT.601, full range.
+fn ycbcr(pixel: [u8; 3]) -> (u8, [u8; 2]) {
+    let [r, g, b] = pixel.map(i32::from);
+    let y = (19_595 * r + 38_470 * g + 7_471 * b + 32_768) >> 16;
+    let cb = (-11_059 * r - 21_709 * g + 32_768 * b + 32_768) >> 16;
+    let cr = (32_768 * r - 27_439 * g - 5_329 * b + 32_768) >> 16;
+    let byte = |value: i32| value.clamp(0, 255) as u8;
+    (byte(y), [byte(cb + 128), byte(cr + 128)])
 }
 
 fn rgb888(pixel: u16) -> [u8; 3] {
@@ -154,6 +187,7 @@ mod tests {
         Picture {
             width: 320,
             height: 240,
+            coding: Coding::Rgb565,
             pixels,
         }
     }
@@ -216,28 +250,46 @@ mod tests {
     }
 
     #[test]
-    fn yuv_of_grey_has_no_chroma_and_power_up_sends_chroma_first() {
+    fn yuv_of_grey_has_no_chroma_and_power_up_sends_luma_first() {
         let grey = Picture {
             width: 2,
             height: 1,
+            coding: Coding::Rgb565,
             pixels: vec![0x8410; 2],
         };
         let output = Output::new(&Registers::default(), 24_000_000).unwrap();
         let bytes = row(&output, &grey, 0);
         assert_eq!(bytes.len(), 1280);
-        assert!(
-            bytes.iter().step_by(2).all(|&c| (127..=129).contains(&c)),
-            "{:?}",
-            &bytes[..4]
-        );
-        assert!(
-            bytes
-                .iter()
-                .skip(1)
-                .step_by(2)
-                .all(|&y| (130..=133).contains(&y)),
-            "{:?}",
-            &bytes[..4]
+        for pixel in bytes.chunks(2) {
+            assert!((130..=133).contains(&pixel[0]), "{pixel:?}");
+            assert!((127..=129).contains(&pixel[1]), "{pixel:?}");
+        }
+    }
+
+    #[test]
+    fn a_picture_in_yuv422_is_sent_byte_for_byte_in_the_order_of_the_registers() {
+        let picture = Picture {
+            coding: Coding::Yuv422,
+            ..picture()
+        };
+        let order = |com3, dsp_ctrl3| {
+            let output = qvga(&[
+                (reg::COM7, 0x40),
+                (reg::COM3, com3),
+                (reg::DSP_CTRL3, dsp_ctrl3),
+            ]);
+            row(&output, &picture, 7)
+        };
+        let pixels = &picture.pixels[7 * 320..][..320];
+        let in_memory: Vec<u8> = pixels.iter().flat_map(|p| p.to_le_bytes()).collect();
+        assert_eq!(order(LUMA_FIRST, 0x10), in_memory);
+        let turned = |turn: fn(&[u8]) -> [u8; 4]| -> Vec<u8> {
+            in_memory.chunks(4).flat_map(turn).collect()
+        };
+        assert_eq!(order(0, 0x10), turned(|p| [p[1], p[0], p[3], p[2]]));
+        assert_eq!(
+            order(LUMA_FIRST, 0x90),
+            turned(|p| [p[0], p[3], p[2], p[1]])
         );
     }
 

@@ -15,9 +15,9 @@ mod sccb;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::faults::{Faults, Kind};
-use crate::frame_source::{FrameSource, Picture};
+use crate::frame_source::{Coding, FrameSource, Picture};
 use crate::truth::{Exposed, TruthLog};
-use output::Output;
+use output::{Format, Output};
 use registers::Registers;
 pub use sccb::Sccb;
 
@@ -165,9 +165,14 @@ impl Camera {
         }
     }
 
-    /// The picture of an exposure.
-    pub fn picture(&self, exposed: Exposed) -> Picture {
-        self.source.picture(exposed.exposure, exposed.time_s())
+    /// The picture of an exposure, for pixels that travel so.
+    pub fn picture(&self, exposed: Exposed, format: Format) -> Picture {
+        let wanted = match format {
+            Format::Yuv => Coding::Yuv422,
+            _ => Coding::Rgb565,
+        };
+        self.source
+            .picture(exposed.exposure, exposed.time_s(), wanted)
     }
 
     /// VSYNC edges since the run began.

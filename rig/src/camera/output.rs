@@ -16,7 +16,7 @@ const INPUT_CLOCK_HZ: std::ops::RangeInclusive<u64> = 10_000_000..=48_000_000;
 /// How a pixel travels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Y and alternating U, V; two bytes per pixel.
+    /// Y and alternating Cb, Cr; two bytes per pixel.
     Yuv,
     /// Red 5, green 6, blue 5 bits, high byte first.
     Rgb565,
@@ -64,6 +64,8 @@ pub struct Output {
     pub window: Window,
     /// COM3: flip, mirror and byte orders.
     pub com3: u8,
+    /// Cr comes before Cb.
+    pub cr_first: bool,
     /// VSYNC is high during the first lines of a frame.
     pub vsync_active_high: bool,
     /// HREF is high while a row is sent.
@@ -115,6 +117,7 @@ impl Output {
             format,
             window,
             com3: registers.get(reg::COM3),
+            cr_first: registers.get(reg::DSP_CTRL3) & 0x80 != 0,
             vsync_active_high: com10 & 0x02 == 0,
             href_active_high: com10 & 0x08 == 0,
             stable_at_rising: com10 & 0x10 == 0,

@@ -41,6 +41,8 @@ pub const ADVFL: u8 = 0x2D;
 pub const ADVFH: u8 = 0x2E;
 /// Low bits of the window's start and size.
 pub const HREF: u8 = 0x32;
+/// Bit 7: Cr before Cb.
+pub const DSP_CTRL3: u8 = 0x66;
 
 /// COM7 bit 7: every register goes back to its power-up value.
 pub const COM7_RESET: u8 = 0x80;
@@ -87,7 +89,7 @@ const POWER_UP: [(u8, u8); 43] = [
     (0x42, 0x80),
     (0x63, 0xE0),
     (0x64, 0xFF),
-    (0x66, 0x10),
+    (DSP_CTRL3, 0x10),
     (0x9C, 0x20),
     (0xAC, 0xFF),
 ];

@@ -137,7 +137,7 @@ pub fn sampled_while_changing(before: u8, byte: u8, position: u64) -> u8 {
 mod tests {
     use super::*;
     use crate::camera::registers::Registers;
-    use crate::frame_source::{FrameSource, TestPicture};
+    use crate::frame_source::{Coding, FrameSource, TestPicture};
 
     fn vga() -> Frame {
         let output = Output::new(&Registers::default(), 24_000_000).unwrap();
@@ -205,7 +205,7 @@ mod tests {
     fn bytes_are_those_of_the_row() {
         let mut frame = vga();
         let run = frame.run_from(22, 510, false).unwrap();
-        let picture = TestPicture.picture(1, 0.0);
+        let picture = TestPicture.picture(1, 0.0, Coding::Rgb565);
         let expected = encode::row(&frame.output, &picture, 0);
         assert_eq!(frame.bytes(&run, 16, 32, |_| picture), expected[16..32]);
     }
