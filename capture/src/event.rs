@@ -51,13 +51,14 @@ pub enum Event {
         /// How.
         how: Ending,
     },
-    /// The camera was set up. Its frames after number `from` up to `to` are accounted for elsewhere.
+    /// The camera was set up, wholly or otherwise than before. Its frames after number `from` up to `to` are accounted for
+    /// elsewhere.
     Passed {
-        /// The newest frame before.
+        /// The newest frame before; 0 when there was none.
         from: u32,
         /// The newest frame of that time.
         to: u32,
-        /// It had been set up before: this was a restart.
+        /// It was started again, as it had been silent or did not answer.
         restart: bool,
     },
 }

@@ -196,7 +196,7 @@ impl Follower {
         self.gap_before(from.saturating_add(1));
         self.accounted = self.accounted.max(to);
         self.after_restart |= restart;
-        self.after_loss |= restart;
+        self.after_loss |= restart || from > 0;
     }
 
     fn edge_under_way(&self) -> Option<Edge> {

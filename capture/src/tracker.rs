@@ -91,9 +91,8 @@ impl Tracker {
         self.restart(interface);
     }
 
-    /// Stops. A frame under way is told as short.
-    pub fn stop(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
-        self.give_up_begun(interface, tell);
+    /// Stops. What becomes of a frame under way is told by [`Event::Passed`], once it goes on.
+    pub fn stop(&mut self, interface: &mut impl Interface) {
         self.running = false;
         interface.stop();
     }

@@ -32,10 +32,10 @@
 
 use crate::band_dma::BandDma;
 use crate::bands::{FRAME, SHAPE};
-use crate::camera;
+use crate::camera::{self, Format};
 use crate::seeded_bugs::INVERTED_POLARITIES;
 use crate::{stats, vsync};
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::pac::{DCMI, RCC};
@@ -48,8 +48,21 @@ use hivtac_capture::{Edge, Event, Interface, Tracker, Window};
 /// Events that wait for the pipeline: more than bands that are still whole.
 const EVENTS_WAITING: usize = 72;
 
+/// An event, and what pixels the camera sends since the newest start.
+#[derive(Clone, Copy)]
+pub struct Told {
+    /// What happened.
+    pub event: Event,
+    /// The frames' pixels.
+    pub format: Format,
+}
+
 /// What happens, in order. When there is no room an event is lost; the pipeline notices that by the next one.
-pub static EVENTS: Channel<CriticalSectionRawMutex, Event, EVENTS_WAITING> = Channel::new();
+pub static EVENTS: Channel<CriticalSectionRawMutex, Told, EVENTS_WAITING> = Channel::new();
+
+/// Of the frames that are captured; changes only while the capture is stopped.
+static FORMAT: CriticalSectionMutex<Cell<Format>> =
+    CriticalSectionMutex::new(Cell::new(Format::Rgb565));
 
 static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
     CriticalSectionMutex::new(RefCell::new(None));
@@ -90,14 +103,21 @@ impl Capture {
         Self(())
     }
 
-    /// Captures from the next frame on.
-    pub fn start(&mut self) {
+    /// Captures from the next frame on, after the time that `passed` tells of; whole frames of such pixels.
+    pub async fn start(&mut self, passed: Event, format: Format) {
+        FORMAT.lock(|cell| cell.set(format));
+        set_window(FRAME);
+        let told = Told {
+            event: passed,
+            format,
+        };
+        EVENTS.send(told).await;
         act(|running, _| running.tracker.start(&mut running.hardware));
     }
 
     /// Captures no more.
     pub fn stop(&mut self) {
-        act(|running, mut tell| running.tracker.stop(&mut running.hardware, &mut tell));
+        act(|running, _| running.tracker.stop(&mut running.hardware));
     }
 
     /// Begins again after a silence.
@@ -143,8 +163,9 @@ fn act(what: impl FnOnce(&mut Running, fn(Event))) {
 
 fn tell(event: Event) {
     ACTIVITY.fetch_add(1, Ordering::Relaxed);
+    let format = FORMAT.lock(Cell::get);
     // Documented at `EVENTS`.
-    let _ = EVENTS.try_send(event);
+    let _ = EVENTS.try_send(Told { event, format });
 }
 
 impl Interface for Hardware {

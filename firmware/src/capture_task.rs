@@ -1,9 +1,12 @@
-//! Keeps the camera going: sets it up, and starts it again when it falls silent.
+//! Keeps the camera going: sets it up, changes its pixel format, and starts it again when it falls silent.
 
-use crate::camera::{self, Camera, FRAME_TIME};
-use crate::capture::{Capture, EVENTS};
+use crate::camera::{self, Camera, FRAME_TIME, Format};
+use crate::capture::Capture;
 use crate::health::{self, Condition};
 use crate::{log, stats, vsync};
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
 use hivtac_wire::message::LogLevel;
@@ -16,12 +19,16 @@ const SILENCES: u32 = 3;
 /// Pause before the next attempt when the camera does not answer.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Runs for ever at the capture executor's priority.
+/// What pixels the camera shall send. Done once it does.
+pub static WANTED_FORMAT: Signal<CriticalSectionRawMutex, Format> = Signal::new();
+
+/// Runs for ever at the capture executor's priority. The camera begins with `format`.
 #[embassy_executor::task]
-pub async fn run(camera: Camera, capture: Capture) {
+pub async fn run(camera: Camera, capture: Capture, format: Format) {
     let mut task = CaptureTask {
         camera,
         capture,
+        format,
         numbering: false,
         activity: 0,
         quiet: 0,
@@ -29,14 +36,18 @@ pub async fn run(camera: Camera, capture: Capture) {
     };
     task.start_camera().await;
     loop {
-        Timer::after(FRAME_TIME).await;
-        task.listen().await;
+        match select(WANTED_FORMAT.wait(), Timer::after(FRAME_TIME)).await {
+            Either::First(format) => task.change_format(format).await,
+            Either::Second(()) => task.listen().await,
+        }
     }
 }
 
 struct CaptureTask {
     camera: Camera,
     capture: Capture,
+    /// What pixels the camera sends.
+    format: Format,
     /// VSYNC edges count since the first register reset.
     numbering: bool,
     /// [`Capture::activity`] when it was looked at last.
@@ -82,17 +93,44 @@ impl CaptureTask {
         }
     }
 
-    /// Sets the camera up; tries until it answers. Frames that pass meanwhile count as dropped at once.
+    /// Sets the camera up; tries until it answers.
     async fn start_camera(&mut self) {
-        self.capture.stop();
         let restart = self.numbering;
-        let from = if restart { vsync::newest().number } else { 0 };
-        stats::pass_over_frames_after(from);
+        let from = self.stop();
         self.try_until_it_answers().await;
+        self.go_on(from, restart).await;
+    }
+
+    /// Has the camera send other pixels; when it does not answer, it is set up anew.
+    async fn change_format(&mut self, format: Format) {
+        let from = self.stop();
+        self.format = format;
+        let answered = self.camera.set_format(format).await;
+        if let Err(error) = answered {
+            log::say(LogLevel::Error, format_args!("camera: {error}"));
+            self.try_until_it_answers().await;
+            stats::CAMERA_RESTARTS.count();
+        }
+        self.go_on(from, answered.is_err()).await;
+    }
+
+    /// Captures no more; the newest frame so far. Frames that pass from now on count as dropped at once.
+    fn stop(&mut self) -> u32 {
+        self.capture.stop();
+        let from = match self.numbering {
+            true => vsync::newest().number,
+            false => 0,
+        };
+        stats::pass_over_frames_after(from);
+        from
+    }
+
+    /// Captures again, after the frames that passed since [`stop`](Self::stop).
+    async fn go_on(&mut self, from: u32, restart: bool) {
         let to = vsync::newest().number;
         stats::end_passing_over(to);
-        EVENTS.send(Event::Passed { from, to, restart }).await;
-        self.capture.start();
+        let passed = Event::Passed { from, to, restart };
+        self.capture.start(passed, self.format).await;
     }
 
     async fn try_until_it_answers(&mut self) {
@@ -109,6 +147,6 @@ impl CaptureTask {
             self.numbering = true;
             vsync::restart_count();
         }
-        self.camera.configure().await
+        self.camera.configure(self.format).await
     }
 }

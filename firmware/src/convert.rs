@@ -1,6 +1,8 @@
 //! Between the sensing pipeline's types and those of the wire.
 
-use hivtac_sensing::{force::Force, markers::Marker, model::CentroidEstimator, threshold};
+use hivtac_sensing::formats::{Mono, Yuv422};
+use hivtac_sensing::threshold::{HsvBox, Threshold};
+use hivtac_sensing::{force::Force, markers::Marker, model::CentroidEstimator};
 use hivtac_wire::message;
 
 /// A force for the wire. Uncertainties are never negative.
@@ -32,27 +34,31 @@ pub fn centroid_to_wire(from: CentroidEstimator) -> message::Centroid {
     }
 }
 
-/// A threshold of RGB565 for the wire, which knows no other.
-pub fn threshold_to_wire(from: threshold::Threshold) -> message::HsvBox {
-    let from = threshold::HsvBox::of_limits(from.limits());
-    message::HsvBox {
-        hue_low: from.hue_low,
-        hue_high: from.hue_high,
-        saturation_low: from.saturation_low,
-        saturation_high: from.saturation_high,
-        value_low: from.value_low,
-        value_high: from.value_high,
+/// A threshold for the wire.
+pub fn threshold_to_wire(from: Threshold) -> message::Threshold {
+    match from {
+        Threshold::Rgb565(from) => {
+            message::Threshold::Rgb565(message::HsvBox::of_limits(from.limits()))
+        }
+        Threshold::Yuv422(Yuv422 { cr_low }) => message::Threshold::Yuv422 { cr_low },
+        Threshold::Mono(Mono { low, high }) => message::Threshold::Mono {
+            luma_low: low,
+            luma_high: high,
+        },
     }
 }
 
 /// A threshold from the wire, unchecked.
-pub fn threshold_from_wire(from: message::HsvBox) -> threshold::HsvBox {
-    threshold::HsvBox {
-        hue_low: from.hue_low,
-        hue_high: from.hue_high,
-        saturation_low: from.saturation_low,
-        saturation_high: from.saturation_high,
-        value_low: from.value_low,
-        value_high: from.value_high,
+pub fn threshold_from_wire(from: message::Threshold) -> Threshold {
+    match from {
+        message::Threshold::Rgb565(from) => Threshold::Rgb565(HsvBox::of_limits(from.limits())),
+        message::Threshold::Yuv422 { cr_low } => Threshold::Yuv422(Yuv422 { cr_low }),
+        message::Threshold::Mono {
+            luma_low,
+            luma_high,
+        } => Threshold::Mono(Mono {
+            low: luma_low,
+            high: luma_high,
+        }),
     }
 }

@@ -46,6 +46,7 @@ fn identity(model: &Model) -> ModelIdentity {
         crc: model.crc(),
         name: model.name(),
         simulated: model.is_simulated(),
+        threshold: convert::threshold_to_wire(model.conditions.threshold),
     }
 }
 

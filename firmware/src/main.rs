@@ -28,7 +28,7 @@ mod info;
 mod log;
 mod model;
 mod near_table;
-mod next_table;
+mod next_threshold;
 mod outbox;
 mod pipeline_task;
 mod priorities;
@@ -40,6 +40,7 @@ mod usb;
 mod vsync;
 
 use board::Board;
+use camera::Format;
 use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
@@ -70,13 +71,17 @@ fn main() -> ! {
     vsync::start();
     let model = model::embedded();
     let sensor = SENSOR.take();
-    configure(sensor, model);
+    let format = configure(sensor, model);
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb, model)));
     usb.spawn(token(health::run(board.led)));
     let capture = CAPTURE_EXECUTOR.start(priorities::CAPTURE_EXECUTOR);
-    capture.spawn(token(capture_task::run(board.camera, board.capture)));
+    capture.spawn(token(capture_task::run(
+        board.camera,
+        board.capture,
+        format,
+    )));
     THREAD_EXECUTOR
         .init(Executor::new())
         .run(|spawner: Spawner| {
@@ -85,13 +90,14 @@ fn main() -> ! {
         })
 }
 
-/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers. A model for
-/// another pixel format than the camera's gives no force then, and every sample says so.
-fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) {
+/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers in RGB565, and
+/// says what pixels it asks for. A model for pixels that the camera does not send gives no force then, and every sample says so.
+fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;
+    let sent = |model: &Model| Format::of(model.conditions.threshold.format());
     let settings = match &model {
-        Some(model) if model.conditions.threshold.format() == camera::FORMAT => Settings {
+        Some(model) if sent(model).is_some() => Settings {
             geometry,
             ..Settings::of_model(model, order)
         },
@@ -101,6 +107,8 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) {
         defmt::panic!("the built-in settings are out of range");
     }
     info::set_looking(sensor.settings());
+    // Always one that the camera sends.
+    Format::of(sensor.threshold().format()).unwrap_or(Format::Rgb565)
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

@@ -13,9 +13,17 @@ pub struct NearTable(Option<&'static mut ByteTable>);
 impl NearTable {
     /// Takes over all of another table.
     pub fn copy_from(&mut self, other: &ByteTable) {
-        if let Some(table) = &mut self.0 {
+        if let Some(table) = self.table() {
             table.copy_from(other);
         }
+    }
+
+    /// The table, taken when it is needed first: not while pixels are not RGB565.
+    fn table(&mut self) -> Option<&mut ByteTable> {
+        if self.0.is_none() {
+            self.0 = TABLE.try_take();
+        }
+        self.0.as_deref_mut()
     }
 }
 
@@ -23,10 +31,7 @@ impl Table for NearTable {
     const CLOSED: Self = NearTable(None);
 
     fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
-        if self.0.is_none() {
-            self.0 = TABLE.try_take();
-        }
-        match &mut self.0 {
+        match self.table() {
             Some(table) => table.set(hsv_box, order),
             None => hsv_box.check(),
         }

@@ -2,12 +2,13 @@
 
 use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
-use crate::capture::{self, EVENTS};
+use crate::camera::Format;
+use crate::capture::{self, EVENTS, Told};
 use crate::convert;
 use crate::follow::Follow;
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
-use crate::next_table::NextTable;
+use crate::next_threshold::NextThreshold;
 use crate::tare::Taring;
 use crate::{info, outbox, session, stats};
 use embassy_futures::select::{Either3, select3};
@@ -16,17 +17,17 @@ use embassy_sync::channel::Channel;
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
-use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Sample};
+use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Sample, Threshold};
 use hivtac_wire::status::Status;
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
 pub enum Order {
-    /// Use this threshold from the next frame on.
+    /// Use this threshold and its pixel format as soon as possible.
     SetThreshold {
         /// Of the command.
         id: u16,
         /// As it came, unchecked.
-        threshold: HsvBox,
+        threshold: Threshold,
     },
     /// Take the mean of the next good frames as the rest position.
     Tare {
@@ -46,9 +47,11 @@ pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
 pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
-    let next = NextTable::take(sensor.settings().byte_order);
+    let next = NextThreshold::take(sensor.settings().byte_order);
+    let sent = Format::of(sensor.threshold().format()).unwrap_or(Format::Rgb565);
     let mut task = PipelineTask {
         sensor,
+        sent,
         next,
         bands,
         follower: Follower::new(SHAPE),
@@ -65,7 +68,9 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
-    next: NextTable,
+    /// The pixels of the frames that come.
+    sent: Format,
+    next: NextThreshold,
     bands: BandCopy,
     follower: Follower,
     follow: Follow,
@@ -85,7 +90,7 @@ impl PipelineTask {
         if self.follower.is_scanning() {
             return self.go_on().await;
         }
-        self.use_next_table();
+        self.use_next_threshold();
         if self.next.is_unfinished() && EVENTS.is_empty() {
             self.next.go_on();
             return;
@@ -94,7 +99,7 @@ impl PipelineTask {
         let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
         match select3(ORDERS.receive(), EVENTS.receive(), Timer::at(deadline)).await {
             Either3::First(order) => self.obey(order),
-            Either3::Second(event) => self.follow(event),
+            Either3::Second(told) => self.follow(told),
             Either3::Third(()) => self.give_up_tare(),
         }
     }
@@ -108,12 +113,15 @@ impl PipelineTask {
         } else if !complete && self.next.is_unfinished() && EVENTS.is_empty() {
             self.next.go_on();
         } else {
-            let event = EVENTS.receive().await;
-            self.follow(event);
+            let told = EVENTS.receive().await;
+            self.follow(told);
         }
     }
 
-    fn follow(&mut self, event: Event) {
+    fn follow(&mut self, Told { event, format }: Told) {
+        if format != self.sent {
+            self.change_format(format);
+        }
         if let Event::Ended { edge, how } = event
             && how != Ending::Whole
         {
@@ -156,11 +164,10 @@ impl PipelineTask {
 
     fn obey(&mut self, order: Order) {
         match order {
-            Order::SetThreshold { id, .. } if self.next.is_wanted() => reply(id, Outcome::Busy),
             Order::SetThreshold { id, threshold } => {
                 let wanted = convert::threshold_from_wire(threshold);
-                if self.next.begin(id, wanted).is_err() {
-                    reply(id, Outcome::InvalidArgument);
+                if let Err(outcome) = self.next.begin(id, wanted) {
+                    reply(id, outcome);
                 }
             }
             Order::Tare { id, .. } if self.taring.is_some() => reply(id, Outcome::Busy),
@@ -171,21 +178,23 @@ impl PipelineTask {
         }
     }
 
-    /// Between two frames: from the next one on, the threshold that was asked for holds, if its table is whole.
-    fn use_next_table(&mut self) {
-        let Some((id, threshold)) = self.next.finish() else {
-            return;
-        };
-        let install = |near: &mut NearTable| self.next.install(near);
-        // It was checked when it came.
-        let outcome = match self.sensor.set_made_threshold(threshold, install) {
-            Ok(()) => {
-                info::set_looking(self.sensor.settings());
-                Outcome::Done
+    /// Between two frames: from the next one on, the threshold that was asked for holds, if it can.
+    fn use_next_threshold(&mut self) {
+        if let Some(asked) = self.next.come_into_use(self.sensor, self.sent) {
+            info::set_looking(self.sensor.settings());
+            if let Some(id) = asked.id() {
+                reply(id, Outcome::Done);
             }
-            Err(_) => Outcome::InvalidArgument,
-        };
-        reply(id, outcome);
+        }
+    }
+
+    /// Frames of other pixels come from now on. Markers have other areas in them: no rest position and no window holds.
+    fn change_format(&mut self, format: Format) {
+        self.sent = format;
+        self.use_next_threshold();
+        self.sensor.set_tare(None);
+        self.give_up_tare();
+        self.follow = Follow::new();
     }
 
     /// Measures the frame whose rows were scanned.

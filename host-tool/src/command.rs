@@ -1,10 +1,12 @@
 //! `hivtac tare` and `hivtac threshold`: one command each.
 
 use crate::output::{note, print};
-use hivtac_host::failure::Failure;
+use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_wire::message::{DeviceMessage, HsvBox, Request};
+use hivtac_host::threshold::{from_wire, text, to_wire};
+use hivtac_sensing::threshold::Threshold;
+use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use std::time::Duration;
 
 /// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
@@ -15,28 +17,42 @@ const TARE_PATIENCE: Duration = Duration::from_secs(10);
 /// Takes the mean of the next `frames` good frames (1–256) as the rest position.
 pub fn tare(address: &Address, patience: Duration, frames: u16) -> Result<(), Failure> {
     let wait = TARE_PATIENCE + SLOWEST_FRAME * frames.into();
-    send(address, patience, Request::Tare { frames }, wait)?;
+    let (mut link, _) = Link::connect(address, patience)?;
+    send(&mut link, Request::Tare { frames }, wait)?;
     print(&format!("tare taken over {frames} frames")).map(|_| ())
 }
 
-/// Sets the threshold until the device restarts.
-pub fn threshold(address: &Address, patience: Duration, threshold: HsvBox) -> Result<(), Failure> {
-    send(
-        address,
-        patience,
-        Request::SetThreshold(threshold),
-        patience,
-    )?;
-    print("threshold set").map(|_| ())
-}
-
-fn send(
+/// Sets the threshold until the device restarts: this one, or when none is given that of its model.
+pub fn threshold(
     address: &Address,
     patience: Duration,
-    request: Request,
-    wait: Duration,
+    wanted: Option<Threshold>,
 ) -> Result<(), Failure> {
-    let (mut link, _) = Link::connect(address, patience)?;
+    let (mut link, hello) = Link::connect(address, patience)?;
+    let wanted = wanted.map_or_else(|| of_model(&hello), Ok)?;
+    send(&mut link, Request::SetThreshold(to_wire(wanted)), patience)?;
+    print(&format!("threshold set: {}", text(&wanted)))?;
+    let made_for = hello.model.map(|model| from_wire(model.threshold));
+    if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
+        note(&format!(
+            "hivtac: samples have markers but no force (model_mismatch): the device's model was made for {}; \
+             `hivtac threshold --model` goes back to that",
+            text(&made_for)
+        ));
+    }
+    Ok(())
+}
+
+fn of_model(hello: &DeviceHello) -> Result<Threshold, Failure> {
+    let none = || {
+        let message = "the device has no usable model; say which threshold with --hsv or --cr";
+        Failure::new(Kind::Refused, message.to_owned())
+    };
+    let model = hello.model.as_ref().ok_or_else(none)?;
+    Ok(from_wire(model.threshold))
+}
+
+fn send(link: &mut Link, request: Request, wait: Duration) -> Result<(), Failure> {
     link.request(request, wait, |message| {
         if let DeviceMessage::Log(line) = message {
             note(&log_text(&line));

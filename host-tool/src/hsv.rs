@@ -1,47 +1,38 @@
 //! Thresholds on the command line.
 
-use hivtac_sensing::threshold;
-use hivtac_wire::message::HsvBox;
+use hivtac_sensing::formats::Mono;
+use hivtac_sensing::threshold::HsvBox;
+
+/// Highest hue, saturation and value, each twice.
+const HIGHEST: [u8; 6] = [179, 179, 255, 255, 255, 255];
 
 /// From `h0,h1,s0,s1,v0,v1` in OpenCV's 8-bit HSV (hue 0–179, h0 > h1 wraps through 0).
 pub fn parse(text: &str) -> Result<HsvBox, String> {
     let fields: Vec<&str> = text.split(',').collect();
-    let [
-        hue_low,
-        hue_high,
-        saturation_low,
-        saturation_high,
-        value_low,
-        value_high,
-    ] = <[&str; 6]>::try_from(fields).map_err(|fields| {
+    let fields = <[&str; 6]>::try_from(fields).map_err(|fields| {
         format!(
             "{} numbers instead of six (h0,h1,s0,s1,v0,v1)",
             fields.len()
         )
     })?;
-    let box_ = HsvBox {
-        hue_low: number(hue_low, 179)?,
-        hue_high: number(hue_high, 179)?,
-        saturation_low: number(saturation_low, 255)?,
-        saturation_high: number(saturation_high, 255)?,
-        value_low: number(value_low, 255)?,
-        value_high: number(value_high, 255)?,
-    };
+    let mut limits = [0; 6];
+    for (limit, (field, highest)) in limits.iter_mut().zip(fields.into_iter().zip(HIGHEST)) {
+        *limit = number(field, highest)?;
+    }
+    let box_ = HsvBox::of_limits(limits);
     ordered("saturation", box_.saturation_low, box_.saturation_high)?;
     ordered("value", box_.value_low, box_.value_high)?;
     Ok(box_)
 }
 
-/// The same for the sensing code.
-pub fn for_sensing(threshold: HsvBox) -> threshold::HsvBox {
-    threshold::HsvBox {
-        hue_low: threshold.hue_low,
-        hue_high: threshold.hue_high,
-        saturation_low: threshold.saturation_low,
-        saturation_high: threshold.saturation_high,
-        value_low: threshold.value_low,
-        value_high: threshold.value_high,
-    }
+/// From `l0,l1`: lowest and highest luma.
+pub fn parse_luma(text: &str) -> Result<Mono, String> {
+    let (low, high) = text
+        .split_once(',')
+        .ok_or_else(|| format!("{text:?} is not two numbers (l0,l1)"))?;
+    let (low, high) = (number(low, 255)?, number(high, 255)?);
+    ordered("luma", low, high)?;
+    Ok(Mono { low, high })
 }
 
 fn number(text: &str, highest: u8) -> Result<u8, String> {
@@ -76,6 +67,15 @@ mod tests {
         };
         assert_eq!(parse("170,10,100,255,45,255"), Ok(red));
         assert_eq!(parse("170, 10, 100, 255, 45, 255"), Ok(red));
+    }
+
+    #[test]
+    fn two_numbers_make_a_range_of_luma() {
+        assert_eq!(parse_luma("0, 88"), Ok(Mono { low: 0, high: 88 }));
+        let error = |text| parse_luma(text).unwrap_err();
+        assert_eq!(error("88"), "\"88\" is not two numbers (l0,l1)");
+        assert_eq!(error("0,256"), "\"256\" is no number from 0 to 255");
+        assert_eq!(error("9,8"), "the lowest luma, 9, is above the highest, 8");
     }
 
     #[test]

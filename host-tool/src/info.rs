@@ -5,8 +5,10 @@ use crate::output::{note, print};
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_wire::message::{Centroid, DeviceHello, DeviceMessage, HsvBox, Request, Stats};
-use serde::Serialize;
+use hivtac_host::threshold::{from_wire, text, to_json as threshold_json};
+use hivtac_sensing::threshold::Threshold;
+use hivtac_wire::message::{Centroid, DeviceHello, DeviceMessage, Request, Stats};
+use serde::{Serialize, Serializer};
 use std::time::Duration;
 
 /// Prints the device's hello and counters, as lines or as one JSON object.
@@ -48,7 +50,8 @@ struct Info<'a> {
     model: Option<Model<'a>>,
     width: u16,
     height: u16,
-    threshold: HsvBox,
+    #[serde(serialize_with = "as_json")]
+    threshold: Threshold,
     preset: &'a str,
     dilations: u8,
     centroid: &'static str,
@@ -60,6 +63,12 @@ struct Model<'a> {
     crc: String,
     name: &'a str,
     simulated: bool,
+    #[serde(serialize_with = "as_json")]
+    threshold: Threshold,
+}
+
+fn as_json<S: Serializer>(threshold: &Threshold, serializer: S) -> Result<S::Ok, S::Error> {
+    threshold_json(threshold).serialize(serializer)
 }
 
 impl<'a> Info<'a> {
@@ -79,10 +88,11 @@ impl<'a> Info<'a> {
                 crc: format!("{:08x}", model.crc),
                 name: &model.name,
                 simulated: model.simulated,
+                threshold: from_wire(model.threshold),
             }),
             width: hello.width,
             height: hello.height,
-            threshold: hello.threshold,
+            threshold: from_wire(hello.threshold),
             preset: &hello.preset,
             dilations: hello.dilations,
             centroid: match hello.centroid {
@@ -94,7 +104,6 @@ impl<'a> Info<'a> {
     }
 
     fn lines(&self) -> Vec<String> {
-        let threshold = &self.threshold;
         let mut lines = vec![
             format!("port       {}", self.port),
             format!("device     {}", self.device_id),
@@ -103,20 +112,19 @@ impl<'a> Info<'a> {
             format!("protocol   {}, schema {}", self.protocol, self.schema),
             format!("model      {}", self.model_text()),
             format!("frame      {} × {} px", self.width, self.height),
-            format!(
-                "threshold  H {}–{}, S {}–{}, V {}–{}",
-                threshold.hue_low,
-                threshold.hue_high,
-                threshold.saturation_low,
-                threshold.saturation_high,
-                threshold.value_low,
-                threshold.value_high
-            ),
+            format!("threshold  {}", text(&self.threshold)),
             format!(
                 "markers    preset {}, dilations {}, centroids {}",
                 self.preset, self.dilations, self.centroid
             ),
         ];
+        let model = self.model.as_ref().map(|model| &model.threshold);
+        if let Some(made_for) = model.filter(|made_for| **made_for != self.threshold) {
+            lines.push(format!(
+                "           no force with it: the model was made for {}",
+                text(made_for)
+            ));
+        }
         lines.extend(self.stats.iter().flat_map(stats_lines));
         lines
     }

@@ -241,6 +241,7 @@ fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
     let why = match outcome {
         Outcome::Done => return Ok(()),
         Outcome::InvalidArgument => "an argument is outside its range",
+        Outcome::Unsupported => "its camera does not send that pixel format; choose another",
         Outcome::Busy => "it is busy with the same thing; try again later",
         Outcome::NotAtRest => {
             "the markers are not where a film at rest has them; take away what touches it, and check the film's distance"

@@ -18,8 +18,9 @@ use clap::{Args, Parser, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
+use hivtac_sensing::formats::{Mono, Yuv422};
 use hivtac_sensing::geometry::Preset;
-use hivtac_wire::message::HsvBox;
+use hivtac_sensing::threshold::{HsvBox, Threshold};
 use lines::Format;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -63,13 +64,15 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=256))]
         frames: u16,
     },
-    /// Set the colour threshold until the device restarts
+    /// Set which pixels a marker may have, and with that the camera's pixel format, until the device restarts
+    ///
+    /// There are forces only with the threshold that the device's model was made for; markers there are all the same, as
+    /// `hivtac-calibrate collect` needs them. Another pixel format forgets the tare.
     Threshold {
         #[command(flatten)]
         device: Device,
-        /// Inclusive bounds in OpenCV's 8-bit HSV: hue 0–179 (h0 > h1 wraps), saturation and value 0–255
-        #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
-        hsv: HsvBox,
+        #[command(flatten)]
+        wanted: WantedThreshold,
     },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
@@ -92,6 +95,32 @@ struct Device {
 impl Device {
     fn address(&self) -> Address {
         self.port.as_deref().map_or(Address::Find, Address::parse)
+    }
+}
+
+#[derive(Args)]
+#[group(required = true, multiple = false)]
+struct WantedThreshold {
+    /// RGB565; inclusive bounds in OpenCV's 8-bit HSV: hue 0–179 (h0 > h1 wraps), saturation and value 0–255
+    #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
+    hsv: Option<HsvBox>,
+    /// YUV422; lowest Cr, 0–255
+    #[arg(long, value_name = "LOW")]
+    cr: Option<u8>,
+    /// Mono; inclusive bounds of the luma, 0–255. An OV7725 does not send it
+    #[arg(long, value_name = "l0,l1", value_parser = hsv::parse_luma)]
+    luma: Option<Mono>,
+    /// The one that the device's model was made for
+    #[arg(long)]
+    model: bool,
+}
+
+impl WantedThreshold {
+    /// `None` for the model's.
+    fn threshold(&self) -> Option<Threshold> {
+        let hsv = self.hsv.map(Threshold::Rgb565);
+        let cr = self.cr.map(|cr_low| Threshold::Yuv422(Yuv422 { cr_low }));
+        hsv.or(cr).or(self.luma.map(Threshold::Mono))
     }
 }
 
@@ -149,7 +178,7 @@ impl SenseArguments {
         sense::Options {
             images: self.images,
             preset: self.preset,
-            threshold: self.threshold.map(hsv::for_sensing),
+            threshold: self.threshold,
             min_area: self.min_area,
             model: self.model,
             tare: self.tare,
@@ -203,8 +232,8 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Tare { device, frames } => {
             command::tare(&device.address(), device.timeout, frames)
         }
-        Command::Threshold { device, hsv } => {
-            command::threshold(&device.address(), device.timeout, hsv)
+        Command::Threshold { device, wanted } => {
+            command::threshold(&device.address(), device.timeout, wanted.threshold())
         }
     }
 }

@@ -5,7 +5,7 @@ mod common;
 
 use common::{Setup, command, firmware};
 use hivtac_rig::script::Action;
-use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Request};
+use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Request, Threshold};
 use hivtac_wire::status::Status;
 
 /// Accepts nothing that the scene shows.
@@ -20,7 +20,10 @@ const GREEN: HsvBox = HsvBox {
 const ASKED: u16 = 77;
 
 fn set(id: u16, threshold: HsvBox) -> Action {
-    Action::Send(command(id, Request::SetThreshold(threshold)))
+    Action::Send(command(
+        id,
+        Request::SetThreshold(Threshold::Rgb565(threshold)),
+    ))
 }
 
 /// What the device answered to a command, and how many samples it had sent before.

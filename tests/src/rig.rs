@@ -33,6 +33,14 @@ impl Rig {
     /// # Errors
     /// When it does not get ready.
     pub fn start(options: &[&str]) -> Result<Rig> {
+        Rig::start_with(&artifact::named_by("HIVTAC_ELF"), options)
+    }
+
+    /// The same with another firmware.
+    ///
+    /// # Errors
+    /// When it does not get ready.
+    pub fn start_with(elf: &Path, options: &[&str]) -> Result<Rig> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
         let mut process = Command::new(artifact::named_by("HIVTAC_RIG"))
             .arg("--pty")
@@ -41,7 +49,7 @@ impl Rig {
             .arg("--stats-json")
             .arg(folder.path().join("stats"))
             .args(options)
-            .arg(artifact::named_by("HIVTAC_ELF"))
+            .arg(elf)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(File::create(folder.path().join("log"))?)

@@ -5,12 +5,13 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use hivtac_scene::{Preset, Scene};
+use hivtac_scene::{Format, Options, Preset, Scene};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
-use hivtac_tests::rig::{Rig, json_lines, tool};
+use hivtac_tests::artifact;
+use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
 use serde_json::{Value, json};
 
 const SEED: u64 = 5;
@@ -26,9 +27,9 @@ fn on_this_computer(model: &[u8], pixels: &[u16]) -> Measurement {
     sensor.finish_frame()
 }
 
-fn model_file() -> Vec<u8> {
+fn model_file(name: &str) -> Vec<u8> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    fs::read(root.join("calibration/models/default.hvtm")).unwrap()
+    fs::read(root.join("calibration/models").join(name)).unwrap()
 }
 
 /// What `monitor --json` must say of a measurement, in the integers that the force is made of.
@@ -73,37 +74,39 @@ fn said(line: &Value) -> Value {
     json!({ "force": force, "status": line["status"] })
 }
 
-/// Runs a scene and holds every line of the host tool against the sensing here. Gives the lines.
-fn compare(name: &str, preset: Preset, frames: usize) -> Vec<Value> {
-    let seed = SEED.to_string();
-    let options = ["--scene", name, "--seed", &seed, "--preset", preset.name()];
-    let rig = Rig::start(&options).unwrap();
-    let output = tool(
-        &rig,
-        "monitor",
-        &["--json", "--frames", &frames.to_string()],
-    )
-    .unwrap();
+/// What the host tool shows of the next frames of a rig.
+fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
+    let output = tool(rig, "monitor", &["--json", "--frames", &frames.to_string()]).unwrap();
     assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
     let lines = json_lines(&output.out).unwrap();
     assert_eq!(lines.len(), frames);
+    lines
+}
+
+/// Holds every line of the host tool against the sensing here.
+fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
     let truth = rig.truth().unwrap();
     let shown: HashMap<u64, &Value> = truth
         .iter()
         .map(|line| (line["frame"].as_u64().unwrap(), line))
         .collect();
-    let scene = Scene::preset(name, preset, 320, 240, SEED).unwrap();
-    let model = model_file();
-    for line in &lines {
+    for line in lines {
         let exposure = shown[&line["frame"].as_u64().unwrap()];
         let number = exposure["exposure"].as_u64().unwrap();
         let frame = scene.frame(number, exposure["time_s"].as_f64().unwrap());
-        assert_eq!(
-            said(line),
-            expected(&on_this_computer(&model, &frame.pixels)),
-            "{line}"
-        );
+        let measurement = on_this_computer(model, &frame.pixels);
+        assert_eq!(said(line), expected(&measurement), "{line}");
     }
+}
+
+/// Runs a scene and holds every line of the host tool against the sensing here. Gives the lines.
+fn compare(name: &str, preset: Preset, frames: usize) -> Vec<Value> {
+    let seed = SEED.to_string();
+    let options = ["--scene", name, "--seed", &seed, "--preset", preset.name()];
+    let rig = Rig::start(&options).unwrap();
+    let lines = monitor(&rig, frames);
+    let scene = Scene::preset(name, preset, 320, 240, SEED).unwrap();
+    check_forces(&rig, &lines, &scene, &model_file("default.hvtm"));
     check_counting(&lines);
     rig.finish().unwrap();
     lines
@@ -141,4 +144,62 @@ fn a_moving_tip_gives_the_same_forces() {
 fn another_camera_geometry_gives_the_same_results() {
     // The markers of this geometry are smaller and nearer to each other than the model's.
     compare("static", Preset::Paper, 4);
+}
+
+/// Runs `hivtac threshold`, which must succeed.
+fn set_threshold(rig: &Rig, options: &[&str]) -> ToolOutput {
+    let output = tool(rig, "threshold", options).unwrap();
+    assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+    output
+}
+
+/// How many lines have a force, and how many say that the model was made for something else.
+fn forces_and_mismatches(lines: &[Value]) -> (usize, usize) {
+    let mismatch = json!("model_mismatch");
+    let says_so = |line: &&Value| line["status"].as_array().unwrap().contains(&mismatch);
+    let has_force = |line: &&Value| line["force"].is_object();
+    (
+        lines.iter().filter(has_force).count(),
+        lines.iter().filter(says_so).count(),
+    )
+}
+
+/// Firmware with a model for YUV422 begins in that format, leaves it for RGB565 on command, and comes back to it.
+#[test]
+fn the_pixel_format_is_chosen_while_frames_are_measured() {
+    const FRAMES: usize = 5;
+    let elf = artifact::named_by("HIVTAC_BUG_ELFS").join("yuv422.elf");
+    let seed = SEED.to_string();
+    let rig = Rig::start_with(&elf, &["--scene", "demo", "--seed", &seed]).unwrap();
+    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
+    let options = Options {
+        format: Format::Yuv422,
+        ..scene.options().clone()
+    };
+    let scene = scene.with_options(options).unwrap();
+    let model = model_file("yuv422/default.hvtm");
+
+    let first = monitor(&rig, FRAMES);
+    check_forces(&rig, &first, &scene, &model);
+    assert_eq!(forces_and_mismatches(&first), (FRAMES, 0));
+
+    let output = set_threshold(&rig, &["--hsv", "170,10,100,255,45,255"]);
+    assert!(output.err.contains("made for yuv422"), "{output:?}");
+    assert_eq!(forces_and_mismatches(&monitor(&rig, FRAMES)), (0, FRAMES));
+
+    let output = set_threshold(&rig, &["--cr", "162"]);
+    assert_eq!(output.out, "threshold set: yuv422, Cr 162–255\n");
+    let mut last = monitor(&rig, FRAMES);
+    // The frames that passed while the camera was set are no matter of the sensing.
+    for line in &mut last {
+        let status = line["status"].as_array_mut().unwrap();
+        status.retain(|name| name != "frame_dropped");
+    }
+    check_forces(&rig, &last, &scene, &model);
+    assert_eq!(forces_and_mismatches(&last), (FRAMES, 0));
+
+    let output = tool(&rig, "threshold", &["--luma", "0,88"]).unwrap();
+    assert_eq!(output.code, Some(6), "{output:?}");
+    assert!(output.err.contains("does not send that pixel format"));
+    rig.finish().unwrap();
 }

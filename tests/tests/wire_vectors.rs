@@ -40,16 +40,10 @@ fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-const RED: HsvBox = HsvBox {
-    hue_low: 170,
-    hue_high: 10,
-    saturation_low: 100,
-    saturation_high: 255,
-    value_low: 45,
-    value_high: 255,
-};
+const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+const RED_CR: Threshold = Threshold::Yuv422 { cr_low: 162 };
 
-fn hello(model: Option<ModelIdentity>) -> DeviceMessage {
+fn hello(model: Option<ModelIdentity>, threshold: Threshold) -> DeviceMessage {
     DeviceMessage::Hello(DeviceHello {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
@@ -59,18 +53,19 @@ fn hello(model: Option<ModelIdentity>) -> DeviceMessage {
         model,
         width: 320,
         height: 240,
-        threshold: RED,
+        threshold,
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: Centroid::RednessWeighted,
     })
 }
 
-fn model() -> ModelIdentity {
+fn model(threshold: Threshold) -> ModelIdentity {
     ModelIdentity {
         crc: 0xcafe_f00d,
         name: "11-64-64-3 ov7725".try_into().unwrap(),
         simulated: true,
+        threshold,
     }
 }
 
@@ -158,8 +153,9 @@ fn reply(id: u16, outcome: Outcome) -> DeviceMessage {
 
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     [
-        ("device-hello", hello(Some(model()))),
-        ("device-hello-without-model", hello(None)),
+        ("device-hello", hello(Some(model(RED)), RED)),
+        ("device-hello-yuv422", hello(Some(model(RED_CR)), RED_CR)),
+        ("device-hello-without-model", hello(None, RED)),
         (
             "sample-force",
             sample(Status::MODEL_SIMULATED, Some([-8707, 4362, -99_525])),
@@ -174,6 +170,7 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
             "reply-no-good-frames",
             reply(u16::MAX, Outcome::NoGoodFrames),
         ),
+        ("reply-unsupported", reply(200, Outcome::Unsupported)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -187,6 +184,20 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("start", command(2, Request::Start)),
         ("stop", command(3, Request::Stop)),
         ("set-threshold", command(200, Request::SetThreshold(RED))),
+        (
+            "set-threshold-yuv422",
+            command(200, Request::SetThreshold(RED_CR)),
+        ),
+        (
+            "set-threshold-mono",
+            command(
+                200,
+                Request::SetThreshold(Threshold::Mono {
+                    luma_low: 0,
+                    luma_high: 88,
+                }),
+            ),
+        ),
         ("tare", command(7, Request::Tare { frames: 128 })),
         ("start-with-markers", command(2, Request::StartWithMarkers)),
     ]

@@ -11,7 +11,7 @@ import pathlib
 import sys
 import zlib
 
-SCHEMA = 0x145736104F119E2C
+SCHEMA = 0xE67EC00410F1123B
 
 
 def varint(value):
@@ -68,8 +68,9 @@ def frame(content):
 
 HOST_HELLO = [raw("Hello", [0]), unsigned("protocol", 1), (varint(SCHEMA), f"schema {SCHEMA:#018x}")]
 COMMAND = [raw("Command", [1])]
-BOX = [170, 10, 100, 255, 45, 255]
-BOX_FIELD = raw("threshold H 170–10, S 100–255, V 45–255", BOX)
+RED = [raw("threshold: Rgb565", [0]), raw("H 170–10, S 100–255, V 45–255", [170, 10, 100, 255, 45, 255])]
+RED_CR = [raw("threshold: Yuv422", [1]), raw("cr_low 162", [162])]
+DARK = [raw("threshold: Mono", [2]), raw("luma_low 0, luma_high 88", [0, 88])]
 
 HELLO = [
     raw("Hello", [0]),
@@ -79,14 +80,19 @@ HELLO = [
     string("board", "weact-h743 + ov7725"),
     string("firmware", "hivtac 0.1.0"),
 ]
-HELLO_END = [
-    unsigned("width", 320),
-    unsigned("height", 240),
-    BOX_FIELD,
-    string("preset", "ov7725"),
-    raw("dilations 1", [1]),
-    raw("centroid: RednessWeighted", [1]),
-]
+
+
+def hello_end(threshold):
+    return [
+        unsigned("width", 320),
+        unsigned("height", 240),
+        *threshold,
+        string("preset", "ov7725"),
+        raw("dilations 1", [1]),
+        raw("centroid: RednessWeighted", [1]),
+    ]
+
+
 MODEL = [
     raw("model: Some", [1]),
     (varint(0xCAFEF00D), "model.crc 0xcafef00d"),
@@ -150,8 +156,9 @@ STATS = [
 ]
 
 DEVICE = {
-    "device-hello": HELLO + MODEL + HELLO_END,
-    "device-hello-without-model": HELLO + [raw("model: None", [0])] + HELLO_END,
+    "device-hello": HELLO + MODEL + RED + hello_end(RED),
+    "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR),
+    "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED),
     "sample-force": sample(41, 42, 1_400_000, 0x2000, "model_simulated") + ANGLES + CARTESIAN + SIGMAS
     + NO_MARKERS,
     "sample-without-cartesian": sample(41, 42, 1_400_000, 0, "") + ANGLES
@@ -168,6 +175,7 @@ DEVICE = {
     ],
     "reply-done": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Done", [0])],
     "reply-no-good-frames": [raw("Reply", [4]), unsigned("id", 65_535), raw("outcome: NoGoodFrames", [3])],
+    "reply-unsupported": [raw("Reply", [4]), unsigned("id", 200), raw("outcome: Unsupported", [5])],
 }
 
 HOST = {
@@ -175,7 +183,9 @@ HOST = {
     "get-info": COMMAND + [unsigned("id", 1), raw("GetInfo", [0])],
     "start": COMMAND + [unsigned("id", 2), raw("Start", [1])],
     "stop": COMMAND + [unsigned("id", 3), raw("Stop", [2])],
-    "set-threshold": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3]), BOX_FIELD],
+    "set-threshold": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3])] + RED,
+    "set-threshold-yuv422": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3])] + RED_CR,
+    "set-threshold-mono": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3])] + DARK,
     "tare": COMMAND + [unsigned("id", 7), raw("Tare", [4]), unsigned("frames", 128)],
     "start-with-markers": COMMAND + [unsigned("id", 2), raw("StartWithMarkers", [5])],
 }
@@ -241,7 +251,7 @@ def annotate(name, fields, whole=None):
 
 
 def print_documentation():
-    for name in ["host-hello", "start", "set-threshold", "tare", "start-with-markers"]:
+    for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare", "start-with-markers"]:
         annotate(name, HOST[name])
     for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers", "stats", "log", "reply-done"]:
         annotate(name, DEVICE[name])

@@ -12,6 +12,9 @@ fn full<const N: usize>() -> String<N> {
     String::try_from(std::string::String::from("x").repeat(N).as_str()).unwrap()
 }
 
+/// The longest kind of threshold.
+const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+
 /// An ordinary hello.
 pub fn device_hello() -> DeviceHello {
     DeviceHello {
@@ -23,14 +26,7 @@ pub fn device_hello() -> DeviceHello {
         model: None,
         width: 320,
         height: 240,
-        threshold: HsvBox {
-            hue_low: 170,
-            hue_high: 10,
-            saturation_low: 100,
-            saturation_high: 255,
-            value_low: 45,
-            value_high: 255,
-        },
+        threshold: RED,
         preset: String::try_from("ov7725").unwrap(),
         dilations: 1,
         centroid: Centroid::RednessWeighted,
@@ -49,6 +45,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
                 crc: u32::MAX,
                 name: full(),
                 simulated: true,
+                threshold: RED,
             }),
             width: u16::MAX,
             height: u16::MAX,
@@ -114,12 +111,11 @@ fn longest_stats() -> Stats {
 
 /// Every field as many bytes as it can have, for each variant.
 pub fn longest_host_messages() -> Vec<HostMessage> {
-    let threshold = device_hello().threshold;
     let requests = [
         Request::GetInfo,
         Request::Start,
         Request::Stop,
-        Request::SetThreshold(threshold),
+        Request::SetThreshold(RED),
         Request::Tare { frames: u16::MAX },
         Request::StartWithMarkers,
     ];
@@ -171,7 +167,7 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     let centroid = prop_oneof![Just(Centroid::BinaryMask), Just(Centroid::RednessWeighted)];
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
-    let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>()));
+    let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
     (any::<[u8; 12]>(), names, size, model, seen).prop_map(
         |(device_id, (board, firmware, preset), (width, height), model, seen)| DeviceHello {
             device_id,
@@ -179,10 +175,11 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
             firmware,
             width,
             height,
-            model: model.map(|(crc, name, simulated)| ModelIdentity {
+            model: model.map(|(crc, name, simulated, threshold)| ModelIdentity {
                 crc,
                 name,
                 simulated,
+                threshold,
             }),
             threshold: seen.0,
             preset,
@@ -273,19 +270,24 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::Busy),
         Just(Outcome::NoGoodFrames),
         Just(Outcome::NotAtRest),
+        Just(Outcome::Unsupported),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
 
-fn any_threshold() -> impl Strategy<Value = HsvBox> {
-    any::<[u8; 6]>().prop_map(|bounds| HsvBox {
-        hue_low: bounds[0],
-        hue_high: bounds[1],
-        saturation_low: bounds[2],
-        saturation_high: bounds[3],
-        value_low: bounds[4],
-        value_high: bounds[5],
-    })
+fn any_threshold() -> impl Strategy<Value = Threshold> {
+    prop_oneof![
+        any_box().prop_map(Threshold::Rgb565),
+        any::<u8>().prop_map(|cr_low| Threshold::Yuv422 { cr_low }),
+        any::<[u8; 2]>().prop_map(|[luma_low, luma_high]| Threshold::Mono {
+            luma_low,
+            luma_high
+        }),
+    ]
+}
+
+fn any_box() -> impl Strategy<Value = HsvBox> {
+    any::<[u8; 6]>().prop_map(HsvBox::of_limits)
 }
 
 /// Text of any characters that fits.

@@ -12,7 +12,7 @@ pub const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 pub(crate) const CRC_BYTES: usize = 4;
 
 /// Longest body a device sends in this protocol version: a hello with full strings.
-pub const MAX_DEVICE_BODY: usize = 163;
+pub const MAX_DEVICE_BODY: usize = 171;
 
 /// Longest body a host sends in this protocol version: its hello.
 pub const MAX_HOST_BODY: usize = 14;

@@ -61,8 +61,8 @@ pub struct DeviceHello {
     pub width: u16,
     /// Rows of a frame, px.
     pub height: u16,
-    /// The threshold in use.
-    pub threshold: HsvBox,
+    /// The threshold in use, and with that the pixel format.
+    pub threshold: Threshold,
     /// Lens and pixels: the name of a geometry preset, e.g. `ov7725`.
     pub preset: String<16>,
     /// 3×3 dilations of the mask, 0–3.
@@ -89,6 +89,27 @@ pub struct ModelIdentity {
     pub name: String<32>,
     /// True when it was trained on a simulated sensor.
     pub simulated: bool,
+    /// The threshold that it was made for: with another one there is no force.
+    pub threshold: Threshold,
+}
+
+/// Which pixels a marker may have, and with that what the camera sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Threshold {
+    /// RGB565: a box of colours.
+    Rgb565(HsvBox),
+    /// YUV422: a least Cr.
+    Yuv422 {
+        /// Lowest Cr of a pair of pixels.
+        cr_low: u8,
+    },
+    /// Mono: a range of the luma, ends included.
+    Mono {
+        /// Lowest luma.
+        luma_low: u8,
+        /// Highest luma.
+        luma_high: u8,
+    },
 }
 
 /// An inclusive box in OpenCV's 8-bit HSV (H 0–179). `hue_low > hue_high` wraps through 0.
@@ -106,6 +127,40 @@ pub struct HsvBox {
     pub value_low: u8,
     /// Highest value.
     pub value_high: u8,
+}
+
+impl HsvBox {
+    /// Of its six limits, in the order of the fields.
+    pub const fn of_limits(limits: [u8; 6]) -> HsvBox {
+        let [
+            hue_low,
+            hue_high,
+            saturation_low,
+            saturation_high,
+            value_low,
+            value_high,
+        ] = limits;
+        HsvBox {
+            hue_low,
+            hue_high,
+            saturation_low,
+            saturation_high,
+            value_low,
+            value_high,
+        }
+    }
+
+    /// Its six limits, in the order of the fields.
+    pub const fn limits(&self) -> [u8; 6] {
+        [
+            self.hue_low,
+            self.hue_high,
+            self.saturation_low,
+            self.saturation_high,
+            self.value_low,
+            self.value_high,
+        ]
+    }
 }
 
 /// One frame's result.
@@ -227,8 +282,8 @@ pub enum Request {
     Start,
     /// Stop streaming.
     Stop,
-    /// Set the threshold. Answered when it holds, from the next frame that starts; until then the one before does.
-    SetThreshold(HsvBox),
+    /// Set the threshold and its pixel format. Answered when it holds; until then the one before does.
+    SetThreshold(Threshold),
     /// Take the mean of the next `frames` good frames (1–256) as the rest position. Answered when done.
     Tare {
         /// How many frames to average.
@@ -260,4 +315,6 @@ pub enum Outcome {
     NoGoodFrames,
     /// Refused: the markers are not where a film at rest has them. Something presses it, or the sensor is built otherwise.
     NotAtRest,
+    /// Refused: this device's camera does not send that pixel format.
+    Unsupported,
 }

@@ -31,6 +31,15 @@ pub fn firmware_with(toolchain: &Toolchain, feature: &str) -> Result<PathBuf> {
     build(command.args(["--features", feature]), "hivtac-firmware")
 }
 
+/// The model for YUV422, from the root of the repository, and the name of the firmware that carries it.
+pub const YUV422: (&str, &str) = ("calibration/models/yuv422/default.hvtm", "yuv422");
+
+/// The firmware with another model than the default one.
+pub fn firmware_with_model(toolchain: &Toolchain, model: &str) -> Result<PathBuf> {
+    let mut command = firmware_command(toolchain);
+    build(command.env("HIVTAC_MODEL", model), "hivtac-firmware")
+}
+
 fn firmware_command(toolchain: &Toolchain) -> Command {
     let mut command = toolchain.build(workspace::root());
     command.args(["--package", "hivtac-firmware", "--release"]);

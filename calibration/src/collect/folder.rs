@@ -18,7 +18,7 @@ use hivtac_wire::message::{Centroid, DeviceHello, Sample};
 use hivtac_wire::status::Status;
 use serde::{Deserialize, Serialize};
 
-use crate::conditions::{CentroidName, Conditions, ContactName, OriginName, PixelName};
+use crate::conditions::{CentroidName, Conditions, ContactName, OriginName};
 
 /// A pose: α and β in degrees, or nothing while the film is untouched.
 pub type Pose = Option<[f64; 2]>;
@@ -195,22 +195,15 @@ fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
 /// # Errors
 /// When this program does not know its preset.
 pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
-    let threshold = hello.threshold;
+    let threshold = hivtac_host::threshold::from_wire(hello.threshold);
     crate::conditions::preset(&hello.preset)
         .context("the sensor says what this program does not know")?;
     Ok(Conditions {
         preset: hello.preset.as_str().to_owned(),
         width: hello.width,
         height: hello.height,
-        pixel_format: PixelName::Rgb565,
-        threshold: [
-            threshold.hue_low,
-            threshold.hue_high,
-            threshold.saturation_low,
-            threshold.saturation_high,
-            threshold.value_low,
-            threshold.value_high,
-        ],
+        pixel_format: threshold.format().into(),
+        threshold: threshold.limits(),
         dilations: hello.dilations,
         centroid: match hello.centroid {
             Centroid::BinaryMask => CentroidName::BinaryMask,
@@ -343,7 +336,8 @@ fn takes_done(path: &Path) -> Result<Vec<[f64; 2]>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_wire::message::Marker;
+    use crate::conditions::PixelName;
+    use hivtac_wire::message::{HsvBox, Marker, Threshold};
 
     fn conditions() -> Conditions {
         Conditions {
@@ -411,6 +405,36 @@ mod tests {
         assert_eq!(recording.samples[1].pose, Some([4.0, -3.5]));
         assert_eq!(recording.samples[1].seen, Err("markers_missing".into()));
         assert_eq!(recording.gauge_lines, [(0, 0.55, "+0.1\u{fffd}2,N".into())]);
+    }
+
+    #[test]
+    fn conditions_have_the_pixel_format_that_the_sensor_is_set_to() {
+        let mut hello = DeviceHello {
+            protocol: 1,
+            schema: 0,
+            device_id: [7; 12],
+            board: "board".try_into().unwrap(),
+            firmware: "firmware".try_into().unwrap(),
+            model: None,
+            width: 320,
+            height: 240,
+            threshold: Threshold::Yuv422 { cr_low: 170 },
+            preset: "ov7725".try_into().unwrap(),
+            dilations: 1,
+            centroid: Centroid::RednessWeighted,
+        };
+        let yuv422 = conditions_of(&hello).unwrap();
+        assert_eq!(yuv422.pixel_format, PixelName::Yuv422);
+        assert_eq!(yuv422.threshold, [170, 0, 0, 0, 0, 0]);
+        let model = yuv422.to_model().unwrap();
+        assert_eq!(
+            hivtac_host::threshold::to_wire(model.threshold),
+            hello.threshold
+        );
+        hello.threshold = Threshold::Rgb565(HsvBox::of_limits([1, 2, 3, 4, 5, 6]));
+        let rgb565 = conditions_of(&hello).unwrap();
+        assert_eq!(rgb565.pixel_format, PixelName::Rgb565);
+        assert_eq!(rgb565.threshold, [1, 2, 3, 4, 5, 6]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{
     Centroid, DeviceHello, DeviceMessage, HostMessage, HsvBox, Marker, Outcome, PROTOCOL_VERSION,
-    Reply, Request, Sample,
+    Reply, Request, Sample, Threshold,
 };
 use hivtac_wire::status::Status;
 use hivtac_wire::version::SCHEMA_HASH;
@@ -59,14 +59,7 @@ pub fn hello() -> DeviceHello {
         model: None,
         width: 320,
         height: 240,
-        threshold: HsvBox {
-            hue_low: 170,
-            hue_high: 10,
-            saturation_low: 100,
-            saturation_high: 255,
-            value_low: 45,
-            value_high: 255,
-        },
+        threshold: Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255])),
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: Centroid::RednessWeighted,

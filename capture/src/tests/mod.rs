@@ -177,9 +177,7 @@ fn silence_gives_the_begun_frame_up() {
 #[test]
 fn frames_that_passed_during_set_up_are_not_counted_here() {
     let mut world = promptly(&[GOOD, GOOD]);
-    let events = &mut world.events;
-    let mut tell = |event| events.push_back(event);
-    world.tracker.stop(&mut world.chip, &mut tell);
+    world.tracker.stop(&mut world.chip);
     let from = world.chip.edge.number;
     world.send(GOOD);
     world.send(GOOD);
@@ -192,6 +190,34 @@ fn frames_that_passed_during_set_up_are_not_counted_here() {
     world.settle();
     assert_eq!(world.numbers(), [1, 2, 3, 6]);
     assert_eq!((world.tally.processed, world.counted()), (4, 4));
+}
+
+#[test]
+fn a_frame_under_way_at_a_stop_is_not_captured_and_the_next_one_says_so() {
+    let mut world = promptly(&[GOOD]);
+    world.chip.edge.number += 1;
+    world.chip.capturing = true;
+    let cut = world.chip.edge.number;
+    for word in 0..BAND + 1 {
+        world.chip.word(word, value(cut, word));
+        world.pass(1);
+    }
+    world.tracker.stop(&mut world.chip);
+    world.send(GOOD);
+    world.tracker.start(&mut world.chip);
+    world.events.push_back(Event::Passed {
+        from: cut,
+        to: cut + 1,
+        restart: false,
+    });
+    world.settle();
+    world.check_contents();
+    assert_eq!(world.numbers(), [1, 2, 5]);
+    assert_eq!(
+        (world.tally.processed, world.tally.busy, world.counted()),
+        (3, 1, 4)
+    );
+    assert_eq!(world.after, [(false, false), (false, false), (true, false)]);
 }
 
 #[test]

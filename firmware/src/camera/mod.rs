@@ -3,6 +3,7 @@
 mod ov7725;
 mod ov7725_registers;
 pub use ov7725::*;
+pub use ov7725_registers::Format;
 
 use hivtac_sensing::geometry::Geometry;
 

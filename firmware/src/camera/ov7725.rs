@@ -1,6 +1,6 @@
-//! OmniVision OV7725: 320 × 240 RGB565, over SCCB (I²C with a stop between address and read).
+//! OmniVision OV7725: 320 × 240, RGB565 or YUV422, over SCCB (I²C with a stop between address and read).
 
-use super::ov7725_registers::{COM7, COM7_RESET, PID, TABLE, VER};
+use super::ov7725_registers::{COM7, COM7_RESET, Format, PID, TABLE, VER};
 use crate::board::XCLK_HZ;
 use core::fmt;
 use embassy_stm32::gpio::Output;
@@ -8,7 +8,6 @@ use embassy_stm32::i2c::{self, I2c, Master};
 use embassy_stm32::mode::Blocking;
 use embassy_time::{Duration, Timer};
 use hivtac_sensing::geometry::Preset;
-use hivtac_sensing::threshold::PixelFormat;
 
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";
@@ -18,9 +17,6 @@ pub const PRESET: Preset = Preset::Ov7725;
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
-
-/// What its pixels are.
-pub const FORMAT: PixelFormat = PixelFormat::Rgb565;
 
 /// Time from frame to frame: 278 lines of 576 pixels of two bytes, one byte per PCLK; PCLK = XCLK as configured.
 pub const FRAME_TIME: Duration = Duration::from_micros(278 * 576 * 2 * 1_000_000 / XCLK_HZ as u64);
@@ -97,14 +93,27 @@ impl Camera {
         self.write(COM7, COM7_RESET)
     }
 
-    /// Writes the register table; returns when the camera sends frames in the new format.
-    pub async fn configure(&mut self) -> Result<(), Error> {
+    /// Writes the register table after a reset; returns when the camera sends frames so.
+    pub async fn configure(&mut self, format: Format) -> Result<(), Error> {
         Timer::after(SETTLE).await;
-        for (register, value) in TABLE {
+        self.write_all(format.registers()).await?;
+        self.write_all(TABLE).await?;
+        Timer::after(FORMAT_CHANGE).await;
+        Ok(())
+    }
+
+    /// Changes the pixel format of a configured camera; returns when it sends frames so.
+    pub async fn set_format(&mut self, format: Format) -> Result<(), Error> {
+        self.write_all(format.registers()).await?;
+        Timer::after(FORMAT_CHANGE).await;
+        Ok(())
+    }
+
+    async fn write_all(&mut self, table: &[(u8, u8)]) -> Result<(), Error> {
+        for (register, value) in table {
             self.write(*register, *value)?;
             Timer::after(PAUSE).await;
         }
-        Timer::after(FORMAT_CHANGE).await;
         Ok(())
     }
 

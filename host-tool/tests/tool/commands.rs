@@ -32,7 +32,7 @@ fn info_for_a_person() {
              protocol   1, schema {SCHEMA_HASH:#018x}\n\
              model      11-64-64-3 ov7725, CRC 0000cafe, trained on: simulated sensor\n\
              frame      320 × 240 px\n\
-             threshold  H 170–10, S 100–255, V 45–255\n\
+             threshold  rgb565, H 170–10, S 100–255, V 45–255\n\
              markers    preset ov7725, dilations 1, centroids redness-weighted\n\
              frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0\n\
              camera     0 timeouts, 0 restarts, 0 overruns\n\
@@ -55,6 +55,8 @@ fn info_as_json() {
     assert_eq!(info["device_id"], "000102030405060708090aff");
     assert_eq!(info["model"]["simulated"], true);
     assert_eq!(info["threshold"]["hue_low"], 170);
+    assert_eq!(info["threshold"]["format"], "rgb565");
+    assert_eq!(info["model"]["threshold"], info["threshold"]);
     assert_eq!(info["stats"]["frames_exposed"], 0);
     assert_eq!(run.stdout.lines().count(), 1);
 }
@@ -207,7 +209,15 @@ fn a_threshold_is_set_as_given() {
     ]);
     assert_eq!(
         (run.code, run.stdout.as_str()),
-        (Some(0), "threshold set\n")
+        (
+            Some(0),
+            "threshold set: rgb565, H 160–8, S 90–250, V 40–240\n"
+        )
+    );
+    assert!(
+        run.stderr.contains("(model_mismatch)"),
+        "the model was made for another one: {}",
+        run.stderr
     );
     let expected = HsvBox {
         hue_low: 160,
@@ -219,7 +229,44 @@ fn a_threshold_is_set_as_given() {
     };
     assert_eq!(
         device.commands.iter().next(),
-        Some(Request::SetThreshold(expected))
+        Some(Request::SetThreshold(Threshold::Rgb565(expected)))
+    );
+}
+
+#[test]
+fn the_pixel_format_follows_the_threshold() {
+    let device = FakeDevice::on_pty(Box::new(|device| device.serve()));
+    let set = run(&["threshold", "--cr", "162", "--port", &device.port]);
+    assert_eq!(
+        (set.code, set.stdout.as_str()),
+        (Some(0), "threshold set: yuv422, Cr 162–255\n")
+    );
+    assert_eq!(
+        set.stderr,
+        "hivtac: samples have markers but no force (model_mismatch): the device's model was made for rgb565, \
+         H 170–10, S 100–255, V 45–255; `hivtac threshold --model` goes back to that\n"
+    );
+    let expected = Request::SetThreshold(Threshold::Yuv422 { cr_low: 162 });
+    assert_eq!(device.commands.iter().next(), Some(expected));
+}
+
+#[test]
+fn the_models_threshold_needs_no_numbers() {
+    let device = FakeDevice::on_pty(Box::new(|device| device.serve()));
+    let set = run(&["threshold", "--model", "--port", &device.port]);
+    assert_eq!((set.code, set.stderr.as_str()), (Some(0), ""));
+    let expected = Request::SetThreshold(hello().threshold);
+    assert_eq!(device.commands.iter().next(), Some(expected));
+}
+
+#[test]
+fn a_format_that_the_camera_does_not_send_is_refused() {
+    let device = FakeDevice::on_pty(Box::new(|device| device.serve()));
+    let refused = run(&["threshold", "--luma", "0,88", "--port", &device.port]);
+    assert_eq!(refused.code, Some(6));
+    assert_eq!(
+        refused.stderr,
+        "hivtac: the device refused \"set threshold\": its camera does not send that pixel format; choose another\n"
     );
 }
 
@@ -229,6 +276,10 @@ fn wrong_usage_is_exit_code_2() {
         &["tare", "--frames", "257"][..],
         &["tare", "--frames", "0"],
         &["threshold", "--hsv", "200,8,90,250,40,240"],
+        &["threshold"],
+        &["threshold", "--cr", "256"],
+        &["threshold", "--luma", "9,8"],
+        &["threshold", "--model", "--cr", "162"],
         &["monitor", "--json", "--csv"],
         &["monitor", "--frames", "0"],
         &["monitor", "--seconds", "-1"],

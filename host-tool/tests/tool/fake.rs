@@ -97,6 +97,10 @@ impl Conversation {
                 self.send(DeviceMessage::Hello(hello()));
                 self.send(DeviceMessage::Stats(self.stats));
             }
+            Request::SetThreshold(Threshold::Mono { .. }) => {
+                self.reply(id, Outcome::Unsupported);
+                return false;
+            }
             Request::Tare { .. } => {
                 if let Some(outcome) = self.tare {
                     self.reply(id, outcome);
@@ -110,6 +114,9 @@ impl Conversation {
     }
 }
 
+/// What its model was made for.
+const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+
 pub fn hello() -> DeviceHello {
     DeviceHello {
         protocol: PROTOCOL_VERSION,
@@ -121,17 +128,11 @@ pub fn hello() -> DeviceHello {
             crc: 0xcafe,
             name: "11-64-64-3 ov7725".try_into().unwrap(),
             simulated: true,
+            threshold: RED,
         }),
         width: 320,
         height: 240,
-        threshold: HsvBox {
-            hue_low: 170,
-            hue_high: 10,
-            saturation_low: 100,
-            saturation_high: 255,
-            value_low: 45,
-            value_high: 255,
-        },
+        threshold: RED,
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: Centroid::RednessWeighted,

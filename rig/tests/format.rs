@@ -1,0 +1,116 @@
+//! Another pixel format while frames are streamed: no frame is read as what it is not, the ones that pass meanwhile are
+//! counted, and the way back leads to the very forces that there would have been.
+
+mod common;
+
+use common::{Run, Setup, bug, command, firmware};
+use hivtac_rig::script::Action;
+use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Request, Sample, Threshold};
+use hivtac_wire::status::Status;
+
+const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+const RED_CR: Threshold = Threshold::Yuv422 { cr_low: 162 };
+const DARK: Threshold = Threshold::Mono {
+    luma_low: 0,
+    luma_high: 88,
+};
+
+fn set(id: u16, threshold: Threshold) -> Action {
+    Action::Send(command(id, Request::SetThreshold(threshold)))
+}
+
+/// What the device answered to a command.
+fn outcome(run: &Run, asked: u16) -> Option<Outcome> {
+    let mut answers = run.messages.iter().filter_map(|message| match message {
+        DeviceMessage::Reply(Reply { id, outcome }) if *id == asked => Some(*outcome),
+        _ => None,
+    });
+    let first = answers.next();
+    assert_eq!(answers.next(), None, "one reply to a command");
+    first
+}
+
+/// The samples before and after the only gap in the frames.
+fn around_the_gap(samples: &[&Sample]) -> (usize, u32) {
+    let gaps = samples.windows(2).enumerate();
+    let mut gaps = gaps.filter(|(_, pair)| pair[1].frame != pair[0].frame + 1);
+    let (at, pair) = gaps.next().expect("frames pass while the camera is set");
+    assert!(gaps.next().is_none(), "only then");
+    (at + 1, pair[1].frame - pair[0].frame - 1)
+}
+
+/// At whatever time of a frame it comes (one takes 25.6 ms).
+#[test]
+fn no_frame_is_read_in_the_wrong_format() {
+    for ms in [300, 309, 318] {
+        let run = Setup::new(firmware(), 560)
+            .at(200, Action::Send(command(70, Request::StartWithMarkers)))
+            .at(ms, set(77, RED_CR))
+            .run();
+        assert_eq!(outcome(&run, 77), Some(Outcome::Done), "{ms} ms");
+        let samples = run.samples();
+        let (old, passed) = around_the_gap(&samples);
+        assert!((1..=6).contains(&passed), "{ms} ms: {passed} frames passed");
+        assert!(samples.len() >= old + 3, "{ms} ms: {}", samples.len());
+        for sample in &samples[..old] {
+            assert!(sample.force.is_some(), "{ms} ms: {sample:?}");
+        }
+        for sample in &samples[old..] {
+            assert!(sample.markers.is_some(), "{ms} ms: {sample:?}");
+            let bits = Status::MODEL_MISMATCH | Status::TARE_MISSING | Status::MODEL_SIMULATED;
+            let status = Status(sample.status.0 & !Status::FRAME_DROPPED.0);
+            assert_eq!(status, bits, "{ms} ms: {sample:?}");
+        }
+        assert_eq!(run.frames_after_a_loss(), [samples[old].frame], "{ms} ms");
+        let stats = run.stats();
+        assert_eq!((stats.dropped_size, stats.dropped_overrun), (0, 0));
+        assert_eq!((stats.camera_restarts, stats.camera_timeouts), (0, 0));
+        let hello = run.hellos();
+        assert_eq!(hello.last().unwrap().threshold, RED_CR);
+        assert_eq!(hello.last().unwrap().model.as_ref().unwrap().threshold, RED);
+    }
+}
+
+#[test]
+fn the_way_back_leads_to_the_same_forces() {
+    for elf in [firmware(), bug("tracking")] {
+        // The same program, so that the camera starts at the same instant.
+        let undisturbed = Setup::new(elf.clone(), 760).run();
+        let run = Setup::new(elf, 760)
+            .at(260, set(80, RED_CR))
+            .at(261, set(81, RED))
+            .at(262, set(82, DARK))
+            .at(450, set(83, DARK))
+            .at(470, set(84, RED))
+            .run();
+        let outcomes = [80, 81, 82, 83, 84].map(|id| outcome(&run, id).unwrap());
+        use Outcome::{Busy, Done, Unsupported};
+        assert_eq!(outcomes, [Done, Busy, Busy, Unsupported, Done]);
+        let samples = run.samples();
+        let gap = samples
+            .windows(2)
+            .rposition(|pair| pair[1].frame != pair[0].frame + 1);
+        let back = &samples[gap.unwrap() + 1..];
+        let with_force = back.iter().filter(|sample| sample.force.is_some());
+        assert!(with_force.count() >= 4, "{back:?}");
+        for sample in back.iter().filter(|sample| sample.force.is_some()) {
+            let others = undisturbed.samples();
+            let same = others.iter().find(|it| it.frame == sample.frame);
+            assert_eq!(same.unwrap().force, sample.force, "{sample:?}");
+        }
+    }
+}
+
+#[test]
+fn a_change_waits_for_a_camera_that_is_away() {
+    let run = Setup::new(firmware(), 1_900)
+        .fault("camera-absent@300-1100")
+        .at(420, set(90, RED_CR))
+        .at(430, set(91, RED))
+        .run();
+    assert_eq!(outcome(&run, 90), Some(Outcome::Done));
+    assert_eq!(outcome(&run, 91), Some(Outcome::Busy));
+    let last = run.samples().into_iter().next_back().unwrap();
+    assert!(last.status.contains(Status::MODEL_MISMATCH), "{last:?}");
+    assert!(!last.status.contains(Status::MARKERS_MISSING), "{last:?}");
+}
