@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::path::PathBuf;
+
 use common::{Run, Setup, bug, firmware};
 
 /// Words of a whole frame.
@@ -23,14 +25,24 @@ fn equal_samples(run: &Run, other: &Run) -> (usize, usize) {
 
 #[test]
 fn cropped_frames_give_the_forces_of_whole_ones() {
+    check_cropped(firmware(), bug("tracking"));
+}
+
+#[test]
+fn cropped_frames_of_yuv422_give_the_forces_of_whole_ones() {
+    check_cropped(bug("yuv422"), bug("yuv422-tracking"));
+}
+
+fn check_cropped(whole: PathBuf, cropped: PathBuf) {
     // Nothing moves: the two programs reset the camera some microseconds apart, so that their exposures are not of the
     // same instants. The noise is the same.
     let still = |elf| Setup {
         scene: "static",
         ..Setup::new(elf, 600)
     };
-    let whole = still(firmware()).run();
-    let cropped = still(bug("tracking")).run();
+    let whole = still(whole).run();
+    let cropped = still(cropped).run();
+    assert!(cropped.samples().iter().all(|it| it.force.is_some()));
     assert_eq!(cropped.missing_frames(), Vec::<u32>::new());
     let (both, equal) = equal_samples(&cropped, &whole);
     assert!(both >= 12, "{both} frames in both runs");

@@ -31,13 +31,14 @@ pub fn firmware_with(toolchain: &Toolchain, feature: &str) -> Result<PathBuf> {
     build(command.args(["--features", feature]), "hivtac-firmware")
 }
 
-/// The model for YUV422, from the root of the repository, and the name of the firmware that carries it.
-pub const YUV422: (&str, &str) = ("calibration/models/yuv422/default.hvtm", "yuv422");
-
-/// The firmware with another model than the default one.
-pub fn firmware_with_model(toolchain: &Toolchain, model: &str) -> Result<PathBuf> {
+/// The firmware with features and the model for YUV422.
+pub fn firmware_for_yuv422(toolchain: &Toolchain, features: &[&str]) -> Result<PathBuf> {
     let mut command = firmware_command(toolchain);
-    build(command.env("HIVTAC_MODEL", model), "hivtac-firmware")
+    command.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
+    for feature in features {
+        command.args(["--features", feature]);
+    }
+    build(&mut command, "hivtac-firmware")
 }
 
 fn firmware_command(toolchain: &Toolchain) -> Command {

@@ -42,7 +42,7 @@ pub struct Test {
 /// The programs that the tests of the rig and those across rooms run.
 struct Programs {
     firmware: PathBuf,
-    /// One ELF per seeded bug or feature, named by it, and `yuv422.elf`.
+    /// One ELF per seeded bug or feature, named by it, and those with the model for YUV422.
     bugs: PathBuf,
 }
 
@@ -169,9 +169,11 @@ impl Programs {
             let elf = artifacts::firmware_with(toolchain, feature)?;
             artifacts::copy(&elf, &bugs.join(format!("{feature}.elf")))?;
         }
-        let (model, name) = artifacts::YUV422;
-        let elf = artifacts::firmware_with_model(toolchain, model)?;
-        artifacts::copy(&elf, &bugs.join(format!("{name}.elf")))?;
+        let tracking: &[&str] = &[artifacts::TRACKING];
+        for (features, name) in [(&[][..], "yuv422"), (tracking, "yuv422-tracking")] {
+            let elf = artifacts::firmware_for_yuv422(toolchain, features)?;
+            artifacts::copy(&elf, &bugs.join(format!("{name}.elf")))?;
+        }
         // Last, so that what cargo leaves behind is the firmware without a bug.
         Ok(Programs {
             firmware: artifacts::firmware(toolchain)?,
