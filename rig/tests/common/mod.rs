@@ -1,7 +1,7 @@
 //! Runs the firmware under a scripted host, and decodes what it sends.
 //!
-//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug, and
-//! `tracking.elf`.
+//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug, `tracking.elf`, and
+//! `yuv422.elf` and `yuv422-tracking.elf` with the model for YUV422.
 //! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
@@ -34,7 +34,7 @@ pub fn firmware() -> PathBuf {
     path_from("HIVTAC_ELF", "the firmware ELF")
 }
 
-/// The firmware with a seeded bug, or with another feature.
+/// The firmware with a seeded bug, another feature or another model.
 pub fn bug(name: &str) -> PathBuf {
     let path = path_from(
         "HIVTAC_BUG_ELFS",
