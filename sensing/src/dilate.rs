@@ -111,7 +111,6 @@ impl Dilation {
     /// `near` is [that](Self::near) of all of them.
     #[inline(always)]
     pub fn edges(&self, i: usize, near: &Near, edges: &mut Edges) {
-        edges.clear();
         #[cfg(armv7em)]
         if self.radius == 1 {
             let rows = self.mask.get(i * self.words + near.first..);
@@ -119,6 +118,7 @@ impl Dilation {
             edges.fill(|edges| dilate_edges(rows, self.words, near, edges));
             return edges.end(32 * self.words as u16);
         }
+        edges.clear();
         self.spread(i, near, edges);
     }
 
