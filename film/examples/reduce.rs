@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_film::{Check, Design, check, fit};
+use hivtac_film::{Check, Design, check, fit, solve_stuck};
 use hivtac_scene::Contact;
 use hivtac_scene::film::curves::Curves;
+use hivtac_scene::film::stuck::{Solved, Stuck};
 use hivtac_scene::film::{Family, Film};
 
 const USAGE: &str = "reduce FOLDER [--check] [force] [stick] [slip] [force-overhang]
@@ -18,31 +19,57 @@ const USAGE: &str = "reduce FOLDER [--check] [force] [stick] [slip] [force-overh
 /// One file to make.
 struct Task {
     name: &'static str,
-    family: Family,
+    content: Content,
     contact: Contact,
     overhang_mm: f64,
     /// Loads of its check.
     checks: usize,
 }
 
+/// What a file holds.
+#[derive(Clone, Copy, Debug)]
+enum Content {
+    Curves(Family),
+    /// Full solutions on a grid.
+    Stuck,
+}
+
 const TASKS: [Task; 4] = [
-    Task::new("force", Family::Force, Contact::Force, 0.0, 40),
-    Task::new("stick", Family::Stick, Contact::Stick, 0.0, 60),
-    Task::new("slip", Family::Slip, Contact::Slip { mu: 0.6 }, 0.0, 20),
-    Task::new("force-overhang", Family::Force, Contact::Force, 6.0, 12),
+    Task::new(
+        "force",
+        Content::Curves(Family::Force),
+        Contact::Force,
+        0.0,
+        40,
+    ),
+    Task::new("stick", Content::Stuck, Contact::Stick, 0.0, 60),
+    Task::new(
+        "slip",
+        Content::Curves(Family::Slip),
+        Contact::Slip { mu: 0.6 },
+        0.0,
+        20,
+    ),
+    Task::new(
+        "force-overhang",
+        Content::Curves(Family::Force),
+        Contact::Force,
+        6.0,
+        12,
+    ),
 ];
 
 impl Task {
     const fn new(
         name: &'static str,
-        family: Family,
+        content: Content,
         contact: Contact,
         overhang_mm: f64,
         checks: usize,
     ) -> Task {
         Task {
             name,
-            family,
+            content,
             contact,
             overhang_mm,
             checks,
@@ -88,17 +115,14 @@ fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error
     };
     let path = file(folder, task.name);
     if anew {
-        let curves = fit(task.family, &design, threads, progress(task.name, "curves"))?;
-        std::fs::write(&path, curves.to_string())?;
+        let progress = progress(task.name, "solutions");
+        let text = match task.content {
+            Content::Curves(family) => fit(family, &design, threads, progress)?.to_string(),
+            Content::Stuck => solve_stuck(&design, threads, progress)?.to_string(),
+        };
+        std::fs::write(&path, text)?;
     }
-    let curves: Curves = std::fs::read_to_string(&path)?.parse()?;
-    let text = curves.to_string();
-    // As rounded in the file. A tip that slides has stuck before.
-    let mut film = Film::default().with_curves(task.family, curves);
-    if task.family == Family::Slip {
-        let stick = std::fs::read_to_string(file(folder, "stick"))?;
-        film = film.with_curves(Family::Stick, stick.parse()?);
-    }
+    let (text, film) = load(task, folder)?;
     let check = check(
         &film,
         &design,
@@ -107,25 +131,65 @@ fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error
         threads,
         progress(task.name, "check"),
     )?;
-    let notes = format!(
-        "# The reduced film, {:?}, overhang {} mm: {} curves (see scene/src/film/curves.rs).\n\
-         # cargo run --release -p hivtac-film --example reduce -- scene/data {}\n\
-         # Against the full solution at {} loads of the whole domain: at most {:.3} px, rms {:.3} px; the tip within \
-         {:.4} mm.\n\
-         # output, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients\n",
-        task.family,
-        task.overhang_mm,
-        text.lines().count(),
-        task.name,
-        check.poses,
-        check.worst_px,
-        check.rms_px,
-        check.worst_tip_mm
-    );
+    let notes = notes(task, text.lines().count(), &check);
     std::fs::write(path, format!("{notes}{text}"))?;
     print!("{notes}");
     println!("# The largest error is at {}.", place(&check));
     Ok(())
+}
+
+/// What a file holds, and the film with it: as rounded there.
+fn load(task: &Task, folder: &Path) -> Result<(String, Film), Box<dyn std::error::Error>> {
+    let text = std::fs::read_to_string(file(folder, task.name))?;
+    let film = Film::default();
+    Ok(match task.content {
+        Content::Curves(family) => {
+            let curves: Curves = text.parse()?;
+            let (text, film) = (curves.to_string(), film.with_curves(family, curves));
+            match family {
+                // A tip that slides has stuck before.
+                Family::Slip => (text, film.with_stuck(stuck(&file(folder, "stick"))?)),
+                Family::Force => (text, film),
+            }
+        }
+        Content::Stuck => {
+            let solved: Solved = text.parse()?;
+            (solved.to_string(), film.with_stuck(Stuck::new(&solved)?))
+        }
+    })
+}
+
+/// The first lines of a file of so many lines.
+fn notes(task: &Task, lines: usize, check: &Check) -> String {
+    let what = match task.content {
+        Content::Curves(family) => format!(
+            "# The reduced film, {family:?}, overhang {} mm: {lines} curves (see scene/src/film/curves.rs).",
+            task.overhang_mm
+        ),
+        Content::Stuck => format!(
+            "# The film under a tip that sticks: {lines} lines (see scene/src/film/stuck/text.rs)."
+        ),
+    };
+    let columns = match task.content {
+        Content::Curves(_) => "# output, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients",
+        Content::Stuck => {
+            "# state: size, steepness, turn, solution and first derivatives by the offset; bend: …, the rest of the answer to offsets"
+        }
+    };
+    format!(
+        "{what}\n\
+         # cargo run --release -p hivtac-film --example reduce -- scene/data {}\n\
+         # Against the full solution at {} loads of the whole domain: at most {:.3} px, rms {:.3} px; the tip within \
+         {:.4} mm.\n\
+         {columns}\n",
+        task.name, check.poses, check.worst_px, check.rms_px, check.worst_tip_mm
+    )
+}
+
+/// The film under a tip that sticks, from its file.
+fn stuck(path: &Path) -> Result<Stuck, Box<dyn std::error::Error>> {
+    let solved: Solved = std::fs::read_to_string(path)?.parse()?;
+    Ok(Stuck::new(&solved)?)
 }
 
 /// Which load the curves are farthest off at.

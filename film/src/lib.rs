@@ -21,6 +21,7 @@ mod samples;
 mod shell;
 mod sparse;
 mod spline;
+mod stuck;
 #[cfg(test)]
 mod verification;
 mod view;
@@ -32,4 +33,5 @@ pub use film::{Contact, Equilibrium, Film};
 pub use load::{Loaded, press_load};
 pub use point::Material;
 pub use reduce::fit;
+pub use stuck::solve_stuck;
 pub use view::{Marker, markers, paper_camera};

@@ -39,7 +39,6 @@ fn effort(family: Family, overhang_mm: f64) -> Effort {
         // Twice as many unknowns: as few poses and nodes as will do.
         Family::Force if overhang_mm > 0.0 => (5, 18, &[3, 2, 1, 0], &[3, 2, 1, 0]),
         Family::Force => (8, 24, &[3, 2, 1, 0], &[3, 2, 1, 0]),
-        Family::Stick => (32, 18, &[11, 7, 3], &[11, 7, 3]),
         Family::Slip => (12, 20, &[4, 3, 2, 1], &[4, 3, 2, 1]),
     };
     Effort {

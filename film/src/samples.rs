@@ -3,10 +3,9 @@
 use std::f64::consts::PI;
 
 use hivtac_scene::film::curves::{Answer, Pose};
-use hivtac_scene::film::{Family, MAX_FORCE_N, MAX_STUCK_N, SLIP_N};
+use hivtac_scene::film::{Family, MAX_FORCE_N, SLIP_N};
 
 use crate::film::Response;
-use crate::newton::solve_small;
 use crate::point::V3;
 use crate::view::disc_motions;
 use crate::{Contact, Equilibrium, Film, FilmError};
@@ -29,22 +28,41 @@ pub fn samples(
     index: usize,
     sizes: &[f64],
 ) -> Result<Vec<Sample>, FilmError> {
-    let mut path = vec![(0.0, film.rest())];
+    let mut path = Path::from_rest(film);
     let mut samples = Vec::new();
     for &size in sizes {
         let pose = training_pose(family, index, size);
         film.move_tip(offset_mm(family, &pose))?;
-        let latest = &path[path.len().saturating_sub(FORETOLD_FROM)..];
-        let known: Vec<_> = latest.iter().map(|(s, state)| (*s, state)).collect();
-        let contact = contact(family, &pose);
-        let last = &path[path.len() - 1].1;
-        let state = Equilibrium::foretold(&known, size)
-            .and_then(|start| film.press(contact, &start).ok())
-            .map_or_else(|| film.press(contact, last), Ok)?;
+        let state = path.go(film, Contact::Force(force_n(family, &pose)), size)?;
         samples.push(sample(family, film, pose, &state)?);
-        path.push((size, state));
     }
     Ok(samples)
+}
+
+/// States found one after the other, each foretold by the latest.
+pub struct Path(Vec<(f64, Equilibrium)>);
+
+impl Path {
+    pub fn from_rest(film: &Film) -> Path {
+        Path(vec![(0.0, film.rest())])
+    }
+
+    /// The state of the next place.
+    pub fn go(
+        &mut self,
+        film: &Film,
+        contact: Contact,
+        place: f64,
+    ) -> Result<Equilibrium, FilmError> {
+        let latest = &self.0[self.0.len().saturating_sub(FORETOLD_FROM)..];
+        let known: Vec<_> = latest.iter().map(|(at, state)| (*at, state)).collect();
+        let last = &self.0[self.0.len() - 1].1;
+        let state = Equilibrium::foretold(&known, place)
+            .and_then(|start| film.press(contact, &start).ok())
+            .map_or_else(|| film.press(contact, last), Ok)?;
+        self.0.push((place, state.clone()));
+        Ok(state)
+    }
 }
 
 /// Spread evenly over what is asked of a family, and denser towards its limits, where a polynomial would stray first.
@@ -53,13 +71,12 @@ fn training_pose(family: Family, index: usize, size: f64) -> Pose {
     let (radius, angle) = ((PI / 2.0 * part(2)).sin(), 2.0 * PI * part(3));
     let tilt = match family {
         Family::Force => [2, 3].map(|base| -(PI * part(base)).cos()),
-        Family::Stick | Family::Slip => [radius * angle.cos(), radius * angle.sin()],
+        Family::Slip => [radius * angle.cos(), radius * angle.sin()],
     };
     let (wide, turned) = (part(7).sqrt(), 2.0 * PI * part(11));
     let aside = [wide * turned.cos(), wide * turned.sin()];
     let offset = match family {
         Family::Force => [5, 7].map(|base| -(PI * part(base)).cos()),
-        Family::Stick => aside.map(|part| 1.2 * part),
         Family::Slip => {
             // The steepest way less the film's own leaves so much for a slide, along the force.
             let slid_mm = (PI / 2.0 * part(5)).sin() * (2.0 - 0.95 * radius) * size;
@@ -75,23 +92,9 @@ fn offset_mm(family: Family, pose: &Pose) -> [f64; 2] {
     pose.offset.map(|part| family.offset_mm(pose.size) * part)
 }
 
-fn contact(family: Family, pose: &Pose) -> Contact {
-    match family {
-        Family::Force | Family::Slip => Contact::Force(force_n(family, pose)),
-        Family::Stick => {
-            let [x, y] = family.tangents(pose.size, pose.tilt);
-            Contact::Stick {
-                direction: [x, y, -1.0],
-                force_n: MAX_STUCK_N * pose.size.powi(3),
-                slid_mm: [0.0; 2],
-            }
-        }
-    }
-}
-
-/// The force of a pose of the families that are by force, N.
+/// The force of a pose, N.
 fn force_n(family: Family, pose: &Pose) -> V3 {
-    let [x, y] = family.tangents(pose.size, pose.tilt);
+    let [x, y] = family.tangents(pose.tilt);
     let most = match family {
         Family::Slip => SLIP_N,
         _ => MAX_FORCE_N / (1.0 + x * x + y * y).sqrt(),
@@ -106,20 +109,15 @@ fn sample(
     state: &Equilibrium,
 ) -> Result<Sample, FilmError> {
     let responses = film.responses(state)?;
-    let changes = match family {
-        Family::Force | Family::Slip => changes_by_force(family, &pose),
-        Family::Stick => changes_by_way(&pose, state, &responses)?,
-    };
-    let slopes = changes.map(|change| {
+    let slopes = changes_by_force(family, &pose).map(|change| {
         let response = Response::to_all(&responses, change);
         let step = 1e-4 / response.size();
         let [back, forth] = [-step, step].map(|step| {
             let there = film.beside(state, &response, step);
             outputs(film, &there, [0.0; 3])
         });
-        let tip = tip(family, [change[0], change[1], change[2]], response.tip_mm);
         let of_tip = Answer {
-            tip,
+            tip: response.tip_mm,
             ..Answer::default()
         }
         .outputs();
@@ -129,10 +127,9 @@ fn sample(
             })
         })
     });
-    let tip = tip(family, state.force_n, state.tip_mm);
     Ok(Sample {
         pose,
-        outputs: outputs(film, state, tip),
+        outputs: outputs(film, state, state.tip_mm),
         slopes,
     })
 }
@@ -140,14 +137,6 @@ fn sample(
 fn outputs(film: &Film, state: &Equilibrium, tip: V3) -> [[f64; 4]; 12] {
     let discs = disc_motions(film, state);
     Answer { tip, discs }.outputs()
-}
-
-/// The tip's vector of a family, or its change.
-fn tip(family: Family, force_n: V3, tip_mm: V3) -> V3 {
-    match family {
-        Family::Force | Family::Slip => tip_mm,
-        Family::Stick => [force_n[0], force_n[1], tip_mm[2]],
-    }
 }
 
 /// What one unit of tilt along x and y and of offset along x and y is: of force along x, y and z (N) and of the tip's
@@ -170,50 +159,6 @@ fn changes_by_force(family: Family, pose: &Pose) -> [[f64; 5]; 4] {
         [0.0, 0.0, 0.0, reach, 0.0],
         [0.0, 0.0, 0.0, 0.0, reach],
     ]
-}
-
-/// The same for a tip that sticks: the force that keeps it on its way, and the gauge's reading.
-fn changes_by_way(
-    pose: &Pose,
-    state: &Equilibrium,
-    responses: &[Response; 5],
-) -> Result<[[f64; 5]; 4], FilmError> {
-    const STEP: f64 = 1e-5;
-    let family = Family::Stick;
-    let tangents = family.tangents(pose.size, pose.tilt);
-    let way = |[x, y]: [f64; 2]| (1.0 + x * x + y * y).sqrt();
-    let gauge_n = MAX_STUCK_N * pose.size.powi(3);
-    // What leaves the way, and the gauge, for each unit of force along x, y and z or of place along x and y.
-    let aside = |k: usize, c: usize| responses[k].tip_mm[c] + tangents[c] * responses[k].tip_mm[2];
-    let matrix = vec![
-        vec![aside(0, 0), aside(1, 0), aside(2, 0)],
-        vec![aside(0, 1), aside(1, 1), aside(2, 1)],
-        vec![tangents[0], tangents[1], -1.0],
-    ];
-    let mut changes = [[0.0; 5]; 4];
-    for (k, change) in changes.iter_mut().enumerate() {
-        let mut moved = [0.0; 2];
-        let side = if k < 2 {
-            let [back, forth] = [-STEP, STEP].map(|step| {
-                let mut tilt = pose.tilt;
-                tilt[k] += step;
-                family.tangents(pose.size, tilt)
-            });
-            let turn = [0, 1].map(|c| (forth[c] - back[c]) / (2.0 * STEP));
-            let longer = (way(forth) - way(back)) / (2.0 * STEP);
-            let pulled = turn[0] * state.force_n[0] + turn[1] * state.force_n[1];
-            let [x, y] = turn.map(|part| -state.tip_mm[2] * part);
-            vec![x, y, longer * gauge_n - pulled]
-        } else {
-            moved[k - 2] = family.offset_mm(pose.size);
-            let [x, y] = [0, 1].map(|c| -aside(k + 1, c) * moved[k - 2]);
-            vec![x, y, 0.0]
-        };
-        let force = solve_small(matrix.clone(), side)
-            .ok_or_else(|| FilmError::Solver("a way that no force changes".into()))?;
-        *change = [force[0], force[1], force[2], moved[0], moved[1]];
-    }
-    Ok(changes)
 }
 
 /// Halton's sequence: the digits of `index` in `base` behind the point, reversed.
@@ -248,7 +193,9 @@ mod tests {
             };
             let mut at = |pose: Pose| {
                 film.move_tip(offset_mm(family, &pose)).unwrap();
-                let state = film.press(contact(family, &pose), &film.rest()).unwrap();
+                let state = film
+                    .press(Contact::Force(force_n(family, &pose)), &film.rest())
+                    .unwrap();
                 sample(family, &film, pose, &state).unwrap()
             };
             let here = at(pose);

@@ -153,7 +153,7 @@ pub struct Curves {
 }
 
 impl Curves {
-    /// Curves of at most [`TERMS`] numbers, of at most 255 different terms whose powers sum up to at most [`DEGREE`];
+    /// Curves of at most [`TERMS`] numbers, of at most 95 different terms whose powers sum up to at most [`DEGREE`];
     /// others are left out.
     pub fn new(curves: impl IntoIterator<Item = Curve>) -> Curves {
         let fits = |curve: &Curve| {

@@ -1,13 +1,15 @@
 //! Where the film goes when it is pressed.
 //!
 //! The film is a nonlinear shell; its finite elements (`film/`) take a third of a second for one press. What a frame
-//! needs of it are a few curves in `data/`, made from the full solution by a command that their first lines name.
+//! needs of it are a few curves in `data/`, and for a tip that sticks a grid of solutions, made from the full solution by a
+//! command that their first lines name.
 
 pub mod curves;
 mod field;
 mod format;
 mod products;
 mod slide;
+pub mod stuck;
 mod table;
 
 use std::sync::{Arc, LazyLock};
@@ -15,6 +17,7 @@ use std::sync::{Arc, LazyLock};
 use crate::{Contact, Load, SceneError};
 use curves::{Curves, DiscMotion, Pose};
 use slide::Gauge;
+use stuck::{Solved, Stuck};
 
 /// Half the distance between the posts that hold the film, in mm (the paper's a = 14 mm).
 pub const HALF_SIDE_MM: f64 = 14.0;
@@ -37,9 +40,6 @@ const SLIGHT_N: f64 = 2e-4;
 pub enum Family {
     /// By the tip's force: the size is (|F| / 0.5 N)^⅓, the tilt is F_x and F_y over −F_z; the tip's vector is its way.
     Force,
-    /// By the way of a tip that the film sticks to: the size is (force along the way / 0.3 N)^⅓, the tilt is the way's
-    /// sideways part over its depth; the tip's vector is the sideways force on the film and minus the depth.
-    Stick,
     /// By force again, as far as it takes for a tip that slides: the size is (−F_z / 0.32 N)^⅓, the tilt is F_x and F_y
     /// over −F_z up to a ratio of 1, and the tip is farther from the middle.
     Slip,
@@ -47,106 +47,71 @@ pub enum Family {
 
 impl Family {
     /// All of them.
-    pub const ALL: [Family; 3] = [Family::Force, Family::Stick, Family::Slip];
+    pub const ALL: [Family; 2] = [Family::Force, Family::Slip];
 
     /// Its name: that of its file in `data/`.
     pub fn name(self) -> &'static str {
         match self {
             Family::Force => "force",
-            Family::Stick => "stick",
             Family::Slip => "slip",
         }
     }
 
-    /// The tilt of a pose of this size: what sideways force over normal force, or sideways way over depth, is in
-    /// parts of the largest.
-    ///
-    /// A film that sticks answers to a sideways way in another manner once one side of it goes slack, which is at a
-    /// tangent of about half the depth over half the span; stretched by asinh about there, its answer is smooth.
-    pub fn tilt(self, size: f64, tangents: [f64; 2]) -> [f64; 2] {
-        let slack = match self {
-            Family::Force => return tangents.map(|part| part / MAX_TANGENT),
-            Family::Slip => return tangents,
-            Family::Stick => slack(size),
-        };
-        let [x, y] = tangents;
-        let part = (x * x + y * y).sqrt() / slack;
-        let stretch = match part < 1e-9 {
-            true => 1.0,
-            false => libm::asinh(part) / part,
-        };
-        tangents.map(|tangent| tangent / slack * stretch / libm::asinh(STEEPEST / slack))
-    }
-
-    /// The way back.
-    pub fn tangents(self, size: f64, tilt: [f64; 2]) -> [f64; 2] {
-        let slack = match self {
-            Family::Force => return tilt.map(|part| part * MAX_TANGENT),
-            Family::Slip => return tilt,
-            Family::Stick => slack(size),
-        };
-        let [x, y] = tilt;
-        let part = (x * x + y * y).sqrt() * libm::asinh(STEEPEST / slack);
-        let stretch = match part < 1e-9 {
-            true => 1.0,
-            false => libm::sinh(part) / part,
-        };
-        tilt.map(|tilt| tilt * slack * stretch * libm::asinh(STEEPEST / slack))
+    /// F_x and F_y over −F_z of a pose's tilt.
+    pub fn tangents(self, tilt: [f64; 2]) -> [f64; 2] {
+        match self {
+            Family::Force => tilt.map(|part| part * MAX_TANGENT),
+            Family::Slip => tilt,
+        }
     }
 
     /// The largest offset of a pose of this size, along x and along y, mm: a tip slides the farther the deeper it is.
     pub fn offset_mm(self, size: f64) -> f64 {
         match self {
-            Family::Force | Family::Stick => MAX_OFFSET_MM,
+            Family::Force => MAX_OFFSET_MM,
             Family::Slip => 0.36 + 1.9 * size,
         }
     }
 }
 
-/// The steepest way of a tip: 12° along x and along y.
-const STEEPEST: f64 = std::f64::consts::SQRT_2 * MAX_TANGENT;
-
-/// The tangent at which one side of a film that sticks goes slack; never less than where bending holds it.
-fn slack(size: f64) -> f64 {
-    0.22 * (size * size + 0.01).sqrt()
-}
-
 /// The paper's film model.
-static CLAMPED: LazyLock<[Arc<Curves>; 3]> = LazyLock::new(|| {
-    [
-        committed(include_str!("../../data/force.csv")),
-        committed(include_str!("../../data/stick.csv")),
-        committed(include_str!("../../data/slip.csv")),
-    ]
+static CLAMPED: LazyLock<Film> = LazyLock::new(|| Film {
+    force: committed(include_str!("../../data/force.csv")),
+    stick: Some(Arc::new(solved(include_str!("../../data/stick.csv")))),
+    slip: committed(include_str!("../../data/slip.csv")),
 });
 
-/// The paper's film as it is cut, 40 × 40 mm. There are no curves of it for a tip that sticks.
-static OVERHANGING: LazyLock<[Arc<Curves>; 3]> = LazyLock::new(|| {
-    let none = || Arc::new(Curves::new([]));
-    [
-        committed(include_str!("../../data/force-overhang.csv")),
-        none(),
-        none(),
-    ]
+/// The paper's film as it is cut, 40 × 40 mm. It is not known under a tip that sticks.
+static OVERHANGING: LazyLock<Film> = LazyLock::new(|| Film {
+    force: committed(include_str!("../../data/force-overhang.csv")),
+    stick: None,
+    slip: Arc::new(Curves::new([])),
 });
 
 fn committed(text: &str) -> Arc<Curves> {
     Arc::new(text.parse().expect("the committed curves are curves"))
 }
 
-/// The film by its curves: markers within 0.1 px of the full solution at 800×600 in the readings `force` and `slip`, within
-/// 0.4 px in `stick` (rms 0.13 px; `film/README.md`); the film between them roughly.
+fn solved(text: &str) -> Stuck {
+    let solved = text
+        .parse::<Solved>()
+        .and_then(|solved| Stuck::new(&solved));
+    solved.expect("the committed solutions are a grid")
+}
+
+/// The film by its curves and solutions: markers within about 0.1 px of the full solution at 800×600 (`film/README.md`); the
+/// film between them roughly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    curves: [Arc<Curves>; 3],
+    force: Arc<Curves>,
+    stick: Option<Arc<Stuck>>,
+    slip: Arc<Curves>,
 }
 
 impl Default for Film {
     /// The paper's film model: 28 × 28 mm between its posts, nothing beyond.
     fn default() -> Film {
-        Film {
-            curves: CLAMPED.clone(),
-        }
+        CLAMPED.clone()
     }
 }
 
@@ -156,23 +121,27 @@ impl Film {
     /// # Errors
     /// When it is another number: there are curves of these two.
     pub fn with_overhang(overhang_mm: f64) -> Result<Film, SceneError> {
-        let curves = match overhang_mm {
-            0.0 => &CLAMPED,
-            6.0 => &OVERHANGING,
-            _ => {
-                return Err(SceneError::Load(format!(
-                    "the film's overhang is {overhang_mm} mm: use 0 or 6, of which there are curves"
-                )));
-            }
-        };
-        Ok(Film {
-            curves: LazyLock::force(curves).clone(),
-        })
+        match overhang_mm {
+            0.0 => Ok(CLAMPED.clone()),
+            6.0 => Ok(OVERHANGING.clone()),
+            _ => Err(SceneError::Load(format!(
+                "the film's overhang is {overhang_mm} mm: use 0 or 6, of which there are curves"
+            ))),
+        }
     }
 
     /// The same film with other curves.
     pub fn with_curves(mut self, family: Family, curves: Curves) -> Film {
-        self.curves[family as usize] = Arc::new(curves);
+        match family {
+            Family::Force => self.force = Arc::new(curves),
+            Family::Slip => self.slip = Arc::new(curves),
+        }
+        self
+    }
+
+    /// The same film with another answer to a tip that sticks.
+    pub fn with_stuck(mut self, stuck: Stuck) -> Film {
+        self.stick = Some(Arc::new(stuck));
         self
     }
 
@@ -195,7 +164,7 @@ impl Film {
             Contact::Stick | Contact::Slip { .. } => MAX_STUCK_N,
         };
         within("|F|", load.magnitude_n(), most_n, "N")?;
-        if load.contact() != Contact::Force && self.curves(Family::Stick).count() == 0 {
+        if load.contact() != Contact::Force && self.stick.is_none() {
             return Err(SceneError::Load(
                 "this film has curves for the contact reading `force` only: use another overhang"
                     .into(),
@@ -206,22 +175,18 @@ impl Film {
 
     /// The film under a load that [`Film::check`] accepts. Under another one it stays at the curves' limit.
     pub fn press(&self, load: &Load) -> Pressed {
-        if load.magnitude_n() == 0.0 {
-            return Pressed {
-                touches_mm: load.offset_mm(),
-                ..Pressed::default()
-            };
-        }
-        match load.contact() {
-            Contact::Force => self.by_force(load),
-            Contact::Stick => self.stick(load),
-            Contact::Slip { mu } => self.slip(load, mu),
+        match (load.contact(), &self.stick) {
+            _ if load.magnitude_n() == 0.0 => at_rest(load),
+            (Contact::Force, _) => self.by_force(load),
+            (Contact::Stick, Some(stuck)) => stick(stuck, load),
+            (Contact::Slip { mu }, Some(stuck)) => self.slip(stuck, load, mu),
+            (_, None) => at_rest(load),
         }
     }
 
     fn by_force(&self, load: &Load) -> Pressed {
         let [x, y, z] = load.vector_n();
-        let answer = self.curves(Family::Force).at(&Pose {
+        let answer = self.force.at(&Pose {
             size: libm::cbrt(load.magnitude_n() / MAX_FORCE_N).min(1.0),
             tilt: [x, y].map(|part| (part / -z / MAX_TANGENT).clamp(-1.0, 1.0)),
             offset: load
@@ -236,37 +201,25 @@ impl Film {
         }
     }
 
-    fn stick(&self, load: &Load) -> Pressed {
-        let gauge = gauge(load);
-        let answer = self.curves(Family::Stick).at(&stuck(&gauge));
-        let [x, y, z] = answer.tip;
-        Pressed {
-            tip_mm: [-z * gauge.tangents[0], -z * gauge.tangents[1], z],
-            force_n: gauge.force_n([x, y]),
-            touches_mm: load.offset_mm(),
-            discs: answer.discs,
-        }
-    }
-
-    fn slip(&self, load: &Load, mu: f64) -> Pressed {
+    fn slip(&self, stuck: &Stuck, load: &Load, mu: f64) -> Pressed {
         if load.magnitude_n() < SLIGHT_N {
-            return self.slip_slightly(load, mu);
+            return self.slip_slightly(stuck, load, mu);
         }
         let gauge = gauge(load);
-        let [x, y, _] = self.curves(Family::Stick).tip(&stuck(&gauge));
+        let [x, y, _] = stuck.tip(gauge.stuck_size(), gauge.tangents, gauge.offset_mm);
         let [_, _, z] = gauge.force_n([x, y]);
         if (x * x + y * y).sqrt() <= mu * -z {
-            return self.stick(load);
+            return stick(stuck, load);
         }
-        let slid = gauge.slide(self.curves(Family::Slip), mu, [x, y]);
-        slid.unwrap_or_else(|| self.stick(load))
+        let slid = gauge.slide(&self.slip, mu, [x, y]);
+        slid.unwrap_or_else(|| stick(stuck, load))
     }
 
     /// The state of a slight force, in proportion to it.
-    fn slip_slightly(&self, load: &Load, mu: f64) -> Pressed {
+    fn slip_slightly(&self, stuck: &Stuck, load: &Load, mu: f64) -> Pressed {
         let part = load.magnitude_n() / SLIGHT_N;
         let times = |vector: [f64; 3]| vector.map(|component| part * component);
-        let whole = self.slip(&load.of_size(SLIGHT_N), mu);
+        let whole = self.slip(stuck, &load.of_size(SLIGHT_N), mu);
         let offset = load.offset_mm();
         Pressed {
             tip_mm: times(whole.tip_mm),
@@ -279,21 +232,24 @@ impl Film {
             }),
         }
     }
+}
 
-    fn curves(&self, family: Family) -> &Curves {
-        &self.curves[family as usize]
+fn at_rest(load: &Load) -> Pressed {
+    Pressed {
+        touches_mm: load.offset_mm(),
+        ..Pressed::default()
     }
 }
 
-/// The pose of a tip that sticks.
-fn stuck(gauge: &Gauge) -> Pose {
-    let size = libm::cbrt(gauge.force_n / MAX_STUCK_N).min(1.0);
-    Pose {
-        size,
-        tilt: Family::Stick.tilt(size, gauge.tangents),
-        offset: gauge
-            .offset_mm
-            .map(|mm| (mm / MAX_OFFSET_MM).clamp(-1.0, 1.0)),
+fn stick(stuck: &Stuck, load: &Load) -> Pressed {
+    let gauge = gauge(load);
+    let answer = stuck.at(gauge.stuck_size(), gauge.tangents, gauge.offset_mm);
+    let [x, y, z] = answer.tip;
+    Pressed {
+        tip_mm: [-z * gauge.tangents[0], -z * gauge.tangents[1], z],
+        force_n: gauge.force_n([x, y]),
+        touches_mm: load.offset_mm(),
+        discs: answer.discs,
     }
 }
 
@@ -356,23 +312,6 @@ mod tests {
         assert!(refused(0.2, 0.0, 12.5).contains("|F_y / F_z|"));
         assert_eq!(film.check(&load(0.5, 12.0, -10.0)), Ok(()));
         assert_eq!(film.check(&Load::REST), Ok(()));
-    }
-
-    #[test]
-    fn tilts_are_tangents_and_back() {
-        for family in Family::ALL {
-            for size in [1e-6, 0.1, 1.0] {
-                for tangents in [[0.0; 2], [1e-12, 0.0], [0.1, -0.05]] {
-                    let tilt = family.tilt(size, tangents);
-                    let back = family.tangents(size, tilt);
-                    for (there, again) in tangents.iter().zip(back) {
-                        assert!((there - again).abs() < 1e-12, "{family:?} {tangents:?}");
-                    }
-                }
-            }
-        }
-        let [x, y] = Family::Stick.tilt(0.5, [MAX_TANGENT; 2]);
-        assert!((x * x + y * y - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use super::curves::{Pose, to_diagonal};
 use crate::MARKERS;
 
-/// Different products at most, among them those on the way to a higher one.
-pub(super) const MOST_PRODUCTS: usize = 256;
+/// Different products at most, among them 1 and those on the way to a higher one.
+pub(super) const MOST_PRODUCTS: usize = 96;
 
 /// Products of powers of (q_r, q_t, o_r, o_t), each from another by one multiplication.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,10 +28,13 @@ impl Products {
         let mut fewer = powers;
         fewer[variable] -= 1;
         let from = self.place(fewer)?;
-        let place = u8::try_from(self.powers.len() + 1).ok()?;
+        let place = self.powers.len() + 1;
+        if place >= MOST_PRODUCTS {
+            return None;
+        }
         self.powers.push(powers);
         self.steps.push((from, variable as u8));
-        Some(place)
+        Some(place as u8)
     }
 
     /// Where the product of these powers is.

@@ -5,7 +5,7 @@
 //! the stage that carries it is that way and the slide.
 
 use super::curves::{Curves, Pose};
-use super::{Family, Pressed, SLIP_N};
+use super::{Family, MAX_STUCK_N, Pressed, SLIP_N};
 
 /// What a gauge on the tip's stage holds: the stage's direction and the force along it.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +35,11 @@ impl Gauge {
     pub fn way(&self) -> f64 {
         let [x, y] = self.tangents;
         (1.0 + x * x + y * y).sqrt()
+    }
+
+    /// The size of the way of a tip that sticks.
+    pub fn stuck_size(&self) -> f64 {
+        libm::cbrt(self.force_n / MAX_STUCK_N).min(1.0)
     }
 
     /// The force on the film whose sideways part is this: what is left of the gauge's is normal.

@@ -131,7 +131,6 @@ mod tests {
     fn between_sizes_it_is_the_series() {
         let files = [
             include_str!("../../data/force.csv"),
-            include_str!("../../data/stick.csv"),
             include_str!("../../data/slip.csv"),
             include_str!("../../data/force-overhang.csv"),
         ];
