@@ -50,6 +50,10 @@ pub struct OptionArgs {
     /// Adam's first step size; it falls linearly.
     #[arg(long, default_value_t = Options::default().learning_rate)]
     learning_rate: f64,
+    /// Train the first layer on the features themselves instead of their principal components made equally large: slower, and
+    /// never better here.
+    #[arg(long)]
+    plain_features: bool,
     /// Decides first weights, shuffling and which rows are held out.
     #[arg(long = "training-seed", default_value_t = Options::default().seed)]
     training_seed: u64,
@@ -68,6 +72,7 @@ impl OptionArgs {
             rounded_epochs: self.rounded_epochs,
             batch: self.batch,
             learning_rate: self.learning_rate,
+            whitened: !self.plain_features,
             seed: self.training_seed,
         })
     }

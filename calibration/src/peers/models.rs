@@ -96,6 +96,8 @@ pub fn all(args: &PeersArgs, contact: Contact, size: Size, frames: &Frames) -> R
         epochs: args.epochs,
         rounded_epochs: 0,
         learning_rate: 1e-3,
+        batch: 64,
+        whitened: false,
         seed: SEED,
         ..Options::default()
     };

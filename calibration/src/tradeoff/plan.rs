@@ -85,8 +85,8 @@ impl Default for Plan {
             rows: 8_000,
             parts: 5,
             seeds: 3,
-            epochs: [60, 20],
-            paper_epochs: [10, 4],
+            epochs: [200, 60],
+            paper_epochs: [20, 6],
         }
     }
 }

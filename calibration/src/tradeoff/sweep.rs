@@ -17,9 +17,9 @@ use crate::quantize::export;
 use crate::train::Options;
 use crate::weights::{Range, Weights};
 
-/// Adam's first step: for networks of up to 128 units a layer, and the paper's for the paper's.
-const RATE: f64 = 5e-3;
+/// Adam's first step and rows that share one, for the paper's network: the paper's.
 const PAPER_RATE: f64 = 1e-3;
+const PAPER_BATCH: usize = 64;
 
 /// What a sweep tells of its progress.
 pub enum Step {
@@ -109,18 +109,16 @@ fn models(plan: &Plan, training: &Dataset, task: &Task) -> Result<Vec<(Numbers, 
         false => Kind::Network,
     };
     let [epochs, rounded_epochs] = plan.epochs_of(estimator);
-    let options = Options {
+    let mut options = Options {
         hidden: estimator.hidden.clone(),
         epochs,
         rounded_epochs: 0,
-        learning_rate: if estimator.is_papers() {
-            PAPER_RATE
-        } else {
-            RATE
-        },
         seed,
         ..Options::default()
     };
+    if estimator.is_papers() {
+        (options.learning_rate, options.batch) = (PAPER_RATE, PAPER_BATCH);
+    }
     let float = fit(training, split, kind, &options, |_| ())?.weights;
     let mut models = vec![(Numbers::F32, float.clone())];
     for &numbers in estimator.numbers() {

@@ -9,6 +9,7 @@ mod options;
 mod product;
 mod rounded;
 mod state;
+mod whitening;
 
 use anyhow::{Context, Result, ensure};
 

@@ -28,6 +28,9 @@ pub struct Options {
     pub learning_rate: f64,
     /// Passes without a better loss on held-out samples after which a phase ends early; 0 for never.
     pub patience: usize,
+    /// Whether the first layer is trained on the features' principal components, all made equally large; the network is then
+    /// folded back to features.
+    pub whitened: bool,
     /// Decides first weights and shuffling.
     pub seed: u64,
     /// A network to go on from instead of random weights; its widths, meaning and scaling then hold.
@@ -42,9 +45,10 @@ impl Default for Options {
             arithmetic: Arithmetic::Int8PerChannel,
             epochs: 150,
             rounded_epochs: 100,
-            batch: 64,
-            learning_rate: 2e-3,
+            batch: 256,
+            learning_rate: 5e-3,
             patience: 0,
+            whitened: true,
             seed: 1,
             start: None,
         }

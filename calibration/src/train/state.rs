@@ -7,8 +7,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::adam::Adam;
 use super::mlp::Mlp;
+use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
-use crate::network::{INPUTS, Network, OUTPUTS, Standardization};
+use crate::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
 use crate::quantize::input_scaling;
 use crate::weights::features_from_q16;
 
@@ -27,7 +28,9 @@ pub(super) struct Phase {
 }
 
 pub(super) struct State {
+    /// The network; during a phase its first layer takes components.
     mlp: Mlp,
+    whitening: Whitening,
     adam: Adam,
     random: ChaCha8Rng,
     batch: usize,
@@ -50,17 +53,17 @@ struct Best {
 
 /// Data as the network takes it.
 struct Rows {
-    /// Standardized features.
-    floats: Vec<[f32; INPUTS]>,
-    /// The same as the chip has them.
+    /// Components of the standardized features.
+    components: Vec<[f32; INPUTS]>,
+    /// The features as the chip has them.
     steps: Vec<[i16; INPUTS]>,
     /// Standardized answers.
     answers: Vec<[f32; OUTPUTS]>,
 }
 
 impl Rows {
-    fn new(samples: &Samples, input: &Standardization, output: &Standardization) -> Result<Self> {
-        let scaling = input_scaling(input)?;
+    fn new(samples: &Samples, network: &Network, whitening: &Whitening) -> Result<Self> {
+        let scaling = input_scaling(&network.input)?;
         let steps = samples.features.iter().map(|row| {
             let features = features_from_q16(&row.map(|px| (px * 65_536.0).round() as i64))?;
             Ok(scale_inputs(
@@ -70,10 +73,11 @@ impl Rows {
                 &features_from_q16(&[0; INPUTS])?,
             ))
         });
+        let floats = standardized(&samples.features, &network.input);
         Ok(Self {
-            floats: standardized(&samples.features, input),
+            components: floats.iter().map(|row| whitening.components(row)).collect(),
             steps: steps.collect::<Result<_>>()?,
-            answers: standardized(&samples.answers, output),
+            answers: standardized(&samples.answers, &network.output),
         })
     }
 }
@@ -95,7 +99,7 @@ fn gathered<T: Copy, U: From<T>, const N: usize>(data: &[[T; N]], rows: &[usize]
 impl State {
     pub fn new(training: &Samples, held_out: &Samples, options: &Options) -> Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(options.seed);
-        let (mlp, network) = match &options.start {
+        let (mut mlp, network) = match &options.start {
             Some(start) => (Mlp::of_layers(&start.layers), start.clone()),
             None => {
                 let widths = [&[INPUTS], &options.hidden[..], &[OUTPUTS]].concat();
@@ -106,14 +110,23 @@ impl State {
             arithmetic: options.arithmetic,
             ..network
         };
+        let whitening = match options.whitened {
+            true => Whitening::of(&standardized(&training.features, &network.input)),
+            false => Whitening::none(),
+        };
+        if options.start.is_none() {
+            whitening.fold(&mut mlp);
+        }
+        let rows = |samples| Rows::new(samples, &network, &whitening);
         Ok(Self {
             adam: Adam::new(&mlp),
             mlp,
             random,
             batch: options.batch,
             order: (0..training.features.len()).collect(),
-            training: Rows::new(training, &network.input, &network.output)?,
-            held_out: Rows::new(held_out, &network.input, &network.output)?,
+            training: rows(training)?,
+            held_out: rows(held_out)?,
+            whitening,
             network,
             best: None,
         })
@@ -125,7 +138,14 @@ impl State {
         self.best = None;
         if phase.rounded {
             self.network.layers = self.mlp.to_layers();
+            if phase.epochs > 0 {
+                self.network.equalize(&training.features);
+                self.mlp = Mlp::of_layers(&self.network.layers);
+            }
             self.network.activation_max = self.network.activation_maxima(&training.features);
+        }
+        if phase.epochs > 0 {
+            self.whitening.unfold(&mut self.mlp);
         }
         Ok(())
     }
@@ -157,17 +177,18 @@ impl State {
                 .collect()
         };
         let (outputs, gradients) = if rounded {
-            self.network.layers = self.mlp.to_layers();
+            self.network.layers = self.by_features();
             let inputs = gathered(&self.training.steps, rows);
             let seen = rounded::forward(&self.network, inputs, rows.len())?;
-            let gradients =
+            let mut gradients =
                 seen.mlp
                     .backward(&seen.trace, gradient(&seen.trace.outputs), rows.len());
+            gradients[0].weights = self.whitening.gradient(&gradients[0].weights);
             (seen.trace.outputs, gradients)
         } else {
             let trace = self
                 .mlp
-                .forward(gathered(&self.training.floats, rows), rows.len());
+                .forward(gathered(&self.training.components, rows), rows.len());
             let gradients = self
                 .mlp
                 .backward(&trace, gradient(&trace.outputs), rows.len());
@@ -180,7 +201,7 @@ impl State {
     fn held_out_loss(&mut self, rounded: bool) -> Result<f64> {
         let all: Vec<usize> = (0..self.held_out.answers.len()).collect();
         self.network.layers = if rounded {
-            self.mlp.to_layers()
+            self.by_features()
         } else {
             Vec::new()
         };
@@ -194,7 +215,7 @@ impl State {
                     .outputs
             } else {
                 self.mlp
-                    .forward(gathered(&self.held_out.floats, rows), rows.len())
+                    .forward(gathered(&self.held_out.components, rows), rows.len())
                     .outputs
             };
             sum += mean_square(&outputs, &targets) * rows.len() as f64;
@@ -219,6 +240,13 @@ impl State {
         }
     }
 
+    /// The layers in training, the first by features.
+    fn by_features(&self) -> Vec<Layer> {
+        let mut mlp = self.mlp.clone();
+        self.whitening.fold(&mut mlp);
+        mlp.to_layers()
+    }
+
     /// The training data as the chip takes it.
     #[cfg(test)]
     pub fn chip_inputs(&self) -> Vec<f64> {
@@ -235,6 +263,7 @@ impl State {
     pub fn take_best(&mut self) {
         if let Some(best) = self.best.take() {
             self.mlp = best.layers;
+            self.whitening.fold(&mut self.mlp);
         }
     }
 

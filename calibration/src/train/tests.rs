@@ -120,6 +120,7 @@ fn rounding_costs_little_after_training_with_it() {
     let (training, held_out) = (easy(1500, 1), easy(300, 2));
     let options = Options {
         hidden: vec![32],
+        batch: 64,
         epochs: 60,
         rounded_epochs: 30,
         ..Options::default()
