@@ -84,7 +84,7 @@ pub fn fit(
     curves(&blank, &known, sizes)
 }
 
-/// For each row the force (N) that curves of these sizes give when they are made from the others.
+/// For each row the curves that are made from the others, of the sizes of `form`.
 ///
 /// # Errors
 /// When the others do not determine the curves.
@@ -92,7 +92,7 @@ pub fn left_out(
     rest: &[f64; INPUTS],
     rows: &[([f64; INPUTS], [f64; 3])],
     form: &ClosedForm,
-) -> Result<Vec<[f64; 3]>> {
+) -> Result<Vec<ClosedForm>> {
     let known: Vec<Known> = rows
         .iter()
         .map(|(features, force)| Known {
@@ -109,8 +109,9 @@ pub fn left_out(
             .map(|(_, row)| *row)
             .collect()
     };
-    let answer = |out: usize| Ok(curves(form, &without(out), sizes)?.force_of(known[out].motion));
-    (0..known.len()).map(answer).collect()
+    (0..known.len())
+        .map(|out| curves(form, &without(out), sizes))
+        .collect()
 }
 
 /// Mean of the weighted squared errors of rows that the curves were not made from; `None` when there are too few rows.

@@ -5,11 +5,11 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use super::no_network;
-use crate::closed_form::{self, Effort};
+use crate::closed_form::{self, ClosedForm, Effort};
 use crate::dataset::{Dataset, Observation};
 use crate::errors::{angle_deg, norm};
 use crate::network::INPUTS;
-use crate::uncertainty::Miss;
+use crate::uncertainty::{MAGNITUDE_BOUND, Miss};
 use crate::weights::{Range, Training, Uncertainty, Weights};
 
 /// The fewest loads.
@@ -31,7 +31,7 @@ pub struct Checked {
     pub force_n: [f64; 3],
     /// Frames of it.
     pub frames: usize,
-    /// What the others say of it, N.
+    /// What the others say of its frames' mean features, N.
     pub found_n: [f64; 3],
 }
 
@@ -59,20 +59,32 @@ pub fn quick(dataset: &Dataset) -> Result<Quick> {
         .map(|load| (load.features, load.force_n))
         .collect();
     let form = closed_form::fit(&rest.features_px(), &rows, Effort::Few)?;
-    let found = closed_form::left_out(&rest.features_px(), &rows, &form)?;
-    let checked = |(load, found_n): (&Load, [f64; 3])| Checked {
+    let others = closed_form::left_out(&rest.features_px(), &rows, &form)?;
+    let pressed: Vec<(&Observation, [f64; 3])> = dataset.accepted().collect();
+    let found =
+        |form: &ClosedForm, features: &[f64; INPUTS]| form.force_n(features, &rest.features_px());
+    let misses: Vec<Vec<Miss>> = loads
+        .iter()
+        .zip(&others)
+        .map(|(load, form)| {
+            let of_load = pressed.iter().filter(|(_, force)| *force == load.force_n);
+            of_load
+                .map(|(seen, force)| Miss::of(found(form, &seen.features_px()), *force))
+                .collect()
+        })
+        .collect();
+    let checked = |(load, form): (&Load, &ClosedForm)| Checked {
         force_n: load.force_n,
         frames: load.frames,
-        found_n,
+        found_n: found(form, &load.features),
     };
-    let loads: Vec<Checked> = loads.iter().zip(found).map(checked).collect();
-    let pressed: Vec<(&Observation, [f64; 3])> = dataset.accepted().collect();
+    let loads: Vec<Checked> = loads.iter().zip(&others).map(checked).collect();
     let weights = Weights {
         format: Weights::format(),
         conditions: dataset.about.conditions.clone(),
         rest,
         range: range(&loads),
-        uncertainty: uncertainty(&loads),
+        uncertainty: uncertainty(&misses),
         training: Training {
             scene: dataset.about.scene.clone(),
             data_seed: dataset.about.seed,
@@ -123,19 +135,35 @@ fn range(loads: &[Checked]) -> Range {
     }
 }
 
-/// Root mean squares of what left-out loads were off by: there are too few of them to say more.
-fn uncertainty(loads: &[Checked]) -> Uncertainty {
-    let misses = loads
-        .iter()
-        .map(|load| Miss::of(load.found_n, load.force_n));
-    let mean_square = |of: fn(&Miss) -> f64| {
-        let squares: f64 = misses.clone().map(|miss| of(&miss).powi(2)).sum();
-        (squares / loads.len() as f64).sqrt()
+/// Root mean squares of what single frames of loads that were left out were off by, each load counting the same; larger by
+/// as much as so few loads may be luckier than the rest (Student's t at 97.5 %, loads less one degrees of freedom, over the
+/// normal distribution's).
+fn uncertainty(misses: &[Vec<Miss>]) -> Uncertainty {
+    let mean = |values: &mut dyn Iterator<Item = f64>, count: usize| {
+        values.sum::<f64>() / count.max(1) as f64
     };
-    Uncertainty::constant(
-        mean_square(|miss| miss.across_n),
-        mean_square(|miss| miss.along_n),
-    )
+    let root = |of: fn(&Miss) -> f64| {
+        let of_load = |frames: &Vec<Miss>| {
+            mean(
+                &mut frames.iter().map(|miss| of(miss).powi(2)),
+                frames.len(),
+            )
+        };
+        let square = mean(&mut misses.iter().map(of_load), misses.len());
+        square.sqrt() * few(misses.len())
+    };
+    Uncertainty::constant(root(|miss| miss.across_n), root(|miss| miss.along_n))
+}
+
+/// Student's t over the normal distribution's, both at 97.5 %, for a deviation from so many values: an expansion by the
+/// degrees of freedom (Fisher and Cornish 1960), within 1 % from four values on.
+fn few(values: usize) -> f64 {
+    let (z, n) = (MAGNITUDE_BOUND, values.saturating_sub(1).max(1) as f64);
+    let z2 = z * z;
+    let first = (z2 + 1.0) / 4.0;
+    let second = ((5.0 * z2 + 16.0) * z2 + 3.0) / 96.0;
+    let third = (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / 384.0;
+    1.0 + first / n + second / (n * n) + third / (n * n * n)
 }
 
 impl fmt::Display for Quick {
@@ -161,5 +189,19 @@ impl fmt::Display for Quick {
             across_n[0] * 1e3,
             along_n[0] * 1e3
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::few;
+
+    /// Tables of Student's distribution at 97.5 %: 3.182, 2.776, 2.262 and 1.984 for 3, 4, 9 and 99 degrees of freedom.
+    #[test]
+    fn few_values_count_as_students_distribution_says() {
+        for (values, t) in [(4, 3.182), (5, 2.776), (10, 2.262), (100, 1.984)] {
+            let expected = t / 1.959_964;
+            assert!((few(values) / expected - 1.0).abs() < 0.01, "{values}");
+        }
     }
 }
