@@ -51,7 +51,7 @@ pub struct PeersArgs {
     #[arg(long, value_delimiter = ',', default_values_t = [512, 512, 512])]
     hidden: Vec<usize>,
     /// Passes of our networks in floats.
-    #[arg(long, default_value_t = 300)]
+    #[arg(long, default_value_t = 1000)]
     our_epochs: usize,
     /// And with the chip's rounding.
     #[arg(long, default_value_t = 100)]

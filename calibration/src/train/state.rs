@@ -9,7 +9,7 @@ use super::adam::Adam;
 use super::mlp::Mlp;
 use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
-use crate::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
+use crate::network::{Arithmetic, INPUTS, Layer, Network, OUTPUTS, Standardization};
 use crate::quantize::input_scaling;
 use crate::weights::features_from_q16;
 
@@ -138,7 +138,8 @@ impl State {
         self.best = None;
         if phase.rounded {
             self.network.layers = self.mlp.to_layers();
-            if phase.epochs > 0 {
+            // Activations of twelve bits have steps to spare, and the weights after them would be the coarser for it.
+            if phase.epochs > 0 && self.network.arithmetic != Arithmetic::Int16 {
                 self.network.equalize(&training.features);
                 self.mlp = Mlp::of_layers(&self.network.layers);
             }
