@@ -117,11 +117,9 @@ fn identity() -> Matrix {
 
 /// Turns two rows of a matrix.
 fn rotate(matrix: &mut Matrix, [i, j]: [usize; 2], [cos, sin]: [f64; 2]) {
-    for k in 0..INPUTS {
-        let (a, b) = (matrix[i][k], matrix[j][k]);
-        matrix[i][k] = cos * a - sin * b;
-        matrix[j][k] = sin * a + cos * b;
-    }
+    let (a, b) = (matrix[i], matrix[j]);
+    matrix[i] = std::array::from_fn(|k| cos * a[k] - sin * b[k]);
+    matrix[j] = std::array::from_fn(|k| sin * a[k] + cos * b[k]);
 }
 
 #[cfg(test)]
