@@ -50,7 +50,7 @@ pub struct OptionArgs {
     /// Adam's first step size; it falls linearly.
     #[arg(long, default_value_t = Options::default().learning_rate)]
     learning_rate: f64,
-    /// Train the first layer on the features themselves instead of their principal components made equally large: slower, and
+    /// Train the first layer on the features themselves instead of their principal components, weak ones made larger: slower, and
     /// never better here.
     #[arg(long)]
     plain_features: bool,

@@ -28,7 +28,7 @@ pub struct Options {
     pub learning_rate: f64,
     /// Passes without a better loss on held-out samples after which a phase ends early; 0 for never.
     pub patience: usize,
-    /// Whether the first layer is trained on the features' principal components, all made equally large; the network is then
+    /// Whether the first layer is trained on the features' principal components, weak ones made larger; the network is then
     /// folded back to features.
     pub whitened: bool,
     /// Decides first weights and shuffling.
