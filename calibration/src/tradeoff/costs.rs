@@ -243,8 +243,8 @@ pub(super) mod tests {
             "firmware/src/model.rs",
             "const NEAR_LIMIT: usize = 12 * 1024;",
         );
-        has("firmware/src/bands.rs", "pub const ROWS: u16 = 4;");
-        has("firmware/src/bands.rs", "pub const SLOTS: u16 = 64;");
+        has("firmware/src/bands.rs", "pub const ROWS: u16 = 8;");
+        has("firmware/src/bands.rs", "pub const SLOTS: u16 = 32;");
         has(
             "firmware/src/camera/ov7725.rs",
             "pub const WIDTH: u16 = 320;",
