@@ -59,6 +59,7 @@ fn small() -> Options {
         hidden: vec![8, 8],
         epochs: 40,
         rounded_epochs: 20,
+        batch: 64,
         learning_rate: 5e-3,
         ..Options::default()
     }

@@ -44,6 +44,10 @@ impl Whitening {
         }
         let (variances, directions) = principal(covariance);
         let whole: f64 = variances.iter().sum();
+        if whole <= 0.0 {
+            // Features that never vary have no components.
+            return Self::none();
+        }
         let size = |k: usize| (variances[k].clamp(0.0, 1.0) + FLOOR * whole).sqrt();
         let rows = |k: usize| directions[k].map(|part| (part / size(k)) as f32);
         let back = |k: usize| directions[k].map(|part| (part * size(k)) as f32);
