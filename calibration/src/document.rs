@@ -19,7 +19,8 @@ pub fn write_into(file: &Path, name: &str, text: &str) -> Result<()> {
     Ok(())
 }
 
-fn replaced(document: &str, name: &str, text: &str) -> Option<String> {
+/// The document with the text in its place; `None` when it has none.
+pub(crate) fn replaced(document: &str, name: &str, text: &str) -> Option<String> {
     let begin = document.find(&format!("<!-- {name}: begin"))?;
     let start = begin + document[begin..].find("-->")? + "-->".len();
     let end = start + document[start..].find(&format!("<!-- {name}: end -->"))?;

@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 
+use crate::document;
 pub use costs::Costs;
 pub use pick::{Limits, best};
 pub use plan::{Estimator, Plan};
@@ -145,12 +146,8 @@ impl TradeoffArgs {
     }
 
     fn write_documents(&self, results: &Results, all: &[Configuration]) -> Result<()> {
-        let document = self.docs.join("tradeoff.md");
-        let before = fs::read_to_string(&document)
-            .with_context(|| format!("cannot read {}", document.display()))?;
-        let after = report::replaced(&before, &report::markdown(results, all))
-            .with_context(|| format!("{} has no place for the tables", document.display()))?;
-        write(&document, &after)?;
+        let file = self.docs.join("tradeoff.md");
+        document::write_into(&file, "tradeoff", &report::markdown(results, all))?;
         write(&self.docs.join("pictures/tradeoff.svg"), &report::plot(all))?;
         write(
             &self.results.with_file_name("configurations.csv"),

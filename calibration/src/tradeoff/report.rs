@@ -264,23 +264,11 @@ pub fn plot(configurations: &[Configuration]) -> String {
     plot.to_svg()
 }
 
-/// Puts `text` between the document's marks.
-pub fn replaced(document: &str, text: &str) -> Option<String> {
-    let start = document.find("<!-- tradeoff: begin")?;
-    let start = start + document[start..].find("-->")? + "-->".len();
-    let end = start + document[start..].find("<!-- tradeoff: end -->")?;
-    Some(format!(
-        "{}\n\n{}\n\n{}",
-        &document[..start],
-        text.trim(),
-        &document[end..]
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::pick::tests::made;
     use super::*;
+    use crate::document::replaced;
 
     #[test]
     fn tables_say_what_is_there_and_mark_what_cannot_be() {
@@ -316,8 +304,8 @@ mod tests {
     #[test]
     fn only_what_is_generated_changes() {
         let document = "a\n<!-- tradeoff: begin, by x -->\nold\n<!-- tradeoff: end -->\nb\n";
-        let new = replaced(document, "new").unwrap();
+        let new = replaced(document, "tradeoff", "new").unwrap();
         assert_eq!(new, document.replace("\nold\n", "\n\nnew\n\n"));
-        assert_eq!(replaced("no marks", "new"), None);
+        assert_eq!(replaced("no marks", "tradeoff", "new"), None);
     }
 }
