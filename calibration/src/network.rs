@@ -281,7 +281,7 @@ impl Network {
     /// Equalization and Bias Correction").
     pub fn equalize(&mut self, rows: &[[f64; INPUTS]]) {
         for i in 0..self.layers.len().saturating_sub(1) {
-            let maxima = self.unit_maxima(i, rows);
+            let maxima = self.unit_maxima(rows).swap_remove(i);
             let most = maxima.iter().copied().fold(0.0, f64::max);
             if most == 0.0 {
                 continue;
@@ -297,16 +297,17 @@ impl Network {
         }
     }
 
-    /// The largest output of each unit of a hidden layer over `rows`.
-    fn unit_maxima(&self, layer: usize, rows: &[[f64; INPUTS]]) -> Vec<f64> {
-        let mut maxima = vec![0.0; self.layers[layer].outputs()];
+    /// The largest output of each unit of each hidden layer over `rows`.
+    fn unit_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<Vec<f64>> {
+        let hidden = &self.layers[..self.layers.len().saturating_sub(1)];
+        let mut maxima: Vec<_> = hidden.iter().map(|it| vec![0.0; it.outputs()]).collect();
         for row in rows {
             let mut x = self.input.forward(row);
-            for layer in &self.layers[..=layer] {
+            for (layer, maxima) in hidden.iter().zip(&mut maxima) {
                 x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
-            }
-            for (max, x) in maxima.iter_mut().zip(x) {
-                *max = x.max(*max);
+                for (max, x) in maxima.iter_mut().zip(&x) {
+                    *max = x.max(*max);
+                }
             }
         }
         maxima
@@ -315,15 +316,8 @@ impl Network {
     /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so that a layer
     /// that never fires can still be scaled.
     pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
-        let mut maxima = vec![1e-6; self.layers.len().saturating_sub(1)];
-        for row in rows {
-            let mut x = self.input.forward(row);
-            for (layer, max) in self.layers.iter().zip(&mut maxima) {
-                x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
-                *max = x.iter().copied().fold(*max, f64::max);
-            }
-        }
-        maxima
+        let of_layer = |units: Vec<f64>| units.into_iter().fold(1e-6, f64::max);
+        self.unit_maxima(rows).into_iter().map(of_layer).collect()
     }
 }
 
@@ -396,8 +390,8 @@ mod tests {
             .collect();
         let before = network.clone();
         network.equalize(&rows);
-        let [a, b] = [0, 1].map(|unit| network.unit_maxima(0, &rows)[unit]);
-        assert!((a - b).abs() < 1e-4 * a && a == before.unit_maxima(0, &rows)[0]);
+        let [a, b] = [0, 1].map(|unit| network.unit_maxima(&rows)[0][unit]);
+        assert!((a - b).abs() < 1e-4 * a && a == before.unit_maxima(&rows)[0][0]);
         for row in &rows {
             for (a, b) in network.predict(row).iter().zip(before.predict(row)) {
                 assert!((a - b).abs() < 1e-4, "{a} {b}");
