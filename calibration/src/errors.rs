@@ -56,12 +56,12 @@ impl Errors {
 
     /// Mean angle between found and true force, degrees; not a number when there is none.
     pub fn mean_direction_deg(&self) -> f64 {
-        mean(&self.directions_deg)
+        mean(self.directions_deg.iter().copied())
     }
 
     /// The same for true forces of at least [`WEAK_N`].
     pub fn mean_strong_direction_deg(&self) -> f64 {
-        mean(&self.strong_directions_deg)
+        mean(self.strong_directions_deg.iter().copied())
     }
 
     /// How many true forces were at least [`WEAK_N`].
@@ -85,8 +85,10 @@ impl Errors {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+/// The mean of some values; not a number when there is none.
+pub(crate) fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    sum / count
 }
 
 /// |F| in the unit of its components.

@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use super::no_network;
 use crate::closed_form::{self, ClosedForm, Effort};
 use crate::dataset::{Dataset, Observation};
-use crate::errors::{angle_deg, norm};
+use crate::errors::{angle_deg, mean, norm};
 use crate::network::INPUTS;
 use crate::uncertainty::{MAGNITUDE_BOUND, Miss};
 use crate::weights::{Range, Training, Uncertainty, Weights};
@@ -139,18 +139,9 @@ fn range(loads: &[Checked]) -> Range {
 /// as much as so few loads may be luckier than the rest (Student's t at 97.5 %, loads less one degrees of freedom, over the
 /// normal distribution's).
 fn uncertainty(misses: &[Vec<Miss>]) -> Uncertainty {
-    let mean = |values: &mut dyn Iterator<Item = f64>, count: usize| {
-        values.sum::<f64>() / count.max(1) as f64
-    };
     let root = |of: fn(&Miss) -> f64| {
-        let of_load = |frames: &Vec<Miss>| {
-            mean(
-                &mut frames.iter().map(|miss| of(miss).powi(2)),
-                frames.len(),
-            )
-        };
-        let square = mean(&mut misses.iter().map(of_load), misses.len());
-        square.sqrt() * few(misses.len())
+        let of_load = |frames: &Vec<Miss>| mean(frames.iter().map(|miss| of(miss).powi(2)));
+        mean(misses.iter().map(of_load)).sqrt() * few(misses.len())
     };
     Uncertainty::constant(root(|miss| miss.across_n), root(|miss| miss.along_n))
 }

@@ -1,7 +1,7 @@
 //! Errors of the frames that everyone accepts.
 
 use super::models::Answers;
-use crate::errors::{WEAK_N, angle_deg, norm};
+use crate::errors::{WEAK_N, angle_deg, mean, norm};
 
 /// Means over frames.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,11 +27,6 @@ impl Sums {
             force_rmse_n: mean(known().map(square)).sqrt(),
         }
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
-    sum / count
 }
 
 #[cfg(test)]
