@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::{Run, Setup, bug, command, firmware};
+use common::{Run, Setup, bug, command, firmware, set_threshold};
 use hivtac_rig::script::Action;
-use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Request, Sample, Threshold};
+use hivtac_wire::message::{HsvBox, Outcome, Request, Sample, Threshold};
 use hivtac_wire::status::Status;
 
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
@@ -15,19 +15,11 @@ const DARK: Threshold = Threshold::Mono {
     luma_high: 88,
 };
 
-fn set(id: u16, threshold: Threshold) -> Action {
-    Action::Send(command(id, Request::SetThreshold(threshold)))
-}
-
 /// What the device answered to a command.
 fn outcome(run: &Run, asked: u16) -> Option<Outcome> {
-    let mut answers = run.messages.iter().filter_map(|message| match message {
-        DeviceMessage::Reply(Reply { id, outcome }) if *id == asked => Some(*outcome),
-        _ => None,
-    });
-    let first = answers.next();
-    assert_eq!(answers.next(), None, "one reply to a command");
-    first
+    let answers = run.answers(asked);
+    assert!(answers.len() <= 1, "one reply to a command");
+    answers.first().map(|(outcome, _)| *outcome)
 }
 
 /// The samples before and after the only gap in the frames.
@@ -45,7 +37,7 @@ fn no_frame_is_read_in_the_wrong_format() {
     for ms in [300, 309, 318] {
         let run = Setup::new(firmware(), 560)
             .at(200, Action::Send(command(70, Request::StartWithMarkers)))
-            .at(ms, set(77, RED_CR))
+            .at(ms, set_threshold(77, RED_CR))
             .run();
         assert_eq!(outcome(&run, 77), Some(Outcome::Done), "{ms} ms");
         let samples = run.samples();
@@ -77,11 +69,11 @@ fn the_way_back_leads_to_the_same_forces() {
         // The same program, so that the camera starts at the same instant.
         let undisturbed = Setup::new(elf.clone(), 760).run();
         let run = Setup::new(elf, 760)
-            .at(260, set(80, RED_CR))
-            .at(261, set(81, RED))
-            .at(262, set(82, DARK))
-            .at(450, set(83, DARK))
-            .at(470, set(84, RED))
+            .at(260, set_threshold(80, RED_CR))
+            .at(261, set_threshold(81, RED))
+            .at(262, set_threshold(82, DARK))
+            .at(450, set_threshold(83, DARK))
+            .at(470, set_threshold(84, RED))
             .run();
         let outcomes = [80, 81, 82, 83, 84].map(|id| outcome(&run, id).unwrap());
         use Outcome::{Busy, Done, Unsupported};
@@ -105,8 +97,8 @@ fn the_way_back_leads_to_the_same_forces() {
 fn a_change_waits_for_a_camera_that_is_away() {
     let run = Setup::new(firmware(), 1_900)
         .fault("camera-absent@300-1100")
-        .at(420, set(90, RED_CR))
-        .at(430, set(91, RED))
+        .at(420, set_threshold(90, RED_CR))
+        .at(430, set_threshold(91, RED))
         .run();
     assert_eq!(outcome(&run, 90), Some(Outcome::Done));
     assert_eq!(outcome(&run, 91), Some(Outcome::Busy));

@@ -3,9 +3,9 @@
 
 mod common;
 
-use common::{Setup, command, firmware};
+use common::{Setup, firmware, set_threshold};
 use hivtac_rig::script::Action;
-use hivtac_wire::message::{DeviceMessage, HsvBox, Outcome, Reply, Request, Threshold};
+use hivtac_wire::message::{HsvBox, Outcome, Threshold};
 use hivtac_wire::status::Status;
 
 /// Accepts nothing that the scene shows.
@@ -20,25 +20,7 @@ const GREEN: HsvBox = HsvBox {
 const ASKED: u16 = 77;
 
 fn set(id: u16, threshold: HsvBox) -> Action {
-    Action::Send(command(
-        id,
-        Request::SetThreshold(Threshold::Rgb565(threshold)),
-    ))
-}
-
-/// What the device answered to a command, and how many samples it had sent before.
-fn answers(run: &common::Run, asked: u16) -> Vec<(Outcome, usize)> {
-    let (mut samples, mut answers) = (0, Vec::new());
-    for message in &run.messages {
-        match message {
-            DeviceMessage::Sample(_) => samples += 1,
-            DeviceMessage::Reply(Reply { id, outcome }) if *id == asked => {
-                answers.push((*outcome, samples));
-            }
-            _ => {}
-        }
-    }
-    answers
+    set_threshold(id, Threshold::Rgb565(threshold))
 }
 
 /// At whatever time of a frame it comes (one takes 25.6 ms).
@@ -48,8 +30,8 @@ fn no_frame_is_lost_or_of_two_thresholds() {
         let run = Setup::new(firmware(), 460).at(ms, set(ASKED, GREEN)).run();
         assert_eq!(run.missing_frames(), Vec::<u32>::new(), "{ms} ms");
         assert_eq!(run.frames_after_a_loss(), Vec::<u32>::new(), "{ms} ms");
-        let [(Outcome::Done, before)] = answers(&run, ASKED)[..] else {
-            panic!("{ms} ms: {:?}", answers(&run, ASKED));
+        let [(Outcome::Done, before)] = run.answers(ASKED)[..] else {
+            panic!("{ms} ms: {:?}", run.answers(ASKED));
         };
         let samples = run.samples();
         // With the markers' red every frame has a force; without it nothing is seen. Half of both would be something else.
@@ -100,7 +82,7 @@ fn a_second_one_waits_its_turn_and_nonsense_is_refused() {
         .at(380, set(1004, nonsense))
         .at(390, set(1005, red))
         .run();
-    let outcome = |asked| answers(&run, asked).first().map(|(outcome, _)| *outcome);
+    let outcome = |asked| run.answers(asked).first().map(|(outcome, _)| *outcome);
     assert_eq!(outcome(1001), Some(Outcome::Done));
     assert_eq!(outcome(1002), Some(Outcome::Busy));
     assert_eq!(outcome(1003), Some(Outcome::Busy));

@@ -20,7 +20,8 @@ use hivtac_rig::truth::TruthLog;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
-    Command, DeviceHello, DeviceMessage, HostMessage, Request, Sample, Stats,
+    self, Command, DeviceHello, DeviceMessage, HostMessage, Reply, Request, Sample, Stats,
+    Threshold,
 };
 use hivtac_wire::status::Status;
 use hivtac_wire::version::HelloPrefix;
@@ -185,6 +186,11 @@ pub fn command(id: u16, request: Request) -> Vec<u8> {
     frame(&HostMessage::Command(Command { id, request }))
 }
 
+/// A command that sets the threshold.
+pub fn set_threshold(id: u16, threshold: Threshold) -> Action {
+    Action::Send(command(id, Request::SetThreshold(threshold)))
+}
+
 fn frame(message: &HostMessage) -> Vec<u8> {
     let mut buffer = [0; MAX_HOST_FRAME];
     [&[0], encode(message, &mut buffer).unwrap()].concat()
@@ -246,6 +252,21 @@ impl Run {
                 }
             })
             .collect()
+    }
+
+    /// What the device answered to a command, and how many samples it had sent before.
+    pub fn answers(&self, asked: u16) -> Vec<(message::Outcome, usize)> {
+        let (mut samples, mut answers) = (0, Vec::new());
+        for message in &self.messages {
+            match message {
+                DeviceMessage::Sample(_) => samples += 1,
+                DeviceMessage::Reply(Reply { id, outcome }) if *id == asked => {
+                    answers.push((*outcome, samples));
+                }
+                _ => {}
+            }
+        }
+        answers
     }
 
     /// The last counters.
