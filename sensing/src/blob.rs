@@ -47,18 +47,6 @@ pub struct Blob {
     pub y1: u16,
 }
 
-/// Second moments of a blob about its centroid, multiplied by its area so that they are whole numbers.
-/// The variance along x, in px², is `xx / area²`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct CentralMoments {
-    /// area · Σ(x − x̄)² = area · Σx² − (Σx)².
-    pub xx: i64,
-    /// area · Σ(x − x̄)(y − ȳ) = area · Σxy − Σx · Σy.
-    pub xy: i64,
-    /// area · Σ(y − ȳ)² = area · Σy² − (Σy)².
-    pub yy: i64,
-}
-
 impl Blob {
     /// The blob of one run in row `y`, with columns and row below 800, and its weights.
     #[cfg(test)]
@@ -93,12 +81,8 @@ impl Blob {
     /// The centroid (x, y), each rounded to the nearest step of Q16.16: off by at most 1/131,072 px.
     /// Σx · 2¹⁶ ≤ 640,000 · 799 · 2¹⁶ < 2⁴⁵.
     pub fn centroid(&self) -> (Px, Px) {
-        self.centroid_by(&Divisor::new(self.area))
-    }
-
-    /// [`centroid`](Self::centroid) with the area as a divisor, for who needs that otherwise, too.
-    pub(crate) fn centroid_by(&self, area: &Divisor) -> (Px, Px) {
-        let mean = |sum| mean(sum, self.area.max(1), area);
+        let area = Divisor::new(self.area);
+        let mean = |sum| mean(sum, self.area.max(1), &area);
         (mean(self.sum_x), mean(self.sum_y))
     }
 
@@ -110,17 +94,6 @@ impl Blob {
         let weight = Divisor::new(self.weight);
         let mean = |sum| mean(sum, self.weight, &weight);
         Some((mean(self.weight_x), mean(self.weight_y)))
-    }
-
-    /// The second moments about the centroid, exact: each product is at most 640,000² · 799² < 2⁵⁸.
-    pub fn central_moments(&self) -> CentralMoments {
-        let area = i64::from(self.area);
-        let (x, y) = (self.sum_x as i64, self.sum_y as i64);
-        CentralMoments {
-            xx: area * self.sum_xx as i64 - x * x,
-            xy: area * self.sum_xy as i64 - x * y,
-            yy: area * self.sum_yy as i64 - y * y,
-        }
     }
 }
 
@@ -177,16 +150,6 @@ mod tests {
                 let error = i128::from(mean.0) * i128::from(blob.area) - exact;
                 prop_assert!(2 * error.abs() <= i128::from(blob.area));
             }
-        }
-
-        #[test]
-        fn central_moments_do_not_overflow(blob in blobs()) {
-            let [area, x, y, xx, xy, yy] =
-                [blob.area.into(), blob.sum_x, blob.sum_y, blob.sum_xx, blob.sum_xy, blob.sum_yy].map(i128::from);
-            let moments = blob.central_moments();
-            prop_assert_eq!(i128::from(moments.xx), area * xx - x * x);
-            prop_assert_eq!(i128::from(moments.xy), area * xy - x * y);
-            prop_assert_eq!(i128::from(moments.yy), area * yy - y * y);
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Quotients of 64 bits from 32-bit instructions: exact, and several times as fast on a Cortex-M as the compiler's library.
+//! Quotients of 64 bits from 32-bit instructions, several times as fast on a Cortex-M as the compiler's library: exact ones,
+//! and such as are good enough for what is compared with a limit.
 //!
 //! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, two words divided by d take two products and two
 //! corrections (Möller and Granlund, *Improved division by invariant integers*, 2011, Algorithm 4). v itself takes two
@@ -70,36 +71,57 @@ impl Divisor {
     }
 }
 
-/// ⌊`dividend` / `divisor`⌋ for a divisor of any size; 0 divides as 1 does.
-pub fn quotient(dividend: u64, divisor: u64) -> u64 {
-    match u32::try_from(divisor) {
-        Ok(small) => Divisor::new(small).quotient(dividend),
-        Err(_) => quotient_by_large(dividend, divisor),
+/// One over a number, to 2⁻²⁷ of it: for what is only compared with a limit. It is made in half the cycles of a [`Divisor`],
+/// and multiplied with in a third.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reciprocal {
+    /// 2⁶¹ / the divisor, shifted until its highest bit is set: 2²⁹ to 2³⁰.
+    mantissa: u32,
+    /// 1 / divisor = mantissa / 2^(shift + 30).
+    shift: u32,
+}
+
+impl Reciprocal {
+    /// Of a number that is at least 1; 0 divides as 1 does.
+    #[inline(never)]
+    pub fn of(divisor: u32) -> Reciprocal {
+        let divisor = divisor.max(1);
+        let zeros = divisor.leading_zeros();
+        let normalized = divisor << zeros;
+        // 16 bits of it, rounded up: the quotient is too small by less than 2⁻¹⁴ of it.
+        let upper = (normalized >> 16) + 1;
+        let rough = (u32::MAX / upper) << 13;
+        // Newton's step x·(2 − x·d): squares what is missing.
+        let product = (u64::from(rough) * u64::from(normalized)) >> 32;
+        let missing = (1 << 29) - product as u32;
+        let more = (u64::from(rough) * u64::from(missing)) >> 29;
+        Reciprocal {
+            mantissa: rough + more as u32,
+            shift: 31 - zeros,
+        }
+    }
+
+    /// `value` / divisor of one within ±2⁶¹, and a little less where it is not a whole number.
+    #[inline]
+    pub fn times(&self, value: i64) -> i64 {
+        let (value, factor) = (value << 2, u64::from(self.mantissa));
+        let (high, low) = ((value >> 32) as i32, u64::from(value as u32));
+        let product = i64::from(high) * factor as i64 + ((low * factor) >> 32) as i64;
+        // A shift by 0 to 31, word by word.
+        let (high, low) = ((product >> 32) as i32, product as u32);
+        let carried = ((high as u32) << 1) << (31 - self.shift);
+        i64::from(high >> self.shift) << 32 | i64::from(low >> self.shift | carried)
+    }
+
+    /// `part` / divisor, of 65,536, limited to 32 bits.
+    pub fn part(&self, part: i32) -> i32 {
+        limited(self.times(i64::from(part) << 16))
     }
 }
 
-/// `dividend` / `divisor`, rounded towards zero as `/` does; 0 divides as 1 does.
-pub fn signed_quotient(dividend: i64, divisor: i64) -> i64 {
-    let quotient = quotient(dividend.unsigned_abs(), divisor.unsigned_abs()) as i64;
-    if (dividend < 0) != (divisor < 0) {
-        -quotient
-    } else {
-        quotient
-    }
-}
-
-/// By a divisor of 2³² or more.
-///
-/// With s the bits that the divisor has beyond 32, q' = ⌊⌊dividend / 2ˢ⌋ / ⌊divisor / 2ˢ⌋⌋ is never too small. The divisor's
-/// upper word is 2³¹ or more and the quotient below 2³², so that q' is too large by less than 2³² / 2³¹ + 1: by 2 at most.
-fn quotient_by_large(dividend: u64, divisor: u64) -> u64 {
-    let shift = 32 - divisor.leading_zeros();
-    let mut quotient = Divisor::new((divisor >> shift) as u32).quotient(dividend >> shift);
-    // It may be 2³² or more by its error only; the product then wraps, and is still compared rightly in 128 bits.
-    while u128::from(quotient) * u128::from(divisor) > u128::from(dividend) {
-        quotient -= 1;
-    }
-    quotient
+/// The nearest number of 32 bits.
+pub fn limited(value: i64) -> i32 {
+    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
 }
 
 /// ⌊(B² − 1)/d⌋ − B = ⌊((B − 1 − d)·B + B − 1) / d⌋ for d of B/2 or more, a half word at a time.
@@ -135,6 +157,10 @@ mod tests {
         prop_oneof![any_length, next_to_powers, Just(u64::MAX)]
     }
 
+    fn divisors() -> impl Strategy<Value = u32> {
+        numbers().prop_map(|number| (number as u32).max(1))
+    }
+
     #[test]
     fn the_reciprocal_is_that_of_its_formula() {
         let by_formula = |divisor: u32| (u64::MAX / u64::from(divisor) - (1 << 32)) as u32;
@@ -150,8 +176,19 @@ mod tests {
     }
 
     #[test]
+    fn a_reciprocal_is_near() {
+        let spread = (0..1 << 20u32).map(|near: u32| near.wrapping_mul(0x9e37_79b9));
+        for divisor in spread.chain(1..1 << 17).chain((0..1 << 17).map(|by| !by)) {
+            let (divisor, by) = (divisor.max(1), Reciprocal::of(divisor));
+            let exact = (1u64 << 61) as f64 / f64::from(divisor);
+            let error = by.times((1 << 61) - 1) as f64 / exact - 1.0;
+            assert!(error.abs() < 2f64.powi(-27), "{divisor}: {error:e}");
+        }
+    }
+
+    #[test]
     fn nothing_is_divided_by_zero() {
-        assert_eq!(quotient(7, 0), 7);
+        assert_eq!(Reciprocal::of(0).times(7), Reciprocal::of(1).times(7));
         assert_eq!(Divisor::new(0).quotient(7), 7);
     }
 
@@ -159,31 +196,36 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(50_000))]
 
         #[test]
-        fn it_is_the_quotient(dividend in numbers(), divisor in numbers()) {
-            let divisor = divisor.max(1);
-            prop_assert_eq!(quotient(dividend, divisor), dividend / divisor);
+        fn it_is_the_quotient(dividend in numbers(), divisor in divisors()) {
+            prop_assert_eq!(Divisor::new(divisor).quotient(dividend), dividend / u64::from(divisor));
         }
 
         #[test]
         fn it_is_the_quotient_next_to_multiples(
-            divisor in numbers(),
+            divisor in divisors(),
             times in numbers(),
             by in -1..2i64,
         ) {
-            let divisor = divisor.max(1);
-            let dividend = (times % (u64::MAX / divisor).max(1) * divisor).wrapping_add_signed(by);
-            prop_assert_eq!(quotient(dividend, divisor), dividend / divisor);
+            let exact = u64::from(divisor);
+            let dividend = (times % (u64::MAX / exact) * exact).wrapping_add_signed(by);
+            prop_assert_eq!(Divisor::new(divisor).quotient(dividend), dividend / exact);
         }
 
         #[test]
-        fn signs_are_those_of_the_operator(dividend: i64, shift in 0..64u32, divisor: i32) {
-            let (dividend, divisor) = (dividend >> shift, i64::from(divisor));
-            prop_assume!(divisor != 0);
-            prop_assert_eq!(signed_quotient(dividend, divisor), dividend / divisor);
-            if divisor > 0 {
-                let prepared = Divisor::new(divisor as u32);
-                prop_assert_eq!(prepared.signed_quotient(dividend), dividend / divisor);
-            }
+        fn signs_are_those_of_the_operator(dividend: i64, shift in 0..64u32, divisor in divisors()) {
+            let (dividend, exact) = (dividend >> shift, i64::from(divisor));
+            prop_assert_eq!(Divisor::new(divisor).signed_quotient(dividend), dividend / exact);
+        }
+
+        #[test]
+        fn a_reciprocal_gives_nearly_the_quotient(
+            value: i64, shift in 2..64u32, divisor in divisors(),
+        ) {
+            let value = value >> shift;
+            let exact = value as f64 / f64::from(divisor);
+            let error = Reciprocal::of(divisor).times(value) as f64 - exact;
+            let allowed = 1.0 + exact.abs() / (1u64 << 27) as f64;
+            prop_assert!(error.abs() <= allowed, "{error}");
         }
     }
 }

@@ -23,6 +23,7 @@
 //! sideways ones, which strain the film as much: such a disc looks like a marker in everything else. Without an own rest
 //! position the pattern may be strained by 5 px, for another unit's markers lie elsewhere.
 
+mod central;
 mod lean;
 pub(crate) mod pattern;
 mod reading;
@@ -70,13 +71,13 @@ struct Image {
     /// As the pattern's centre sees it.
     seen: Seen,
     /// Its width by the optics, without what the mask adds, px in Q16.16.
-    expected: i64,
+    expected: i32,
     /// [`Shape::hollow`].
-    hollow: i64,
+    hollow: i32,
     /// [`Shape::lopsided`].
-    lopsided: i64,
+    lopsided: i32,
     /// [`Shape::density`].
-    density: i64,
+    density: i32,
 }
 
 /// More candidates than this are not sorted out: 8 make 70 sets of four.
@@ -88,7 +89,7 @@ const SMALLEST_PART: u32 = 3;
 const LARGEST_MULTIPLE: u32 = 8;
 /// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any size and tilt, a
 /// half disc 0.95, two touching discs 0.88, a crescent less.
-const LEAST_FILL: i64 = 60_950;
+const LEAST_FILL: i32 = 60_950;
 /// How far a marker may be from the optical law in width, of 256 (±25 %): threshold, light and blur are unknown
 /// before there is a rest position.
 const SIZE_TOLERANCE: i64 = 64;
@@ -206,11 +207,11 @@ impl Finder {
     /// A marker's image, when its size fits its distance from the pattern's centre.
     fn image(&self, shape: &Shape, pattern: &Pattern) -> Option<Image> {
         let seen = shape.seen_from(pattern.center)?;
-        let expected = i64::from(self.across.at(seen.distance).0);
-        let excess = (seen.across - i64::from(self.edge.0) - expected).abs();
+        let expected = self.across.at(seen.distance).0;
+        let excess = i64::from((seen.across - self.edge.0).abs_diff(expected));
         // ⌊256·along / across⌋ within the limits.
-        let (along, across) = (256 * seen.along, seen.across.max(1));
-        let is_plausible = excess * 256 <= expected * SIZE_TOLERANCE
+        let (along, across) = (256 * i64::from(seen.along), i64::from(seen.across.max(1)));
+        let is_plausible = excess * 256 <= i64::from(expected) * SIZE_TOLERANCE
             && along >= LEAST_ASPECT * across
             && along < (LARGEST_ASPECT + 1) * across;
         is_plausible.then_some(Image {

@@ -9,8 +9,8 @@
 use super::shape::Shape;
 use crate::{
     angle::atan2,
-    division::Divisor,
-    root::root,
+    division::Reciprocal,
+    root::rough_root,
     units::{MilliDegrees, Px},
 };
 
@@ -20,22 +20,22 @@ pub struct Pattern {
     /// Their mean.
     pub center: (Px, Px),
     /// Half the side of the square that fits best, px in Q16.16.
-    pub half_side: i64,
+    pub half_side: i32,
     /// How far that square is turned, x towards y.
     pub turn: MilliDegrees,
     /// Stretch and shear, in parts of the square's size, of 65,536.
-    pub strain: [i64; 2],
+    pub strain: [i32; 2],
     /// Taper along x and y, in parts of the square's half side, of 65,536.
-    pub taper: [i64; 2],
+    pub taper: [i32; 2],
 }
 
 /// Limits of a pattern before there is a rest position: lens, mounting and punched film are as they come.
 /// Turned by at most 20°.
 const LARGEST_TURN: MilliDegrees = MilliDegrees(20_000);
 /// Strain of at most 0.05, of 65,536.
-const LARGEST_STRAIN: i64 = 3_277;
+const LARGEST_STRAIN: i32 = 3_277;
 /// Taper of at most 0.15, of 65,536.
-const LARGEST_TAPER: i64 = 9_830;
+const LARGEST_TAPER: i32 = 9_830;
 /// Centre at most 0.8 of the half side at rest away from the picture's middle; of 256.
 const LARGEST_SHIFT: i64 = 205;
 /// 0.75 to 2.2 times as large as at rest, of 256: a film pulled outwards, and one that nearly touches the lens.
@@ -45,7 +45,7 @@ const SCALE: (i64, i64) = (192, 563);
 const SQRT_HALF: i64 = 181;
 
 /// (Sign of x, sign of y) of markers 0–3 around their centre.
-const SIGNS: [(i64, i64); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
+const SIGNS: [(i32, i32); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
 
 /// Puts four shapes in the order of the identities: by the quadrant around their own centre. `None` unless there is
 /// one in each.
@@ -71,15 +71,12 @@ pub fn identify(shapes: [&Shape; 4]) -> Option<[&Shape; 4]> {
 impl Pattern {
     /// Of four points in the order of the identities.
     pub fn of_centroids(centroids: [(Px, Px); 4]) -> Pattern {
-        // Four times the coefficient of a sign pattern in x and in y.
-        let project = |weight: fn((i64, i64)) -> i64| {
+        // Four times the coefficient of a sign pattern in x and in y: below 2²⁹, as positions are below 2²⁶.
+        let project = |weight: fn((i32, i32)) -> i32| {
             let terms = centroids.iter().zip(SIGNS);
             terms.fold((0, 0), |(x, y), (point, signs)| {
                 let weight = weight(signs);
-                (
-                    x + weight * i64::from(point.0.0),
-                    y + weight * i64::from(point.1.0),
-                )
+                (x + weight * point.0.0, y + weight * point.1.0)
             })
         };
         let (sum_x, sum_y) = project(|_| 1);
@@ -87,14 +84,14 @@ impl Pattern {
         let (xy, yy) = project(|(_, y)| y);
         let (taper_x, taper_y) = project(|(x, y)| x * y);
         // Eight half sides.
-        let size = root(((xx + yy).pow(2) + (yx - xy).pow(2)) as u64).max(1);
-        let by_size = Divisor::new(size);
+        let size = length([xx + yy, yx - xy]).max(1);
+        let by_size = Reciprocal::of(size as u32);
         Pattern {
-            center: (Px((sum_x >> 2) as i32), Px((sum_y >> 2) as i32)),
-            half_side: i64::from(size / 8),
-            turn: atan2(yx - xy, xx + yy),
-            strain: [xx - yy, xy + yx].map(|part| by_size.signed_quotient(part << 16)),
-            taper: [taper_x, taper_y].map(|part| by_size.signed_quotient(part << 17)),
+            center: (Px(sum_x >> 2), Px(sum_y >> 2)),
+            half_side: size / 8,
+            turn: atan2(i64::from(yx - xy), i64::from(xx + yy)),
+            strain: [xx - yy, xy + yx].map(|part| by_size.part(part)),
+            taper: [taper_x, taper_y].map(|part| by_size.part(2 * part)),
         }
     }
 
@@ -107,17 +104,18 @@ impl Pattern {
             && length(self.strain) <= LARGEST_STRAIN
             && length(self.taper) <= LARGEST_TAPER
             && shift * 256 <= rest * LARGEST_SHIFT
-            && (rest * SCALE.0..=rest * SCALE.1).contains(&(self.half_side * 256))
+            && (rest * SCALE.0..=rest * SCALE.1).contains(&(i64::from(self.half_side) * 256))
     }
 }
 
-/// Distance of two points, both in a picture.
+/// Distance of two points, both in a picture, to 2⁻¹⁵ of it.
 pub fn distance(a: (Px, Px), b: (Px, Px)) -> Px {
     let (dx, dy) = (a.0 - b.0, a.1 - b.1);
-    Px(length([i64::from(dx.0), i64::from(dy.0)]) as i32)
+    Px(length([dx.0, dy.0]))
 }
 
-/// Length of a vector whose parts are below 2³¹.
-pub fn length([x, y]: [i64; 2]) -> i64 {
-    i64::from(root((x * x + y * y) as u64))
+/// Length of a vector, to 2⁻¹⁵ of it, limited to 32 bits.
+pub fn length(vector: [i32; 2]) -> i32 {
+    let [x, y] = vector.map(|part| (i64::from(part) * i64::from(part)) as u64);
+    rough_root(x + y).min(i32::MAX as u32) as i32
 }

@@ -11,20 +11,20 @@ use crate::model::ContactReading;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     /// Strain by the square of the shift; in halves.
-    pub strain_by_shift: i64,
+    pub strain_by_shift: i32,
     /// Strain by the change of taper, but for what one displaced marker makes of it.
-    pub strain_by_taper: i64,
+    pub strain_by_taper: i32,
     /// Skew by the taper.
-    pub skew_by_taper: i64,
+    pub skew_by_taper: i32,
     /// Lean by the taper and the square of the image's width; of 65,536.
-    pub lean_by_taper: i64,
+    pub lean_by_taper: i32,
     /// Difference of aspects by the shift.
-    pub aspect_by_shift: i64,
+    pub aspect_by_shift: i32,
     /// Difference of mean weights by the shift.
-    pub density_by_shift: i64,
+    pub density_by_shift: i32,
     /// Difference of the mean weights without the mask's edge, over that of the usual 0.015: px² over the square of the
     /// narrowest's width. `None` where it is not looked at.
-    pub inner_density_area: Option<i64>,
+    pub inner_density_area: Option<i32>,
 }
 
 /// Strain: 1.5 times the square of the shift (seen: 1.3 times with the tip up to 0.25 mm off the middle, 1.5 times at

@@ -1,15 +1,19 @@
 //! How the image of one marker looks: its moments as an ellipse's, and what the optics says of them.
 
-use super::{lean::ThirdMoments, pattern::distance};
+use super::{
+    central::Central,
+    lean::{Direction, lean},
+    pattern::distance,
+};
 use crate::{
     blob::Blob,
-    division::{Divisor, signed_quotient},
+    division::{Reciprocal, limited},
     model::CentroidEstimator,
-    root::root,
+    root::{root, rough_root},
     units::Px,
 };
 
-/// A blob's centroid and second moments. Lengths and variances have 16 fractional bits.
+/// A blob's centroid and how its pixels lie around it. Quotients and roots are to 2⁻¹⁵ of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Centroid, column.
@@ -19,17 +23,16 @@ pub struct Shape {
     /// Pixels.
     pub area: u32,
     /// Area over that of the ellipse with the same moments, of 65,536. 1 for an ellipse, less for anything else.
-    pub fill: i64,
+    pub fill: i32,
     /// What [`fill`](Self::fill) lacks of 1, times the mean variance: px² in Q16.16. Pixels make it the same for discs of
     /// any size.
-    pub hollow: i64,
+    pub hollow: i32,
     /// Distance of the centroid from the middle of the bounding box, the larger of x and y, px in Q16.16: 0 for an
     /// ellipse, more for one that is cut.
-    pub lopsided: i64,
+    pub lopsided: i32,
     /// Mean weight of its pixels, of 65,536; 0 when nothing was weighed.
-    pub density: i64,
-    variance: [i64; 3],
-    third: ThirdMoments,
+    pub density: i32,
+    central: Central,
 }
 
 /// A shape as its pattern's centre sees it. Diameters in px, Q16.16.
@@ -38,19 +41,17 @@ pub struct Seen {
     /// Distance from the centre.
     pub distance: Px,
     /// Diameter across the radius.
-    pub across: i64,
+    pub across: i32,
     /// Diameter along the radius.
-    pub along: i64,
+    pub along: i32,
     /// Covariance of both directions over the variance across, of 65,536: 0 where the ellipse lies across or along.
-    pub skew: i64,
-    /// How far it leans to one side ([`ThirdMoments::lean`]), px² in Q16.16.
-    pub lean: i64,
+    pub skew: i32,
+    /// How far it leans to one side ([`lean`]), px² in Q16.16.
+    pub lean: i32,
 }
 
-/// A pixel is a square, not a point: 1/12 px² in Q16.
-const PIXEL_VARIANCE: i64 = 5_461;
 /// 4π in Q16.
-const FOUR_PI: i64 = 823_550;
+const FOUR_PI: u64 = 823_550;
 /// What soft edges add to a diameter (0.8 px: a pixel half covered by red passes), and a dilation (2 px).
 const SOFT_EDGE: i32 = 52_429;
 const DILATION_EDGE: i32 = 131_072;
@@ -63,83 +64,75 @@ pub fn nominal_edge(dilations: u8) -> Px {
 impl Shape {
     /// Of a blob of at least one pixel; `None` when its position cannot be told: no pixel has a weight.
     pub fn of_blob(blob: &Blob, estimator: CentroidEstimator) -> Option<Shape> {
-        let by_area = Divisor::new(blob.area);
         let (x, y) = match estimator {
-            CentroidEstimator::BinaryMask => blob.centroid_by(&by_area),
+            CentroidEstimator::BinaryMask => blob.centroid(),
             CentroidEstimator::RednessWeighted => blob.weighted_centroid()?,
         };
-        let moments = blob.central_moments();
-        let area = i64::from(blob.area.max(1));
-        // A whole number of px² first: the fraction lost is below 1/area.
-        let variance = |moment: i64| by_area.signed_quotient(by_area.signed_quotient(moment) << 16);
-        let variance = [
-            variance(moments.xx) + PIXEL_VARIANCE,
-            variance(moments.xy),
-            variance(moments.yy) + PIXEL_VARIANCE,
-        ];
+        let by_area = Reciprocal::of(blob.area);
+        let central = Central::of_blob(blob, &by_area);
+        let (fill, hollow) = fill(blob.area, central.variance);
         let lopsided = |low: u16, high: u16, mean: Px| {
-            let middle = i64::from(u32::from(low) + u32::from(high)) << 15;
-            (middle - i64::from(mean.0)).abs()
+            let middle = (i32::from(low) + i32::from(high)) << 15;
+            (middle - mean.0).abs()
         };
-        let fill = fill(area, variance);
         Some(Shape {
             x,
             y,
             area: blob.area,
             fill,
-            hollow: ((65_536 - fill) * ((variance[0] + variance[2]) / 2)) >> 16,
+            hollow,
             lopsided: lopsided(blob.x0, blob.x1, x).max(lopsided(blob.y0, blob.y1, y)),
-            density: by_area.signed_quotient(i64::from(blob.weight) << 16),
-            variance,
-            third: ThirdMoments::of_blob(blob, &by_area),
+            density: by_area.part(blob.weight as i32),
+            central,
         })
     }
 
     /// Seen from a centre; `None` from its own.
     pub fn seen_from(&self, center: (Px, Px)) -> Option<Seen> {
-        let [dx, dy] =
-            [(self.x, center.0), (self.y, center.1)].map(|(a, b)| a.0 as i64 - b.0 as i64);
-        // Sixteenths of a pixel give the direction well enough, and a product below 2⁶³.
-        let (ux, uy) = (dx >> 12, dy >> 12);
-        let norm = ux * ux + uy * uy;
-        let [xx, xy, yy] = self.variance;
-        if norm == 0 {
+        let distance = distance((self.x, self.y), center);
+        if distance.0 == 0 {
             return None;
         }
-        // Both parts are below 2¹⁴.
-        let by_norm = Divisor::new(norm as u32);
-        let [xx_part, xy_part, yy_part] = [ux * ux, ux * uy, uy * uy];
-        let along = by_norm.signed_quotient(xx_part * xx + 2 * xy_part * xy + yy_part * yy);
-        let across = by_norm.signed_quotient(yy_part * xx - 2 * xy_part * xy + xx_part * yy);
-        let covariance = by_norm.signed_quotient(xy_part * (yy - xx) + (xx_part - yy_part) * xy);
-        let by_root = Divisor::new(root(norm as u64));
-        let direction = [ux, uy].map(|part| by_root.signed_quotient(part << 14));
-        let [by_along, by_across] = [along, across].map(divisor);
+        let by_distance = Reciprocal::of(distance.0 as u32);
+        let [cos, sin] = [self.x - center.0, self.y - center.1]
+            .map(|part| by_distance.times(i64::from(part.0) << 14) as i32);
+        let direction = Direction::new(cos, sin);
+        let Central { variance, third } = self.central;
+        let along = direction.along(variance).max(1);
+        let across = direction.across(variance).max(1);
+        let [by_along, by_across] = [along, across].map(|it| Reciprocal::of(it as u32));
+        let deviation = deviation(across);
         Some(Seen {
-            distance: distance((self.x, self.y), center),
-            across: diameter(across),
-            along: diameter(along),
-            skew: by_across.signed_quotient(covariance << 16),
-            lean: self.third.lean(direction, &by_along, &by_across, across),
+            distance,
+            across: diameter(deviation),
+            along: diameter(self::deviation(along)),
+            skew: by_across.part(direction.mixed(variance)),
+            lean: lean(third, &direction, [&by_along, &by_across], deviation),
         })
     }
 }
 
-/// By a variance, at least 2⁻¹⁶ px². One of 2¹⁶ px² or more, which no marker has, divides as that does.
-fn divisor(variance: i64) -> Divisor {
-    Divisor::new(u32::try_from(variance.max(1)).unwrap_or(u32::MAX))
+/// Of a variance in px² with 12 fractional bits, px with 16.
+fn deviation(variance: i32) -> i32 {
+    rough_root((variance.max(0) as u64) << 20) as i32
 }
 
 /// An ellipse's diameter is four standard deviations.
-fn diameter(variance: i64) -> i64 {
-    4 * i64::from(root((variance.max(0) as u64) << 16))
+fn diameter(deviation: i32) -> i32 {
+    4 * deviation
 }
 
-/// An ellipse's area is 4π√det of its covariance. Variances are below 800²/12 + 1 px² < 2³² in Q16, so that the
-/// determinant fits 64 bits.
-fn fill(area: i64, [xx, xy, yy]: [i64; 3]) -> i64 {
-    let product = |a: i64, b: i64| a.unsigned_abs() * b.unsigned_abs();
+/// [`Shape::fill`] and [`Shape::hollow`]. An ellipse's area is 4π√det of its covariance; the determinant is below 2⁶⁰.
+fn fill(area: u32, [xx, xy, yy]: [i32; 3]) -> (i32, i32) {
+    let product = |a: i32, b: i32| u64::from(a.unsigned_abs()) * u64::from(b.unsigned_abs());
     let determinant = product(xx, yy).saturating_sub(product(xy, xy));
-    let ellipse_q24 = (FOUR_PI * i64::from(root(determinant))) >> 8;
-    signed_quotient(area << 40, ellipse_q24)
+    // With 8 fractional bits: below 2³², as a blob's variances are below 800²/12 px².
+    let ellipse = ((FOUR_PI * u64::from(root(determinant))) >> 20) as u32;
+    let lack = i64::from(ellipse) - (i64::from(area) << 8);
+    let lack = limited(Reciprocal::of(ellipse).times(lack << 20));
+    let mean = (xx + yy) / 2;
+    (
+        65_536 - (lack >> 4),
+        limited((i64::from(lack) * i64::from(mean)) >> 16),
+    )
 }
