@@ -54,8 +54,12 @@ pub struct Labeller<const BLOBS: usize> {
     /// Column and row in which the frame's first pixel lies.
     origin: (u16, u16),
     min_area: u32,
-    /// Runs that the frame may still have; `None` when it had more.
-    runs_left: Option<u32>,
+    /// Runs that the frame may still have.
+    runs_left: u32,
+    /// Whether it had more.
+    exhausted: bool,
+    /// Whether the row that was pushed last has no run.
+    idle: bool,
     overflowed: bool,
 }
 
@@ -69,7 +73,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             kept: Vec::new(),
             origin: (0, 0),
             min_area: 0,
-            runs_left: Some(0),
+            runs_left: 0,
+            exhausted: false,
+            idle: true,
             overflowed: false,
         }
     }
@@ -82,7 +88,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.kept.clear();
         self.origin = origin;
         self.min_area = min_area;
-        self.runs_left = Some(max_runs);
+        self.runs_left = max_runs;
+        self.exhausted = false;
+        self.idle = true;
         self.overflowed = false;
     }
 
@@ -90,12 +98,16 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// left out while the labeller is [idle](Self::is_idle).
     pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize, near: &Near) {
         self.last = 1 - self.last;
-        let edges = &mut self.rows[self.last].edges;
-        dilation.edges(i, near, edges);
-        let count = edges.runs().len() as u32;
-        self.runs_left = self.runs_left.and_then(|left| left.checked_sub(count));
-        self.overflowed |= self.runs_left.is_none();
-        if !self.continue_blobs(y) {
+        let (before, current) = last_two(&mut self.rows, self.last);
+        dilation.edges(i, near, &mut current.edges);
+        let count = current.edges.runs().len() as u32;
+        let (left, exhausted) = self.runs_left.overflowing_sub(count);
+        self.runs_left = left;
+        self.exhausted |= exhausted;
+        self.overflowed |= exhausted;
+        self.idle = count == 0;
+        let (left, top) = self.origin;
+        if !continue_blobs(before, current, &mut self.forest, left, y + top) {
             self.label_row(y);
         }
     }
@@ -115,18 +127,19 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
 
     /// Whether the frame has had more runs than it may.
     pub fn is_exhausted(&self) -> bool {
-        self.runs_left.is_none()
+        self.exhausted
     }
 
     /// Whether no blob is open, so that an empty row changes nothing.
     pub fn is_idle(&self) -> bool {
-        self.rows[self.last].edges.runs().is_empty()
+        self.idle
     }
 
     /// Finishes the blobs that reach the last row, `height` − 1.
     pub fn finish(&mut self, height: u16) {
         self.last = 1 - self.last;
         self.rows[self.last].edges.clear();
+        self.idle = true;
         self.label_row(height);
     }
 
@@ -140,42 +153,10 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed
     }
 
-    /// Labels the runs of the last row, `y`, when each touches just one of those above, and each of these just one of them: the usual
-    /// case. Otherwise does nothing and gives false.
-    fn continue_blobs(&mut self, y: u16) -> bool {
-        let (left, y) = (self.origin.0, y + self.origin.1);
-        let [a, b] = &mut self.rows;
-        let (before, current) = if self.last == 0 { (b, a) } else { (a, b) };
-        let (above, runs) = (before.edges.runs(), current.edges.runs());
-        let mut free = [0, 0];
-        for (a, b) in above.iter().zip(runs) {
-            let touch = a[0] <= b[1] && b[0] <= a[1];
-            let apart = free[0] <= b[0] && free[1] <= a[0];
-            if !touch || !apart {
-                return false;
-            }
-            // Behind what touches these.
-            free = [a[1] + 1, b[1] + 1];
-        }
-        if above.len() != runs.len() {
-            return false;
-        }
-        let labels = current.labels.iter_mut().zip(&before.labels);
-        for (&[x0, end], (label, above)) in runs.iter().zip(labels) {
-            *label = *above;
-            let run = Run { x0, x1: end - 1 }.moved(left);
-            self.forest.slots[usize::from(*above)]
-                .moments
-                .add_run(run, y);
-        }
-        true
-    }
-
     /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.
     fn label_row(&mut self, y: u16) {
         let (left, y) = (self.origin.0, y + self.origin.1);
-        let [a, b] = &mut self.rows;
-        let (before, current) = if self.last == 0 { (b, a) } else { (a, b) };
+        let (before, current) = last_two(&mut self.rows, self.last);
         let (above, above_labels) = (before.edges.runs(), &before.labels);
         // The first run above that can touch this one or a later one.
         let mut first = 0;
@@ -228,6 +209,40 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             self.overflowed |= self.forest.free.push(label).is_err();
         }
     }
+}
+
+/// The row before the last, and the last.
+#[inline(always)]
+fn last_two(rows: &mut [Row; 2], last: usize) -> (&mut Row, &mut Row) {
+    let [a, b] = rows;
+    if last == 0 { (b, a) } else { (a, b) }
+}
+
+/// Labels the runs of the row `y` of the frame when each touches just one of those before, and each of these just one of them: the
+/// usual case. Otherwise does nothing and gives false. `left` is where columns begin.
+#[inline(always)]
+fn continue_blobs(before: &Row, current: &mut Row, forest: &mut Forest, left: u16, y: u16) -> bool {
+    let (above, runs) = (before.edges.runs(), current.edges.runs());
+    if above.len() != runs.len() {
+        return false;
+    }
+    let mut free = [0, 0];
+    for (a, b) in above.iter().zip(runs) {
+        let touch = a[0] <= b[1] && b[0] <= a[1];
+        let apart = free[0] <= b[0] && free[1] <= a[0];
+        if !touch || !apart {
+            return false;
+        }
+        // Behind what touches these.
+        free = [a[1] + 1, b[1] + 1];
+    }
+    let labels = current.labels.iter_mut().zip(&before.labels);
+    for (&[x0, end], (label, above)) in runs.iter().zip(labels) {
+        *label = *above;
+        let run = Run { x0, x1: end - 1 }.moved(left);
+        forest.slots[usize::from(*above)].moments.add_run(run, y);
+    }
+    true
 }
 
 /// One entry of the union-find forest.

@@ -102,8 +102,7 @@ impl Moments {
     pub fn weigh(&mut self, weights: Weights, y: u16) {
         self.weight += weights.sum;
         self.weight_x += u64::from(weights.sum_x);
-        // At most 800 · 127 · 799 < 2²⁷.
-        self.weight_y += u64::from(weights.sum * u32::from(y));
+        self.weight_y += u64::from(weights.sum) * u64::from(y);
     }
 
     /// Adds what belongs to the same blob.

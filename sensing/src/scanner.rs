@@ -340,10 +340,10 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
         let late = u16::from(self.dilation.radius());
         let near = self.dilation.near();
-        for i in 0..rows {
-            let Some(y) = (self.rows_in + i as u16).checked_sub(late) else {
-                continue;
-            };
+        // Nothing of the frame lies above its first row.
+        let above = usize::from(late.saturating_sub(self.rows_in));
+        for i in above.min(rows)..rows {
+            let y = self.rows_in + i as u16 - late;
             if self.labels.is_idle() && self.dilation.is_empty_row(i) {
                 continue;
             }

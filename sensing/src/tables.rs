@@ -306,7 +306,10 @@ impl Pixels for ByteTable {
     #[inline(always)]
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let (x0, x1) = (usize::from(run.x0), usize::from(run.x1));
-        let pixels = row.get(x0..row.len().min(x1 + 1)).unwrap_or_default();
+        let pixels = match row.get(x0..x1 + 1) {
+            Some(pixels) => pixels,
+            None => row.get(x0..).unwrap_or_default(),
+        };
         let [sum, sums] = weigh_bytes(&self.bytes, pixels);
         Weights {
             sum,

@@ -39,16 +39,16 @@ hivtac_weigh_bytes:
     beq    .Lhivtac_weigh_bytes_end
 .Lhivtac_weigh_bytes_four:
     ldrh   r4, [r0, #-2]
-    ldrh   r5, [r0, #-4]
-    ldrh   r6, [r0, #-6]
     ldrh   r7, [r0, #-8]
+    ldrh   r6, [r0, #-6]
+    ldrh   r5, [r0, #-4]
+    subs   r2, r2, #1
     ldrb   r4, [r1, r4]
+    sub.w  r0, r0, #8
     ldrb   r5, [r1, r5]
     ldrb   r6, [r1, r6]
     ldrb   r7, [r1, r7]
-    sub.w  r0, r0, #8
     add.w  r3, r3, r4, lsr #1
-    subs   r2, r2, #1
     add.w  r12, r12, r3
     add.w  r3, r3, r5, lsr #1
     add.w  r12, r12, r3
