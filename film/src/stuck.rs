@@ -1,20 +1,21 @@
 //! The full solutions that a scene's film under a tip that sticks is made of.
 
-use hivtac_scene::film::curves::{Answer, DiscMotion};
-use hivtac_scene::film::stuck::{Bend, Numbers, Shift, Solved, State, Way, tangent};
+use hivtac_scene::Camera;
+use hivtac_scene::film::curves::Answer;
+use hivtac_scene::film::stuck::{Bend, Numbers, Shift, Solved, State, Way, odd, tangent};
 use hivtac_scene::film::{MAX_OFFSET_MM, MAX_STUCK_N};
 
 use crate::film::Response;
 use crate::newton::solve_small;
 use crate::parallel::in_parallel;
 use crate::samples::Path;
-use crate::view::disc_motions;
+use crate::view::{paper_camera, seen_motions};
 use crate::{Contact, Design, Equilibrium, Film, FilmError};
 
 /// Sizes: dense where a steep way's slack side buckles.
 const SIZES: [f64; 22] = [
-    0.05, 0.1, 0.15, 0.2, 0.225, 0.25, 0.275, 0.3, 0.325, 0.35, 0.375, 0.4, 0.425, 0.45, 0.5, 0.55,
-    0.625, 0.7, 0.775, 0.85, 0.925, 1.0,
+    0.05, 0.1, 0.15, 0.2, 0.225, 0.25, 0.275, 0.2875, 0.3, 0.3125, 0.325, 0.35, 0.4, 0.45, 0.5,
+    0.55, 0.625, 0.7, 0.775, 0.85, 0.925, 1.0,
 ];
 /// Steepnesses; the first is half a step, for its mirror image is as far on the other side.
 const STEEPNESSES: [f64; 11] = [
@@ -86,6 +87,7 @@ impl Ray {
             states: Vec::new(),
             bends: Vec::new(),
         };
+        let camera = paper_camera()?;
         film.move_tip([0.0; 2])?;
         let mut path = Path::from_rest(film);
         let sizes: &[f64] = if self.bends { &BEND_SIZES } else { &SIZES };
@@ -97,9 +99,11 @@ impl Ray {
             };
             let state = path.go(film, contact(&way), size)?;
             if self.bends {
-                found.bends.push((way, bend(film, &way, &state)?));
+                found.bends.push((way, bend(film, &camera, &way, &state)?));
             } else {
-                found.states.push((way, solution(film, &way, &state)?));
+                found
+                    .states
+                    .push((way, solution(film, &camera, &way, &state)?));
             }
         }
         Ok(found)
@@ -121,15 +125,20 @@ fn contact(way: &Way) -> Contact {
 }
 
 /// A state and its first derivatives by the tip's offset.
-fn solution(film: &Film, way: &Way, state: &Equilibrium) -> Result<State, FilmError> {
+fn solution(
+    film: &Film,
+    camera: &Camera,
+    way: &Way,
+    state: &Equilibrium,
+) -> Result<State, FilmError> {
     let responses = film.responses(state)?;
     let changes = changes_by_offset(tangents(way), &responses)?;
     let by_offset = changes.map(|change| {
         let response = Response::to_all(&responses, change);
         let step = 1e-4 / response.size();
         let [back, forth] = [-step, step].map(|step| {
-            let discs = disc_motions(film, &film.beside(state, &response, step));
-            discs.map(|disc: DiscMotion| disc.moved_mm)
+            let there = film.beside(state, &response, step);
+            seen_motions(film, &there, camera).map(|disc| disc.moved_mm)
         });
         let slope = |k: usize, c: usize| (forth[k][c] - back[k][c]) / (2.0 * step);
         Shift {
@@ -138,7 +147,7 @@ fn solution(film: &Film, way: &Way, state: &Equilibrium) -> Result<State, FilmEr
         }
     });
     Ok(State {
-        answer: answer_of(film, state),
+        answer: answer_of(film, camera, state),
         by_offset,
     })
 }
@@ -167,10 +176,15 @@ fn changes_by_offset(
     Ok(changes)
 }
 
-/// What first derivatives by the tip's offset leave at the largest offset, eight ways round: as a polynomial.
-fn bend(film: &mut Film, way: &Way, state: &Equilibrium) -> Result<Bend, FilmError> {
+/// What first derivatives by the tip's offset leave at the largest offset, eight ways round: as coefficients of a [`Bend`].
+fn bend(
+    film: &mut Film,
+    camera: &Camera,
+    way: &Way,
+    state: &Equilibrium,
+) -> Result<Bend, FilmError> {
     const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
-    let State { answer, by_offset } = solution(film, way, state)?;
+    let State { answer, by_offset } = solution(film, camera, way, state)?;
     let here = numbers(&answer);
     let slopes = by_offset.map(|shift| shift.numbers().map(|part| MAX_OFFSET_MM * part));
     // What is even and what is odd in an offset.
@@ -182,31 +196,32 @@ fn bend(film: &mut Film, way: &Way, state: &Equilibrium) -> Result<Bend, FilmErr
         let start = Equilibrium::foretold(&[(0.0, state), (1.0, &forth)], -1.0);
         let back = film.press(contact(way), start.as_ref().unwrap_or(state))?;
         film.move_tip([0.0; 2])?;
-        let [forth, back] = [forth, back].map(|state| numbers(&answer_of(film, &state)));
+        let [forth, back] = [forth, back].map(|state| numbers(&answer_of(film, camera, &state)));
         let even = |k: usize| (forth[k] + back[k]) / 2.0 - here[k];
-        let odd = |k: usize| (forth[k] - back[k]) / 2.0 - (x * slopes[0][k] + y * slopes[1][k]);
-        Ok([std::array::from_fn(even), std::array::from_fn(odd)])
+        let uneven = |k: usize| (forth[k] - back[k]) / 2.0 - (x * slopes[0][k] + y * slopes[1][k]);
+        Ok([std::array::from_fn(even), std::array::from_fn(uneven)])
     };
     let ([xx, xxx], [yy, yyy]) = (both(1.0, 0.0)?, both(0.0, 1.0)?);
     let ([even_p, odd_p], [even_q, odd_q]) = (both(HALF, HALF)?, both(HALF, -HALF)?);
     let of = |at: &dyn Fn(usize) -> f64| Shift::from_numbers(std::array::from_fn(at));
-    // HALF³ · 2.
-    const CUBE: f64 = HALF;
+    // x²y and xy² on the diagonals.
+    const CUBE: f64 = HALF * HALF * HALF;
+    let own = odd(HALF);
     Ok([
         of(&|k| xx[k]),
         of(&|k| even_p[k] - even_q[k]),
         of(&|k| yy[k]),
         of(&|k| xxx[k]),
-        of(&|k| (odd_p[k] - odd_q[k]) / CUBE - yyy[k]),
-        of(&|k| (odd_p[k] + odd_q[k]) / CUBE - xxx[k]),
+        of(&|k| ((odd_p[k] - odd_q[k]) / 2.0 - own * yyy[k]) / CUBE),
+        of(&|k| ((odd_p[k] + odd_q[k]) / 2.0 - own * xxx[k]) / CUBE),
         of(&|k| yyy[k]),
     ])
 }
 
-fn answer_of(film: &Film, state: &Equilibrium) -> Answer {
+fn answer_of(film: &Film, camera: &Camera, state: &Equilibrium) -> Answer {
     Answer {
         tip: [state.force_n[0], state.force_n[1], state.tip_mm[2]],
-        discs: disc_motions(film, state),
+        discs: seen_motions(film, state, camera),
     }
 }
 

@@ -12,6 +12,9 @@ const RAYS: usize = 8;
 /// Their rings, in parts of the radius: Gauss's two points for sums over a disc, each half of its area.
 const RINGS: [f64; 2] = [0.459_700_843_380_983_1, 0.888_073_833_977_115_3];
 
+/// What discs are moved by to find how much a pixel is, mm.
+const SHIFT_MM: f64 = 1e-3;
+
 /// A marker on a pressed film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Marker {
@@ -63,6 +66,35 @@ fn disc_motion(film: &Film, state: &Equilibrium, disc: &Disc) -> DiscMotion {
     motion
 }
 
+/// The same maps, moved along the film so that the camera sees their discs' centroids where it sees those of the film's:
+/// where the film is curved within a disc, the centroid is some hundredths of a pixel off the nearest
+/// affine map's.
+pub(crate) fn seen_motions(film: &Film, state: &Equilibrium, camera: &Camera) -> [DiscMotion; 4] {
+    MARKERS.map(|disc| {
+        let mut motion = disc_motion(film, state, &disc);
+        let [x, y] = disc.centroid_px(|rest| film.displacement(state, rest), camera);
+        let seen = |shift: [f64; 2]| {
+            let moved = |[px, py]: [f64; 2]| {
+                let [cx, cy] = disc.centre_mm;
+                let [dx, dy, dz] = motion.at([px - cx, py - cy]);
+                [dx + shift[0], dy + shift[1], dz]
+            };
+            disc.centroid_px(moved, camera)
+        };
+        let here = seen([0.0; 2]);
+        let step = |way| {
+            let there = seen(way);
+            [0, 1].map(|c| (there[c] - here[c]) / SHIFT_MM)
+        };
+        let ([xx, yx], [xy, yy]) = (step([SHIFT_MM, 0.0]), step([0.0, SHIFT_MM]));
+        let (aside, below) = (x - here[0], y - here[1]);
+        let whole = xx * yy - xy * yx;
+        motion.moved_mm[0] += (yy * aside - xy * below) / whole;
+        motion.moved_mm[1] += (xx * below - yx * aside) / whole;
+        motion
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,6 +139,34 @@ mod tests {
             [(0.009, 0.011), (0.19, 0.21)].map(|(a, b)| (radius(b) - radius(a)) / (b - a));
         // A membrane stiffens as it is pressed.
         assert!(slight > 4.0 * full && full > 0.0, "{slight} {full}");
+    }
+
+    /// Of a deep press in front of the post that the tip is pushed towards, where the film is most curved.
+    #[test]
+    fn affine_discs_are_seen_where_the_films_are() {
+        let (film, camera) = (film(), paper_camera().unwrap());
+        let contact = Contact::Stick {
+            direction: [0.2, 0.15, -1.0],
+            force_n: 0.25,
+            slid_mm: [0.0; 2],
+        };
+        let state = film.press(contact, &film.rest()).unwrap();
+        let distance = |motions: [DiscMotion; 4]| {
+            let of_marker = |(disc, motion): (Disc, DiscMotion)| {
+                let [cx, cy] = disc.centre_mm;
+                let [x, y] = disc.centroid_px(|[x, y]| motion.at([x - cx, y - cy]), &camera);
+                let full = disc.centroid_px(|rest| film.displacement(&state, rest), &camera);
+                (full[0] - x).hypot(full[1] - y)
+            };
+            MARKERS
+                .into_iter()
+                .zip(motions)
+                .map(of_marker)
+                .fold(0.0, f64::max)
+        };
+        let seen = distance(seen_motions(&film, &state, &camera));
+        let nearest = distance(disc_motions(&film, &state));
+        assert!(seen < 1e-4 && nearest > 0.03, "{seen} {nearest} px");
     }
 
     #[test]

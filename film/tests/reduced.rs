@@ -5,10 +5,8 @@ use hivtac_scene::film::stuck::{Solved, tangent};
 use hivtac_scene::film::{Family, Film as ReducedFilm, MAX_STUCK_N};
 use hivtac_scene::{Contact, Load, MARKERS};
 
-/// How far the reduced film's markers may be off, px at 800×600 …
+/// How far the reduced film's markers may be off, px at 800×600.
 const MOST_PX: f64 = 0.1;
-/// … and over the whole domain of `stick`, whose committed file says 0.104 px.
-const STICK_PX: f64 = 0.11;
 
 /// |F|, α, β and offset.
 type Case = (f64, f64, f64, [f64; 2]);
@@ -71,6 +69,7 @@ fn stuck_films_are_the_full_solution() {
         (0.02, -8.0, 2.0, [0.2, 0.0]),
         // Where one side of the film buckles.
         (0.01, -11.5, -7.0, [0.0, 0.0]),
+        (0.0092, 10.4, 9.9, [0.0, 0.0]),
         (0.012, 3.0, 10.0, [0.1, -0.2]),
     ];
     agree(Contact::Stick, 0.0, &cases);
@@ -94,15 +93,15 @@ fn slip_curves_are_the_full_solution() {
 #[ignore = "slow: run by cargo xtask test --all"]
 fn curves_are_the_full_solution_everywhere() {
     let threads = std::thread::available_parallelism().unwrap().get();
-    for (contact, poses, most_px) in [
-        (Contact::Force, 20, MOST_PX),
-        (Contact::Stick, 30, STICK_PX),
-        (Contact::Slip { mu: 0.6 }, 10, MOST_PX),
+    for (contact, poses) in [
+        (Contact::Force, 20),
+        (Contact::Stick, 30),
+        (Contact::Slip { mu: 0.6 }, 10),
     ] {
         let design = Design::default();
         let film = ReducedFilm::default();
         let check = check(&film, &design, contact, poses, threads, |_, _| ()).unwrap();
-        assert!(check.worst_px < most_px, "{contact}: {check:?}");
+        assert!(check.worst_px < MOST_PX, "{contact}: {check:?}");
     }
 }
 
@@ -145,11 +144,17 @@ fn committed_solutions_are_the_full_solution() {
         for (a, b) in [x, y, z].iter().zip(state.answer.tip) {
             assert!((a - b).abs() < 1e-4, "{way:?}: tip {a} {b}");
         }
-        let markers = markers(&film, &full, &paper_camera().unwrap());
-        for (marker, disc) in markers.iter().zip(state.answer.discs) {
-            for (a, b) in marker.moved_mm.iter().zip(disc.moved_mm) {
-                assert!((a - b).abs() < 1e-4, "{way:?}: marker {a} {b} mm");
+        let camera = paper_camera().unwrap();
+        let markers = markers(&film, &full, &camera);
+        for (k, (marker, disc)) in markers.iter().zip(state.answer.discs).enumerate() {
+            let [cx, cy] = MARKERS[k].centre_mm;
+            let seen = MARKERS[k].centroid_px(|[x, y]| disc.at([x - cx, y - cy]), &camera);
+            for (a, b) in marker.seen_px.iter().zip(seen) {
+                // Of the file's digits; the affine map nearest to the film is off by several times as much.
+                assert!((a - b).abs() < 0.01, "{way:?}: marker {a} {b} px");
             }
+            let (a, b) = (marker.moved_mm[2], disc.moved_mm[2]);
+            assert!((a - b).abs() < 1e-4, "{way:?}: marker {a} {b} mm");
         }
     }
 }

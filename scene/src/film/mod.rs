@@ -99,7 +99,7 @@ fn solved(text: &str) -> Stuck {
     solved.expect("the committed solutions are a grid")
 }
 
-/// The film by its curves and solutions: markers within about 0.1 px of the full solution at 800×600 (`film/README.md`); the
+/// The film by its curves and solutions: markers within 0.07 px of the full solution at 800×600 (`film/README.md`); the
 /// film between them roughly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {

@@ -1,8 +1,9 @@
 //! The film under a tip that sticks to it: full solutions on a grid of forces and ways, and cubic splines between them.
 //!
 //! The film answers to a steep way with a slack side that buckles, within so few degrees that polynomials over all ways
-//! miss it; splines follow. The grid is of ways of the octant 0 ≤ y ≤ x; mirroring gives the others. Where the tip
-//! touches is told by a cubic: its first order has the grid of the ways, the rest a coarser one with straight lines.
+//! miss it; splines follow. The grid is of ways of the octant 0 ≤ y ≤ x; mirroring gives the others. What
+//! the tip's offset does is told to third order: the first has the grid of the ways, the rest a coarser one with straight
+//! lines.
 
 mod grid;
 mod octant;
@@ -52,9 +53,22 @@ pub struct Shift {
 /// The tip's vector and the markers' means, all in a row.
 pub type Numbers = [f64; 15];
 
-/// What first derivatives leave of an offset's effect: the coefficients of x², xy, y², x³, x²y, xy² and y³ of the offset
-/// in parts of the largest (0.25 mm).
+/// What first derivatives leave of an offset's effect: the coefficients of [`even`] of x, xy, [`even`] of y, [`odd`] of x,
+/// x²y, xy² and [`odd`] of y, with the offset (x, y) in parts of the largest (0.25 mm).
 pub type Bend = [Shift; 7];
+
+/// How what is even in an offset along x or along y grows with it, in parts of the largest: as 1 − cos πx rather than x². The
+/// largest offset is half a cell of the full solution's mesh, and most of this effect is the mesh's.
+pub fn even(x: f64) -> f64 {
+    let square = x * x;
+    square * (2.0 - square)
+}
+
+/// The same for what is odd and of higher than first order: as πx − sin πx rather than x³.
+pub fn odd(x: f64) -> f64 {
+    let square = x * x;
+    x * square * (1.5 - 0.5 * square)
+}
 
 /// Full solutions on two grids of ways.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -199,7 +213,7 @@ impl Stuck {
     }
 }
 
-/// An offset of the tip, mm, and the products of its parts of the largest that a [`Bend`] has.
+/// An offset of the tip, mm, and the functions of it that a [`Bend`] has coefficients of.
 struct Offset {
     mm: [f64; 2],
     products: [f32; 7],
@@ -210,10 +224,11 @@ impl Offset {
     fn new(mm: [f64; 2]) -> Offset {
         let mm = mm.map(|part| part.clamp(-MAX_OFFSET_MM, MAX_OFFSET_MM));
         let [x, y] = mm.map(|part| part / MAX_OFFSET_MM);
-        let (xx, yy) = (x * x, y * y);
+        let (xy, along_x, along_y) = (x * y, odd(x), odd(y));
+        let products = [even(x), xy, even(y), along_x, x * xy, y * xy, along_y];
         Offset {
             mm,
-            products: [xx, x * y, yy, x * xx, y * xx, x * yy, y * yy].map(|product| product as f32),
+            products: products.map(|product| product as f32),
         }
     }
 
