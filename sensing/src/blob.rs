@@ -13,6 +13,8 @@ use crate::{moments::Moments, runs::Run, tables::Weights};
 pub struct Blob {
     /// Number of pixels.
     pub area: u32,
+    /// How many of them passed the threshold themselves; dilation added the others. At most `area`.
+    pub passed: u32,
     /// Σx.
     pub sum_x: u64,
     /// Σy.
@@ -48,11 +50,12 @@ pub struct Blob {
 }
 
 impl Blob {
-    /// The blob of one run in row `y`, with columns and row below 800, and its weights.
+    /// The blob of one run in row `y`, with columns and row below 800, and its weights. All of it passed.
     #[cfg(test)]
     pub(crate) fn of_run(run: Run, y: u16, weights: Weights) -> Blob {
         let mut moments = Moments::of_run(run, y);
         moments.weigh(weights, y);
+        moments.passed = moments.area;
         moments.blob()
     }
 
@@ -60,6 +63,7 @@ impl Blob {
     #[cfg(test)]
     pub(crate) fn add(&mut self, other: &Blob) {
         self.area += other.area;
+        self.passed += other.passed;
         self.sum_x += other.sum_x;
         self.sum_y += other.sum_y;
         self.sum_xx += other.sum_xx;

@@ -148,6 +148,29 @@ impl Dilation {
         edges.end(32 * self.words as u16);
     }
 
+    /// How many pixels of a run of the dilated row of [`edges`](Self::edges) at `i` were set before, from its first column to
+    /// the one behind its last.
+    #[inline(always)]
+    pub fn passed(&self, i: usize, [x0, end]: [u16; 2]) -> u32 {
+        let row = (i + usize::from(self.radius)) * self.words;
+        let (first, last) = (usize::from(x0 / 32), usize::from((end - 1) / 32));
+        let words = self.mask.get(row + first..=row + last).unwrap_or_default();
+        let count = |(i, word): (usize, &u32)| {
+            let from = if i == 0 {
+                u32::MAX << (x0 % 32)
+            } else {
+                u32::MAX
+            };
+            let to = if i == last - first {
+                last_word_bits(end)
+            } else {
+                u32::MAX
+            };
+            (word & from & to).count_ones()
+        };
+        words.iter().enumerate().map(count).sum()
+    }
+
     /// The words in which dilated rows may have set bits: from the first to before the last that is next to an occupied one.
     pub fn near(&self) -> Near {
         let first = self.occupied.trailing_zeros() as usize;

@@ -110,6 +110,10 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         if !continue_blobs(before, current, &mut self.forest, left, y + top) {
             self.label_row(y);
         }
+        let Row { edges, labels } = &self.rows[self.last];
+        for (run, label) in edges.runs().iter().zip(labels) {
+            self.forest.slots[usize::from(*label)].moments.passed += dilation.passed(i, *run);
+        }
     }
 
     /// Weighs the runs of row `y`, which was pushed last.

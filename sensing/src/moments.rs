@@ -12,6 +12,8 @@ use crate::{blob::Blob, runs::Run, tables::Weights};
 pub struct Moments {
     /// Σ1.
     pub area: u32,
+    /// Σ1 over the pixels that were set before dilation.
+    pub passed: u32,
     /// 2 Σx ≤ 2 · 640,000 · 799 < 2³⁰.
     x: u32,
     /// Σy.
@@ -43,6 +45,7 @@ pub struct Moments {
 impl Moments {
     const NONE: Moments = Moments {
         area: 0,
+        passed: 0,
         x: 0,
         y: 0,
         xx: 0,
@@ -108,6 +111,7 @@ impl Moments {
     /// Adds what belongs to the same blob.
     pub fn add(&mut self, other: &Moments) {
         self.area += other.area;
+        self.passed += other.passed;
         self.x += other.x;
         self.y += other.y;
         self.xx += other.xx;
@@ -130,6 +134,7 @@ impl Moments {
     pub fn blob(&self) -> Blob {
         Blob {
             area: self.area,
+            passed: self.passed,
             sum_x: u64::from(self.x / 2),
             sum_y: u64::from(self.y),
             sum_xx: twelfth(self.xx),

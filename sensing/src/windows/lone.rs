@@ -40,7 +40,7 @@ fn lone_blob_in<P: Pixels, const WORDS: usize>(
         .pixels()
         .mask_rows(data, row_length, window.width(), rows);
     let mut moments: Option<Moments> = None;
-    let plain = for_each_run(mask.get(..height + 2)?, |y, run| {
+    let plain = for_each_run(mask.get(..height + 2)?, |y, run, passed| {
         let (row, placed) = (y + window.y0, run.moved(window.x0));
         let moments = match &mut moments {
             Some(moments) => {
@@ -49,6 +49,7 @@ fn lone_blob_in<P: Pixels, const WORDS: usize>(
             }
             none => none.insert(Moments::of_run(placed, row)),
         };
+        moments.passed += passed;
         if frame.settings().weighted {
             let pixels = data.get(usize::from(y) * row_length..);
             let weights = frame.pixels().weigh(pixels.unwrap_or_default(), run);
@@ -58,12 +59,12 @@ fn lone_blob_in<P: Pixels, const WORDS: usize>(
     plain.then(|| moments.map(|moments| moments.blob()))
 }
 
-/// Dilates rows, the first and the last of which are not of the window, and calls `visit` with the number and the run of each. Gives
-/// false, sooner or later, when these make something else than one plain blob.
+/// Dilates rows, the first and the last of which are not of the window, and calls `visit` with the number and the run of each, and how
+/// many pixels of it were set before. Gives false, sooner or later, when these make something else than one plain blob.
 #[inline(always)]
 fn for_each_run<const WORDS: usize>(
     mask: &[[u32; WORDS]],
-    mut visit: impl FnMut(u16, Run),
+    mut visit: impl FnMut(u16, Run, u32),
 ) -> bool {
     let mut before = None;
     let mut ended = false;
@@ -83,7 +84,7 @@ fn for_each_run<const WORDS: usize>(
         if !before.is_none_or(touches) {
             return false;
         }
-        visit(y, run);
+        visit(y, run, here.iter().map(|word| word.count_ones()).sum());
         before = Some(run);
     }
     true

@@ -26,6 +26,7 @@ fn full(width: u64, height: u64) -> Blob {
     let squares = |n: u64| n * (n - 1) * (2 * n - 1) / 6;
     Blob {
         area: (width * height) as u32,
+        passed: (width * height) as u32,
         sum_x: sum(width) * height,
         sum_y: sum(height) * width,
         sum_xx: squares(width) * height,
@@ -154,7 +155,11 @@ fn a_lattice_of_dots_overflows_or_is_dropped_by_area() {
     assert_eq!(checked::<1>(&with_disc, 2).len(), 1);
     // Dilation joins them all.
     let mut joined = Scanner::<1>::new();
-    assert_eq!(scan(&mut joined, &mask, 1, 1).blobs, [full(800, 600)]);
+    let all = Blob {
+        passed: 400 * 300,
+        ..full(800, 600)
+    };
+    assert_eq!(scan(&mut joined, &mask, 1, 1).blobs, [all]);
 }
 
 #[test]

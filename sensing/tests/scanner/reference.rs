@@ -11,6 +11,8 @@ pub struct Mask {
     pub width: usize,
     pub height: usize,
     bits: Vec<bool>,
+    /// The bits before any dilation.
+    passed: Vec<bool>,
 }
 
 impl Mask {
@@ -19,6 +21,7 @@ impl Mask {
         Mask {
             width,
             height,
+            passed: bits.clone(),
             bits,
         }
     }
@@ -53,9 +56,11 @@ impl Mask {
 
     pub fn dilated(&self, times: u8) -> Mask {
         (0..times).fold(self.clone(), |mask, _| {
-            Mask::from_fn(mask.width, mask.height, |x, y| {
-                mask.around(x, y).any(|(x, y)| mask.get(x, y))
-            })
+            let set = |x, y| mask.around(x, y).any(|(x, y)| mask.get(x, y));
+            Mask {
+                passed: mask.passed.clone(),
+                ..Mask::from_fn(mask.width, mask.height, set)
+            }
         })
     }
 
@@ -71,7 +76,12 @@ impl Mask {
         for i in 0..self.bits.len() {
             if left.bits[i] {
                 let pixels = left.flood(i % self.width, i / self.width);
-                found.push((order(&pixels), sum(&pixels, &weight)));
+                let passed = |(x, y): &&(usize, usize)| self.passed[y * self.width + x];
+                let blob = Blob {
+                    passed: pixels.iter().filter(passed).count() as u32,
+                    ..sum(&pixels, &weight)
+                };
+                found.push((order(&pixels), blob));
             }
         }
         found.sort_by_key(|(order, _)| *order);
@@ -123,6 +133,7 @@ fn sum(pixels: &[(usize, usize)], weight: impl Fn(usize, usize) -> u8) -> Blob {
     let rows = || pixels.iter().map(|(_, y)| *y as u16);
     Blob {
         area: pixels.len() as u32,
+        passed: pixels.len() as u32,
         sum_x: total(|x, _| x),
         sum_y: total(|_, y| y),
         sum_xx: total(|x, _| x * x),
