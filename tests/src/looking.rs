@@ -4,14 +4,14 @@
 use std::boxed::Box;
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_scene::{Contact, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
+use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensing::geometry::{self, Geometry};
 use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 
 use crate::models;
 
@@ -31,6 +31,8 @@ pub struct View {
     pub preset: Preset,
     /// Columns and rows of a frame.
     pub size: [u32; 2],
+    /// How the camera codes pixels.
+    pub format: PixelFormat,
     /// How positions are taken.
     pub estimator: CentroidEstimator,
     /// What presses, and the reading of the model.
@@ -79,7 +81,7 @@ impl View {
         Ok(self.pressed(scene)?)
     }
 
-    /// A scene in which loads press in this view's way.
+    /// A scene in which loads press in this view's way, sent in this view's format unless it is JPEG: that becomes RGB565.
     ///
     /// # Errors
     /// When the film cannot take the scene's own load so.
@@ -89,7 +91,17 @@ impl View {
             contact: self.contact,
             ..options.film
         };
-        scene.with_options(Options { film, ..options })
+        let format = match self.format {
+            _ if options.format != Format::default() => options.format,
+            PixelFormat::Rgb565 => Format::Rgb565,
+            PixelFormat::Yuv422 => Format::Yuv422,
+            PixelFormat::Mono => Format::Mono,
+        };
+        scene.with_options(Options {
+            film,
+            format,
+            ..options
+        })
     }
 
     fn reading(&self) -> ContactReading {
@@ -112,6 +124,7 @@ impl View {
         let [width, height] = self.size;
         let geometry = Geometry::preset(lens, width as u16, height as u16);
         let settings = Settings {
+            threshold: Threshold::red(self.format),
             centroid: self.estimator,
             ..Settings::usual(geometry, ByteOrder::Native)
         };
@@ -140,10 +153,10 @@ impl View {
 }
 
 impl Looker {
-    /// The whole pipeline on a frame of 16-bit pixels.
+    /// The whole pipeline on a frame.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
         self.sensor.begin_frame();
-        self.sensor.push_rows(&frame.pixels);
+        self.sensor.push_rows(&frame.words());
         self.sensor.finish_frame()
     }
 

@@ -98,6 +98,7 @@ pub fn file_read_so(settings: &Settings, rest: Rest, contact: ContactReading) ->
         output,
         1,
     );
+    spec.conditions.threshold = settings.threshold;
     spec.conditions.centroid = settings.centroid;
     spec.conditions.contact = contact;
     encoded(&spec)

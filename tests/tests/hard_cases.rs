@@ -1,6 +1,7 @@
 //! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused for it.
 
 use hivtac_scene::{Contact, Expected, Load, Preset};
+use hivtac_sensing::threshold::PixelFormat;
 use hivtac_tests::hard::look_at_all;
 use hivtac_tests::looking::{ESTIMATORS, Seen, View};
 
@@ -14,6 +15,7 @@ fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<View> {
             views.extend(ESTIMATORS.map(|estimator| View {
                 preset,
                 size,
+                format: PixelFormat::Rgb565,
                 estimator,
                 contact,
             }));

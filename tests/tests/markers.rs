@@ -2,6 +2,7 @@
 
 use hivtac_scene::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;
+use hivtac_sensing::threshold::PixelFormat;
 use hivtac_tests::looking::{ESTIMATORS, Looker, Seen, View};
 
 /// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small spot on its edge.
@@ -22,6 +23,7 @@ const fn view(preset: Preset, estimator: CentroidEstimator) -> View {
     View {
         preset,
         size: [320, 240],
+        format: PixelFormat::Rgb565,
         estimator,
         contact: Contact::Force,
     }

@@ -3,6 +3,7 @@
 
 use anyhow::{Context, Result};
 use hivtac_scene::{Contact, Preset};
+use hivtac_sensing::threshold::PixelFormat;
 use hivtac_tests::hard::{look_at_all, table};
 use hivtac_tests::looking::{ESTIMATORS, View};
 
@@ -32,6 +33,7 @@ fn main() -> Result<()> {
             let view = View {
                 preset,
                 size,
+                format: PixelFormat::Rgb565,
                 estimator,
                 contact,
             };
