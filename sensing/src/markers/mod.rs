@@ -70,6 +70,10 @@ pub(crate) struct Found {
 struct Image {
     /// As the pattern's centre sees it.
     seen: Seen,
+    /// [`Shape::area`].
+    area: u32,
+    /// [`Shape::passed`].
+    passed: u32,
     /// Its width by the optics, without what the mask adds, px in Q16.16.
     expected: i32,
     /// [`Shape::hollow`].
@@ -216,6 +220,8 @@ impl Finder {
             && along < (LARGEST_ASPECT + 1) * across;
         is_plausible.then_some(Image {
             seen,
+            area: shape.area,
+            passed: shape.passed,
             expected,
             hollow: shape.hollow,
             lopsided: shape.lopsided,

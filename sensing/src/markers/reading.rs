@@ -10,10 +10,14 @@ use crate::model::ContactReading;
 /// Limits of one contact reading. Factors are of 256; a shift is in parts of the rest's half side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
+    /// Strain of weighted centroids against this unit's own rest, as the displacement of one marker that makes it, px in Q16.16.
+    pub displacement: i32,
     /// Strain by the square of the shift; in halves.
     pub strain_by_shift: i32,
     /// Strain by the change of taper, but for what one displaced marker makes of it.
     pub strain_by_taper: i32,
+    /// Hollowness beyond the usual, px² in Q16.
+    pub hollow: i32,
     /// Skew by the taper.
     pub skew_by_taper: i32,
     /// Lean by the taper and the square of the image's width; of 65,536.
@@ -27,9 +31,11 @@ pub struct Reading {
     pub inner_density_area: Option<i32>,
 }
 
-/// Strain: 1.5 times the square of the shift (seen: 1.3 times with the tip up to 0.25 mm off the middle, 1.5 times at
-/// 0.5 mm). Skew: the taper. Aspect: the shift, as the film is steeper where an off-centre tip is.
+/// Strain: 0.2 px (seen: 0.16, and 0.2 at four-fold noise) and 1.5 times the square of the shift (seen: 1.3 times with the tip up
+/// to 0.25 mm off the middle, 1.5 times at 0.5 mm). Skew: the taper. Aspect: the shift, as the film is steeper where an off-centre tip is.
 const FORCE: Reading = Reading {
+    displacement: 13_107,
+    hollow: 0,
     strain_by_shift: 3,
     strain_by_taper: 0,
     skew_by_taper: 256,
@@ -39,10 +45,12 @@ const FORCE: Reading = Reading {
     inner_density_area: None,
 };
 
-/// Strain: 0.375 of the taper. Skew: 2.03 of it. Lean: 0.011 of it. Mean weights: 0.605 of the shift, 18 px² (seen: 13.7, in 4
+/// Strain: 0.25 px and 0.375 of the taper. Hollowness: 0.04 px² more (seen: 0.21 in all). Skew: 2.03 of it. Lean: 0.011 of it. Mean weights: 0.605 of the shift, 18 px² (seen: 13.7, in 4
 /// of 2,000 more). The first four are a tenth and more above what was seen with the film's curves of before (0.30, 1.72, 0.0087,
 /// 0.54): under a tip off the middle at 800×600 the film strays a little further.
 const STICK: Reading = Reading {
+    displacement: 16_384,
+    hollow: 2_621,
     strain_by_taper: 96,
     skew_by_taper: 520,
     lean_by_taper: 720,
@@ -51,10 +59,12 @@ const STICK: Reading = Reading {
     ..FORCE
 };
 
-/// Strain: 3 times the square of the shift (seen: 2.7, at a friction ratio of 0.1). Skew: 2.2 of the taper (seen: 2.2).
+/// Strain: 0.25 px (seen: 0.22) and 3 times the square of the shift (seen: 2.7, at a friction ratio of 0.1). Hollowness: 0.04 px² more (seen: 0.23 in all). Skew: 2.2 of the taper (seen: 2.2).
 /// Lean: 0.0045 of it (seen: 0.0042). Aspect: 1.8 of the shift (seen: 1.73). Mean weights: 0.32 of the shift (seen: 0.27),
 /// 18 px² (seen: 13.7, in 4 of 2,000 more).
 const SLIP: Reading = Reading {
+    displacement: 16_384,
+    hollow: 2_621,
     strain_by_shift: 6,
     skew_by_taper: 563,
     lean_by_taper: 295,

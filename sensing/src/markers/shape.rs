@@ -22,6 +22,8 @@ pub struct Shape {
     pub y: Px,
     /// Pixels.
     pub area: u32,
+    /// [`Blob::passed`].
+    pub passed: u32,
     /// Area over that of the ellipse with the same moments, of 65,536. 1 for an ellipse, less for anything else.
     pub fill: i32,
     /// What [`fill`](Self::fill) lacks of 1, times the mean variance: px² in Q16.16. Pixels make it the same for discs of
@@ -79,6 +81,7 @@ impl Shape {
             x,
             y,
             area: blob.area,
+            passed: blob.passed,
             fill,
             hollow,
             lopsided: lopsided(blob.x0, blob.x1, x).max(lopsided(blob.y0, blob.y1, y)),

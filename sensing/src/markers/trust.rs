@@ -13,6 +13,7 @@ use super::{
     shape::Seen,
 };
 use crate::{
+    dilate::MAX_DILATIONS,
     division::{Reciprocal, limited},
     geometry::Geometry,
     model::{CentroidEstimator, ContactReading, Rest},
@@ -23,10 +24,9 @@ use crate::{
     units::{MilliDegrees, Px},
 };
 
-/// Strain against this unit's own rest, as the displacement of one marker that makes it: 0.25 px for weighted centroids
-/// (seen: 0.14, and 0.2 at four-fold noise), 0.7 px for binary ones (seen: 0.53 at QVGA, 0.2 at 800×600). It is what a
-/// thing that stands in for a marker may be off.
-const STRAIN_WEIGHTED: i32 = 16_384;
+/// Strain of binary centroids against this unit's own rest, as the displacement of one marker that makes it: 0.7 px (seen: 0.7
+/// at QVGA, 0.26 at 800×600). Of weighted ones: [`Reading::displacement`]. It is what a thing that stands in for a marker may
+/// be off.
 const STRAIN_BINARY: i32 = 45_875;
 /// Strain against a model's rest, 0.015 of 65,536: another unit's markers are not quite where this one's are.
 const STRAIN_FOREIGN: i32 = 983;
@@ -49,10 +49,15 @@ const ASPECT_PIXELS: i32 = 32_768;
 const ASPECT_TAPER: i32 = 6;
 /// Skew: 1 px of its width (seen: 0.91 px) and the taper. Eaten or cut on one side.
 const SKEW_PIXELS: i32 = 65_536;
-/// Hollowness: at most 0.22 px² and 0.04 for the square of the number of dilations, which make a disc a little square
-/// (seen: 0.20, 0.19, 0.28 and 0.44 with none to three). Dented, notched, grown.
-const HOLLOW: i32 = 14_418;
-const HOLLOW_BY_DILATIONS: i32 = 2_621;
+/// Hollowness: at most 0.22, 0.22, 0.31 and 0.49 px² with none to three dilations, which make a disc a little square (seen: 0.20,
+/// 0.20, 0.28 and 0.44). Dented, notched, grown.
+const HOLLOW: [i32; 1 + MAX_DILATIONS as usize] = [14_418, 14_418, 20_316, 32_113];
+/// Pixels that passed the threshold themselves, before dilation: at least as many as an ellipse has whose diameters are
+/// smaller than the mask's by what dilation adds to them, 8/π px each time (it adds 2 px to the width and to the height of
+/// what it dilates, 8·r + 4 px to a disc's area), and by 0.33 px (seen: 0.27). In px with 8 fractional bits. What is less
+/// are holes, which dilation closes: white pixels, stripes, spots of light.
+const DILATED: i32 = 652;
+const HOLES: i32 = 84;
 /// Lean: at most 0.3 px² for a marker as wide as at rest, and more as it is wider: the lens bends what comes near
 /// (seen: 0.16 near rest, 0.26 at 1.5 times its width). Cut or grown on one side.
 const LEAN: i32 = 19_661;
@@ -74,10 +79,13 @@ pub struct Trust {
     by_rest_width: Reciprocal,
     /// By half the pattern's side at rest, px in Q16.16.
     by_half_side: Reciprocal,
-    /// Limits that come of the pixel grid are so many times those of other formats: YUV422 has one Cr for two columns.
+    /// Limits of a marker's second moments that come of the pixel grid are so many times those of other formats: YUV422 has one
+    /// Cr for two columns. It hardly changes means: see [`grid_of_means`].
     grid: i32,
     /// Largest hollowness.
     hollow: i32,
+    /// By how much the diameters of the pixels that passed may be smaller than the mask's, px with 8 fractional bits.
+    rim: i32,
     /// Strain as the displacement of one marker that makes it, px in Q16.16; `None` against a model's rest.
     displacement: Option<i32>,
     reading: Reading,
@@ -89,15 +97,16 @@ impl Trust {
     pub fn new(settings: &Settings, rest: &Rest, own_rest: bool, contact: ContactReading) -> Trust {
         let geometry = &settings.geometry;
         let at_rest = Pattern::of_centroids(rest.features.centroids);
-        let dilations = i32::from(settings.dilations);
         let grid = match settings.threshold.format() {
             PixelFormat::Yuv422 => 2,
             PixelFormat::Rgb565 | PixelFormat::Mono => 1,
         };
+        let reading = Reading::of(contact);
         let displacement = match settings.centroid {
-            CentroidEstimator::RednessWeighted => STRAIN_WEIGHTED,
-            CentroidEstimator::BinaryMask => STRAIN_BINARY,
+            CentroidEstimator::RednessWeighted => grid_of_means(grid, reading.displacement),
+            CentroidEstimator::BinaryMask => grid * STRAIN_BINARY,
         };
+        let hollow = HOLLOW[usize::from(settings.dilations.min(MAX_DILATIONS))];
         Trust {
             edges: core::array::from_fn(|identity| {
                 let distance = distance(rest.features.centroids[identity], at_rest.center);
@@ -107,9 +116,13 @@ impl Trust {
             by_half_side: by(at_rest.half_side),
             at_rest,
             grid,
-            hollow: grid * (HOLLOW + HOLLOW_BY_DILATIONS * dilations * dilations),
-            displacement: own_rest.then_some(grid * displacement),
-            reading: Reading::of(contact),
+            hollow: grid * (hollow + reading.hollow),
+            rim: match i32::from(settings.dilations) {
+                0 => 0,
+                times => times * DILATED + HOLES,
+            },
+            displacement: own_rest.then_some(displacement),
+            reading,
         }
     }
 
@@ -190,7 +203,7 @@ impl Trust {
 
     fn image_fits(&self, image: &Image, by_across: &Reciprocal, edge: i32, taper: i32) -> bool {
         let Image { seen, expected, .. } = image;
-        let lopsided = self.grid * LOPSIDED_PIXELS + scaled(seen.across, LOPSIDED, 8);
+        let lopsided = grid_of_means(self.grid, LOPSIDED_PIXELS) + scaled(seen.across, LOPSIDED, 8);
         let skew = by_across
             .part(self.grid * SKEW_PIXELS)
             .saturating_add(scaled(taper, self.reading.skew_by_taper, 8));
@@ -206,8 +219,9 @@ impl Trust {
         width_fits(*expected, seen, edge, self.grid)
             && seen.skew.saturating_abs() <= skew
             && image.hollow <= self.hollow
-            && seen.lean <= lean.saturating_mul(self.grid)
+            && seen.lean <= scaled(lean, self.grid + 1, 1)
             && image.lopsided <= lopsided
+            && is_filled(image, self.rim)
     }
 }
 
@@ -238,7 +252,21 @@ fn inner_density(image: &Image, by_across: &Reciprocal, edge: i32) -> i32 {
 /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
 fn width_fits(expected: i32, seen: &Seen, edge: i32, grid: i32) -> bool {
     let excess = i64::from(seen.across) - i64::from(edge) - i64::from(expected);
-    excess.abs() <= i64::from(expected) * WIDTH / 256 + i64::from(grid * WIDTH_PIXELS)
+    excess.abs() <= i64::from(expected) * WIDTH / 256 + i64::from(grid_of_means(grid, WIDTH_PIXELS))
+}
+
+/// A limit of a mean over a marker, in YUV422 nine eighths of what it is in other formats.
+fn grid_of_means(grid: i32, limit: i32) -> i32 {
+    (grid + 7) * limit / 8
+}
+
+/// Whether enough pixels passed, for diameters that may be smaller by `rim`, px with 8 fractional bits. Both products are below
+/// 2⁵⁷: diameters are below 2¹⁸ then, and an area is at most 640,000 px.
+fn is_filled(image: &Image, rim: i32) -> bool {
+    let [across, along] = [image.seen.across, image.seen.along].map(|length| length >> 8);
+    let product = |count: u32, a: i32, b: i32| i64::from(count) * (i64::from(a) * i64::from(b));
+    let least = product(image.area, (across - rim).max(0), (along - rim).max(0));
+    product(image.passed, across, along) >= least
 }
 
 /// `value`·`factor` / 2^`bits`, limited to 32 bits.
