@@ -81,7 +81,8 @@ impl View {
         Ok(self.pressed(scene)?)
     }
 
-    /// A scene in which loads press in this view's way, sent in this view's format unless it is JPEG: that becomes RGB565.
+    /// A scene in which loads press in this view's way and whose camera sends this view's format; a JPEG camera's pictures become
+    /// RGB565, and are left as they are.
     ///
     /// # Errors
     /// When the film cannot take the scene's own load so.
@@ -91,17 +92,28 @@ impl View {
             contact: self.contact,
             ..options.film
         };
-        let format = match self.format {
-            _ if options.format != Format::default() => options.format,
-            PixelFormat::Rgb565 => Format::Rgb565,
-            PixelFormat::Yuv422 => Format::Yuv422,
-            PixelFormat::Mono => Format::Mono,
+        let format = match options.format {
+            Format::Jpeg { .. } => options.format,
+            _ => self.sent(),
         };
         scene.with_options(Options {
             film,
             format,
             ..options
         })
+    }
+
+    /// Whether this view's camera can take the frames of a scene: of JPEG only where it sends RGB565.
+    pub fn takes(&self, scene: &Scene) -> bool {
+        self.format == PixelFormat::Rgb565 || scene.options().format == self.sent()
+    }
+
+    fn sent(&self) -> Format {
+        match self.format {
+            PixelFormat::Rgb565 => Format::Rgb565,
+            PixelFormat::Yuv422 => Format::Yuv422,
+            PixelFormat::Mono => Format::Mono,
+        }
     }
 
     fn reading(&self) -> ContactReading {

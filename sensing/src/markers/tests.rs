@@ -93,6 +93,26 @@ fn three_markers_are_not_four() {
     }
 }
 
+/// Dilation closes every second pixel in a marker's middle: mask and centroids stay what they are.
+#[test]
+fn a_marker_with_holes_is_refused_although_its_mask_is_whole() {
+    for (width, height) in [(160, 120), (320, 240), (800, 600)] {
+        let geometry = Geometry::preset(Preset::Ov7725, width, height);
+        let mut sensor = tared(geometry);
+        let pattern = Pattern::at_rest(geometry);
+        let mut picture = pattern.draw();
+        let whole = trusted(&picture.feed(&mut sensor)).unwrap();
+        let (center, reach) = (pattern.center_of(2), pattern.diameters().0 / 3.0);
+        picture.paint_near(GREY, center, reach, |x, y| {
+            (x - center.0).hypot(y - center.1) < reach && x % 2.0 == 0.0 && y % 2.0 == 0.0
+        });
+        let seen = picture.feed(&mut sensor);
+        assert_eq!(seen.markers, Some(whole), "{width}");
+        let why = seen.status.contains(Status::MARKERS_IMPLAUSIBLE);
+        assert!(why, "{width}: {:?}", names(&seen));
+    }
+}
+
 #[test]
 fn all_red_and_nothing_red() {
     let mut sensor = tared(QVGA);

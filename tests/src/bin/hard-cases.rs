@@ -3,6 +3,7 @@
 
 use anyhow::{Context, Result};
 use hivtac_scene::{Contact, Preset};
+use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::threshold::PixelFormat;
 use hivtac_tests::hard::{look_at_all, table};
 use hivtac_tests::looking::{ESTIMATORS, View};
@@ -23,22 +24,32 @@ fn main() -> Result<()> {
         None => Contact::Force,
         Some(text) => text.parse()?,
     };
-    for (preset, size) in [
-        (Preset::Ov7725, [320, 240]),
-        (Preset::Paper, [320, 240]),
-        (Preset::Ov7725, [800, 600]),
-        (Preset::Paper, [800, 600]),
-    ] {
-        for estimator in ESTIMATORS {
-            let view = View {
+    for view in views(contact) {
+        println!("{}", table(view, &look_at_all(view, repeats)?));
+    }
+    Ok(())
+}
+
+/// Both cameras at two sizes with both estimators, and the firmware's when it sends YUV422.
+fn views(contact: Contact) -> Vec<View> {
+    let mut views = Vec::new();
+    for size in [[320, 240], [800, 600]] {
+        for preset in [Preset::Ov7725, Preset::Paper] {
+            views.extend(ESTIMATORS.map(|estimator| View {
                 preset,
                 size,
                 format: PixelFormat::Rgb565,
                 estimator,
                 contact,
-            };
-            println!("{}", table(view, &look_at_all(view, repeats)?));
+            }));
         }
     }
-    Ok(())
+    views.push(View {
+        preset: Preset::Ov7725,
+        size: [320, 240],
+        format: PixelFormat::Yuv422,
+        estimator: CentroidEstimator::RednessWeighted,
+        contact,
+    });
+    views
 }
