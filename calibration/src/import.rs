@@ -39,6 +39,7 @@ pub fn parse(bytes: &[u8]) -> Result<Network> {
         input: scaling(&tensors, "input", INPUTS)?,
         output: scaling(&tensors, "output", OUTPUTS)?,
         activation_max: vec![1.0; layers.len().saturating_sub(1)],
+        saturates: false,
         layers,
     };
     network.validate()?;

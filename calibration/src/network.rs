@@ -1,5 +1,7 @@
 //! A small fully connected network in plain floats: what training produces and what is quantized.
 
+mod reach;
+
 use anyhow::{Result, ensure};
 use serde::{Deserialize, Serialize};
 
@@ -187,12 +189,12 @@ pub struct Network {
     pub output: Standardization,
     /// For each hidden layer, the largest activation that the chip can carry (see `quantize`).
     pub activation_max: Vec<f64>,
+    /// Whether activations end there in floats, too, as units that were [split](Network::split) need it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub saturates: bool,
     /// The layers, in order.
     pub layers: Vec<Layer>,
 }
-
-/// How much a unit that hardly speaks is scaled up at most.
-const MOST_STRETCHED: f64 = 32.0;
 
 impl Network {
     /// Checks that the parts fit each other and that every number is finite.
@@ -258,6 +260,16 @@ impl Network {
         Ok(())
     }
 
+    /// What a hidden layer makes of its inputs.
+    fn activations(&self, layer: usize, x: &[f64]) -> Vec<f64> {
+        let limit = match self.saturates {
+            true => self.activation_max[layer],
+            false => f64::INFINITY,
+        };
+        let sums = self.layers[layer].apply(x);
+        sums.into_iter().map(|v| v.max(0.0).min(limit)).collect()
+    }
+
     /// The float reference: features (px, px²) to a force (N).
     pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
         self.meaning.to_force(self.predict(features))
@@ -269,55 +281,11 @@ impl Network {
             return [0.0; OUTPUTS];
         };
         let mut x = self.input.forward(features);
-        for layer in hidden {
-            x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
+        for layer in 0..hidden.len() {
+            x = self.activations(layer, &x);
         }
         let y = self.output.backward(&last.apply(&x));
         [y[0], y[1], y[2]]
-    }
-
-    /// Scales each unit of the hidden layers, and what takes it up, such that all of a layer reach as far over `rows`: the
-    /// network is the same, and each unit has all steps of an activation (Nagel et al. 2019, "Data-Free Quantization Through Weight
-    /// Equalization and Bias Correction").
-    pub fn equalize(&mut self, rows: &[[f64; INPUTS]]) {
-        for i in 0..self.layers.len().saturating_sub(1) {
-            let maxima = self.unit_maxima(rows).swap_remove(i);
-            let most = maxima.iter().copied().fold(0.0, f64::max);
-            if most == 0.0 {
-                continue;
-            }
-            for (unit, max) in maxima.into_iter().enumerate() {
-                let factor = (most / max.max(most / MOST_STRETCHED)) as f32;
-                let layer = &mut self.layers[i];
-                layer.weights[unit].iter_mut().for_each(|w| *w *= factor);
-                layer.bias[unit] *= factor;
-                let next = self.layers[i + 1].weights.iter_mut();
-                next.for_each(|row| row[unit] /= factor);
-            }
-        }
-    }
-
-    /// The largest output of each unit of each hidden layer over `rows`.
-    fn unit_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<Vec<f64>> {
-        let hidden = &self.layers[..self.layers.len().saturating_sub(1)];
-        let mut maxima: Vec<_> = hidden.iter().map(|it| vec![0.0; it.outputs()]).collect();
-        for row in rows {
-            let mut x = self.input.forward(row);
-            for (layer, maxima) in hidden.iter().zip(&mut maxima) {
-                x = layer.apply(&x).into_iter().map(|v| v.max(0.0)).collect();
-                for (max, x) in maxima.iter_mut().zip(&x) {
-                    *max = x.max(*max);
-                }
-            }
-        }
-        maxima
-    }
-
-    /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so that a layer
-    /// that never fires can still be scaled.
-    pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
-        let of_layer = |units: Vec<f64>| units.into_iter().fold(1e-6, f64::max);
-        self.unit_maxima(rows).into_iter().map(of_layer).collect()
     }
 }
 
@@ -346,7 +314,7 @@ mod tests {
         assert!(Standardization::of::<2>(&[]).is_err());
     }
 
-    fn tiny() -> Network {
+    pub(super) fn tiny() -> Network {
         let ones = |n: usize| Standardization {
             mean: vec![0.0; n],
             sigma: vec![1.0; n],
@@ -365,6 +333,7 @@ mod tests {
             input: ones(INPUTS),
             output: ones(OUTPUTS),
             activation_max: vec![1.0],
+            saturates: false,
             layers: vec![hidden, last],
         }
     }
@@ -379,29 +348,6 @@ mod tests {
             network.activation_maxima(&[[1.0; INPUTS], [-2.0; INPUTS]]),
             [22.0]
         );
-    }
-
-    #[test]
-    fn equalized_units_reach_as_far_and_say_the_same() {
-        let mut network = tiny();
-        network.layers[0].weights[1].fill(-0.25);
-        let rows: Vec<[f64; INPUTS]> = (-8..=8)
-            .map(|x| std::array::from_fn(|i| f64::from(x) + 0.1 * i as f64))
-            .collect();
-        let before = network.clone();
-        network.equalize(&rows);
-        let [a, b] = [0, 1].map(|unit| network.unit_maxima(&rows)[0][unit]);
-        assert!((a - b).abs() < 1e-4 * a && a == before.unit_maxima(&rows)[0][0]);
-        for row in &rows {
-            for (a, b) in network.predict(row).iter().zip(before.predict(row)) {
-                assert!((a - b).abs() < 1e-4, "{a} {b}");
-            }
-        }
-        // A unit that never speaks, and a layer of such.
-        network.layers[0].bias.fill(-1e3);
-        let silent = network.clone();
-        network.equalize(&rows);
-        assert_eq!(network, silent);
     }
 
     #[test]

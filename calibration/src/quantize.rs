@@ -132,18 +132,16 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
         width: WeightWidth::Int16,
         one_scale: network.arithmetic == Arithmetic::Int8PerTensor,
     };
-    // A layer's weights and its largest input. The output layer has three rows only: int16 costs nothing there, and
+    // What takes up a hidden layer, and its largest activation. The output layer has three rows only: int16 costs nothing there, and
     // spares the last activations and the answer itself the coarse steps.
-    let held = |layer: usize| match network.arithmetic {
-        Arithmetic::Int8PerChannel | Arithmetic::Int8PerTensor if layer < last => {
-            (WeightWidth::Int8, LARGEST_ACTIVATION8)
-        }
-        _ => (WeightWidth::Int16, LARGEST_ACTIVATION16),
+    let held = |layer: usize| match network.is_coarse(layer) {
+        true => (WeightWidth::Int8, LARGEST_ACTIVATION8),
+        false => (WeightWidth::Int16, LARGEST_ACTIVATION16),
     };
     let mut layers = Vec::with_capacity(network.layers.len());
     for (i, layer) in network.layers.iter().enumerate() {
         let quantized = if i < last {
-            let (width, largest) = held(i + 1);
+            let (width, largest) = held(i);
             let next = network.activation_max[i] / f64::from(largest);
             let output = |_| Output {
                 factor: 1.0 / next,

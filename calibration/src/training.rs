@@ -54,6 +54,17 @@ pub struct OptionArgs {
     /// never better here.
     #[arg(long)]
     plain_features: bool,
+    /// Weigh what is off across a force by 1 / √(|F|² + (10 mN)²), with this as the mean weight (what is off along it has 1): weak
+    /// forces' directions count, too.
+    #[arg(long)]
+    direction_weight: Option<f64>,
+    /// What a step takes off each weight, times the step size (AdamW).
+    #[arg(long, default_value_t = Options::default().weight_decay)]
+    weight_decay: f64,
+    /// With int8, make so many units of each whose activation would have seven bits, one for each part of its reach: a wider layer on
+    /// the chip, with finer steps.
+    #[arg(long, default_value_t = Options::default().unit_parts)]
+    unit_parts: usize,
     /// Decides first weights, shuffling and which rows are held out.
     #[arg(long = "training-seed", default_value_t = Options::default().seed)]
     training_seed: u64,
@@ -73,6 +84,9 @@ impl OptionArgs {
             batch: self.batch,
             learning_rate: self.learning_rate,
             whitened: !self.plain_features,
+            direction_weight: self.direction_weight,
+            weight_decay: self.weight_decay,
+            unit_parts: self.unit_parts,
             seed: self.training_seed,
         })
     }

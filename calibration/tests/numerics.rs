@@ -66,7 +66,11 @@ fn small() -> Options {
 }
 
 fn trained(features: Vec<[f64; INPUTS]>, answers: Vec<[f64; OUTPUTS]>) -> Network {
-    let samples = Samples { features, answers };
+    let samples = Samples {
+        features,
+        answers,
+        ..Samples::default()
+    };
     train(&samples, &Samples::default(), &small(), |_| ()).unwrap()
 }
 

@@ -2,6 +2,7 @@
 
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
 use hivtac_calibration::fit::{Kind, fit};
+use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::network::{INPUTS, OUTPUTS};
 use hivtac_calibration::train::{Options, Samples, train};
 
@@ -76,12 +77,53 @@ fn constant_data_trains_to_the_constant() {
     let samples = Samples {
         features: vec![[100.0; INPUTS]; 50],
         answers: vec![[0.01, 0.0, -0.1]; 50],
+        ..Samples::default()
     };
     let network = train(&samples, &Samples::default(), &small(), |_| ()).unwrap();
     let force = network.predict(&[100.0; INPUTS]);
     for (found, truth) in force.iter().zip([0.01, 0.0, -0.1]) {
         assert!((found - truth).abs() < 1e-4, "{force:?}");
     }
+}
+
+fn options_that_do_not_fit(refused: &dyn Fn(&Options, &str)) {
+    let weighed = Options {
+        direction_weight: Some(1.0),
+        ..small()
+    };
+    refused(&weighed, "0 of forces");
+    let polar = Options {
+        meaning: Meaning::AnglesMagnitude,
+        ..weighed.clone()
+    };
+    refused(&polar, "force vector only");
+    let nothing = Options {
+        direction_weight: Some(0.0),
+        ..weighed
+    };
+    refused(&nothing, "weight of directions");
+    let decaying = Options {
+        weight_decay: -0.1,
+        ..small()
+    };
+    refused(&decaying, "weight decay");
+    let split = Options {
+        hidden: vec![300, 8],
+        unit_parts: 2,
+        rounded_epochs: 1,
+        ..small()
+    };
+    refused(&split, "600 wide");
+    let unrounded = Options {
+        rounded_epochs: 0,
+        ..split.clone()
+    };
+    refused(&unrounded, "before passes with rounding");
+    let int16 = Options {
+        arithmetic: Arithmetic::Int16,
+        ..split
+    };
+    refused(&int16, "for int8");
 }
 
 #[test]
@@ -96,6 +138,7 @@ fn what_cannot_be_trained_on_is_said() {
     let some = Samples {
         features: (0..5).map(|i| [f64::from(i); INPUTS]).collect(),
         answers: (0..5).map(|i| [f64::from(i); OUTPUTS]).collect(),
+        ..Samples::default()
     };
     refused(&Samples::default(), &small(), "no usable row");
     refused(
@@ -138,6 +181,8 @@ fn what_cannot_be_trained_on_is_said() {
         },
         "diverged",
     );
+
+    options_that_do_not_fit(&|options, words| refused(&some, options, words));
 
     let mut untouched_missing = data();
     untouched_missing.rows.drain(..8);

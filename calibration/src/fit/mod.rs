@@ -247,7 +247,11 @@ fn samples(
         (seen.features_px(), meaning.of_force(left))
     };
     let (features, answers) = rows.iter().map(answer).unzip();
-    Samples { features, answers }
+    Samples {
+        features,
+        answers,
+        forces_n: rows.iter().map(|(_, force)| *force).collect(),
+    }
 }
 
 fn record(dataset: &Dataset, split: Split, rows: usize) -> Training {

@@ -4,6 +4,7 @@
 //! on every machine.
 
 mod adam;
+mod loss;
 mod mlp;
 mod options;
 mod product;
@@ -24,6 +25,9 @@ pub struct Samples {
     pub features: Vec<[f64; INPUTS]>,
     /// Answers in the units of the network's meaning, row by row.
     pub answers: Vec<[f64; OUTPUTS]>,
+    /// The whole force (N), of which the answers may be a part, row by row. Only
+    /// [`Options::direction_weight`] needs it.
+    pub forces_n: Vec<[f64; OUTPUTS]>,
 }
 
 /// One finished pass over the data.
@@ -35,7 +39,8 @@ pub struct Progress {
     pub epochs: usize,
     /// Whether the chip's rounding was on.
     pub rounded: bool,
-    /// Mean squared error of the standardized answers over the pass; a constant answer has 1.
+    /// Mean squared error of the standardized answers over the pass; a constant answer has 1, unless
+    /// [`Options::direction_weight`] weighs rows.
     pub loss: f64,
     /// The same on the held-out samples after the pass; not a number when there are none.
     pub held_out: f64,
@@ -55,12 +60,12 @@ pub fn train(
     mut report: impl FnMut(Progress),
 ) -> Result<Network> {
     options.check()?;
-    training.check().context("training data")?;
+    training.check(options).context("training data")?;
     ensure!(
         !training.features.is_empty(),
         "the data set has no usable row"
     );
-    held_out.check().context("held-out data")?;
+    held_out.check(options).context("held-out data")?;
     let mut state = State::new(training, held_out, options)?;
     let epochs = options.epochs + options.rounded_epochs;
     let phases = [
@@ -105,11 +110,16 @@ pub fn train(
 }
 
 impl Samples {
-    fn check(&self) -> Result<()> {
+    fn check(&self, options: &Options) -> Result<()> {
         let (rows, answers) = (self.features.len(), self.answers.len());
         ensure!(
             rows == answers,
             "{rows} rows of features, but {answers} of answers"
+        );
+        let forces = self.forces_n.len();
+        ensure!(
+            options.direction_weight.is_none() || forces == rows,
+            "{rows} rows of features, but {forces} of forces to weigh them by"
         );
         let finite = |row: &[f64]| row.iter().all(|x| x.is_finite());
         let odd = (0..rows).find(|&i| !finite(&self.features[i]) || !finite(&self.answers[i]));

@@ -6,6 +6,7 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
 use super::adam::Adam;
+use super::loss::{Across, loss};
 use super::mlp::Mlp;
 use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
@@ -34,6 +35,8 @@ pub(super) struct State {
     adam: Adam,
     random: ChaCha8Rng,
     batch: usize,
+    decay: f64,
+    parts: usize,
     order: Vec<usize>,
     training: Rows,
     held_out: Rows,
@@ -59,10 +62,17 @@ struct Rows {
     steps: Vec<[i16; INPUTS]>,
     /// Standardized answers.
     answers: Vec<[f32; OUTPUTS]>,
+    /// How much what is off across each force counts, when that is not the same for all.
+    across: Option<Across>,
 }
 
 impl Rows {
-    fn new(samples: &Samples, network: &Network, whitening: &Whitening) -> Result<Self> {
+    fn new(
+        samples: &Samples,
+        network: &Network,
+        whitening: &Whitening,
+        across: Option<Across>,
+    ) -> Result<Self> {
         let scaling = input_scaling(&network.input)?;
         let steps = samples.features.iter().map(|row| {
             let features = features_from_q16(&row.map(|px| (px * 65_536.0).round() as i64))?;
@@ -78,7 +88,14 @@ impl Rows {
             components: floats.iter().map(|row| whitening.components(row)).collect(),
             steps: steps.collect::<Result<_>>()?,
             answers: standardized(&samples.answers, &network.output),
+            across,
         })
+    }
+
+    /// The mean loss of these rows, and its gradient by the outputs.
+    fn loss(&self, outputs: &[f32], rows: &[usize]) -> (f64, Vec<f32>) {
+        let targets: Vec<f32> = gathered(&self.answers, rows);
+        loss(outputs, &targets, self.across.as_ref(), rows)
     }
 }
 
@@ -117,9 +134,15 @@ impl State {
         if options.start.is_none() {
             whitening.fold(&mut mlp);
         }
-        let rows = |samples| Rows::new(samples, &network, &whitening);
+        let rows = |samples: &Samples| {
+            let weighed = |weight| Across::new(samples, training, weight);
+            let across = options.direction_weight.map(weighed);
+            Rows::new(samples, &network, &whitening, across)
+        };
         Ok(Self {
-            adam: Adam::new(&mlp),
+            adam: Adam::new(&mlp, options.weight_decay),
+            decay: options.weight_decay,
+            parts: options.unit_parts,
             mlp,
             random,
             batch: options.batch,
@@ -134,20 +157,25 @@ impl State {
 
     /// Starts a phase. The first fixes how much each hidden layer of the chip can carry for the second.
     pub fn begin(&mut self, phase: &Phase, training: &Samples) -> Result<()> {
-        self.adam = Adam::new(&self.mlp);
         self.best = None;
         if phase.rounded {
             self.network.layers = self.mlp.to_layers();
             // Activations of twelve bits have steps to spare, and the weights after them would be the coarser for it.
             if phase.epochs > 0 && self.network.arithmetic != Arithmetic::Int16 {
                 self.network.equalize(&training.features);
+            }
+            if !self.network.saturates {
+                self.network.activation_max = self.network.activation_maxima(&training.features);
+            }
+            if phase.epochs > 0 {
+                self.network.split(self.parts);
                 self.mlp = Mlp::of_layers(&self.network.layers);
             }
-            self.network.activation_max = self.network.activation_maxima(&training.features);
         }
         if phase.epochs > 0 {
             self.whitening.unfold(&mut self.mlp);
         }
+        self.adam = Adam::new(&self.mlp, self.decay);
         Ok(())
     }
 
@@ -168,35 +196,24 @@ impl State {
     }
 
     fn step(&mut self, rows: &[usize], rate: f64, rounded: bool) -> Result<f64> {
-        let targets: Vec<f32> = gathered(&self.training.answers, rows);
-        let gradient = |outputs: &[f32]| -> Vec<f32> {
-            let scale = 2.0 / outputs.len() as f32;
-            outputs
-                .iter()
-                .zip(&targets)
-                .map(|(y, t)| scale * (y - t))
-                .collect()
-        };
-        let (outputs, gradients) = if rounded {
+        let loss = |outputs: &[f32]| self.training.loss(outputs, rows);
+        let (loss, gradients) = if rounded {
             self.network.layers = self.by_features();
             let inputs = gathered(&self.training.steps, rows);
             let seen = rounded::forward(&self.network, inputs, rows.len())?;
-            let mut gradients =
-                seen.mlp
-                    .backward(&seen.trace, gradient(&seen.trace.outputs), rows.len());
+            let (loss, gradient) = loss(&seen.trace.outputs);
+            let mut gradients = seen.mlp.backward(&seen.trace, gradient, rows.len());
             gradients[0].weights = self.whitening.gradient(&gradients[0].weights);
-            (seen.trace.outputs, gradients)
+            (loss, gradients)
         } else {
             let trace = self
                 .mlp
                 .forward(gathered(&self.training.components, rows), rows.len());
-            let gradients = self
-                .mlp
-                .backward(&trace, gradient(&trace.outputs), rows.len());
-            (trace.outputs, gradients)
+            let (loss, gradient) = loss(&trace.outputs);
+            (loss, self.mlp.backward(&trace, gradient, rows.len()))
         };
         self.adam.step(&mut self.mlp, &gradients, rate);
-        Ok(mean_square(&outputs, &targets))
+        Ok(loss)
     }
 
     fn held_out_loss(&mut self, rounded: bool) -> Result<f64> {
@@ -208,7 +225,6 @@ impl State {
         };
         let mut sum = 0.0;
         for rows in all.chunks(MEASURED_ROWS) {
-            let targets: Vec<f32> = gathered(&self.held_out.answers, rows);
             let outputs = if rounded {
                 let inputs = gathered(&self.held_out.steps, rows);
                 rounded::forward(&self.network, inputs, rows.len())?
@@ -219,7 +235,7 @@ impl State {
                     .forward(gathered(&self.held_out.components, rows), rows.len())
                     .outputs
             };
-            sum += mean_square(&outputs, &targets) * rows.len() as f64;
+            sum += self.held_out.loss(&outputs, rows).0 * rows.len() as f64;
         }
         Ok(sum / all.len() as f64)
     }
@@ -276,14 +292,6 @@ impl State {
     }
 }
 
-fn mean_square(outputs: &[f32], targets: &[f32]) -> f64 {
-    let squares = outputs
-        .iter()
-        .zip(targets)
-        .map(|(&y, &t)| f64::from(y - t).powi(2));
-    squares.sum::<f64>() / outputs.len() as f64
-}
-
 /// A network without layers: scaling from the data.
 fn blank(training: &Samples, options: &Options) -> Result<Network> {
     let [input, output] = scaling(training, options.meaning)?;
@@ -293,6 +301,7 @@ fn blank(training: &Samples, options: &Options) -> Result<Network> {
         input,
         output,
         activation_max: Vec::new(),
+        saturates: false,
         layers: Vec::new(),
     })
 }
