@@ -9,7 +9,7 @@ use hivtac_sensing::network::Network;
 use super::frames::{Frames, Sets};
 use super::{PeersArgs, there};
 use crate::check::vector_n;
-use crate::dataset::Split;
+use crate::dataset::{Dataset, Split};
 use crate::fit::{Kind, fit, fit_closed_form};
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
@@ -75,9 +75,61 @@ impl Model {
 
 /// All of them, trained on a size's frames or read from the folder.
 pub fn all(args: &PeersArgs, contact: Contact, size: Size, frames: &Frames) -> Result<Vec<Model>> {
-    let (ours, theirs) = (&frames.ours.training, &frames.theirs.training);
-    let kept = |name: &str, make: &dyn Fn() -> Result<Weights>| -> Result<Weights> {
-        let path = args.file(contact, size, &format!("{name}.weights"));
+    let kept = Kept {
+        args,
+        contact,
+        size,
+    };
+    let ours = &frames.ours.training;
+    let paper = kept.trained(
+        &format!("paper-{}-passes", args.epochs),
+        &frames.theirs.training,
+        Kind::Network,
+        &paper(args),
+    )?;
+    let form = kept.weights("closed-form", &|| {
+        Ok(fit_closed_form(ours, Split::WithinPose, SEED)?.weights)
+    })?;
+    let both = Options {
+        arithmetic: Arithmetic::Int8PerChannel,
+        rounded_epochs: args.our_rounded_epochs,
+        ..plain(args)
+    };
+    let both = kept.trained("both", ours, Kind::Both, &both)?;
+    let model = |name, how, weights| Model { name, how, weights };
+    let mut models = vec![model("the paper's", How::Paper, paper)];
+    for tier in [plain_tier(args), fine_tier(args)] {
+        let [float, int16, int8] = tier.files;
+        let alone = kept.trained(float, ours, Kind::Network, &tier.float)?;
+        let rounded = |file, options: &Options| {
+            let options = Options {
+                start: Some(alone.network.clone()),
+                ..options.clone()
+            };
+            kept.trained(file, ours, Kind::Network, &options)
+        };
+        let (int16, int8) = (rounded(int16, &tier.int16)?, rounded(int8, &tier.int8)?);
+        let rows = [(How::Float, alone), (How::Chip, int16), (How::Chip, int8)];
+        let named = tier.names.into_iter().zip(rows);
+        models.extend(named.map(|(name, (how, weights))| model(name, how, weights)));
+    }
+    models.push(model("closed form", How::Chip, form));
+    models.push(model("closed form + 64-64 int8", How::Chip, both));
+    Ok(models)
+}
+
+/// The weights files of one reading and size.
+struct Kept<'a> {
+    args: &'a PeersArgs,
+    contact: Contact,
+    size: Size,
+}
+
+impl Kept<'_> {
+    /// Those of this name, from the folder or made.
+    fn weights(&self, name: &str, make: &dyn Fn() -> Result<Weights>) -> Result<Weights> {
+        let file = format!("{name}.weights");
+        let path = self.args.file(self.contact, self.size, &file);
         if there(&path) {
             return Weights::load(&path);
         }
@@ -85,11 +137,24 @@ pub fn all(args: &PeersArgs, contact: Contact, size: Size, frames: &Frames) -> R
         let weights = make().with_context(|| format!("training {}", path.display()))?;
         weights.save(&path)?;
         Ok(weights)
-    };
-    let trained = |data, kind, options: Options| {
-        Ok(fit(data, Split::WithinPose, kind, &options, |_| ())?.weights)
-    };
-    let paper = Options {
+    }
+
+    fn trained(
+        &self,
+        name: &str,
+        data: &Dataset,
+        kind: Kind,
+        options: &Options,
+    ) -> Result<Weights> {
+        self.weights(name, &|| {
+            Ok(fit(data, Split::WithinPose, kind, options, |_| ())?.weights)
+        })
+    }
+}
+
+/// The paper's network (its Section 6).
+fn paper(args: &PeersArgs) -> Options {
+    Options {
         hidden: args.hidden.clone(),
         meaning: Meaning::AnglesMagnitude,
         arithmetic: Arithmetic::Int16,
@@ -100,48 +165,77 @@ pub fn all(args: &PeersArgs, contact: Contact, size: Size, frames: &Frames) -> R
         whitened: false,
         seed: SEED,
         ..Options::default()
-    };
-    let float = Options {
+    }
+}
+
+/// A network of ours in floats, and what it becomes on the chip.
+struct Tier {
+    /// In the tables: floats, int16, int8.
+    names: [&'static str; 3],
+    files: [&'static str; 3],
+    float: Options,
+    int16: Options,
+    int8: Options,
+}
+
+/// Floats, with the trainer's defaults.
+fn plain(args: &PeersArgs) -> Options {
+    Options {
         arithmetic: Arithmetic::Int16,
         epochs: args.our_epochs,
         rounded_epochs: 0,
         seed: SEED,
         ..Options::default()
-    };
-    let name = format!("paper-{}-passes", args.epochs);
-    let paper = kept(&name, &|| trained(theirs, Kind::Network, paper.clone()))?;
-    let alone = kept("64-64-float", &|| {
-        trained(ours, Kind::Network, float.clone())
-    })?;
-    let rounded = |arithmetic| Options {
-        arithmetic,
+    }
+}
+
+/// As the default model is trained, only longer.
+fn plain_tier(args: &PeersArgs) -> Tier {
+    let float = plain(args);
+    let int16 = Options {
         epochs: 0,
         rounded_epochs: args.our_rounded_epochs,
-        start: Some(alone.network.clone()),
         ..float.clone()
     };
-    let int8 = kept("64-64-int8", &|| {
-        trained(ours, Kind::Network, rounded(Arithmetic::Int8PerChannel))
-    })?;
-    let int16 = kept("64-64-int16", &|| {
-        trained(ours, Kind::Network, rounded(Arithmetic::Int16))
-    })?;
-    let form = kept("closed-form", &|| {
-        Ok(fit_closed_form(ours, Split::WithinPose, SEED)?.weights)
-    })?;
-    let both = Options {
-        arithmetic: Arithmetic::Int8PerChannel,
+    Tier {
+        names: ["64-64 float", "64-64 int16", "64-64 int8"],
+        files: ["64-64-float", "64-64-int16", "64-64-int8"],
+        int8: Options {
+            arithmetic: Arithmetic::Int8PerChannel,
+            ..int16.clone()
+        },
+        float,
+        int16,
+    }
+}
+
+/// Wider, with everything that makes a network fine: directions of weak forces count, unused weights decay, and in int8 each
+/// unit of the first layer has four parts.
+fn fine_tier(args: &PeersArgs) -> Tier {
+    let float = Options {
+        hidden: vec![128, 64],
+        batch: 128,
+        learning_rate: 1e-2,
+        direction_weight: Some(3.0),
+        weight_decay: 0.02,
+        ..plain(args)
+    };
+    let int16 = Options {
+        epochs: 0,
         rounded_epochs: args.our_rounded_epochs,
+        // Begins with a third of it: the weights are in their place.
+        learning_rate: 3e-3,
         ..float.clone()
     };
-    let both = kept("both", &|| trained(ours, Kind::Both, both.clone()))?;
-    let model = |name, how, weights| Model { name, how, weights };
-    Ok(vec![
-        model("the paper's", How::Paper, paper),
-        model("64-64 float", How::Float, alone),
-        model("64-64 int16", How::Chip, int16),
-        model("64-64 int8", How::Chip, int8),
-        model("closed form", How::Chip, form),
-        model("closed form + 64-64 int8", How::Chip, both),
-    ])
+    Tier {
+        names: ["128-64 float", "128-64 int16", "4×128-64 int8"],
+        files: ["128-64-float", "128-64-int16", "4x128-64-int8"],
+        int8: Options {
+            arithmetic: Arithmetic::Int8PerChannel,
+            unit_parts: 4,
+            ..int16.clone()
+        },
+        float,
+        int16,
+    }
 }

@@ -34,7 +34,7 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
     let [comparison] = &comparisons[..] else {
         panic!("one reading")
     };
-    assert_eq!((comparison.test_frames, comparison.cells.len()), (142, 12));
+    assert_eq!((comparison.test_frames, comparison.cells.len()), (142, 18));
     assert!(comparison.common_frames > 100, "{comparison:?}");
     let form = |size: &str| {
         let mut cells = comparison.cells.iter();
