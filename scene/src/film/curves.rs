@@ -9,8 +9,8 @@
 //! A marker is a small disc. Its nine outputs are the affine map that is nearest to the film's displacement over the
 //! disc: the disc's mean displacement and its slopes along r and t.
 
-use super::products::Products;
-use super::table::Table;
+use super::products::{MOST_PRODUCTS, Products};
+use super::table::{Lead, TIP, Table};
 use crate::MARKERS;
 
 pub use super::products::product;
@@ -185,20 +185,33 @@ impl Curves {
 
     /// Tip and markers under a press.
     pub fn at(&self, pose: &Pose) -> Answer {
-        answer(&self.table.sums(pose.size, &self.products.values(pose)))
+        let mut products = [[0.0; MOST_PRODUCTS]; 2];
+        self.products.values(pose, &mut products);
+        Answer {
+            tip: tip(self.table.tip_sums(pose.size, &products[0])),
+            discs: discs(self.table.sums(pose.size, &products)),
+        }
+    }
+
+    /// The markers alone.
+    pub fn discs(&self, pose: &Pose) -> [DiscMotion; 4] {
+        let mut products = [[0.0; MOST_PRODUCTS]; 2];
+        self.products.values(pose, &mut products);
+        discs(self.table.sums(pose.size, &products))
     }
 
     /// The tip's vector alone.
     pub fn tip(&self, pose: &Pose) -> [f64; 3] {
-        let products = self.products.tip_values(pose, TIP_VIEW);
-        let [r, t, z] = self.table.tip_sums(pose.size, &products);
-        let [x, y] = from_diagonal([r, t], MARKERS[TIP_VIEW].centre_mm);
-        [x, y, z]
+        let mut products = [[0.0; MOST_PRODUCTS]];
+        self.products.tip_values(pose, &mut products);
+        tip(self.table.tip_sums(pose.size, &products[0]))
+    }
+
+    /// The first terms of the tip's vector.
+    pub(super) fn lead(&self, size: f64) -> Lead {
+        self.table.lead(size)
     }
 }
-
-/// The marker in whose directions the tip alone is told; the symmetry of the curves gives all four the same.
-const TIP_VIEW: usize = 2;
 
 impl Answer {
     /// The outputs as each marker sees them, by [`Output::index`] and identity.
@@ -224,34 +237,30 @@ impl Answer {
 }
 
 /// A row of three outputs as marker `k` sees it, in the film frame.
-fn vector(sums: &[[f64; 4]; 12], row: usize, k: usize) -> [f64; 3] {
+fn vector(sums: &[[f64; 4]; TIP], row: usize, k: usize) -> [f64; 3] {
     let [r, t, z] = [0, 1, 2].map(|part| sums[3 * row + part][k]);
     let [x, y] = from_diagonal([r, t], MARKERS[k].centre_mm);
     [x, y, z]
 }
 
-/// The tip's vector is the mean of what the four markers say.
-fn tip(sums: &[[f64; 4]; 12]) -> [f64; 3] {
-    let tips: [[f64; 3]; 4] = std::array::from_fn(|k| vector(sums, 3, k));
-    std::array::from_fn(|c| (tips[0][c] + tips[1][c] + tips[2][c] + tips[3][c]) / 4.0)
+/// The tip's vector as the first marker sees it, in the film frame; the symmetry of the curves gives all four the same.
+fn tip([r, t, z]: [f64; 3]) -> [f64; 3] {
+    let [x, y] = from_diagonal([r, t], MARKERS[0].centre_mm);
+    [x, y, z]
 }
 
 /// From the markers' own directions to the film frame.
-fn answer(sums: &[[f64; 4]; 12]) -> Answer {
-    let disc = |k: usize| {
+fn discs(sums: [[f64; 4]; TIP]) -> [DiscMotion; 4] {
+    std::array::from_fn(|k| {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let [x, y] = MARKERS[k].centre_mm.map(|part| half * part.signum());
-        let (along_r, along_t) = (vector(sums, 1, k), vector(sums, 2, k));
+        let (along_r, along_t) = (vector(&sums, 1, k), vector(&sums, 2, k));
         DiscMotion {
-            moved_mm: vector(sums, 0, k),
+            moved_mm: vector(&sums, 0, k),
             along_x: std::array::from_fn(|c| x * (along_r[c] - along_t[c])),
             along_y: std::array::from_fn(|c| y * (along_r[c] + along_t[c])),
         }
-    };
-    Answer {
-        tip: tip(sums),
-        discs: std::array::from_fn(disc),
-    }
+    })
 }
 
 /// Mirrors a vector into the (+, +) corner and turns it: along the diagonal of a corner and across it.
@@ -355,9 +364,17 @@ mod tests {
             tip: vector(30.0),
             discs: std::array::from_fn(disc),
         };
-        let back = answer(&told.outputs()).outputs();
-        for (there, again) in told.outputs().iter().zip(back) {
-            for (there, again) in there.iter().zip(again) {
+        let outputs = told.outputs();
+        let back = discs(std::array::from_fn(|output| outputs[output]));
+        for (k, (there, again)) in told.discs.iter().zip(back).enumerate() {
+            for at in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+                for (there, again) in there.at(at).iter().zip(again.at(at)) {
+                    assert!((there - again).abs() < 1e-15, "{there} {again}");
+                }
+            }
+            let [r, t, z] = [9, 10, 11].map(|output| outputs[output][k]);
+            let [x, y] = from_diagonal([r, t], MARKERS[k].centre_mm);
+            for (there, again) in told.tip.iter().zip([x, y, z]) {
                 assert!((there - again).abs() < 1e-15, "{there} {again}");
             }
         }

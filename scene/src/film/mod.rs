@@ -178,7 +178,10 @@ impl Film {
         match (load.contact(), &self.stick) {
             _ if load.magnitude_n() == 0.0 => at_rest(load),
             (Contact::Force, _) => self.by_force(load),
-            (Contact::Stick, Some(stuck)) => stick(stuck, load),
+            (Contact::Stick, Some(stuck)) => {
+                let gauge = gauge(load);
+                gauge.stuck(&gauge.placed(stuck))
+            }
             (Contact::Slip { mu }, Some(stuck)) => self.slip(stuck, load, mu),
             (_, None) => at_rest(load),
         }
@@ -206,13 +209,18 @@ impl Film {
             return self.slip_slightly(stuck, load, mu);
         }
         let gauge = gauge(load);
-        let [x, y, _] = stuck.tip(gauge.stuck_size(), gauge.tangents, gauge.offset_mm);
-        let [_, _, z] = gauge.force_n([x, y]);
-        if (x * x + y * y).sqrt() <= mu * -z {
-            return stick(stuck, load);
+        let start = gauge.start(&self.slip, mu);
+        if start.is_sure()
+            && let Some(slid) = gauge.slide(&self.slip, &start)
+        {
+            return slid;
         }
-        let slid = gauge.slide(&self.slip, mu, [x, y]);
-        slid.unwrap_or_else(|| stick(stuck, load))
+        let placed = gauge.placed(stuck);
+        if gauge.is_held(&placed, mu) {
+            return gauge.stuck(&placed);
+        }
+        let slid = gauge.slide(&self.slip, &start);
+        slid.unwrap_or_else(|| gauge.stuck(&placed))
     }
 
     /// The state of a slight force, in proportion to it.
@@ -238,18 +246,6 @@ fn at_rest(load: &Load) -> Pressed {
     Pressed {
         touches_mm: load.offset_mm(),
         ..Pressed::default()
-    }
-}
-
-fn stick(stuck: &Stuck, load: &Load) -> Pressed {
-    let gauge = gauge(load);
-    let answer = stuck.at(gauge.stuck_size(), gauge.tangents, gauge.offset_mm);
-    let [x, y, z] = answer.tip;
-    Pressed {
-        tip_mm: [-z * gauge.tangents[0], -z * gauge.tangents[1], z],
-        force_n: gauge.force_n([x, y]),
-        touches_mm: load.offset_mm(),
-        discs: answer.discs,
     }
 }
 

@@ -51,33 +51,32 @@ impl Products {
         self.tip_steps = self.steps.len();
     }
 
-    /// Each product as each marker sees it.
-    pub(super) fn values(&self, pose: &Pose) -> [[f64; 4]; MOST_PRODUCTS] {
-        let mut variables = [[0.0; 4]; 4];
-        for marker in 0..MARKERS.len() {
-            for (variable, value) in variables.iter_mut().zip(seen(pose, marker)) {
-                variable[marker] = value;
-            }
-        }
-        let mut values = [[1.0; 4]; MOST_PRODUCTS];
-        for (k, (from, variable)) in self.steps.iter().enumerate() {
-            let (from, variable) = (
-                values[usize::from(*from)],
-                variables[usize::from(*variable)],
-            );
-            values[k + 1] = std::array::from_fn(|marker| from[marker] * variable[marker]);
-        }
-        values
+    /// Each product as the first two markers see it; the others lie opposite.
+    pub(super) fn values(&self, pose: &Pose, values: &mut Values<2>) {
+        multiply(&self.steps, [0, 1].map(|marker| seen(pose, marker)), values);
     }
 
-    /// The tip's products as one marker sees them.
-    pub(super) fn tip_values(&self, pose: &Pose, marker: usize) -> [f64; MOST_PRODUCTS] {
-        let variables = seen(pose, marker);
-        let mut values = [1.0; MOST_PRODUCTS];
-        for (k, (from, variable)) in self.steps[..self.tip_steps].iter().enumerate() {
+    /// The tip's products as the first marker sees them.
+    pub(super) fn tip_values(&self, pose: &Pose, values: &mut Values<1>) {
+        multiply(&self.steps[..self.tip_steps], [seen(pose, 0)], values);
+    }
+}
+
+/// Each product's value as some markers see it.
+pub(super) type Values<const MARKERS: usize> = [[f64; MOST_PRODUCTS]; MARKERS];
+
+/// Products of each marker's variables; the first is 1.
+#[inline(always)]
+fn multiply<const MARKERS: usize>(
+    steps: &[(u8, u8)],
+    variables: [[f64; 4]; MARKERS],
+    values: &mut Values<MARKERS>,
+) {
+    values.iter_mut().for_each(|values| values[0] = 1.0);
+    for (k, (from, variable)) in steps.iter().enumerate() {
+        for (values, variables) in values.iter_mut().zip(&variables) {
             values[k + 1] = values[usize::from(*from)] * variables[usize::from(*variable)];
         }
-        values
     }
 }
 
@@ -146,8 +145,12 @@ mod tests {
         assert_eq!(products.find([2, 1, 1, 1]), Some(place));
         products.mark_tip();
         let place = usize::from(place);
-        assert!((products.values(&pose)[place][2] - expected).abs() < 1e-15);
-        assert!((products.tip_values(&pose, 2)[place] - expected).abs() < 1e-15);
+        // Marker 0 lies opposite, and the degree is odd.
+        let (mut values, mut tip_values) = ([[0.0; MOST_PRODUCTS]; 2], [[0.0; MOST_PRODUCTS]]);
+        products.values(&pose, &mut values);
+        products.tip_values(&pose, &mut tip_values);
+        assert!((values[0][place] + expected).abs() < 1e-15);
+        assert!((tip_values[0][place] + expected).abs() < 1e-15);
         for (k, slope) in slopes.into_iter().enumerate() {
             let moved = |step: f64| {
                 let mut pose = pose;

@@ -181,35 +181,58 @@ impl Stuck {
 
     /// Tip and markers under a tip of this size (0 to 1) whose way has these tangents and that touches at this offset, mm.
     pub fn at(&self, size: f64, tangents: [f64; 2], offset_mm: [f64; 2]) -> Answer {
+        self.placed(size, tangents, offset_mm).answer()
+    }
+
+    /// Such a tip's place between the solutions.
+    #[inline(always)]
+    pub(super) fn placed(&self, size: f64, tangents: [f64; 2], offset_mm: [f64; 2]) -> Placed<'_> {
         let octant = Octant::of(tangents);
         let way = Way::new(size, octant.mirrored(tangents));
-        let offset = Offset::new(octant.mirrored(offset_mm));
-        let place = self.axes.at(&way);
-        let bent = offset.bent(&self.bend_axes.at(&way), &self.bend_rows);
-        let halves = [0, 1].map(|half| place.sum(&self.discs[half]));
+        Placed {
+            stuck: self,
+            octant,
+            offset: Offset::new(octant.mirrored(offset_mm)),
+            place: self.axes.at(&way),
+            bend_place: self.bend_axes.at(&way),
+        }
+    }
+}
+
+/// A tip that sticks, by the solutions around it: its vector can be told without the markers.
+pub(super) struct Placed<'a> {
+    stuck: &'a Stuck,
+    octant: Octant,
+    offset: Offset,
+    place: Place<4>,
+    bend_place: Place<2>,
+}
+
+impl Placed<'_> {
+    /// Tip and markers.
+    pub(super) fn answer(&self) -> Answer {
+        let bent: [f32; 16] = self.offset.bent(&self.bend_place, &self.stuck.bend_rows);
+        let halves = [0, 1].map(|half| self.place.sum(&self.stuck.discs[half]));
         let disc = |k: usize| {
             let row = &halves[k / 2][DISC * (k % 2)..][..DISC];
             DiscMotion {
-                moved_mm: offset.moves(row, &bent[3 * (k + 1)..]),
+                moved_mm: self.offset.moves(row, &bent[3 * (k + 1)..]),
                 along_x: vector(&row[9..]),
                 along_y: vector(&row[12..]),
             }
         };
-        let tip = offset.moves(&place.sum(&self.tips), &bent);
-        octant.answer(&Answer {
+        let tip = self.offset.moves(&self.place.sum(&self.stuck.tips), &bent);
+        self.octant.answer(&Answer {
             tip,
             discs: std::array::from_fn(disc),
         })
     }
 
-    /// The tip's vector alone.
-    pub fn tip(&self, size: f64, tangents: [f64; 2], offset_mm: [f64; 2]) -> [f64; 3] {
-        let octant = Octant::of(tangents);
-        let way = Way::new(size, octant.mirrored(tangents));
-        let offset = Offset::new(octant.mirrored(offset_mm));
-        let bent = offset.bent(&self.bend_axes.at(&way), &self.bend_rows);
-        let tip = self.axes.at(&way).sum(&self.tips);
-        octant.vector(offset.moves(&tip, &bent))
+    /// The tip's vector alone, the same to the last bit.
+    pub(super) fn tip(&self) -> [f64; 3] {
+        let bent: [f32; 4] = self.offset.bent(&self.bend_place, &self.stuck.bend_rows);
+        let tip = self.place.sum(&self.stuck.tips);
+        self.octant.vector(self.offset.moves(&tip, &bent))
     }
 }
 
@@ -232,10 +255,10 @@ impl Offset {
         }
     }
 
-    /// What the first derivatives leave, of tip and markers.
+    /// What the first derivatives leave, of the first few of the tip's and the markers' numbers.
     #[inline(always)]
-    fn bent(&self, place: &Place<2>, rows: &[[f32; BENT]]) -> [f32; 16] {
-        let mut sum = [0.0; 16];
+    fn bent<const FEW: usize>(&self, place: &Place<2>, rows: &[[f32; BENT]]) -> [f32; FEW] {
+        let mut sum = [0.0; FEW];
         place.each(|number, weight| {
             let parts = rows[number].chunks_exact(16).zip(self.products);
             for (part, product) in parts {

@@ -158,7 +158,7 @@ fn every_octant_and_offset_comes_from_one_octants_solutions() {
                     assert!((a - b).abs() < 2e-3, "{size} {tangents:?}: {a} {b}");
                 }
             }
-            let tip = stuck.tip(size, tangents, offset);
+            let tip = stuck.placed(size, tangents, offset).tip();
             assert_eq!(tip, found.tip);
         }
     }
