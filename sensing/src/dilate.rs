@@ -74,26 +74,25 @@ impl Dilation {
         &mut self.mask[kept..][..rows * self.words]
     }
 
-    /// Looks at the rows that were written: the number of their set bits.
-    pub fn look(&mut self, rows: usize) -> u32 {
+    /// Looks at the rows that were written.
+    pub fn look(&mut self, rows: usize) {
         let row_words = self.words;
         let incoming = self.incoming(rows);
         if !any_set(incoming) {
             // As most are.
-            return 0;
+            return;
         }
-        let (mut count, mut occupied, mut set_rows) = (0, 0, 0);
+        let (mut occupied, mut set_rows) = (0, 0);
         for (y, row) in incoming.chunks_exact(row_words).enumerate() {
-            let before = count;
-            for (i, word) in row.iter().enumerate().filter(|(_, word)| **word != 0) {
-                count += word.count_ones();
-                occupied |= 1 << i;
+            let mut in_row = 0;
+            for (i, _) in row.iter().enumerate().filter(|(_, word)| **word != 0) {
+                in_row |= 1 << i;
             }
-            set_rows |= u32::from(count > before) << y;
+            occupied |= in_row;
+            set_rows |= u32::from(in_row != 0) << y;
         }
         self.occupied |= occupied;
         self.set_rows |= set_rows << self.kept_rows();
-        count
     }
 
     /// Whether no row that is still needed has a set bit.
@@ -152,23 +151,29 @@ impl Dilation {
     /// the one behind its last.
     #[inline(always)]
     pub fn passed(&self, i: usize, [x0, end]: [u16; 2]) -> u32 {
-        let row = (i + usize::from(self.radius)) * self.words;
-        let (first, last) = (usize::from(x0 / 32), usize::from((end - 1) / 32));
-        let words = self.mask.get(row + first..=row + last).unwrap_or_default();
-        let count = |(i, word): (usize, &u32)| {
-            let from = if i == 0 {
-                u32::MAX << (x0 % 32)
-            } else {
-                u32::MAX
-            };
-            let to = if i == last - first {
-                last_word_bits(end)
-            } else {
-                u32::MAX
-            };
+        let first = (i + usize::from(self.radius)) * self.words + usize::from(x0 / 32);
+        let (start, columns) = (u32::from(x0 % 32), u32::from(end - x0));
+        match self.mask.get(first..first + 2) {
+            // Most runs of a marker.
+            Some([word, next]) if (1..=32).contains(&columns) => {
+                let bits = word >> start | (next << 1) << (31 - start);
+                (bits << (32 - columns)).count_ones()
+            }
+            _ => self.passed_in_words(first, start, columns),
+        }
+    }
+
+    /// The set bits among so many from bit `start` of the mask's word `first` on.
+    #[inline(never)]
+    fn passed_in_words(&self, first: usize, start: u32, columns: u32) -> u32 {
+        let words = self.mask.get(first..).unwrap_or_default();
+        let end = start + columns;
+        let inside = |(word, column): (&u32, u32)| {
+            let from = u32::MAX << start.saturating_sub(column).min(31);
+            let to = u32::MAX >> (32 - (end - column).min(32));
             (word & from & to).count_ones()
         };
-        words.iter().enumerate().map(count).sum()
+        words.iter().zip((0..end).step_by(32)).map(inside).sum()
     }
 
     /// The words in which dilated rows may have set bits: from the first to before the last that is next to an occupied one.
@@ -266,17 +271,20 @@ mod tests {
         let mut dilation = Dilation::new();
         dilation.begin(WIDTH, dilations);
         let mut out = Vec::new();
+        let set = |row: &[u32; 3]| row.iter().map(|word| word.count_ones()).sum::<u32>();
         for band in all.chunks(at_a_time) {
             let words: Vec<u32> = band.iter().flat_map(|row| **row).collect();
             dilation.incoming(band.len()).copy_from_slice(&words);
-            let count = words.iter().map(|word| word.count_ones()).sum::<u32>();
-            assert_eq!(dilation.look(band.len()), count);
+            dilation.look(band.len());
             for i in 0..band.len() {
                 let mut edges = Edges::new();
                 dilation.edges(i, &dilation.near(), &mut edges);
                 let runs: Vec<_> = edges.runs().iter().map(|[x, end]| (*x, end - 1)).collect();
                 assert!(!dilation.is_empty() || dilation.is_empty_row(i));
                 assert!(!dilation.is_empty_row(i) || runs.is_empty());
+                let passed = edges.runs().iter().map(|run| dilation.passed(i, *run));
+                let of_row = (out.len().checked_sub(late)).map_or(0, |row| set(all[row]));
+                assert_eq!(passed.sum::<u32>(), of_row);
                 out.push(runs);
             }
             dilation.advance(band.len());

@@ -95,25 +95,31 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     }
 
     /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i` and with `near`. Rows come in order, from 0 to at most 799; empty ones may be
-    /// left out while the labeller is [idle](Self::is_idle).
-    pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize, near: &Near) {
+    /// left out while the labeller is [idle](Self::is_idle). Gives the number of the row's pixels that were set before dilation.
+    pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize, near: &Near) -> u32 {
         self.last = 1 - self.last;
         let (before, current) = last_two(&mut self.rows, self.last);
         dilation.edges(i, near, &mut current.edges);
-        let count = current.edges.runs().len() as u32;
+        let (above, runs) = (before.edges.runs(), current.edges.runs());
+        let labels = (&before.labels, &mut current.labels);
+        let count = runs.len() as u32;
         let (left, exhausted) = self.runs_left.overflowing_sub(count);
         self.runs_left = left;
         self.exhausted |= exhausted;
         self.overflowed |= exhausted;
         self.idle = count == 0;
         let (left, top) = self.origin;
-        if !continue_blobs(before, current, &mut self.forest, left, y + top) {
-            self.label_row(y);
+        let mut all = 0;
+        let mut passed = |run: [u16; 2]| {
+            let passed = dilation.passed(i, run);
+            all += passed;
+            passed
+        };
+        let place = (left, y + top);
+        if !continue_blobs([above, runs], labels, &mut self.forest, place, &mut passed) {
+            self.label_row(y, passed);
         }
-        let Row { edges, labels } = &self.rows[self.last];
-        for (run, label) in edges.runs().iter().zip(labels) {
-            self.forest.slots[usize::from(*label)].moments.passed += dilation.passed(i, *run);
-        }
+        all
     }
 
     /// Weighs the runs of row `y`, which was pushed last.
@@ -144,7 +150,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.last = 1 - self.last;
         self.rows[self.last].edges.clear();
         self.idle = true;
-        self.label_row(height);
+        self.label_row(height, |_| 0);
     }
 
     /// The blobs kept so far, ordered by their lowest row, then by where they begin in it.
@@ -157,8 +163,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed
     }
 
-    /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.
-    fn label_row(&mut self, y: u16) {
+    /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it. `passed` says how many pixels of a run
+    /// were set before dilation.
+    fn label_row(&mut self, y: u16, mut passed: impl FnMut([u16; 2]) -> u32) {
         let (left, y) = (self.origin.0, y + self.origin.1);
         let (before, current) = last_two(&mut self.rows, self.last);
         let (above, above_labels) = (before.edges.runs(), &before.labels);
@@ -174,7 +181,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             let touched = above[first..].iter().zip(&above_labels[first..]);
             let mut touched = touched.take_while(|(above, _)| above[0] <= end);
             let Some((_, touched_label)) = touched.next() else {
-                let opened = self.forest.open(Moments::of_run(run, y));
+                let mut moments = Moments::of_run(run, y);
+                moments.passed = passed([x0, end]);
+                let opened = self.forest.open(moments);
                 self.overflowed |= opened.is_none();
                 *label = opened.unwrap_or(0);
                 continue;
@@ -184,7 +193,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
                 self.forest.join(root, *other);
                 joined = true;
             }
-            self.forest.slots[usize::from(root)].moments.add_run(run, y);
+            let moments = &mut self.forest.slots[usize::from(root)].moments;
+            moments.add_run(run, y);
+            moments.passed += passed([x0, end]);
             *label = root;
         }
         if joined {
@@ -222,11 +233,17 @@ fn last_two(rows: &mut [Row; 2], last: usize) -> (&mut Row, &mut Row) {
     if last == 0 { (b, a) } else { (a, b) }
 }
 
-/// Labels the runs of the row `y` of the frame when each touches just one of those before, and each of these just one of them: the
-/// usual case. Otherwise does nothing and gives false. `left` is where columns begin.
+/// Labels the runs of the row `y` of the frame when each touches just one of those above, and each of these just one of them: the
+/// usual case. Otherwise does nothing and gives false. `left` is where columns begin, and `passed` says how many pixels of a run were set
+/// before dilation.
 #[inline(always)]
-fn continue_blobs(before: &Row, current: &mut Row, forest: &mut Forest, left: u16, y: u16) -> bool {
-    let (above, runs) = (before.edges.runs(), current.edges.runs());
+fn continue_blobs(
+    [above, runs]: [&[[u16; 2]]; 2],
+    (above_labels, labels): (&[Label; MAX_RUNS], &mut [Label; MAX_RUNS]),
+    forest: &mut Forest,
+    (left, y): (u16, u16),
+    mut passed: impl FnMut([u16; 2]) -> u32,
+) -> bool {
     if above.len() != runs.len() {
         return false;
     }
@@ -240,11 +257,13 @@ fn continue_blobs(before: &Row, current: &mut Row, forest: &mut Forest, left: u1
         // Behind what touches these.
         free = [a[1] + 1, b[1] + 1];
     }
-    let labels = current.labels.iter_mut().zip(&before.labels);
+    let labels = labels.iter_mut().zip(above_labels);
     for (&[x0, end], (label, above)) in runs.iter().zip(labels) {
         *label = *above;
         let run = Run { x0, x1: end - 1 }.moved(left);
-        forest.slots[usize::from(*above)].moments.add_run(run, y);
+        let moments = &mut forest.slots[usize::from(*above)].moments;
+        moments.add_run(run, y);
+        moments.passed += passed([x0, end]);
     }
     true
 }

@@ -322,7 +322,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// Takes the rows that were written to the dilation.
     fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
         if !self.labels.is_exhausted() {
-            self.set_pixels += self.dilation.look(rows);
+            self.dilation.look(rows);
             if !self.is_quiet() {
                 self.label(pixels, band, rows);
             }
@@ -347,7 +347,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             if self.labels.is_idle() && self.dilation.is_empty_row(i) {
                 continue;
             }
-            self.labels.push(y, &self.dilation, i, &near);
+            self.set_pixels += self.labels.push(y, &self.dilation, i, &near);
             if self.settings.weighted && !self.labels.is_idle() {
                 match band.row(y).or_else(|| self.history.row(y)) {
                     Some(row) => self.labels.weigh(y, |run| pixels.weigh(row, run)),
