@@ -114,6 +114,11 @@ fn options_that_do_not_fit(refused: &dyn Fn(&Options, &str)) {
         ..small()
     };
     refused(&split, "600 wide");
+    let single = Options {
+        hidden: vec![8],
+        ..split.clone()
+    };
+    refused(&single, "between two hidden layers");
     let unrounded = Options {
         rounded_epochs: 0,
         ..split.clone()

@@ -120,7 +120,7 @@ impl Options {
         ensure!(self.unit_parts > 1, "a unit has at least one part");
         ensure!(
             self.arithmetic != Arithmetic::Int16 && self.rounded_epochs > 0,
-            "units are split for int8, and before passes with rounding"
+            "units are split for int8, and before passes with rounding: ask for these, or leave the units whole"
         );
         let hidden = start.map_or_else(
             || self.hidden.clone(),
@@ -133,6 +133,10 @@ impl Options {
             },
         );
         let (_, coarse) = hidden.split_last().unwrap_or((&0, &[]));
+        ensure!(
+            !coarse.is_empty(),
+            "units are split between two hidden layers: this network has fewer, and no activation of seven bits"
+        );
         let widest = coarse.iter().max().unwrap_or(&0) * self.unit_parts;
         ensure!(
             widest <= WIDEST,
