@@ -283,8 +283,8 @@ fn the_films_curves_agree_with_its_solver() {
     for (more, tolerance_px) in [
         (vec!["--contact", "force"], 0.1),
         (asides.to_vec(), 0.1),
-        (vec!["--contact", "stick"], 0.2),
-        (vec!["--contact", "slip:0.4"], 0.2),
+        (vec!["--contact", "stick"], 0.1),
+        (vec!["--contact", "slip:0.4"], 0.1),
     ] {
         let (depth, reduced) = film(&more);
         let (full_depth, full) = film(&[&more[..], &["--solver", "full"]].concat());
