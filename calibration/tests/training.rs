@@ -2,8 +2,7 @@
 
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
 use hivtac_calibration::fit::{Kind, fit};
-use hivtac_calibration::network::{Arithmetic, Meaning};
-use hivtac_calibration::network::{INPUTS, OUTPUTS};
+use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::train::{Options, Samples, train};
 
 fn data() -> Dataset {

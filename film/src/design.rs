@@ -1,6 +1,7 @@
 //! What a film is: its dimensions, its material and how finely it is computed.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 use crate::FilmError;
 use crate::grid::Grid;
@@ -8,18 +9,23 @@ use crate::point::Material;
 use crate::shell::{Shell, Spring};
 use crate::spline::Axis;
 
-/// Rings and rays of the points by which a post holds the film.
-const POST_RINGS: usize = 16;
-const POST_RAYS: usize = 64;
+/// Points along a post by which it holds the film, both ways.
+const POST_POINTS: usize = 20;
 /// Rings and rays of the points on which a tip presses.
 const TIP_RINGS: usize = 10;
 const TIP_RAYS: usize = 32;
+/// How far from the middle a tip may press where cells are small, mm: a tip of half a millimetre anywhere within ±5 mm, or a
+/// larger one a little nearer.
+const TIP_REACH_MM: f64 = 5.5;
 /// How fast cells grow away from posts and tip, mm per mm.
 const GROWTH: f64 = 0.25;
 /// Cells at fineness 1, mm: under the tip, at a post (where the film's grip ends within 0.2 mm), and anywhere.
 const TIP_CELL_MM: f64 = 0.5;
 const POST_CELL_MM: f64 = 0.35;
 const LARGEST_CELL_MM: f64 = 1.6;
+
+/// The farthest that a post may be off its place along x and along y, mm.
+pub const MOST_POST_SHIFT_MM: f64 = 1.0;
 
 /// A film on four posts, pressed by a tip. Lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +38,9 @@ pub struct Design {
     pub material: Material,
     /// Radius of the discs around the posts' centres on which the film is held, > 0.
     pub post_radius_mm: f64,
+    /// How far each post is off its place, in the order of the markers' identities; the film is cut as if none were. Within
+    /// ±[`MOST_POST_SHIFT_MM`].
+    pub post_shift_mm: [[f64; 2]; 4],
     /// How stiffly a post holds the film, N/mm per mm², > 0. The film slips by √(membrane stiffness / grip) at a
     /// post's rim: 0.18 mm at the default 20, as if the post were that much smaller. A rubber film that is clamped on
     /// both faces gives by shear through its thickness, about 12 G/t = 8 N/mm³: the default is no softer than that.
@@ -55,6 +64,7 @@ impl Default for Design {
                 thickness_mm: 0.5,
             },
             post_radius_mm: 1.5,
+            post_shift_mm: [[0.0; 2]; 4],
             post_grip_n_per_mm3: 20.0,
             tip_radius_mm: 0.5,
             tip_offset_mm: [0.0; 2],
@@ -91,6 +101,12 @@ impl Design {
                 return Err(refused(what, value, &format!("between {from} and {to}")));
             }
         }
+        for part in self.post_shift_mm.into_iter().flatten() {
+            if !(-MOST_POST_SHIFT_MM..=MOST_POST_SHIFT_MM).contains(&part) {
+                let bound = format!("within ±{MOST_POST_SHIFT_MM} mm");
+                return Err(refused("post shift", part, &bound));
+            }
+        }
         self.check_tip()
     }
 
@@ -110,15 +126,18 @@ impl Design {
         let breaks = self.breaks();
         let axes = [Axis::new(&breaks), Axis::new(&breaks)];
         let mut shell = Shell::new(Grid { axes }, &self.material);
-        let springs: Vec<Spring> = self
-            .post_points()
-            .map(|(point, area)| Spring {
-                place: shell.grid().place(point),
-                stiffness: area * self.post_grip_n_per_mm3,
-            })
-            .collect();
+        let springs = self.springs(shell.grid());
         shell.hold(springs);
         shell
+    }
+
+    /// What holds a film over `grid`.
+    pub(crate) fn springs(&self, grid: &Grid) -> Vec<Spring> {
+        let spring = |(point, area)| Spring {
+            place: grid.place(point),
+            stiffness: area * self.post_grip_n_per_mm3,
+        };
+        self.post_points().into_iter().map(spring).collect()
     }
 
     /// The points of the film on which the tip presses, with their shares of its force.
@@ -134,15 +153,25 @@ impl Design {
             .collect()
     }
 
-    /// The points of the film on posts, with their areas in mm².
-    fn post_points(&self) -> impl Iterator<Item = ([f64; 2], f64)> + '_ {
+    /// The points of the film on posts, with their areas in mm²: Gauss's over the angle whose sine is x, and along the chord
+    /// there. They follow a post that is shifted, and the film's edge cuts them, without a jump.
+    fn post_points(&self) -> Vec<([f64; 2], f64)> {
         let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
         let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];
-        centres
-            .into_iter()
-            .flat_map(|centre| disc(centre, self.post_radius_mm, POST_RINGS, POST_RAYS))
-            .filter(move |([x, y], ..)| x.abs() <= edge && y.abs() <= edge)
-            .map(|(point, area, _)| (point, area))
+        let radius = self.post_radius_mm;
+        let on_film = |from: f64, to: f64| [from.max(-edge), to.min(edge)];
+        let mut points = Vec::new();
+        for ([cx, cy], [dx, dy]) in centres.into_iter().zip(self.post_shift_mm) {
+            let (cx, cy) = (cx + dx, cy + dy);
+            let angles = on_film(cx - radius, cx + radius)
+                .map(|x| ((x - cx) / radius).clamp(-1.0, 1.0).asin());
+            for (angle, turned) in gauss(angles) {
+                let (x, chord) = (cx + radius * angle.sin(), radius * angle.cos());
+                let along = gauss(on_film(cy - chord, cy + chord));
+                points.extend(along.map(|(y, height)| ([x, y], chord * turned * height)));
+            }
+        }
+        points
     }
 
     /// Cell borders along one side: even steps in the integral of 1 / (wanted size), symmetric.
@@ -169,13 +198,42 @@ impl Design {
         left.chain([0.0]).chain(half.iter().copied()).collect()
     }
 
-    /// The wanted size of a cell `at` mm from the middle: small at the tip and at the posts.
+    /// The wanted size of a cell `at` mm from the middle: small wherever a tip may press, and at the posts.
     fn cell_mm(&self, at: f64) -> f64 {
-        let tip = TIP_CELL_MM + GROWTH * (at - self.tip_radius_mm).max(0.0);
+        let tip = TIP_CELL_MM + GROWTH * (at - TIP_REACH_MM).max(0.0);
         let outside = (at - self.span_mm / 2.0).abs() - self.post_radius_mm;
         let post = POST_CELL_MM + GROWTH * outside.max(0.0);
         tip.min(post).min(LARGEST_CELL_MM) / self.fineness
     }
+}
+
+/// Gauss's points on a length, with their weights: none on one that is not there.
+fn gauss([from, to]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+    static POINTS: LazyLock<[(f64, f64); POST_POINTS]> = LazyLock::new(gauss_points);
+    let (middle, half) = ((from + to) / 2.0, ((to - from) / 2.0).max(0.0));
+    POINTS
+        .iter()
+        .map(move |(at, weight)| (middle + half * at, half * weight))
+        .filter(|(_, weight)| *weight > 0.0)
+}
+
+/// Gauss's points and weights on [−1, 1]: the roots of Legendre's polynomial by Newton's method.
+fn gauss_points() -> [(f64, f64); POST_POINTS] {
+    let n = POST_POINTS as f64;
+    std::array::from_fn(|i| {
+        let mut x = -(PI * (i as f64 + 0.75) / (n + 0.5)).cos();
+        let mut slope = 1.0;
+        for _ in 0..20 {
+            let (mut before, mut value) = (1.0, x);
+            for k in 2..=POST_POINTS {
+                let k = k as f64;
+                (before, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k);
+            }
+            slope = n * (x * value - before) / (x * x - 1.0);
+            x -= value / slope;
+        }
+        (x, 2.0 / ((1.0 - x * x) * slope * slope))
+    })
 }
 
 /// Points of a disc in rings: place, area and distance from its centre.
@@ -252,7 +310,8 @@ mod tests {
                 overhang_mm,
                 ..Design::default()
             };
-            design.post_points().map(|(_, area)| area).sum()
+            let points = design.post_points();
+            points.iter().map(|(_, area)| area).sum()
         };
         let disc = PI * 1.5 * 1.5;
         assert!((area(0.0) - disc).abs() < 1e-9, "four quarters");

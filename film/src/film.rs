@@ -3,7 +3,8 @@
 use crate::newton::{Guide, Problem, Solution};
 use crate::point::{V3, dot, normal};
 use crate::shell::Shell;
-use crate::sparse::{COMPONENTS, Solver};
+use crate::answers::{Change, Neighbours};
+use crate::sparse::{COMPONENTS, Factors, Solver};
 use crate::{Design, FilmError};
 
 /// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a press has F_z < 0).
@@ -127,12 +128,21 @@ impl Film {
     /// How the camera-side surface point that rests at (x, y) mm moves, mm: half the thickness below the middle
     /// surface, along its normal.
     pub fn displacement(&self, state: &Equilibrium, rest_mm: [f64; 2]) -> [f64; 3] {
+        self.surface(state, rest_mm, self.design.material.thickness_mm / 2.0)
+    }
+
+    /// The same of the surface that is `half` mm below the middle one.
+    pub(crate) fn surface(
+        &self,
+        state: &Equilibrium,
+        rest_mm: [f64; 2],
+        half: f64,
+    ) -> [f64; 3] {
         let grid = self.shell.grid();
         let place = grid.place(rest_mm);
         let [mut a1, mut a2] = grid.gradients(&state.unknowns, &place);
         a1[0] += 1.0;
         a2[1] += 1.0;
-        let half = self.design.material.thickness_mm / 2.0;
         let n = normal(&a1, &a2);
         let [dx, dy, dz] = grid.interpolate(&state.unknowns, &place);
         [dx - half * n[0], dy - half * n[1], dz + half * (1.0 - n[2])]
@@ -186,37 +196,57 @@ pub struct Response {
 }
 
 impl Film {
+    /// The factored stiffness of a state.
+    pub(crate) fn factors_at(&self, state: &Equilibrium) -> Result<Factors, FilmError> {
+        let at = self.shell.derivatives(&state.unknowns);
+        let factors = self.solver.factor(self.shell.pattern(), &at.stiffness);
+        factors.ok_or_else(|| FilmError::Solver("the film is not stable".into()))
+    }
+
+    pub(crate) fn shell(&self) -> &Shell {
+        &self.shell
+    }
+
+    /// The response whose unknowns change so, as far as the tip stays where it is.
+    pub(crate) fn response(&self, unknowns: Vec<f64>) -> Response {
+        Response {
+            tip_mm: mean(&self.tip, &unknowns),
+            unknowns,
+        }
+    }
+
+    /// The tip's shares of another design on this mesh.
+    pub(crate) fn shares(&self, design: &Design) -> Vec<f64> {
+        tip_shares(&self.shell, design)
+    }
+
+    /// The displacement of what `shares` weigh, mm.
+    pub(crate) fn mean(&self, shares: &[f64], state: &Equilibrium) -> V3 {
+        mean(shares, &state.unknowns)
+    }
+
+    /// A force at the tip on each unknown, N.
+    pub(crate) fn load(&self, force: &V3) -> Vec<f64> {
+        weighted(&self.tip, force)
+    }
+
+    /// A force on each unknown by its share, N.
+    pub(crate) fn spread(shares: &[f64], force: &V3) -> Vec<f64> {
+        weighted(shares, force)
+    }
+
     /// How a state answers to one more newton along x, y and z, and to a tip that touches the film one millimetre farther
     /// along x and y with the force kept: its derivatives.
     ///
     /// # Errors
     /// When the stiffness is not positive definite: a force would not hold the film there.
     pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], FilmError> {
-        let at = self.shell.derivatives(&state.unknowns);
-        let factors = self.solver.factor(self.shell.pattern(), &at.stiffness);
-        let factors = factors.ok_or_else(|| FilmError::Solver("the film is not stable".into()))?;
-        let moved = [[1.0, 0.0], [0.0, 1.0]].map(|way| self.shares_per_mm(way));
-        let mut sides = Vec::new();
-        for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
-            sides.extend(weighted(&self.tip, &axis));
-        }
-        for shares in &moved {
-            sides.extend(weighted(shares, &state.force_n));
-        }
-        factors.solve(&mut sides, 5);
-        let unknowns: Vec<&[f64]> = sides.chunks(self.unknowns()).collect();
-        Ok(std::array::from_fn(|k| {
-            let mut tip_mm = mean(&self.tip, unknowns[k]);
-            if let Some(shares) = k.checked_sub(3).map(|way| &moved[way]) {
-                for (sum, part) in tip_mm.iter_mut().zip(mean(shares, &state.unknowns)) {
-                    *sum += part;
-                }
-            }
-            Response {
-                unknowns: unknowns[k].to_vec(),
-                tip_mm,
-            }
-        }))
+        let load: Vec<Change> = Change::all().take(5).collect();
+        let beside = Neighbours::of(&self.design);
+        let answers = self.answers(&beside, state, &load)?;
+        answers
+            .try_into()
+            .map_err(|_| FilmError::Solver("five changes have five answers".into()))
     }
 
     /// The state beside this one that a response foretells, `units` away; only its unknowns are changed.
@@ -228,21 +258,6 @@ impl Film {
         there
     }
 
-    /// How the tip's shares change with its place, per mm.
-    fn shares_per_mm(&self, way: [f64; 2]) -> Vec<f64> {
-        const STEP_MM: f64 = 1e-3;
-        let [back, forth] = [-STEP_MM, STEP_MM].map(|step| {
-            let at = self.design.tip_offset_mm;
-            let tip_offset_mm = [0, 1].map(|k| at[k] + step * way[k]);
-            let design = Design {
-                tip_offset_mm,
-                ..self.design.clone()
-            };
-            tip_shares(&self.shell, &design)
-        });
-        let pairs = forth.iter().zip(&back);
-        pairs.map(|(b, a)| (b - a) / (2.0 * STEP_MM)).collect()
-    }
 }
 
 impl Response {
@@ -271,6 +286,11 @@ impl Response {
 }
 
 impl Equilibrium {
+    /// The film's unknowns, mm.
+    pub(crate) fn unknowns(&self) -> &[f64] {
+        &self.unknowns
+    }
+
     /// The state at a place of a path that the polynomial through some known states of it foretells: a start for
     /// [`Film::press`]. `None` of none.
     pub fn foretold(path: &[(f64, &Equilibrium)], at: f64) -> Option<Equilibrium> {

@@ -7,6 +7,7 @@
     reason = "formulas in indices read best with indices"
 )]
 
+mod answers;
 mod check;
 mod design;
 mod error;
@@ -14,7 +15,7 @@ mod film;
 mod grid;
 mod load;
 mod newton;
-mod parallel;
+pub mod parallel;
 mod point;
 mod reduce;
 mod samples;
@@ -22,10 +23,12 @@ mod shell;
 mod sparse;
 mod spline;
 mod stuck;
+pub mod sweep;
 #[cfg(test)]
 mod verification;
 mod view;
 
+pub use answers::{Change, Neighbours};
 pub use check::{Check, check};
 pub use design::Design;
 pub use error::FilmError;

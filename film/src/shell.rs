@@ -100,18 +100,9 @@ impl Shell {
 
     /// The gradient of the energy of displacements `u`, N.
     pub fn gradient(&self, u: &[f64]) -> Vec<f64> {
-        let mut sum = vec![0.0; u.len()];
+        let mut sum = self.pull(u, &self.springs);
         for &(unknown, stiffness) in &self.pins {
             sum[unknown] += stiffness * u[unknown];
-        }
-        for Spring { place, stiffness } in &self.springs {
-            let moved = self.grid.interpolate(u, place);
-            for (a, value) in place.values.iter().enumerate() {
-                let row = self.grid.coefficient(place.origin, a);
-                for c in 0..COMPONENTS {
-                    sum[COMPONENTS * row + c] += stiffness * value * moved[c];
-                }
-            }
         }
         for cell in self.cells() {
             let local = self.grid.gather(u, cell.origin);
@@ -124,6 +115,21 @@ impl Shell {
                 let row = COMPONENTS * self.grid.coefficient(cell.origin, a);
                 for (total, part) in sum[row..].iter_mut().zip(part) {
                     *total += part;
+                }
+            }
+        }
+        sum
+    }
+
+    /// The gradient of the energy that displacements `u` give to `springs`, N.
+    pub fn pull(&self, u: &[f64], springs: &[Spring]) -> Vec<f64> {
+        let mut sum = vec![0.0; u.len()];
+        for Spring { place, stiffness } in springs {
+            let moved = self.grid.interpolate(u, place);
+            for (a, value) in place.values.iter().enumerate() {
+                let row = self.grid.coefficient(place.origin, a);
+                for c in 0..COMPONENTS {
+                    sum[COMPONENTS * row + c] += stiffness * value * moved[c];
                 }
             }
         }

@@ -35,18 +35,18 @@ pub fn paper_camera() -> Result<Camera, FilmError> {
 /// The four markers of a film in a state.
 pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4] {
     MARKERS.map(|disc| Marker {
-        moved_mm: disc_motion(film, state, &disc).moved_mm,
+        moved_mm: disc_motion(|rest| film.displacement(state, rest), &disc).moved_mm,
         seen_px: disc.centroid_px(|rest| film.displacement(state, rest), camera),
     })
 }
 
 /// How the film moves around each marker.
 pub(crate) fn disc_motions(film: &Film, state: &Equilibrium) -> [DiscMotion; 4] {
-    MARKERS.map(|disc| disc_motion(film, state, &disc))
+    MARKERS.map(|disc| disc_motion(|rest| film.displacement(state, rest), &disc))
 }
 
 /// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u · (x, y)).
-fn disc_motion(film: &Film, state: &Equilibrium, disc: &Disc) -> DiscMotion {
+fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion {
     let mut motion = DiscMotion::default();
     let [cx, cy] = disc.centre_mm;
     let count = (RAYS * RINGS.len()) as f64;
@@ -55,8 +55,7 @@ fn disc_motion(film: &Film, state: &Equilibrium, disc: &Disc) -> DiscMotion {
         for ray in 0..RAYS {
             let (sin, cos) = (ray as f64 * 2.0 * PI / RAYS as f64).sin_cos();
             let [x, y] = [cos, sin].map(|part| ring * disc.radius_mm * part);
-            let moved = film.displacement(state, [cx + x, cy + y]);
-            for (c, part) in moved.into_iter().enumerate() {
+            for (c, part) in moved([cx + x, cy + y]).into_iter().enumerate() {
                 motion.moved_mm[c] += part / count;
                 motion.along_x[c] += slope * part * x;
                 motion.along_y[c] += slope * part * y;
@@ -66,33 +65,40 @@ fn disc_motion(film: &Film, state: &Equilibrium, disc: &Disc) -> DiscMotion {
     motion
 }
 
-/// The same maps, moved along the film so that the camera sees their discs' centroids where it sees those of the film's:
-/// where the film is curved within a disc, the centroid is some hundredths of a pixel off the nearest
-/// affine map's.
+/// The same maps, moved along the film so that the camera sees their discs' centroids where it sees those of the film's.
 pub(crate) fn seen_motions(film: &Film, state: &Equilibrium, camera: &Camera) -> [DiscMotion; 4] {
-    MARKERS.map(|disc| {
-        let mut motion = disc_motion(film, state, &disc);
-        let [x, y] = disc.centroid_px(|rest| film.displacement(state, rest), camera);
-        let seen = |shift: [f64; 2]| {
-            let moved = |[px, py]: [f64; 2]| {
-                let [cx, cy] = disc.centre_mm;
-                let [dx, dy, dz] = motion.at([px - cx, py - cy]);
-                [dx + shift[0], dy + shift[1], dz]
-            };
-            disc.centroid_px(moved, camera)
+    MARKERS.map(|disc| seen_motion(|rest| film.displacement(state, rest), &disc, camera))
+}
+
+/// The affine map nearest to the displacement over a disc, moved along the film so that the camera sees its disc's centroid
+/// where it sees that of the film's: where the film is curved within a disc, the centroid is some hundredths of a pixel off
+/// the nearest affine map's.
+pub(crate) fn seen_motion(
+    film: impl Fn([f64; 2]) -> [f64; 3],
+    disc: &Disc,
+    camera: &Camera,
+) -> DiscMotion {
+    let mut motion = disc_motion(&film, disc);
+    let [x, y] = disc.centroid_px(&film, camera);
+    let seen = |shift: [f64; 2]| {
+        let moved = |[px, py]: [f64; 2]| {
+            let [cx, cy] = disc.centre_mm;
+            let [dx, dy, dz] = motion.at([px - cx, py - cy]);
+            [dx + shift[0], dy + shift[1], dz]
         };
-        let here = seen([0.0; 2]);
-        let step = |way| {
-            let there = seen(way);
-            [0, 1].map(|c| (there[c] - here[c]) / SHIFT_MM)
-        };
-        let ([xx, yx], [xy, yy]) = (step([SHIFT_MM, 0.0]), step([0.0, SHIFT_MM]));
-        let (aside, below) = (x - here[0], y - here[1]);
-        let whole = xx * yy - xy * yx;
-        motion.moved_mm[0] += (yy * aside - xy * below) / whole;
-        motion.moved_mm[1] += (xx * below - yx * aside) / whole;
-        motion
-    })
+        disc.centroid_px(moved, camera)
+    };
+    let here = seen([0.0; 2]);
+    let step = |way| {
+        let there = seen(way);
+        [0, 1].map(|c| (there[c] - here[c]) / SHIFT_MM)
+    };
+    let ([xx, yx], [xy, yy]) = (step([SHIFT_MM, 0.0]), step([0.0, SHIFT_MM]));
+    let (aside, below) = (x - here[0], y - here[1]);
+    let whole = xx * yy - xy * yx;
+    motion.moved_mm[0] += (yy * aside - xy * below) / whole;
+    motion.moved_mm[1] += (xx * below - yx * aside) / whole;
+    motion
 }
 
 #[cfg(test)]

@@ -119,6 +119,11 @@ impl Reciprocal {
     }
 }
 
+/// `value`·`factor` / 2^`bits`, limited to 32 bits.
+pub fn scaled(value: i32, factor: i32, bits: u32) -> i32 {
+    limited((i64::from(value) * i64::from(factor)) >> bits)
+}
+
 /// The nearest number of 32 bits.
 pub fn limited(value: i64) -> i32 {
     value.clamp(i32::MIN.into(), i32::MAX.into()) as i32

@@ -2,6 +2,7 @@
 //! whether it would trust them with a force.
 
 use std::boxed::Box;
+use std::vec::Vec;
 
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
@@ -58,7 +59,33 @@ pub struct Looker {
     sensor: Box<Sensor<'static>>,
 }
 
+/// RGB565 at these sizes: both cameras with both estimators.
+pub fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<View> {
+    let mut views = Vec::new();
+    for &size in sizes {
+        for preset in [Preset::Ov7725, Preset::Paper] {
+            views.extend(ESTIMATORS.map(|estimator| View {
+                preset,
+                size,
+                format: PixelFormat::Rgb565,
+                estimator,
+                contact,
+            }));
+        }
+    }
+    views
+}
+
 impl View {
+    /// The firmware's camera when it sends YUV422.
+    pub const YUV422: View = View {
+        preset: Preset::Ov7725,
+        size: [320, 240],
+        format: PixelFormat::Yuv422,
+        estimator: CentroidEstimator::RednessWeighted,
+        contact: Contact::Force,
+    };
+
     /// How far a marker may be from the truth, px: 0.3 up to QVGA, 0.15 at 800×600, linear between them. Binary centroids
     /// are themselves off by up to 0.35 px at QVGA and 0.25 px at 800×600 on nominal frames, so that 0.15 px
     /// more are allowed to them.

@@ -1,39 +1,11 @@
 //! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused for it.
 
-use hivtac_scene::{Contact, Load, Preset};
-use hivtac_sensing::model::CentroidEstimator;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_scene::{Contact, Load};
 use hivtac_tests::hard::look_at_all;
-use hivtac_tests::looking::{ESTIMATORS, Seen, View};
+use hivtac_tests::looking::{Seen, View, views};
 
 const STICK: Contact = Contact::Stick;
 const SLIP: Contact = Contact::Slip { mu: 0.6 };
-
-/// The firmware's camera when it sends YUV422.
-const YUV422: View = View {
-    preset: Preset::Ov7725,
-    size: [320, 240],
-    format: PixelFormat::Yuv422,
-    estimator: CentroidEstimator::RednessWeighted,
-    contact: Contact::Force,
-};
-
-/// Both cameras and estimators.
-fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<View> {
-    let mut views = Vec::new();
-    for &size in sizes {
-        for preset in [Preset::Ov7725, Preset::Paper] {
-            views.extend(ESTIMATORS.map(|estimator| View {
-                preset,
-                size,
-                format: PixelFormat::Rgb565,
-                estimator,
-                contact,
-            }));
-        }
-    }
-    views
-}
 
 /// Every case is right or refused; what is plain to see is found in half of the frames at least.
 fn hold(views: &[View], repeats: u64) {
@@ -56,7 +28,7 @@ fn hard_cases_are_right_or_refused() {
 
 #[test]
 fn hard_cases_are_right_or_refused_in_yuv422() {
-    hold(&[YUV422], 4);
+    hold(&[View::YUV422], 4);
 }
 
 #[test]
@@ -134,7 +106,7 @@ fn honest_frames_are_accepted() {
 
 #[test]
 fn honest_frames_are_accepted_in_yuv422() {
-    hardly_any_is_refused(&[YUV422], 1_000);
+    hardly_any_is_refused(&[View::YUV422], 1_000);
 }
 
 #[test]
@@ -147,7 +119,7 @@ fn honest_frames_of_a_tip_that_sticks_or_slips_are_accepted() {
 #[ignore = "slow: run by cargo xtask test --all"]
 fn of_ten_thousand_honest_frames_at_most_ten_are_refused() {
     hardly_any_is_refused(&views(Contact::Force, &[[320, 240]]), 10_000);
-    hardly_any_is_refused(&[YUV422], 10_000);
+    hardly_any_is_refused(&[View::YUV422], 10_000);
     hardly_any_is_refused(&views(Contact::Force, &[[800, 600]]), 1_000);
 }
 

@@ -19,7 +19,7 @@ impl Network {
     /// Equalization and Bias Correction").
     pub fn equalize(&mut self, rows: &[[f64; INPUTS]]) {
         for i in 0..self.layers.len().saturating_sub(1) {
-            let maxima = self.unit_maxima(rows).swap_remove(i);
+            let maxima = self.unit_maxima(i + 1, rows).swap_remove(i);
             let most = maxima.iter().copied().fold(0.0, f64::max);
             if most == 0.0 {
                 continue;
@@ -60,10 +60,10 @@ impl Network {
         self.saturates = true;
     }
 
-    /// The largest output of each unit of each hidden layer over `rows`.
-    fn unit_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<Vec<f64>> {
-        let hidden = &self.layers[..self.layers.len().saturating_sub(1)];
-        let mut maxima: Vec<_> = hidden.iter().map(|it| vec![0.0; it.outputs()]).collect();
+    /// The largest output of each unit of the first few layers, which are hidden ones, over `rows`.
+    fn unit_maxima(&self, few: usize, rows: &[[f64; INPUTS]]) -> Vec<Vec<f64>> {
+        let layers = &self.layers[..few];
+        let mut maxima: Vec<_> = layers.iter().map(|it| vec![0.0; it.outputs()]).collect();
         for row in rows {
             let mut x = self.input.forward(row);
             for (layer, maxima) in maxima.iter_mut().enumerate() {
@@ -80,7 +80,9 @@ impl Network {
     /// that never fires can still be scaled.
     pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
         let of_layer = |units: Vec<f64>| units.into_iter().fold(1e-6, f64::max);
-        self.unit_maxima(rows).into_iter().map(of_layer).collect()
+        let hidden = self.layers.len().saturating_sub(1);
+        let maxima = self.unit_maxima(hidden, rows);
+        maxima.into_iter().map(of_layer).collect()
     }
 }
 
@@ -116,8 +118,8 @@ mod tests {
         let rows = rows();
         let before = network.clone();
         network.equalize(&rows);
-        let [a, b] = [0, 1].map(|unit| network.unit_maxima(&rows)[0][unit]);
-        assert!((a - b).abs() < 1e-4 * a && a == before.unit_maxima(&rows)[0][0]);
+        let [a, b] = [0, 1].map(|unit| network.unit_maxima(1, &rows)[0][unit]);
+        assert!((a - b).abs() < 1e-4 * a && a == before.unit_maxima(1, &rows)[0][0]);
         same(&network, &before, &rows);
         // A unit that never speaks, and a layer of such.
         network.layers[0].bias.fill(-1e3);

@@ -5,7 +5,7 @@
 //! a disc shifts its centroid and E|d|²d so that the two nearly cancel.
 
 use super::pattern::length;
-use crate::division::{Reciprocal, limited};
+use crate::division::{Reciprocal, limited, scaled};
 
 /// Which way to look at a shape: along a direction and across it.
 #[derive(Clone, Copy, Debug)]
@@ -71,12 +71,12 @@ pub fn lean(
 ) -> i32 {
     let parts = [(xxx, xxy), (xxy, xyy), (xyy, yyy)].map(|(p, q)| direction.turned(p, q));
     // px³ with 8 bits over px² with 12 are px with 16 once they are shifted by 20.
-    let scaled = |third: [i32; 3]| {
+    let rounded = |third: [i32; 3]| {
         let parts = [direction.along(third), direction.across(third)].map(|it| i64::from(it) << 20);
         limited(by[0].times(parts[0]) + by[1].times(parts[1]))
     };
-    let lean = length([0, 1].map(|side| scaled(parts.map(|part| part[side]))));
-    limited((i64::from(lean) * i64::from(deviation)) >> 16)
+    let lean = length([0, 1].map(|side| rounded(parts.map(|part| part[side]))));
+    scaled(lean, deviation, 16)
 }
 
 #[cfg(test)]

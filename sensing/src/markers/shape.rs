@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     blob::Blob,
-    division::{Reciprocal, limited},
+    division::{Reciprocal, limited, scaled},
     model::CentroidEstimator,
     root::{root, rough_root},
     units::Px,
@@ -134,8 +134,5 @@ fn fill(area: u32, [xx, xy, yy]: [i32; 3]) -> (i32, i32) {
     let lack = i64::from(ellipse) - (i64::from(area) << 8);
     let lack = limited(Reciprocal::of(ellipse).times(lack << 20));
     let mean = (xx + yy) / 2;
-    (
-        65_536 - (lack >> 4),
-        limited((i64::from(lack) * i64::from(mean)) >> 16),
-    )
+    (65_536 - (lack >> 4), scaled(lack, mean, 16))
 }

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     dilate::MAX_DILATIONS,
-    division::{Reciprocal, limited},
+    division::{Reciprocal, limited, scaled},
     geometry::Geometry,
     model::{CentroidEstimator, ContactReading, Rest},
     root::root,
@@ -267,11 +267,6 @@ fn is_filled(image: &Image, rim: i32) -> bool {
     let product = |count: u32, a: i32, b: i32| i64::from(count) * (i64::from(a) * i64::from(b));
     let least = product(image.area, (across - rim).max(0), (along - rim).max(0));
     product(image.passed, across, along) >= least
-}
-
-/// `value`·`factor` / 2^`bits`, limited to 32 bits.
-fn scaled(value: i32, factor: i32, bits: u32) -> i32 {
-    limited((i64::from(value) * i64::from(factor)) >> bits)
 }
 
 /// By a length, at least the least one.

@@ -2,11 +2,9 @@
 //! hard-cases -- [REPEATS [CONTACT]]`.
 
 use anyhow::{Context, Result};
-use hivtac_scene::{Contact, Preset};
-use hivtac_sensing::model::CentroidEstimator;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_scene::Contact;
 use hivtac_tests::hard::{look_at_all, table};
-use hivtac_tests::looking::{ESTIMATORS, View};
+use hivtac_tests::looking::{View, views};
 
 /// Frames for each case and load.
 const REPEATS: u64 = 4;
@@ -24,32 +22,13 @@ fn main() -> Result<()> {
         None => Contact::Force,
         Some(text) => text.parse()?,
     };
-    for view in views(contact) {
+    let yuv422 = View {
+        contact,
+        ..View::YUV422
+    };
+    let views = views(contact, &[[320, 240], [800, 600]]);
+    for view in views.into_iter().chain([yuv422]) {
         println!("{}", table(view, &look_at_all(view, repeats)?));
     }
     Ok(())
-}
-
-/// Both cameras at two sizes with both estimators, and the firmware's when it sends YUV422.
-fn views(contact: Contact) -> Vec<View> {
-    let mut views = Vec::new();
-    for size in [[320, 240], [800, 600]] {
-        for preset in [Preset::Ov7725, Preset::Paper] {
-            views.extend(ESTIMATORS.map(|estimator| View {
-                preset,
-                size,
-                format: PixelFormat::Rgb565,
-                estimator,
-                contact,
-            }));
-        }
-    }
-    views.push(View {
-        preset: Preset::Ov7725,
-        size: [320, 240],
-        format: PixelFormat::Yuv422,
-        estimator: CentroidEstimator::RednessWeighted,
-        contact,
-    });
-    views
 }

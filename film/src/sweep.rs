@@ -1,0 +1,206 @@
+//! What the reduced film is made from: full solutions for loads of many sizes, tilts and places, with their derivatives.
+
+use std::f64::consts::PI;
+
+use hivtac_scene::film::curves::DiscMotion;
+use hivtac_scene::{Camera, Disc, MARKERS};
+
+use crate::film::Response;
+use crate::samples::Path;
+use crate::view::seen_motion;
+use crate::{Change, Contact, Equilibrium, Film, FilmError, Neighbours};
+
+/// A load of size s is a force of `LINEAR_N`·s + s³ newton: s grows like the depth, from where bending holds the film to where
+/// stretching does.
+pub const LINEAR_N: f64 = 0.01;
+/// The size of the largest load, of 0.255 N.
+pub const LARGEST_SIZE: f64 = 0.628_8;
+/// The largest tilt, rad: the tangential force is 0.8 of the normal one.
+pub const LARGEST_TILT: f64 = 0.674_740_942_223_553_1;
+/// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where nothing moves.
+const SIZES: [f64; 4] = [
+    0.146_446_609_406_726_24,
+    0.5,
+    0.853_553_390_593_273_8,
+    1.0,
+];
+/// Rings of tilts: radius in parts of the largest, and the turn of the first of their four, °.
+const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];
+/// Distance of the places around a marker's own at which its motion is looked at, mm.
+pub const STENCIL_MM: f64 = 0.25;
+/// Step by which motions are differentiated: the largest unknown changes by so many mm.
+const STEP_MM: f64 = 1e-4;
+
+/// Which force presses where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// See [`LINEAR_N`].
+    pub size: f64,
+    /// The force's polar angle, split along x and y, rad.
+    pub tilt: [f64; 2],
+    /// Where the tip touches the film, mm.
+    pub place_mm: [f64; 2],
+}
+
+impl Pose {
+    /// The force, N.
+    pub fn force_n(&self) -> [f64; 3] {
+        let size = LINEAR_N * self.size + self.size.powi(3);
+        let angle = self.tilt[0].hypot(self.tilt[1]);
+        let sinc = if angle > 1e-9 {
+            angle.sin() / angle
+        } else {
+            1.0
+        };
+        let [x, y] = self.tilt.map(|part| size * sinc * part);
+        [x, y, -size * angle.cos()]
+    }
+}
+
+/// Motions of tip and markers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moved {
+    /// The tip's way, mm.
+    pub tip_mm: [f64; 3],
+    /// How the film moves around each marker.
+    pub discs: [DiscMotion; 4],
+}
+
+/// A full solution as the reduced film needs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solved {
+    /// Its load.
+    pub pose: Pose,
+    /// Its motions.
+    pub moved: Moved,
+    /// The motion of each marker if it sat [`STENCIL_MM`] beside its place: three rows of three, y first to last.
+    pub around_mm: [[[f64; 3]; 9]; 4],
+    /// How the motions answer to each [`Change`].
+    pub answers: Vec<Moved>,
+}
+
+/// Solves the film with the tip at one place, for all sizes and tilts.
+///
+/// # Errors
+/// When no equilibrium is found.
+pub fn solve_place(
+    film: &mut Film,
+    beside: &Neighbours,
+    camera: &Camera,
+    place_mm: [f64; 2],
+) -> Result<Vec<Solved>, FilmError> {
+    film.move_tip(place_mm)?;
+    let at_rest = Pose {
+        size: 0.0,
+        tilt: [0.0; 2],
+        place_mm,
+    };
+    let mut solved = vec![look(film, beside, camera, at_rest, &film.rest())?];
+    for tilt in tilts() {
+        let mut path = Path::from_rest(film);
+        for part in SIZES {
+            let pose = Pose {
+                size: part * LARGEST_SIZE,
+                tilt,
+                place_mm,
+            };
+            let state = path.go(film, Contact::Force(pose.force_n()), pose.size)?;
+            solved.push(look(film, beside, camera, pose, &state)?);
+        }
+    }
+    Ok(solved)
+}
+
+fn tilts() -> Vec<[f64; 2]> {
+    let ring = |(radius, turn): (f64, f64)| {
+        (0..4).map(move |k| {
+            let angle = (turn + 90.0 * f64::from(k)).to_radians();
+            [angle.cos(), angle.sin()].map(|part| radius * LARGEST_TILT * part)
+        })
+    };
+    let rings = TILTS.into_iter().flat_map(ring);
+    [[0.0; 2]].into_iter().chain(rings).collect()
+}
+
+fn look(
+    film: &Film,
+    beside: &Neighbours,
+    camera: &Camera,
+    pose: Pose,
+    state: &Equilibrium,
+) -> Result<Solved, FilmError> {
+    let changes: Vec<Change> = Change::all().collect();
+    let answers = film.answers(beside, state, &changes)?;
+    let half = film.design().material.thickness_mm / 2.0;
+    let around_mm = MARKERS.map(|disc| {
+        std::array::from_fn(|k| {
+            let by = [k % 3, k / 3].map(|i| (i as f64 - 1.0) * STENCIL_MM);
+            let [x, y] = disc.centre_mm;
+            let beside = Disc {
+                centre_mm: [x + by[0], y + by[1]],
+                ..disc
+            };
+            seen_motion(|rest| film.surface(state, rest, half), &beside, camera).moved_mm
+        })
+    });
+    let answered = changes.iter().zip(&answers);
+    Ok(Solved {
+        pose,
+        moved: Moved {
+            tip_mm: state.tip_mm,
+            discs: discs(film, state, half, camera),
+        },
+        around_mm,
+        answers: answered
+            .map(|(change, answer)| answered_by(film, state, camera, *change, answer))
+            .collect(),
+    })
+}
+
+fn discs(film: &Film, state: &Equilibrium, half: f64, camera: &Camera) -> [DiscMotion; 4] {
+    MARKERS.map(|disc| seen_motion(|rest| film.surface(state, rest, half), &disc, camera))
+}
+
+fn answered_by(
+    film: &Film,
+    state: &Equilibrium,
+    camera: &Camera,
+    change: Change,
+    answer: &Response,
+) -> Moved {
+    let step = STEP_MM / answer.size().max(0.1);
+    let half = |sign: f64| {
+        let thicker = match change {
+            Change::Thickness => sign * step,
+            _ => 0.0,
+        };
+        (film.design().material.thickness_mm + thicker) / 2.0
+    };
+    let [back, forth] = [-1.0, 1.0].map(|sign| {
+        let there = film.beside(state, answer, sign * step);
+        discs(film, &there, half(sign), camera)
+    });
+    let slope = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] {
+        std::array::from_fn(|c| (b[c] - a[c]) / (2.0 * step))
+    };
+    Moved {
+        tip_mm: answer.tip_mm,
+        discs: std::array::from_fn(|k| DiscMotion {
+            moved_mm: slope(back[k].moved_mm, forth[k].moved_mm),
+            along_x: slope(back[k].along_x, forth[k].along_x),
+            along_y: slope(back[k].along_y, forth[k].along_y),
+        }),
+    }
+}
+
+/// Places of the tip that, mirrored, are everywhere on a grid: 0 ≤ y ≤ x of `knots_mm`, which begin at 0.
+pub fn octant(knots_mm: &[f64]) -> Vec<[f64; 2]> {
+    let below = |(i, &x): (usize, &f64)| {
+        let ys = knots_mm[..=i].iter();
+        ys.map(move |&y| [x, y]).collect::<Vec<_>>()
+    };
+    knots_mm.iter().enumerate().flat_map(below).collect()
+}
+
+#[allow(dead_code)]
+const _: f64 = PI;
