@@ -1,86 +1,40 @@
-//! Makes the reduced film's curves and checks them against the full solution.
+//! Makes the reduced film's tables and checks them against the full solution.
 //!
 //! `cargo run --release -p hivtac-film --example reduce -- scene/data`
 
-use std::io::Write;
+use std::error::Error;
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Mutex;
 use std::time::Instant;
 
-use hivtac_film::{Check, Design, check, fit, solve_stuck};
-use hivtac_scene::Contact;
-use hivtac_scene::film::curves::Curves;
-use hivtac_scene::film::stuck::{Solved, Stuck};
-use hivtac_scene::film::{Family, Film};
+use hivtac_film::parallel::in_parallel;
+use hivtac_film::sweep::{Solved, few_tilts, octant, solve_place, tilts};
+use hivtac_film::{Check, Design, FilmError, Neighbours, check, paper_camera, record, tables};
+use hivtac_scene::film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, Unit};
 
-const USAGE: &str = "reduce FOLDER [--check] [force] [stick] [slip] [force-overhang]
---check: hold the files that are there against the full solution instead of making them";
+const USAGE: &str = "reduce FOLDER [--check]
+Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are incomplete.
+--check: hold the film that is built in against the full solution instead";
 
-/// One file to make.
-struct Task {
-    name: &'static str,
-    content: Content,
-    contact: Contact,
-    overhang_mm: f64,
-    /// Loads of its check.
-    checks: usize,
-}
-
-/// What a file holds.
-#[derive(Clone, Copy, Debug)]
-enum Content {
-    Curves(Family),
-    /// Full solutions on a grid.
-    Stuck,
-}
-
-const TASKS: [Task; 4] = [
-    Task::new(
-        "force",
-        Content::Curves(Family::Force),
-        Contact::Force,
-        0.0,
-        40,
-    ),
-    Task::new("stick", Content::Stuck, Contact::Stick, 0.0, 60),
-    Task::new(
-        "slip",
-        Content::Curves(Family::Slip),
-        Contact::Slip { mu: 0.6 },
-        0.0,
-        20,
-    ),
-    Task::new(
-        "force-overhang",
-        Content::Curves(Family::Force),
-        Contact::Force,
-        6.0,
-        12,
-    ),
-];
-
-impl Task {
-    const fn new(
-        name: &'static str,
-        content: Content,
-        contact: Contact,
-        overhang_mm: f64,
-        checks: usize,
-    ) -> Task {
-        Task {
-            name,
-            content,
-            contact,
-            overhang_mm,
-            checks,
-        }
-    }
-}
+/// Loads of a check.
+const LOADS: usize = 200;
+/// How far from the middle they are, mm: anywhere, and where a sensor is calibrated.
+const REACHES_MM: [f64; 2] = [5.0, 4.0];
 
 fn main() -> ExitCode {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
-    match reduce(std::env::args().skip(1)) {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let done = match words.as_slice() {
+        [folder] => reduce(Path::new(folder)),
+        [_, "--check"] => look(),
+        _ => Err(USAGE.into()),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
             eprintln!("{why}");
@@ -89,135 +43,116 @@ fn main() -> ExitCode {
     }
 }
 
-fn reduce(mut words: impl Iterator<Item = String>) -> Result<(), Box<dyn std::error::Error>> {
-    let folder = words.next().ok_or(USAGE)?;
-    let (flags, names): (Vec<String>, Vec<String>) = words.partition(|word| word == "--check");
-    let known = |name: &String| TASKS.iter().any(|task| task.name == name);
-    if let Some(name) = names.iter().find(|name| !known(name)) {
-        return Err(format!("{name}: unknown\n{USAGE}").into());
-    }
-    let begin = Instant::now();
-    for task in &TASKS {
-        if names.is_empty() || names.iter().any(|name| name == task.name) {
-            make(task, Path::new(&folder), flags.is_empty())?;
-        }
-    }
-    println!("{:.0} s", begin.elapsed().as_secs_f64());
+fn reduce(folder: &Path) -> Result<(), Box<dyn Error>> {
+    let nominal = sweep(NOMINAL_RADIUS_MM, Kind::Tip, &tilts())?;
+    let largest = sweep(LARGEST_RADIUS_MM, Kind::TipRadius, &few_tilts())?;
+    let bytes = tables(&nominal, &largest)?.to_bytes();
+    let path = folder.join("film.bin");
+    std::fs::write(&path, &bytes)?;
+    println!(
+        "{}: {} bytes; build again and hold it against --check",
+        path.display(),
+        bytes.len()
+    );
     Ok(())
 }
 
-/// Makes one file, unless it is there already, and checks it.
-fn make(task: &Task, folder: &Path, anew: bool) -> Result<(), Box<dyn std::error::Error>> {
-    let threads = std::thread::available_parallelism()?.get();
+/// All solutions under a tip of a radius at the places of a table: those of its file, and the rest, which are added to it.
+fn sweep(radius_mm: f64, kind: Kind, tilts: &[[f64; 2]]) -> Result<Vec<Solved>, Box<dyn Error>> {
+    let path = PathBuf::from(format!("target/film-{radius_mm}.bin"));
+    let known = read(&path)?;
+    let is_new = |place: &[f64; 2]| !known.iter().any(|solved| solved.pose.place_mm == *place);
+    let places: Vec<[f64; 2]> = octant(kind.axis().nodes())
+        .into_iter()
+        .filter(is_new)
+        .collect();
     let design = Design {
-        overhang_mm: task.overhang_mm,
+        tip_radius_mm: radius_mm,
         ..Design::default()
     };
-    let path = file(folder, task.name);
-    if anew {
-        let progress = progress(task.name, "solutions");
-        let text = match task.content {
-            Content::Curves(family) => fit(family, &design, threads, progress)?.to_string(),
-            Content::Stuck => solve_stuck(&design, threads, progress)?.to_string(),
-        };
-        std::fs::write(&path, text)?;
-    }
-    let (text, film) = load(task, folder)?;
-    let check = check(
-        &film,
+    let (beside, camera) = (Neighbours::of(&design), paper_camera()?);
+    let file = Mutex::new(OpenOptions::new().create(true).append(true).open(&path)?);
+    let task = format!("tip of {radius_mm} mm");
+    in_parallel(
         &design,
-        task.contact,
-        task.checks,
-        threads,
-        progress(task.name, "check"),
+        &places,
+        threads()?,
+        progress(&task),
+        |film, place| {
+            let solved = solve_place(film, &beside, &camera, *place, tilts)?;
+            let numbers = solved.iter().flat_map(record::numbers);
+            let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
+            let written = file.lock().map(|mut file| file.write_all(&bytes));
+            match written {
+                Ok(Ok(())) => Ok(()),
+                _ => Err(FilmError::Solver(format!(
+                    "{}: cannot be written",
+                    path.display()
+                ))),
+            }
+        },
     )?;
-    let notes = notes(task, text.lines().count(), &check);
-    std::fs::write(path, format!("{notes}{text}"))?;
-    print!("{notes}");
-    println!("# The largest error is at {}.", place(&check));
+    Ok(read(&path)?)
+}
+
+fn read(path: &Path) -> Result<Vec<Solved>, Box<dyn Error>> {
+    let mut bytes = Vec::new();
+    if path.exists() {
+        File::open(path)?.read_to_end(&mut bytes)?;
+    }
+    let numbers = bytes
+        .as_chunks()
+        .0
+        .iter()
+        .map(|eight| f64::from_le_bytes(*eight));
+    let numbers: Vec<f64> = numbers.collect();
+    let records = numbers.chunks(record::length()).map(record::solved);
+    let all: Option<Vec<Solved>> = records.collect();
+    all.ok_or_else(|| format!("{}: cut off; delete it", path.display()).into())
+}
+
+fn look() -> Result<(), Box<dyn Error>> {
+    for reach_mm in REACHES_MM {
+        let begin = Instant::now();
+        let found = check(
+            &Unit::default(),
+            reach_mm,
+            LOADS,
+            threads()?,
+            progress("check"),
+        )?;
+        let Check {
+            loads,
+            worst_px,
+            rms_px,
+            worst_tip_mm,
+            ..
+        } = found;
+        println!(
+            "within ±{reach_mm} mm, {loads} loads: rms {rms_px:.4} px, at most {worst_px:.3} px; the tip within \
+             {worst_tip_mm:.3} mm; {:.0} s",
+            begin.elapsed().as_secs_f64()
+        );
+        if let Some(load) = found.worst_at {
+            println!("  the largest at {:?}", load);
+        }
+    }
     Ok(())
 }
 
-/// What a file holds, and the film with it: as rounded there.
-fn load(task: &Task, folder: &Path) -> Result<(String, Film), Box<dyn std::error::Error>> {
-    let text = std::fs::read_to_string(file(folder, task.name))?;
-    let film = Film::default();
-    Ok(match task.content {
-        Content::Curves(family) => {
-            let curves: Curves = text.parse()?;
-            let (text, film) = (curves.to_string(), film.with_curves(family, curves));
-            match family {
-                // A tip that slides has stuck before.
-                Family::Slip => (text, film.with_stuck(stuck(&file(folder, "stick"))?)),
-                Family::Force => (text, film),
-            }
-        }
-        Content::Stuck => {
-            let solved: Solved = text.parse()?;
-            (solved.to_string(), film.with_stuck(Stuck::new(&solved)?))
-        }
-    })
-}
-
-/// The first lines of a file of so many lines.
-fn notes(task: &Task, lines: usize, check: &Check) -> String {
-    let what = match task.content {
-        Content::Curves(family) => format!(
-            "# The reduced film, {family:?}, overhang {} mm: {lines} curves (see scene/src/film/curves.rs).",
-            task.overhang_mm
-        ),
-        Content::Stuck => format!(
-            "# The film under a tip that sticks: {lines} lines (see scene/src/film/stuck/text.rs)."
-        ),
-    };
-    let columns = match task.content {
-        Content::Curves(_) => "# output, powers of (q_r, q_t, o_r, o_t), Chebyshev coefficients",
-        Content::Stuck => {
-            "# state: size, steepness, turn, solution and first derivatives by the offset; bend: …, the rest of the answer to offsets"
-        }
-    };
-    format!(
-        "{what}\n\
-         # cargo run --release -p hivtac-film --example reduce -- scene/data {}\n\
-         # Against the full solution at {} loads of the whole domain: at most {:.3} px, rms {:.3} px; the tip within \
-         {:.4} mm.\n\
-         {columns}\n",
-        task.name, check.poses, check.worst_px, check.rms_px, check.worst_tip_mm
-    )
-}
-
-/// The film under a tip that sticks, from its file.
-fn stuck(path: &Path) -> Result<Stuck, Box<dyn std::error::Error>> {
-    let solved: Solved = std::fs::read_to_string(path)?.parse()?;
-    Ok(Stuck::new(&solved)?)
-}
-
-/// Which load the curves are farthest off at.
-fn place(check: &Check) -> String {
-    check.worst_at.map_or("nowhere".into(), |load| {
-        let [x, y] = load.offset_mm();
-        format!(
-            "{:.4} N, {:.1}°, {:.1}°, offset {x:.2}, {y:.2} mm",
-            load.magnitude_n(),
-            load.alpha_deg(),
-            load.beta_deg()
-        )
-    })
-}
-
-fn file(folder: &Path, name: &str) -> PathBuf {
-    folder.join(format!("{name}.csv"))
+fn threads() -> Result<usize, std::io::Error> {
+    Ok(std::thread::available_parallelism()?.get())
 }
 
 /// A line that counts.
-fn progress(task: &str, what: &str) -> impl Fn(usize, usize) + Sync {
+fn progress(task: &str) -> impl Fn(usize, usize) + Sync {
     const WIDTH: usize = 30;
-    let begin = Instant::now();
+    let (begin, task) = (Instant::now(), task.to_owned());
     move |done, all| {
         let left = begin.elapsed().as_secs_f64() * (all - done) as f64 / done as f64;
         let full = "#".repeat(WIDTH * done / all);
         let end = if done == all { "\n" } else { "" };
-        eprint!("\r{task} {what} [{full:WIDTH$}] {done} of {all}, {left:.0} s left   {end}");
+        eprint!("\r{task} [{full:WIDTH$}] {done} of {all}, {left:.0} s left   {end}");
         // A progress that cannot be shown is no reason to stop.
         let _ = std::io::stderr().flush();
     }

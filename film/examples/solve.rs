@@ -13,6 +13,7 @@ const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--con
 
 /// What to press, and how.
 struct Request {
+    tip_radius_mm: f64,
     design: Design,
     force_n: f64,
     alpha_deg: f64,
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
 impl Request {
     fn parse(mut words: impl Iterator<Item = String>) -> Result<Request, String> {
         let mut request = Request {
+            tip_radius_mm: Design::default().tip_radius_mm,
             design: Design::default(),
             force_n: 0.1,
             alpha_deg: 0.0,
@@ -64,7 +66,7 @@ impl Request {
             "--overhang-mm" => &mut self.design.overhang_mm,
             "--post-radius-mm" => &mut self.design.post_radius_mm,
             "--post-grip" => &mut self.design.post_grip_n_per_mm3,
-            "--tip-radius-mm" => &mut self.design.tip_radius_mm,
+            "--tip-radius-mm" => &mut self.tip_radius_mm,
             "--fineness" => &mut self.design.fineness,
             _ => return Err(format!("{name}: unknown\n{USAGE}")),
         };
@@ -77,7 +79,8 @@ impl Request {
     fn load(&self) -> Result<Load, SceneError> {
         Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg)?
             .with_contact(self.contact)?
-            .with_offset_mm(self.offset_mm)
+            .with_offset_mm(self.offset_mm)?
+            .with_tip_radius_mm(self.tip_radius_mm)
     }
 
     fn run(&self) -> Result<(), String> {

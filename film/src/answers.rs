@@ -109,7 +109,8 @@ impl Film {
             Change::Thickness => {
                 let [thinner, thicker] = &beside.thinner_and_thicker;
                 let pair = thinner.gradient(u).into_iter().zip(thicker.gradient(u));
-                pair.map(|(a, b)| (a - b) / (2.0 * beside.step_mm)).collect()
+                pair.map(|(a, b)| (a - b) / (2.0 * beside.step_mm))
+                    .collect()
             }
             Change::Grip => {
                 let springs = self.design().springs(self.shell().grid());
@@ -127,9 +128,7 @@ impl Film {
             self.shell().pull(u, &design.springs(self.shell().grid()))
         });
         let pairs = back.iter().zip(&forth);
-        pairs
-            .map(|(a, b)| (a - b) / (2.0 * POST_STEP_MM))
-            .collect()
+        pairs.map(|(a, b)| (a - b) / (2.0 * POST_STEP_MM)).collect()
     }
 
     /// How the tip's shares change with its place or radius, per mm.

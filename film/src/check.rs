@@ -2,24 +2,24 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::film::Film as ReducedFilm;
-use hivtac_scene::{Camera, Contact, Load, MARKERS};
+use hivtac_scene::film::reduced::{NOMINAL_RADIUS_MM, Unit};
+use hivtac_scene::film::{Film as ReducedFilm, MAX_RATIO};
+use hivtac_scene::{Camera, Disc, Load, MARKERS, Preset, SceneError};
 
 use crate::parallel::in_parallel;
-use crate::samples::halton;
-use crate::{Design, Film, FilmError, Loaded, paper_camera, press_load};
+use crate::path::halton;
+use crate::{Design, Film, FilmError, Loaded, press_load};
 
-/// The stated domain: the largest force, N, |α| and |β|, degrees, and offset, mm.
-const FORCE_N: f64 = 0.25;
-const TILT_DEG: [f64; 2] = [12.0, 10.0];
-const OFFSET_MM: f64 = 0.25;
+/// What is drawn: sizes of forces evenly, tilts and places evenly over their areas, radii evenly.
+const FORCE_N: [f64; 2] = [0.002, 0.25];
+const TIP_RADII_MM: [f64; 2] = [0.25, 2.0];
 
-/// How far the curves are from the full solution, over poses that they were not made from.
+/// How far the tables are from the full solution, over loads that they were not made from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Check {
-    /// Poses solved.
-    pub poses: usize,
-    /// The largest distance of a marker's centroid at 800×600 `paper`, px.
+    /// Loads solved.
+    pub loads: usize,
+    /// The largest distance of a marker's centroid at 320×240 `ov7725`, px.
     pub worst_px: f64,
     /// The load that it is at.
     pub worst_at: Option<Load>,
@@ -29,28 +29,29 @@ pub struct Check {
     pub worst_tip_mm: f64,
 }
 
-/// Holds the curves of a contact reading against the full solution at `poses` random loads of the whole domain: |F| up
-/// to 0.25 N, |α| to 12°, |β| to 10°, offset to 0.25 mm.
+/// Holds the reduced film against the full solution of a unit at so many random loads: |F| to 0.25 N, tangential
+/// over normal to 0.8, places within ±`reach_mm`, the tip's radius 0.25 to 2 mm (the nominal one in every second load).
 ///
 /// # Errors
 /// When the film cannot be made or an equilibrium is not found.
 pub fn check(
-    reduced: &ReducedFilm,
-    design: &Design,
-    contact: Contact,
-    poses: usize,
+    unit: &Unit,
+    reach_mm: f64,
+    loads: usize,
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Check, FilmError> {
-    let cases = (0..poses)
-        .map(|index| case(index, contact))
-        .collect::<Result<Vec<_>, _>>()?;
-    let camera = paper_camera()?;
-    let errors = in_parallel(design, &cases, threads, progress, |film, load| {
-        errors(film, reduced, load, &camera)
+    let scene = |error: SceneError| FilmError::Scene(error.to_string());
+    let reduced = ReducedFilm::of(*unit).map_err(scene)?;
+    let cases = (0..loads).map(|index| case(index, reach_mm));
+    let cases = cases.collect::<Result<Vec<_>, _>>().map_err(scene)?;
+    let camera = Camera::new(Preset::Ov7725, 320, 240).map_err(scene)?;
+    let design = Design::of(unit);
+    let errors = in_parallel(&design, &cases, threads, progress, |film, load| {
+        errors(film, &reduced, load, &camera)
     })?;
     let mut check = Check {
-        poses,
+        loads,
         ..Check::default()
     };
     for ((tip_mm, pixels), load) in errors.iter().zip(&cases) {
@@ -62,7 +63,7 @@ pub fn check(
             check.rms_px += px * px;
         }
     }
-    check.rms_px = (check.rms_px / (4 * poses.max(1)) as f64).sqrt();
+    check.rms_px = (check.rms_px / (4 * loads.max(1)) as f64).sqrt();
     Ok(check)
 }
 
@@ -79,21 +80,35 @@ fn errors(
         .map_err(|error| FilmError::Scene(error.to_string()))?;
     let pressed = reduced.press(load);
     let distance = |k: usize| {
-        let full = MARKERS[k].centroid_px(|rest| film.displacement(&state, rest), camera);
-        let ours = MARKERS[k].centroid_px(|rest| pressed.displacement(rest), camera);
+        let disc = Disc {
+            centre_mm: pressed.centres_mm[k],
+            ..MARKERS[k]
+        };
+        let full = disc.centroid_px(|rest| film.displacement(&state, rest), camera);
+        let ours = disc.centroid_px(|rest| pressed.displacement(rest), camera);
         (full[0] - ours[0]).hypot(full[1] - ours[1])
     };
     let tip_mm = (0..3).map(|c| (pressed.tip_mm[c] - state.tip_mm[c]).powi(2));
     Ok((tip_mm.sum::<f64>().sqrt(), std::array::from_fn(distance)))
 }
 
-/// A load of the stated domain; from another part of the sequence than the training's, with other bases.
-fn case(index: usize, contact: Contact) -> Result<Load, FilmError> {
+/// A load of the stated domain, from a sequence that fills it evenly.
+fn case(index: usize, reach_mm: f64) -> Result<Load, SceneError> {
     let part = |base| halton(index + 1000, base);
-    let [alpha, beta] = [(3, 0), (5, 1)].map(|(base, k)| TILT_DEG[k] * (2.0 * part(base) - 1.0));
-    let (size, angle) = (OFFSET_MM * part(7).sqrt(), 2.0 * PI * part(11));
-    Load::from_angles(FORCE_N * part(2), alpha, beta)
-        .and_then(|load| load.with_contact(contact))
-        .and_then(|load| load.with_offset_mm([size * angle.cos(), size * angle.sin()]))
-        .map_err(|error| FilmError::Scene(error.to_string()))
+    let between = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
+    let size_n = between(FORCE_N, part(2));
+    let (tilt, turn) = ((MAX_RATIO * part(3).sqrt()).atan(), 2.0 * PI * part(5));
+    let place = [7, 11].map(|base| reach_mm * (2.0 * part(base) - 1.0));
+    let radius = match index % 2 {
+        0 => NOMINAL_RADIUS_MM,
+        _ => between(TIP_RADII_MM, part(13)),
+    };
+    let sideways = size_n * tilt.sin();
+    Load::from_vector([
+        sideways * turn.cos(),
+        sideways * turn.sin(),
+        -size_n * tilt.cos(),
+    ])?
+    .with_offset_mm(place)?
+    .with_tip_radius_mm(radius)
 }

@@ -3,6 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
+use hivtac_scene::film::reduced::Unit;
+
 use crate::FilmError;
 use crate::grid::Grid;
 use crate::point::Material;
@@ -74,6 +76,21 @@ impl Default for Design {
 }
 
 impl Design {
+    /// The film of a unit, whose markers are the matter of whoever looks at it.
+    pub fn of(unit: &Unit) -> Design {
+        let nominal = Design::default();
+        Design {
+            material: Material {
+                youngs_mpa: unit.stiffness * nominal.material.youngs_mpa,
+                thickness_mm: unit.thickness * nominal.material.thickness_mm,
+                ..nominal.material
+            },
+            post_grip_n_per_mm3: unit.grip * nominal.post_grip_n_per_mm3,
+            post_shift_mm: unit.posts_mm,
+            ..nominal
+        }
+    }
+
     /// Half the length of the film's edge.
     pub fn half_edge_mm(&self) -> f64 {
         self.span_mm / 2.0 + self.overhang_mm
@@ -227,7 +244,10 @@ fn gauss_points() -> [(f64, f64); POST_POINTS] {
             let (mut before, mut value) = (1.0, x);
             for k in 2..=POST_POINTS {
                 let k = k as f64;
-                (before, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k);
+                (before, value) = (
+                    value,
+                    ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k,
+                );
             }
             slope = n * (x * value - before) / (x * x - 1.0);
             x -= value / slope;

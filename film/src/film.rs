@@ -1,9 +1,9 @@
 //! The film under a tip.
 
+use crate::answers::{Change, Neighbours};
 use crate::newton::{Guide, Problem, Solution};
 use crate::point::{V3, dot, normal};
 use crate::shell::Shell;
-use crate::answers::{Change, Neighbours};
 use crate::sparse::{COMPONENTS, Factors, Solver};
 use crate::{Design, FilmError};
 
@@ -71,9 +71,10 @@ impl Film {
     ///
     /// # Errors
     /// When the tip would press on a post.
-    pub fn move_tip(&mut self, offset_mm: [f64; 2]) -> Result<(), FilmError> {
+    pub fn move_tip(&mut self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), FilmError> {
         let design = Design {
             tip_offset_mm: offset_mm,
+            tip_radius_mm: radius_mm,
             ..self.design.clone()
         };
         design.check()?;
@@ -132,12 +133,7 @@ impl Film {
     }
 
     /// The same of the surface that is `half` mm below the middle one.
-    pub(crate) fn surface(
-        &self,
-        state: &Equilibrium,
-        rest_mm: [f64; 2],
-        half: f64,
-    ) -> [f64; 3] {
+    pub(crate) fn surface(&self, state: &Equilibrium, rest_mm: [f64; 2], half: f64) -> [f64; 3] {
         let grid = self.shell.grid();
         let place = grid.place(rest_mm);
         let [mut a1, mut a2] = grid.gradients(&state.unknowns, &place);
@@ -257,7 +253,6 @@ impl Film {
         }
         there
     }
-
 }
 
 impl Response {

@@ -31,7 +31,7 @@ struct Slide<'a> {
 /// # Errors
 /// When the load cannot be, or no equilibrium is found.
 pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, FilmError> {
-    film.move_tip(load.offset_mm())?;
+    film.move_tip(load.offset_mm(), load.tip_radius_mm())?;
     if load.magnitude_n() == 0.0 {
         let state = film.rest();
         let touches_mm = load.offset_mm();
@@ -108,7 +108,8 @@ impl Slide<'_> {
     /// What is missing of the friction ratio and of a slide along the sideways force, N.
     fn gap(&mut self, slid: [f64; 2]) -> Result<[f64; 2], FilmError> {
         let [x, y] = self.load.offset_mm();
-        self.film.move_tip([x + slid[0], y + slid[1]])?;
+        let radius_mm = self.load.tip_radius_mm();
+        self.film.move_tip([x + slid[0], y + slid[1]], radius_mm)?;
         self.state = self.film.press(stage(self.load, slid), &self.state)?;
         let [x, y, z] = self.state.force_n;
         let across = (slid[0] * y - slid[1] * x) / -self.state.tip_mm[2];

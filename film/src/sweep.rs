@@ -1,61 +1,22 @@
 //! What the reduced film is made from: full solutions for loads of many sizes, tilts and places, with their derivatives.
 
-use std::f64::consts::PI;
-
-use hivtac_scene::film::curves::DiscMotion;
+use hivtac_scene::film::DiscMotion;
+use hivtac_scene::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
 use hivtac_scene::{Camera, Disc, MARKERS};
 
 use crate::film::Response;
-use crate::samples::Path;
+use crate::path::Path;
 use crate::view::seen_motion;
 use crate::{Change, Contact, Equilibrium, Film, FilmError, Neighbours};
 
-/// A load of size s is a force of `LINEAR_N`·s + s³ newton: s grows like the depth, from where bending holds the film to where
-/// stretching does.
-pub const LINEAR_N: f64 = 0.01;
-/// The size of the largest load, of 0.255 N.
-pub const LARGEST_SIZE: f64 = 0.628_8;
-/// The largest tilt, rad: the tangential force is 0.8 of the normal one.
-pub const LARGEST_TILT: f64 = 0.674_740_942_223_553_1;
 /// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where nothing moves.
-const SIZES: [f64; 4] = [
-    0.146_446_609_406_726_24,
-    0.5,
-    0.853_553_390_593_273_8,
-    1.0,
-];
+const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
 /// Rings of tilts: radius in parts of the largest, and the turn of the first of their four, °.
 const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];
 /// Distance of the places around a marker's own at which its motion is looked at, mm.
 pub const STENCIL_MM: f64 = 0.25;
 /// Step by which motions are differentiated: the largest unknown changes by so many mm.
 const STEP_MM: f64 = 1e-4;
-
-/// Which force presses where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
-    /// See [`LINEAR_N`].
-    pub size: f64,
-    /// The force's polar angle, split along x and y, rad.
-    pub tilt: [f64; 2],
-    /// Where the tip touches the film, mm.
-    pub place_mm: [f64; 2],
-}
-
-impl Pose {
-    /// The force, N.
-    pub fn force_n(&self) -> [f64; 3] {
-        let size = LINEAR_N * self.size + self.size.powi(3);
-        let angle = self.tilt[0].hypot(self.tilt[1]);
-        let sinc = if angle > 1e-9 {
-            angle.sin() / angle
-        } else {
-            1.0
-        };
-        let [x, y] = self.tilt.map(|part| size * sinc * part);
-        [x, y, -size * angle.cos()]
-    }
-}
 
 /// Motions of tip and markers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,7 +40,7 @@ pub struct Solved {
     pub answers: Vec<Moved>,
 }
 
-/// Solves the film with the tip at one place, for all sizes and tilts.
+/// Solves the film with the tip at one place, for all sizes and some of [`tilts`].
 ///
 /// # Errors
 /// When no equilibrium is found.
@@ -88,15 +49,17 @@ pub fn solve_place(
     beside: &Neighbours,
     camera: &Camera,
     place_mm: [f64; 2],
+    tilts: &[[f64; 2]],
 ) -> Result<Vec<Solved>, FilmError> {
-    film.move_tip(place_mm)?;
+    let radius_mm = film.design().tip_radius_mm;
+    film.move_tip(place_mm, radius_mm)?;
     let at_rest = Pose {
         size: 0.0,
         tilt: [0.0; 2],
         place_mm,
     };
     let mut solved = vec![look(film, beside, camera, at_rest, &film.rest())?];
-    for tilt in tilts() {
+    for &tilt in tilts {
         let mut path = Path::from_rest(film);
         for part in SIZES {
             let pose = Pose {
@@ -111,7 +74,8 @@ pub fn solve_place(
     Ok(solved)
 }
 
-fn tilts() -> Vec<[f64; 2]> {
+/// The tilts that the film is solved for: none, and two rings.
+pub fn tilts() -> Vec<[f64; 2]> {
     let ring = |(radius, turn): (f64, f64)| {
         (0..4).map(move |k| {
             let angle = (turn + 90.0 * f64::from(k)).to_radians();
@@ -120,6 +84,12 @@ fn tilts() -> Vec<[f64; 2]> {
     };
     let rings = TILTS.into_iter().flat_map(ring);
     [[0.0; 2]].into_iter().chain(rings).collect()
+}
+
+/// Those that tell how a larger tip differs: none, and the outer ring.
+pub fn few_tilts() -> Vec<[f64; 2]> {
+    let all = tilts();
+    [&all[..1], &all[5..]].concat()
 }
 
 fn look(
@@ -201,6 +171,3 @@ pub fn octant(knots_mm: &[f64]) -> Vec<[f64; 2]> {
     };
     knots_mm.iter().enumerate().flat_map(below).collect()
 }
-
-#[allow(dead_code)]
-const _: f64 = PI;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::film::curves::DiscMotion;
+use hivtac_scene::film::DiscMotion;
 use hivtac_scene::{Camera, Disc, MARKERS, Preset};
 
 use crate::{Equilibrium, Film, FilmError};
@@ -40,11 +40,6 @@ pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4]
     })
 }
 
-/// How the film moves around each marker.
-pub(crate) fn disc_motions(film: &Film, state: &Equilibrium) -> [DiscMotion; 4] {
-    MARKERS.map(|disc| disc_motion(|rest| film.displacement(state, rest), &disc))
-}
-
 /// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u · (x, y)).
 fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion {
     let mut motion = DiscMotion::default();
@@ -63,11 +58,6 @@ fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion 
         }
     }
     motion
-}
-
-/// The same maps, moved along the film so that the camera sees their discs' centroids where it sees those of the film's.
-pub(crate) fn seen_motions(film: &Film, state: &Equilibrium, camera: &Camera) -> [DiscMotion; 4] {
-    MARKERS.map(|disc| seen_motion(|rest| film.displacement(state, rest), &disc, camera))
 }
 
 /// The affine map nearest to the displacement over a disc, moved along the film so that the camera sees its disc's centroid

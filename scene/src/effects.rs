@@ -87,11 +87,6 @@ fn film() -> Vec<Effect> {
             |_, options| options.film.surface = Surface::Middle,
         ),
         on(
-            "overhang",
-            "a film of 40 × 40 mm on the same posts",
-            |_, options| options.film.overhang_mm = 6.0,
-        ),
-        on(
             "contact offset",
             "a tip 0.25 mm to the right of the middle",
             |_, options| options.film.offset_mm = [0.25, 0.0],

@@ -5,6 +5,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::SceneError;
+use crate::film::MAX_RATIO;
+use crate::film::reduced::NOMINAL_RADIUS_MM;
 
 /// What the label (α, β, |F|) of a load says of the tip. It decides how well anything can be measured: at 0.2 N a
 /// degree moves the markers by 0.2 px (`Force`) or 1.8 px (`Stick`) at 800×600.
@@ -15,13 +17,13 @@ pub enum Contact {
     /// The force on the film has that direction and size; the tip goes where the film lets it.
     #[default]
     Force,
-    /// The tip moves in that direction and the film sticks to it; |F| is the force along it, as a gauge on the paper's
-    /// stage reads it. The force on the film is tilted more than the travel.
+    /// The tip moves in that direction and the film sticks to it, up to a friction ratio of 0.8; |F| is the force along
+    /// it, as a gauge on the paper's stage reads it. The force on the film is tilted more than the travel.
     Stick,
     /// As `Stick`, until the sideways force is μ times the normal one (in the film's frame). Then the tip slides over
     /// the film the way it is moved, and the sideways force stays μ times the normal one.
     Slip {
-        /// The friction ratio, 0.05 to 1.
+        /// The friction ratio, 0.05 to 0.8.
         mu: f64,
     },
 }
@@ -69,9 +71,11 @@ impl Contact {
     /// When the friction ratio is outside its range.
     fn check(self) -> Result<(), SceneError> {
         match self {
-            Contact::Slip { mu } if !(0.05..=1.0).contains(&mu) => Err(SceneError::Load(format!(
-                "the friction ratio is {mu}: use 0.05 to 1; what holds better sticks"
-            ))),
+            Contact::Slip { mu } if !(0.05..=MAX_RATIO).contains(&mu) => {
+                Err(SceneError::Load(format!(
+                    "the friction ratio is {mu}: use 0.05 to {MAX_RATIO}; what holds better sticks"
+                )))
+            }
             _ => Ok(()),
         }
     }
@@ -91,6 +95,7 @@ pub struct Load {
     beta_deg: f64,
     contact: Contact,
     offset_mm: [f64; 2],
+    tip_radius_mm: f64,
 }
 
 impl Load {
@@ -102,6 +107,7 @@ impl Load {
         beta_deg: 0.0,
         contact: Contact::Force,
         offset_mm: [0.0; 2],
+        tip_radius_mm: NOMINAL_RADIUS_MM,
     };
 
     /// A force by size (N, ≥ 0) and direction (degrees, between −90 and 90).
@@ -178,23 +184,35 @@ impl Load {
         Ok(Load { offset_mm, ..self })
     }
 
-    /// A force of another size, N, > 0, as this one otherwise; this one must be a force.
-    pub(crate) fn of_size(self, magnitude_n: f64) -> Load {
-        let part = magnitude_n / self.magnitude_n;
-        Load {
-            vector_n: self.vector_n.map(|component| part * component),
-            magnitude_n,
-            ..self
+    /// The same load by a tip that spreads it over a disc of this radius, mm.
+    ///
+    /// # Errors
+    /// When it is not finite.
+    pub fn with_tip_radius_mm(self, tip_radius_mm: f64) -> Result<Load, SceneError> {
+        if !tip_radius_mm.is_finite() {
+            return Err(SceneError::Load(format!(
+                "the tip's radius is {tip_radius_mm} mm: use a finite number"
+            )));
         }
+        Ok(Load {
+            tip_radius_mm,
+            ..self
+        })
     }
 
     /// The same load with what it leaves open, which is what every load begins with; both must be possible.
-    pub(crate) fn or(self, contact: Contact, offset_mm: [f64; 2]) -> Load {
+    pub(crate) fn or(self, contact: Contact, offset_mm: [f64; 2], tip_radius_mm: f64) -> Load {
         let plain = self.contact == Contact::Force;
         let central = self.offset_mm == [0.0; 2];
+        let nominal = self.tip_radius_mm == NOMINAL_RADIUS_MM;
         Load {
             contact: if plain { contact } else { self.contact },
             offset_mm: if central { offset_mm } else { self.offset_mm },
+            tip_radius_mm: if nominal {
+                tip_radius_mm
+            } else {
+                self.tip_radius_mm
+            },
             ..self
         }
     }
@@ -207,6 +225,11 @@ impl Load {
     /// Where the tip first touches the film, mm from the middle along x and y.
     pub fn offset_mm(&self) -> [f64; 2] {
         self.offset_mm
+    }
+
+    /// Radius of the disc over which the tip spreads its force, by (1 − r²/R²)², mm.
+    pub fn tip_radius_mm(&self) -> f64 {
+        self.tip_radius_mm
     }
 
     /// (F_x, F_y, F_z) in N, as the label says: the force on the film in the reading [`Contact::Force`], otherwise |F|
@@ -304,7 +327,7 @@ mod tests {
         assert_eq!(slip.contact(), Contact::Slip { mu: 0.6 });
         assert_eq!(slip.offset_mm(), [0.1, -0.2]);
         assert_eq!(slip.vector_n(), load.vector_n());
-        for mu in [0.0, 1.1, -0.6, f64::NAN] {
+        for mu in [0.0, 0.9, -0.6, f64::NAN] {
             assert!(load.with_contact(Contact::Slip { mu }).is_err(), "μ = {mu}");
         }
         assert!(load.with_offset_mm([0.0, f64::NAN]).is_err());

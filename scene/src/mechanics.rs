@@ -1,6 +1,7 @@
 //! The film as it is, or simplified: to see what each part of its answer is worth.
 
-use crate::film::curves::DiscMotion;
+use crate::film::DiscMotion;
+use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
 use crate::film::{Film, Pressed};
 use crate::{Contact, Load, SceneError};
 
@@ -15,13 +16,15 @@ pub struct Mechanics {
     pub stiffness: Stiffness,
     /// Whether a tilted force moves it sideways; without, |F| presses straight, whatever its direction.
     pub lateral: bool,
-    /// How far it reaches beyond its posts' centres, mm: 0 (the paper's model) or 6 (the paper's film as it is cut), for
-    /// which there are curves of the reading `force` only.
-    pub overhang_mm: f64,
+    /// How it differs from the nominal film.
+    pub unit: Unit,
     /// What the labels of loads mean that do not say so themselves.
     pub contact: Contact,
-    /// Where the tip of loads first touches that do not say so themselves, mm from the middle, within ±0.25.
+    /// Where the tip of loads first touches that do not say so themselves, mm from the middle, within ±5 (±0.25
+    /// where it sticks or slides).
     pub offset_mm: [f64; 2],
+    /// Radius of the disc over which the tip of loads spreads their force that do not say so themselves, mm, 0.25 to 2.
+    pub tip_radius_mm: f64,
 }
 
 /// How far the film gives for how much force.
@@ -46,23 +49,26 @@ impl Default for Mechanics {
             surface: crate::Surface::CameraSide,
             stiffness: Stiffness::Computed,
             lateral: true,
-            overhang_mm: 0.0,
+            unit: Unit::default(),
             contact: Contact::Force,
             offset_mm: [0.0; 2],
+            tip_radius_mm: NOMINAL_RADIUS_MM,
         }
     }
 }
 
 impl Mechanics {
-    /// The film that it asks for.
+    /// The film that it asks for, with markers so far beside their places, by identity, mm.
     ///
     /// # Errors
-    /// When there are no curves of such a film, or a contact cannot be.
-    pub(crate) fn film(&self) -> Result<Film, SceneError> {
-        Load::REST
-            .with_contact(self.contact)?
-            .with_offset_mm(self.offset_mm)?;
-        Film::with_overhang(self.overhang_mm)
+    /// When a film differs too much from the nominal one, or a contact cannot be.
+    pub(crate) fn film(&self, markers_mm: [[f64; 2]; 4]) -> Result<Film, SceneError> {
+        let film = Film::of(Unit {
+            markers_mm,
+            ..self.unit
+        })?;
+        film.check(&self.completed(&Load::REST.with_contact(self.contact)?))?;
+        Ok(film)
     }
 
     /// Whether a film can take a load.
@@ -75,7 +81,7 @@ impl Mechanics {
 
     /// A load with what it leaves open.
     pub(crate) fn completed(&self, load: &Load) -> Load {
-        load.or(self.contact, self.offset_mm)
+        load.or(self.contact, self.offset_mm, self.tip_radius_mm)
     }
 
     /// The film under a load that it accepts.
@@ -107,7 +113,7 @@ impl Mechanics {
         };
         // The angles of a load, and a size, make a load.
         let other = Load::from_angles(magnitude_n, alpha, beta).unwrap_or(*load);
-        other.or(load.contact(), load.offset_mm())
+        other.or(load.contact(), load.offset_mm(), load.tip_radius_mm())
     }
 }
 
@@ -117,6 +123,7 @@ fn scaled(pressed: Pressed, part: f64) -> Pressed {
         tip_mm: times(pressed.tip_mm),
         force_n: times(pressed.force_n),
         touches_mm: pressed.touches_mm,
+        centres_mm: pressed.centres_mm,
         discs: pressed.discs.map(|disc| DiscMotion {
             moved_mm: times(disc.moved_mm),
             along_x: times(disc.along_x),
@@ -148,7 +155,7 @@ mod tests {
             ..Mechanics::default()
         };
         let full = depth(Mechanics::default(), 0.2, 5.0);
-        for (force_n, part) in [(0.05, 0.25), (0.2, 1.0), (0.4, 1.0)] {
+        for (force_n, part) in [(0.05, 0.25), (0.2, 1.0), (0.25, 1.0)] {
             for (a, b) in depth(linear, force_n, 5.0).iter().zip(full) {
                 assert!((a - part * b).abs() < 1e-12);
             }

@@ -32,7 +32,7 @@ pub struct Options {
     pub film: Mechanics,
     /// Which markers (by identity) have come off.
     pub missing: [bool; 4],
-    /// How far from its place each marker (by identity) is glued, mm along x and y, −0.1 to 0.1 each.
+    /// How far from its place each marker (by identity) is glued, mm along x and y, −1 to 1 each.
     pub glued_mm: [[f64; 2]; 4],
     /// Round patches on the film, painted over the markers in this order.
     pub patches: Vec<Patch>,
@@ -107,7 +107,7 @@ impl Options {
             [0.0, 400.0],
         )?;
         for place in self.glued_mm {
-            all_within("glued_mm", place, [-0.1, 0.1])?;
+            all_within("glued_mm", place, [-1.0, 1.0])?;
         }
         self.patches.iter().try_for_each(Patch::check)?;
         self.specks.check()?;
@@ -168,7 +168,7 @@ mod tests {
             (said_of(|o| o.texture = f64::INFINITY), "texture"),
             (said_of(|o| o.salt.fraction = 1.1), "salt"),
             (said_of(|o| o.checkerboard_px = 401), "checkerboard_px"),
-            (said_of(|o| o.glued_mm[3][1] = -0.11), "glued_mm"),
+            (said_of(|o| o.glued_mm[3][1] = -1.1), "glued_mm"),
             (said_of(|o| o.specks.count = 100_001), "specks"),
             (said_of(|o| o.specks.radius_mm = 0.0), "speck_radius_mm"),
             (said_of(|o| o.lens.blur_px = 21.0), "blur_px"),

@@ -82,7 +82,7 @@ impl Scene {
     /// When an option is outside its range, or the film that it asks for cannot take what presses.
     pub fn with_options(mut self, options: Options) -> Result<Scene, SceneError> {
         options.check()?;
-        self.film = options.film.film()?;
+        self.film = options.film.film(options.glued_mm)?;
         self.camera = self.camera.fitted(&options.lens, &options.mounting);
         self.light = Light::new(&self.camera, &options, self.seed);
         self.specks = options.specks.discs(self.seed);

@@ -1,7 +1,7 @@
 //! Which surface of the film carries the markers.
 
+use crate::film::DiscMotion;
 use crate::film::Pressed;
-use crate::film::curves::DiscMotion;
 
 /// A surface of the film. Where the film tilts, one is aside of the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -1,10 +1,10 @@
 //! The film between tip, markers and posts, roughly.
 //!
-//! It follows the tip by a share that depends on the place only, and what that leaves at the markers is spread around
-//! them. Close to a marker it moves as the marker does.
+//! It follows the tip by a share that depends on the place from it only, and what that leaves at the markers is spread
+//! around them. Close to a marker it moves as the marker does.
 
 use super::{HALF_SIDE_MM, Pressed};
-use crate::{MARKER_RADIUS_MM, MARKER_REST_MM, MARKERS};
+use crate::{MARKER_RADIUS_MM, MARKER_REST_MM};
 
 /// Within this distance of a marker's centre the film moves as the marker does, mm: its rim as a polygon is inside.
 const OWN_MM: f64 = 1.05 * MARKER_RADIUS_MM;
@@ -13,7 +13,7 @@ const OTHERS_MM: f64 = 2.0;
 
 pub fn displacement(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
     let k = nearest(rest_mm);
-    let centre = MARKERS[k].centre_mm;
+    let centre = pressed.centres_mm[k];
     let from = [rest_mm[0] - centre[0], rest_mm[1] - centre[1]];
     let away = length(from);
     let own = pressed.discs[k].at(from);
@@ -40,15 +40,27 @@ fn nearest([x, y]: [f64; 2]) -> usize {
 fn rough(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
     // Nothing is known of the film beyond its posts.
     let place = rest_mm.map(|part| part.clamp(-HALF_SIDE_MM, HALF_SIDE_MM));
-    let (of_tip, of_markers) = (share(place), spread(place));
-    let at_markers = share([MARKER_REST_MM; 2]);
+    let (of_tip, of_markers) = (share(from_tip(pressed, place)), spread(pressed, place));
+    let at_markers = pressed
+        .centres_mm
+        .map(|centre| share(from_tip(pressed, centre)));
     let component = |c: usize| {
-        let left = pressed.discs.iter().zip(of_markers);
-        let left =
-            left.map(|(disc, part)| part * (disc.moved_mm[c] - at_markers * pressed.tip_mm[c]));
+        let discs = pressed.discs.iter().zip(at_markers).zip(of_markers);
+        let left = discs
+            .map(|((disc, share), part)| part * (disc.moved_mm[c] - share * pressed.tip_mm[c]));
         of_tip * pressed.tip_mm[c] + left.sum::<f64>()
     };
     std::array::from_fn(component)
+}
+
+/// A place as it is from the tip, the film's border being where it is from the middle.
+fn from_tip(pressed: &Pressed, place: [f64; 2]) -> [f64; 2] {
+    std::array::from_fn(|c| {
+        let tip = pressed.touches_mm[c];
+        let away = place[c] - tip;
+        let free = HALF_SIDE_MM - away.signum() * tip;
+        away * HALF_SIDE_MM / free
+    })
 }
 
 /// The part of the tip's depth that a place takes under a straight press, from the full solution at 0.02 and 0.25 N
@@ -60,15 +72,28 @@ fn share(place: [f64; 2]) -> f64 {
     (along - 0.883 * corner + 0.3006 * corner * r * r).max(0.0)
 }
 
-/// Each marker's part: bilinear on the square through them, falling to nothing at the tip and at the film's border.
-fn spread([x, y]: [f64; 2]) -> [f64; 4] {
-    let reach = x.abs().max(y.abs()) / MARKER_REST_MM;
-    let border = HALF_SIDE_MM / MARKER_REST_MM;
-    let size = reach.min((border - reach) / (border - 1.0));
-    let on_square = reach.max(f64::MIN_POSITIVE) * MARKER_REST_MM;
-    let [u, v] = [x, y].map(|part| (part / on_square + 1.0) / 2.0);
-    let parts = [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v];
-    parts.map(|part| size * part)
+/// Each marker's part: all of it at the marker itself, nothing at the others, at the tip and at the film's border.
+fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
+    let near = |from: [f64; 2]| length([place[0] - from[0], place[1] - from[1]]);
+    // From the markers outward it falls to nothing at the border.
+    let border = place.map(|part| {
+        let [own, marker] = [part, MARKER_REST_MM].map(|part| 1.0 - (part / HALF_SIDE_MM).powi(2));
+        (own / marker).clamp(0.0, 1.0)
+    });
+    let weigh = |k: usize| {
+        let centre = pressed.centres_mm[k];
+        // The tip under a marker leaves it nothing but its own.
+        let apart = |from: [f64; 2]| length([centre[0] - from[0], centre[1] - from[1]]);
+        let clear =
+            smooth((near(pressed.touches_mm) / apart(pressed.touches_mm).max(0.1)).min(1.0));
+        let others = (0..4).filter(|other| *other != k).map(|other| {
+            let other = pressed.centres_mm[other];
+            (near(other) / apart(other)).min(1.0)
+        });
+        let far = (near(centre) / MARKER_REST_MM).min(2.0);
+        clear * others.map(smooth).product::<f64>() * (1.0 - smooth(far / 2.0))
+    };
+    std::array::from_fn(|k| weigh(k) * border[0] * border[1])
 }
 
 /// From 0 to 1 with level ends.
@@ -83,8 +108,8 @@ fn length([x, y]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Load;
     use crate::film::Film;
+    use crate::{Load, MARKERS};
 
     fn pressed() -> Pressed {
         let load = Load::from_angles(0.2, 8.0, -5.0).unwrap();

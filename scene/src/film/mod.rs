@@ -1,265 +1,203 @@
 //! Where the film goes when it is pressed.
 //!
-//! The film is a nonlinear shell; its finite elements (`film/`) take a third of a second for one press. What a frame
-//! needs of it are a few curves in `data/`, and for a tip that sticks a grid of solutions, made from the full solution by a
-//! command that their first lines name.
+//! The film is a nonlinear shell; its finite elements (`film/`) take more than half a second for one press. What a frame
+//! needs of it are tables in `data/`, made from full solutions by a command of `film/`.
 
-pub mod curves;
+mod disc_motion;
 mod field;
-mod format;
-mod products;
-mod slide;
-pub mod stuck;
-mod table;
+mod label;
+pub mod reduced;
 
 use std::sync::{Arc, LazyLock};
 
-use crate::{Contact, Load, SceneError};
-use curves::{Curves, DiscMotion, Pose};
-use slide::Gauge;
-use stuck::{Solved, Stuck};
+use crate::{Contact, Load, MARKERS, SceneError};
+use label::{Felt, Stage};
+use reduced::{
+    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit,
+};
+
+pub use disc_motion::DiscMotion;
 
 /// Half the distance between the posts that hold the film, in mm (the paper's a = 14 mm).
 pub const HALF_SIDE_MM: f64 = 14.0;
-/// The largest force that the curves of [`Family::Force`] hold for, N.
-pub const MAX_FORCE_N: f64 = 0.5;
-/// The largest force that the others hold for, N.
-pub const MAX_STUCK_N: f64 = 0.3;
-/// The normal force that is the size 1 of a tip that slides, N: a little more than the largest along a tilted way.
-pub const SLIP_N: f64 = 0.32;
-/// The largest of |F_x / F_z| and |F_y / F_z| of a label: tan 12°.
+/// The largest force that the film's tables hold for, N.
+pub const MAX_FORCE_N: f64 = 0.25;
+/// The largest tangential force, in parts of the normal one.
+pub const MAX_RATIO: f64 = 0.8;
+/// How far from the middle, along x and along y, a tip may press, mm.
+pub const MAX_PLACE_MM: f64 = 5.0;
+/// The largest label where the tip sticks or slides, N: the force on the film is larger.
+pub const MAX_LABEL_N: f64 = 0.2;
+/// The largest of |F_x / F_z| and |F_y / F_z| of a label where the tip sticks or slides: tan 12°.
 pub const MAX_TANGENT: f64 = 0.212_556_561_670_022_13;
-/// How far from the middle, along x and along y, the tip may first touch the film, mm.
+/// How far from the middle, along x and along y, such a tip may first touch the film, mm.
 pub const MAX_OFFSET_MM: f64 = 0.25;
 
-/// Below this the film answers in proportion to the force (bending alone holds it), and so does a slide, N.
-const SLIGHT_N: f64 = 2e-4;
-
-/// A set of curves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Family {
-    /// By the tip's force: the size is (|F| / 0.5 N)^⅓, the tilt is F_x and F_y over −F_z; the tip's vector is its way.
-    Force,
-    /// By force again, as far as it takes for a tip that slides: the size is (−F_z / 0.32 N)^⅓, the tilt is F_x and F_y
-    /// over −F_z up to a ratio of 1, and the tip is farther from the middle.
-    Slip,
-}
-
-impl Family {
-    /// All of them.
-    pub const ALL: [Family; 2] = [Family::Force, Family::Slip];
-
-    /// Its name: that of its file in `data/`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Family::Force => "force",
-            Family::Slip => "slip",
-        }
+/// The nominal film.
+static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
+    let tables = Tables::from_bytes(include_bytes!("../../data/film.bin"));
+    Film {
+        tables: Arc::new(tables.expect("the committed tables are a film's")),
+        unit: Unit::default(),
     }
-
-    /// F_x and F_y over −F_z of a pose's tilt.
-    pub fn tangents(self, tilt: [f64; 2]) -> [f64; 2] {
-        match self {
-            Family::Force => tilt.map(|part| part * MAX_TANGENT),
-            Family::Slip => tilt,
-        }
-    }
-
-    /// The largest offset of a pose of this size, along x and along y, mm: a tip slides the farther the deeper it is.
-    pub fn offset_mm(self, size: f64) -> f64 {
-        match self {
-            Family::Force => MAX_OFFSET_MM,
-            Family::Slip => 0.36 + 1.9 * size,
-        }
-    }
-}
-
-/// The paper's film model.
-static CLAMPED: LazyLock<Film> = LazyLock::new(|| Film {
-    force: committed(include_str!("../../data/force.csv")),
-    stick: Some(Arc::new(solved(include_str!("../../data/stick.csv")))),
-    slip: committed(include_str!("../../data/slip.csv")),
 });
 
-/// The paper's film as it is cut, 40 × 40 mm. It is not known under a tip that sticks.
-static OVERHANGING: LazyLock<Film> = LazyLock::new(|| Film {
-    force: committed(include_str!("../../data/force-overhang.csv")),
-    stick: None,
-    slip: Arc::new(Curves::new([])),
-});
-
-fn committed(text: &str) -> Arc<Curves> {
-    Arc::new(text.parse().expect("the committed curves are curves"))
-}
-
-fn solved(text: &str) -> Stuck {
-    let solved = text
-        .parse::<Solved>()
-        .and_then(|solved| Stuck::new(&solved));
-    solved.expect("the committed solutions are a grid")
-}
-
-/// The film by its curves and solutions: markers within 0.07 px of the full solution at 800×600 (`film/README.md`); the
-/// film between them roughly.
+/// The film by its tables: markers within 0.1 px of the full solution at 320×240 (`film/README.md`); the film between them
+/// roughly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
-    force: Arc<Curves>,
-    stick: Option<Arc<Stuck>>,
-    slip: Arc<Curves>,
+    tables: Arc<Tables>,
+    unit: Unit,
 }
 
 impl Default for Film {
-    /// The paper's film model: 28 × 28 mm between its posts, nothing beyond.
+    /// The nominal film: the paper's, 28 × 28 mm between its posts.
     fn default() -> Film {
-        CLAMPED.clone()
+        NOMINAL.clone()
     }
 }
 
 impl Film {
-    /// The film that reaches so far beyond its posts' centres, mm: 0 or 6 (cut 40 × 40 mm, as the paper's).
+    /// The film as one unit has it.
     ///
     /// # Errors
-    /// When it is another number: there are curves of these two.
-    pub fn with_overhang(overhang_mm: f64) -> Result<Film, SceneError> {
-        match overhang_mm {
-            0.0 => Ok(CLAMPED.clone()),
-            6.0 => Ok(OVERHANGING.clone()),
-            _ => Err(SceneError::Load(format!(
-                "the film's overhang is {overhang_mm} mm: use 0 or 6, of which there are curves"
-            ))),
-        }
+    /// When the unit is farther from the nominal one than the tables hold.
+    pub fn of(unit: Unit) -> Result<Film, SceneError> {
+        unit.check()?;
+        Ok(Film {
+            unit,
+            ..NOMINAL.clone()
+        })
     }
 
-    /// The same film with other curves.
-    pub fn with_curves(mut self, family: Family, curves: Curves) -> Film {
-        match family {
-            Family::Force => self.force = Arc::new(curves),
-            Family::Slip => self.slip = Arc::new(curves),
-        }
-        self
-    }
-
-    /// The same film with another answer to a tip that sticks.
-    pub fn with_stuck(mut self, stuck: Stuck) -> Film {
-        self.stick = Some(Arc::new(stuck));
+    /// The same film with other tables.
+    pub fn with_tables(mut self, tables: Tables) -> Film {
+        self.tables = Arc::new(tables);
         self
     }
 
     /// Whether the film can take this load.
     ///
     /// # Errors
-    /// When the load is outside what the curves hold for.
+    /// When the load is outside what the tables hold for.
     pub fn check(&self, load: &Load) -> Result<(), SceneError> {
+        let radius = load.tip_radius_mm();
+        if !(SMALLEST_RADIUS_MM..=LARGEST_RADIUS_MM).contains(&radius) {
+            return Err(SceneError::Load(format!(
+                "the tip's radius is {radius} mm: use {SMALLEST_RADIUS_MM} to {LARGEST_RADIUS_MM}"
+            )));
+        }
         if load.magnitude_n() == 0.0 {
             return Ok(());
         }
         let [x, y, z] = load.vector_n();
+        if load.contact() == Contact::Force {
+            within(
+                "the tangential over the normal force",
+                libm::hypot(x, y) / -z,
+                MAX_RATIO,
+                "",
+            )?;
+            for part in load.offset_mm() {
+                within("the tip's offset", part.abs(), MAX_PLACE_MM, "mm")?;
+            }
+            return within("|F|", load.magnitude_n(), MAX_FORCE_N, "N");
+        }
         within("|F_x / F_z|", (x / z).abs(), MAX_TANGENT, "(12°)")?;
         within("|F_y / F_z|", (y / z).abs(), MAX_TANGENT, "(12°)")?;
         for part in load.offset_mm() {
             within("the tip's offset", part.abs(), MAX_OFFSET_MM, "mm")?;
         }
-        let most_n = match load.contact() {
-            Contact::Force => MAX_FORCE_N,
-            Contact::Stick | Contact::Slip { .. } => MAX_STUCK_N,
-        };
-        within("|F|", load.magnitude_n(), most_n, "N")?;
-        if load.contact() != Contact::Force && self.stick.is_none() {
-            return Err(SceneError::Load(
-                "this film has curves for the contact reading `force` only: use another overhang"
-                    .into(),
-            ));
-        }
-        Ok(())
+        within("|F|", load.magnitude_n(), MAX_LABEL_N, "N")
     }
 
-    /// The film under a load that [`Film::check`] accepts. Under another one it stays at the curves' limit.
+    /// The film under a load that [`Film::check`] accepts. Under another one it stays at the tables' limit.
     pub fn press(&self, load: &Load) -> Pressed {
-        match (load.contact(), &self.stick) {
-            _ if load.magnitude_n() == 0.0 => at_rest(load),
-            (Contact::Force, _) => self.by_force(load),
-            (Contact::Stick, Some(stuck)) => {
-                let gauge = gauge(load);
-                gauge.stuck(&gauge.placed(stuck))
-            }
-            (Contact::Slip { mu }, Some(stuck)) => self.slip(stuck, load, mu),
-            (_, None) => at_rest(load),
+        if load.magnitude_n() == 0.0 {
+            return Pressed {
+                touches_mm: load.offset_mm(),
+                centres_mm: self.centres_mm(),
+                ..Pressed::default()
+            };
+        }
+        let (pose, force_n) = match load.contact() {
+            Contact::Force => (self.pose(load), load.vector_n()),
+            Contact::Stick => self.on_stage(load, MAX_RATIO),
+            Contact::Slip { mu } => self.on_stage(load, mu),
+        };
+        Pressed {
+            tip_mm: self.tables.tip_mm(&pose, load.tip_radius_mm()),
+            force_n,
+            touches_mm: pose.place_mm,
+            centres_mm: self.centres_mm(),
+            discs: self.tables.discs(&pose, load.tip_radius_mm(), &self.unit),
         }
     }
 
-    fn by_force(&self, load: &Load) -> Pressed {
+    /// The load of a force, at the tables' limit where it is beyond.
+    fn pose(&self, load: &Load) -> Pose {
+        let stiffness = self.unit.bending_and_stretching();
+        let mut pose = Pose::of_force(load.vector_n(), load.offset_mm(), stiffness);
+        let steep = libm::hypot(pose.tilt[0], pose.tilt[1]) / LARGEST_TILT;
+        pose.size = pose.size.min(LARGEST_SIZE);
+        pose.tilt = pose.tilt.map(|part| part / steep.max(1.0));
+        pose
+    }
+
+    /// The load and the force, N, of a label whose tip is on a stage.
+    fn on_stage(&self, load: &Load, friction: f64) -> (Pose, [f64; 3]) {
         let [x, y, z] = load.vector_n();
-        let answer = self.force.at(&Pose {
-            size: libm::cbrt(load.magnitude_n() / MAX_FORCE_N).min(1.0),
-            tilt: [x, y].map(|part| (part / -z / MAX_TANGENT).clamp(-1.0, 1.0)),
-            offset: load
-                .offset_mm()
-                .map(|part| (part / MAX_OFFSET_MM).clamp(-1.0, 1.0)),
-        });
-        Pressed {
-            tip_mm: answer.tip,
-            force_n: load.vector_n(),
-            touches_mm: load.offset_mm(),
-            discs: answer.discs,
-        }
+        let stage = Stage {
+            tangents: [x, y].map(|part| (part / -z).clamp(-MAX_TANGENT, MAX_TANGENT)),
+            force_n: load.magnitude_n().min(MAX_LABEL_N),
+            offset_mm: load.offset_mm(),
+            friction,
+        };
+        let under = Under {
+            film: self,
+            radius_mm: load.tip_radius_mm(),
+        };
+        let reached = stage.reach(&under);
+        let [x, y] = reached.pose.tilt;
+        let angle = libm::hypot(x, y);
+        let part = if angle > 0.0 {
+            libm::sin(angle) / angle
+        } else {
+            1.0
+        };
+        let direction = [part * x, part * y, -libm::cos(angle)];
+        (
+            reached.pose,
+            direction.map(|part| reached.magnitude_n * part),
+        )
     }
 
-    fn slip(&self, stuck: &Stuck, load: &Load, mu: f64) -> Pressed {
-        if load.magnitude_n() < SLIGHT_N {
-            return self.slip_slightly(stuck, load, mu);
-        }
-        let gauge = gauge(load);
-        let start = gauge.start(&self.slip, mu);
-        if start.is_sure()
-            && let Some(slid) = gauge.slide(&self.slip, &start)
-        {
-            return slid;
-        }
-        let placed = gauge.placed(stuck);
-        if gauge.is_held(&placed, mu) {
-            return gauge.stuck(&placed);
-        }
-        let slid = gauge.slide(&self.slip, &start);
-        slid.unwrap_or_else(|| gauge.stuck(&placed))
-    }
-
-    /// The state of a slight force, in proportion to it.
-    fn slip_slightly(&self, stuck: &Stuck, load: &Load, mu: f64) -> Pressed {
-        let part = load.magnitude_n() / SLIGHT_N;
-        let times = |vector: [f64; 3]| vector.map(|component| part * component);
-        let whole = self.slip(stuck, &load.of_size(SLIGHT_N), mu);
-        let offset = load.offset_mm();
-        Pressed {
-            tip_mm: times(whole.tip_mm),
-            force_n: times(whole.force_n),
-            touches_mm: [0, 1].map(|c| offset[c] + part * (whole.touches_mm[c] - offset[c])),
-            discs: whole.discs.map(|disc| DiscMotion {
-                moved_mm: times(disc.moved_mm),
-                along_x: times(disc.along_x),
-                along_y: times(disc.along_y),
-            }),
-        }
+    /// Where the markers' centres rest, by identity, mm.
+    pub fn centres_mm(&self) -> [[f64; 2]; 4] {
+        std::array::from_fn(|k| MARKERS[k].moved(self.unit.markers_mm[k]).centre_mm)
     }
 }
 
-fn at_rest(load: &Load) -> Pressed {
-    Pressed {
-        touches_mm: load.offset_mm(),
-        ..Pressed::default()
-    }
+/// A film under a tip of a radius.
+struct Under<'a> {
+    film: &'a Film,
+    radius_mm: f64,
 }
 
-fn gauge(load: &Load) -> Gauge {
-    let [x, y, z] = load.vector_n();
-    Gauge {
-        tangents: [x, y].map(|part| (part / -z).clamp(-MAX_TANGENT, MAX_TANGENT)),
-        force_n: load.magnitude_n().min(MAX_STUCK_N),
-        offset_mm: load.offset_mm(),
+impl Felt for Under<'_> {
+    fn tip_mm(&self, pose: &Pose) -> [f64; 3] {
+        self.film.tables.tip_mm(pose, self.radius_mm)
+    }
+
+    fn size_of(&self, force_n: f64) -> f64 {
+        let stiffness = self.film.unit.bending_and_stretching();
+        let straight = Pose::of_force([0.0, 0.0, -force_n], [0.0; 2], stiffness);
+        straight.size.min(LARGEST_SIZE)
     }
 }
 
 /// The film in one state.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressed {
     /// Where the tip went, mm, film frame (z away from the camera: a press goes to z < 0).
     pub tip_mm: [f64; 3],
@@ -267,8 +205,23 @@ pub struct Pressed {
     pub force_n: [f64; 3],
     /// Which point of the film the tip is on, by where it rests, mm: a tip that slides leaves the load's offset.
     pub touches_mm: [f64; 2],
+    /// Where the markers' centres rest, by identity, mm.
+    pub centres_mm: [[f64; 2]; 4],
     /// How the film moved at the markers, by identity.
     pub discs: [DiscMotion; 4],
+}
+
+impl Default for Pressed {
+    /// The nominal film at rest.
+    fn default() -> Pressed {
+        Pressed {
+            tip_mm: [0.0; 3],
+            force_n: [0.0; 3],
+            touches_mm: [0.0; 2],
+            centres_mm: MARKERS.map(|disc| disc.centre_mm),
+            discs: [DiscMotion::default(); 4],
+        }
+    }
 }
 
 impl Pressed {
@@ -287,7 +240,7 @@ fn within(what: &str, value: f64, most: f64, unit: &str) -> Result<(), SceneErro
         return Ok(());
     }
     Err(SceneError::Load(format!(
-        "{what} is {value} {unit} and the film's curves hold up to {most}: press less, or straighter"
+        "{what} is {value} {unit} and the film's tables hold up to {most}: press less, or straighter"
     )))
 }
 
@@ -303,10 +256,23 @@ mod tests {
     fn beyond_the_curves_is_refused() {
         let film = Film::default();
         let refused = |f, a, b| film.check(&load(f, a, b)).unwrap_err().to_string();
-        assert!(refused(0.51, 0.0, 0.0).contains("|F| is 0.51 N"));
-        assert!(refused(0.2, -12.5, 0.0).contains("|F_x / F_z|"));
-        assert!(refused(0.2, 0.0, 12.5).contains("|F_y / F_z|"));
-        assert_eq!(film.check(&load(0.5, 12.0, -10.0)), Ok(()));
+        assert!(refused(0.26, 0.0, 0.0).contains("|F| is 0.26 N"));
+        assert!(refused(0.2, -30.0, 30.0).contains("tangential"));
+        assert_eq!(film.check(&load(0.25, 30.0, -20.0)), Ok(()));
+        let far = load(0.2, 0.0, 0.0).with_offset_mm([0.0, 5.1]).unwrap();
+        assert!(
+            film.check(&far)
+                .unwrap_err()
+                .to_string()
+                .contains("offset is 5.1")
+        );
+        let blunt = load(0.2, 0.0, 0.0).with_tip_radius_mm(2.5).unwrap();
+        assert!(
+            film.check(&blunt)
+                .unwrap_err()
+                .to_string()
+                .contains("radius is 2.5")
+        );
         assert_eq!(film.check(&Load::REST), Ok(()));
     }
 

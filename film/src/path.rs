@@ -1,0 +1,43 @@
+//! States found one after the other, and loads spread evenly.
+
+use crate::{Contact, Equilibrium, Film, FilmError};
+
+/// Known states that a start is foretold from.
+const FORETOLD_FROM: usize = 4;
+
+/// States found one after the other, each foretold by the latest.
+pub struct Path(Vec<(f64, Equilibrium)>);
+
+impl Path {
+    pub fn from_rest(film: &Film) -> Path {
+        Path(vec![(0.0, film.rest())])
+    }
+
+    /// The state of the next place.
+    pub fn go(
+        &mut self,
+        film: &Film,
+        contact: Contact,
+        place: f64,
+    ) -> Result<Equilibrium, FilmError> {
+        let latest = &self.0[self.0.len().saturating_sub(FORETOLD_FROM)..];
+        let known: Vec<_> = latest.iter().map(|(at, state)| (*at, state)).collect();
+        let last = &self.0[self.0.len() - 1].1;
+        let state = Equilibrium::foretold(&known, place)
+            .and_then(|start| film.press(contact, &start).ok())
+            .map_or_else(|| film.press(contact, last), Ok)?;
+        self.0.push((place, state.clone()));
+        Ok(state)
+    }
+}
+
+/// Halton's sequence: the digits of `index` in `base` behind the point, reversed.
+pub fn halton(mut index: usize, base: usize) -> f64 {
+    let (mut value, mut place) = (0.0, 1.0);
+    while index > 0 {
+        place /= base as f64;
+        value += place * (index % base) as f64;
+        index /= base;
+    }
+    value
+}

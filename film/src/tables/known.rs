@@ -1,0 +1,251 @@
+//! What full solutions tell of each table's outputs, seen so that a marker is in the corner (+, +).
+
+use hivtac_scene::film::reduced::{
+    Kind, LARGEST_RADIUS_MM, LARGEST_TILT, LINEAR_N, NOMINAL_RADIUS_MM, Pose, rho,
+};
+
+use super::SAME_PLACE_MM;
+use super::fit::Known;
+use super::symmetry::Mirror;
+use crate::sweep::{Moved, STENCIL_MM, Solved};
+use crate::{Change, FilmError};
+
+/// Full solutions with tips of two radii.
+pub struct Sweeps<'a> {
+    /// The nominal one.
+    pub nominal: &'a [Solved],
+    /// The largest, at some of the loads.
+    pub largest: &'a [Solved],
+}
+
+/// Rows of one number for each of some outputs.
+type Row = Vec<f64>;
+
+impl<'a> Sweeps<'a> {
+    /// What is known of a table's outputs with the tip at a place: by every mirror in which a place that was solved lies there.
+    pub fn known(&self, kind: Kind, place_mm: [f64; 2]) -> Result<Vec<Known>, FilmError> {
+        let mut all = Vec::new();
+        for mirror in Mirror::all() {
+            for (k, solved) in self.nominal.iter().enumerate() {
+                let pose = mirror.pose(&solved.pose);
+                if same(pose.place_mm, place_mm) {
+                    self.tell(kind, &mirror, k, &mut all)?;
+                }
+            }
+        }
+        if all.is_empty() {
+            return Err(FilmError::Solver(format!(
+                "no solution has its tip at {place_mm:?} mm or a mirrored place: sweep the film anew"
+            )));
+        }
+        Ok(all)
+    }
+
+    fn tell(
+        &self,
+        kind: Kind,
+        mirror: &Mirror,
+        index: usize,
+        all: &mut Vec<Known>,
+    ) -> Result<(), FilmError> {
+        let solved = &self.nominal[index];
+        let pose = mirror.pose(&solved.pose);
+        match kind {
+            Kind::Moved | Kind::Slopes | Kind::Tip => {
+                let of = |moved: &Moved| outputs(kind, mirror, moved);
+                for pose in poses(pose) {
+                    all.push(Known {
+                        pose,
+                        values: of(&solved.moved),
+                        slopes: Some(slopes(&pose, &by_force(mirror, solved, of))),
+                    });
+                }
+            }
+            Kind::Bends => {
+                let around = &solved.around_mm[mirror.corner()];
+                all.push(value(pose, bends(mirror, around)));
+            }
+            Kind::Radius => all.extend(self.by_radius(Kind::Moved, mirror, index)),
+            Kind::TipRadius => all.extend(self.by_radius(Kind::Tip, mirror, index)),
+            Kind::Unit => all.push(value(pose, by_unit(mirror, solved, &pose))),
+        }
+        Ok(())
+    }
+
+    /// The coefficients of ρ, ρ² and ρ³ in what a larger tip adds: by the difference at ρ = 1 and the slopes at both ends.
+    /// Nothing of loads that are not solved with the largest.
+    fn by_radius(&self, kind: Kind, mirror: &Mirror, index: usize) -> Option<Known> {
+        let nominal = &self.nominal[index];
+        let same_load = |solved: &&Solved| solved.pose == nominal.pose;
+        let largest = self.largest.iter().find(same_load)?;
+        let of = |moved: &Moved| outputs(kind, mirror, moved);
+        let per_rho = |solved: &Solved, radius_mm: f64| {
+            let step = 1e-3;
+            let rate = (rho(radius_mm + step) - rho(radius_mm - step)) / (2.0 * step);
+            let slope = of(&answer(solved, Change::TipRadius));
+            slope.into_iter().map(|part| part / rate).collect::<Row>()
+        };
+        let ends = [
+            per_rho(nominal, NOMINAL_RADIUS_MM),
+            per_rho(largest, LARGEST_RADIUS_MM),
+        ];
+        let (here, there) = (of(&nominal.moved), of(&largest.moved));
+        let outputs = 0..here.len();
+        let cubic = outputs.clone().map(|k| {
+            let (more, from, to) = (there[k] - here[k], ends[0][k], ends[1][k]);
+            [from, 3.0 * more - 2.0 * from - to, from + to - 2.0 * more]
+        });
+        let cubic: Vec<[f64; 3]> = cubic.collect();
+        let by_power = (0..3).flat_map(|power| cubic.iter().map(move |one| one[power]));
+        Some(value(mirror.pose(&nominal.pose), by_power.collect()))
+    }
+}
+
+fn same(a: [f64; 2], b: [f64; 2]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME_PLACE_MM)
+}
+
+fn value(pose: Pose, values: Row) -> Known {
+    Known {
+        pose,
+        values,
+        slopes: None,
+    }
+}
+
+/// A film at rest begins to answer to a load of any tilt.
+fn poses(pose: Pose) -> Vec<Pose> {
+    if pose.size > 0.0 {
+        return vec![pose];
+    }
+    let ring = |k: u32| {
+        let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_4).sin_cos();
+        [LARGEST_TILT * cos, LARGEST_TILT * sin]
+    };
+    let tilts = [[0.0; 2]].into_iter().chain((0..8).map(ring));
+    tilts.map(|tilt| Pose { tilt, ..pose }).collect()
+}
+
+fn answer(solved: &Solved, change: Change) -> Moved {
+    let place = Change::all().position(|one| one == change);
+    place.map_or_else(Moved::default, |k| solved.answers[k])
+}
+
+/// The outputs of a table of motions.
+fn outputs(kind: Kind, mirror: &Mirror, moved: &Moved) -> Row {
+    let disc = mirror.disc(&moved.discs[mirror.corner()]);
+    match kind {
+        Kind::Slopes => vec![disc.along_x[0], disc.along_y[0], disc.along_x[2]],
+        Kind::Tip => pick(mirror.vector(moved.tip_mm)),
+        _ => pick(disc.moved_mm),
+    }
+}
+
+fn pick([x, _, z]: [f64; 3]) -> Row {
+    vec![x, z]
+}
+
+/// How outputs answer to the force along x, y and z as they are seen.
+fn by_force(mirror: &Mirror, solved: &Solved, of: impl Fn(&Moved) -> Row) -> [Row; 3] {
+    let by = |axis: usize| of(&answer(solved, Change::Force(axis)));
+    // A unit of force along a seen axis is one of these along the film's own.
+    let unit = |seen: usize| {
+        let mut sum: Row = Vec::new();
+        for own in 0..3 {
+            let mut along = [0.0; 3];
+            along[own] = 1.0;
+            let part = mirror.vector(along)[seen];
+            let row = by(own);
+            sum.resize(row.len(), 0.0);
+            for (sum, value) in sum.iter_mut().zip(row) {
+                *sum += part * value;
+            }
+        }
+        sum
+    };
+    [unit(0), unit(1), unit(2)]
+}
+
+/// Slopes by size and tilt from those by force.
+fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
+    let moved = |axis: usize, step: f64| {
+        let mut there = *pose;
+        match axis {
+            0 => there.size += step,
+            _ => there.tilt[axis - 1] += step,
+        }
+        there.force_n()
+    };
+    [0, 1, 2].map(|axis| {
+        let step = 1e-5;
+        let [back, forth] = [-step, step].map(|step| moved(axis, step));
+        let mut sum = vec![0.0; by_force[0].len()];
+        for (c, row) in by_force.iter().enumerate() {
+            let part = (forth[c] - back[c]) / (2.0 * step);
+            for (sum, value) in sum.iter_mut().zip(row) {
+                *sum += part * value;
+            }
+        }
+        sum
+    })
+}
+
+/// Second differences of the motion around a marker: along x by xx, xy and yy, along z by xx and xy.
+fn bends(mirror: &Mirror, around: &[[f64; 3]; 9]) -> Row {
+    let at = |i: i32, j: i32| {
+        // The point of the film that is seen there: a mirror's way back is its transpose.
+        let own = |x: [f64; 2]| {
+            Mirror::all()
+                .find(|m| undoes(m, mirror))
+                .map(|m| m.along(x))
+        };
+        let [x, y] = own([f64::from(i), f64::from(j)]).unwrap_or_default();
+        let index = 3 * (y.round() as i32 + 1) + x.round() as i32 + 1;
+        mirror.vector(around[index as usize])
+    };
+    let step = STENCIL_MM * STENCIL_MM;
+    let second =
+        |i: i32, j: i32, c: usize| (at(i, j)[c] - 2.0 * at(0, 0)[c] + at(-i, -j)[c]) / step;
+    let mixed =
+        |c: usize| (at(1, 1)[c] - at(1, -1)[c] - at(-1, 1)[c] + at(-1, -1)[c]) / (4.0 * step);
+    vec![
+        second(1, 0, 0),
+        mixed(0),
+        second(0, 1, 0),
+        second(1, 0, 2),
+        mixed(2),
+    ]
+}
+
+fn undoes(one: &Mirror, other: &Mirror) -> bool {
+    let there_and_back = |v: [f64; 2]| same(one.along(other.along(v)), v);
+    there_and_back([1.0, 0.0]) && there_and_back([0.0, 1.0])
+}
+
+/// What a film's own differences add at a load that the nominal film would be pressed as far by.
+fn by_unit(mirror: &Mirror, solved: &Solved, pose: &Pose) -> Row {
+    let of = |moved: &Moved| outputs(Kind::Moved, mirror, moved);
+    let [per_size, ..] = slopes(pose, &by_force(mirror, solved, of));
+    // At the force's own ln t the size falls by so much.
+    let s = pose.size;
+    let size_per_thickness = match s {
+        0.0 => 0.0,
+        _ => -(3.0 * LINEAR_N * s + s * s * s) / (LINEAR_N + 3.0 * s * s),
+    };
+    let thickness_mm = crate::Design::default().material.thickness_mm;
+    let thicker = of(&answer(solved, Change::Thickness)).into_iter();
+    let thicker = thicker
+        .zip(per_size)
+        .map(|(part, size)| thickness_mm * part - size * size_per_thickness);
+    let mut row: Row = thicker.collect();
+    row.extend(of(&answer(solved, Change::Grip)));
+    for corner in hivtac_scene::MARKERS {
+        let post = mirror.seen_as(corner.centre_mm);
+        let by = [0, 1].map(|way| {
+            let told = of(&answer(solved, Change::Post(post, way)));
+            [told[0], told[1]]
+        });
+        row.extend(mirror.components(by).as_flattened());
+    }
+    row
+}

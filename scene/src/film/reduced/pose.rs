@@ -1,0 +1,110 @@
+//! A load in the variables in which the film's answer is nearly a polynomial.
+
+/// A load of size s is a force of `LINEAR_N`·s + s³ newton: s grows like the depth, from where bending
+/// holds the film to where stretching does.
+pub const LINEAR_N: f64 = 0.01;
+/// The size of the largest load, of 0.255 N.
+pub const LARGEST_SIZE: f64 = 0.628_8;
+/// The largest tilt, rad: the tangential force is 0.8 of the normal one.
+pub const LARGEST_TILT: f64 = 0.674_740_942_223_553_1;
+
+/// Which force presses where.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// See [`LINEAR_N`]; 0 to [`LARGEST_SIZE`].
+    pub size: f64,
+    /// The force's polar angle, split along x and y, rad; at most [`LARGEST_TILT`] long.
+    pub tilt: [f64; 2],
+    /// Where the tip touches the film, mm.
+    pub place_mm: [f64; 2],
+}
+
+impl Pose {
+    /// Of a force (N, F_z < 0, or none) at a place (mm) on a film that is so many times as stiff as
+    /// the nominal one in bending and in stretching.
+    pub fn of_force(force_n: [f64; 3], place_mm: [f64; 2], stiffness: [f64; 2]) -> Pose {
+        let [x, y, z] = force_n;
+        let sideways = libm::hypot(x, y);
+        let angle = libm::atan2(sideways, -z);
+        let part = if sideways > 0.0 {
+            angle / sideways
+        } else {
+            0.0
+        };
+        let [bending, stretching] = stiffness;
+        let linear = LINEAR_N * bending / stretching;
+        Pose {
+            size: size_of(libm::hypot(sideways, z) / stretching, linear),
+            tilt: [x * part, y * part],
+            place_mm,
+        }
+    }
+
+    /// The force on the nominal film, N.
+    pub fn force_n(&self) -> [f64; 3] {
+        let size_n = LINEAR_N * self.size + self.size * self.size * self.size;
+        let angle = libm::hypot(self.tilt[0], self.tilt[1]);
+        let sinc = if angle > 1e-9 {
+            libm::sin(angle) / angle
+        } else {
+            1.0
+        };
+        let [x, y] = self.tilt.map(|part| size_n * sinc * part);
+        [x, y, -size_n * libm::cos(angle)]
+    }
+
+    /// The same load seen in a mirror: x and y by these signs.
+    pub fn mirrored(&self, [sx, sy]: [f64; 2]) -> Pose {
+        let mirror = |[x, y]: [f64; 2]| [sx * x, sy * y];
+        Pose {
+            size: self.size,
+            tilt: mirror(self.tilt),
+            place_mm: mirror(self.place_mm),
+        }
+    }
+
+    /// The same load mirrored at the diagonal x = y.
+    pub fn swapped(&self) -> Pose {
+        let swap = |[x, y]: [f64; 2]| [y, x];
+        Pose {
+            size: self.size,
+            tilt: swap(self.tilt),
+            place_mm: swap(self.place_mm),
+        }
+    }
+}
+
+/// The root s of linear·s + s³ = f, for f ≥ 0 and linear > 0.
+fn size_of(f: f64, linear: f64) -> f64 {
+    // Cardano's formula without cancellation: s = 2 √(linear / 3) sinh(asinh(…) / 3).
+    let scale = 2.0 * libm::sqrt(linear / 3.0);
+    let argument = 3.0 * f / (linear * scale);
+    scale * libm::sinh(libm::asinh(argument) / 3.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn forces_come_back(f in 0.0..0.255, tilt in 0.0..LARGEST_TILT, turn in 0.0..6.3) {
+            let (sin, cos) = libm::sincos(turn);
+            let sideways = f * libm::sin(tilt);
+            let force = [sideways * cos, sideways * sin, -f * libm::cos(tilt)];
+            let pose = Pose::of_force(force, [1.0, 2.0], [1.0; 2]);
+            prop_assert!((0.0..=LARGEST_SIZE).contains(&pose.size));
+            for (a, b) in pose.force_n().into_iter().zip(force) {
+                prop_assert!((a - b).abs() < 1e-14, "{} {}", a, b);
+            }
+        }
+
+        #[test]
+        fn a_stiffer_film_is_as_one_that_is_pressed_less(f in 1e-5..0.2f64, by in 1.0..1.2f64) {
+            let nominal = Pose::of_force([0.0, 0.0, -f], [0.0; 2], [1.0; 2]);
+            let stiffer = Pose::of_force([0.0, 0.0, -f * by], [0.0; 2], [by; 2]);
+            prop_assert!((nominal.size - stiffer.size).abs() < 1e-12);
+        }
+    }
+}
