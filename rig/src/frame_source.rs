@@ -141,6 +141,8 @@ impl FrameSource for SceneSource {
     fn truth(&self, time_s: f64) -> Value {
         let truth = self.rgb565.truth(time_s);
         let force = truth.force.vector_n();
+        // A tip that does not press is nowhere on the film.
+        let place = (truth.force.magnitude_n() > 0.0).then(|| truth.force.offset_mm());
         let markers: Vec<Value> = (truth.markers.iter())
             .map(|marker| match marker {
                 Some(marker) => json!({"x": marker.centroid_px[0], "y": marker.centroid_px[1], "area": marker.area_px2}),
@@ -152,6 +154,8 @@ impl FrameSource for SceneSource {
             "beta_deg": truth.force.beta_deg(),
             "magnitude_n": truth.force.magnitude_n(),
             "x_n": force[0], "y_n": force[1], "z_n": force[2],
+            "place_x_mm": place.map(|place| place[0]),
+            "place_y_mm": place.map(|place| place[1]),
             "markers": markers,
         })
     }
