@@ -1,4 +1,5 @@
-//! The true force of each frame and where it acts, from the log of a simulated sensor, joined by frame number.
+//! The true force of each frame and where it acts, from the log of a simulated sensor, joined by
+//! frame number.
 
 use hivtac_host::failure::{Failure, Kind};
 use serde::{Deserialize, Serialize};

@@ -193,8 +193,8 @@ fn log_lines_go_to_standard_error() {
 #[test]
 fn the_truth_stands_beside_and_is_compared() {
     let mut log = tempfile::NamedTempFile::new().unwrap();
-    // The sample's force exactly, twice the force in the same direction, and one at a right angle; the sample's place, one
-    // half a millimetre beside it, and none.
+    // The sample's force exactly, twice the force in the same direction, and one at a right angle;
+    // the sample's place, one half a millimetre beside it, and none.
     for (frame, magnitude, [x, y, z], place) in [
         (
             1,

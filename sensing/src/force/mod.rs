@@ -44,8 +44,8 @@ pub struct Force {
     pub beta: MilliDegrees,
     /// |F| ≥ 0.
     pub magnitude: MicroNewtons,
-    /// (Fx, Fy, Fz): |F| in the direction of α and β. Where a model's angles are those of the pressing
-    /// direction (`stick`, `slip`), it is |F| along that.
+    /// (Fx, Fy, Fz): |F| in the direction of α and β. Where a model's angles are those of the
+    /// pressing direction (`stick`, `slip`), it is |F| along that.
     pub cartesian: [MicroNewtons; 3],
     /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within 1.731 times this angle of
     /// the one found (`model::Uncertainty`).
