@@ -211,7 +211,8 @@ pub struct Force {
     pub place: Option<Place>,
 }
 
-/// Where the tip touches the film, in the film frame: (0, 0) is its middle.
+/// The point of the film that the tip touches, by where it rests in the film frame: (0, 0) is the
+/// film's middle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Place {
     /// To the right in the image, µm.

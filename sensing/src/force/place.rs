@@ -2,7 +2,8 @@
 
 use crate::units::{Micrometres, SignedMicrometres};
 
-/// A place of contact in the film frame, with its standard uncertainty. (0, 0) is the film's middle.
+/// The point of the film that the tip touches, by where it rests in the film frame: (0, 0) is the
+/// film's middle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Place {
     /// To the right in the image.
