@@ -2,7 +2,11 @@
 
 use hivtac_sensing::formats::{Mono, Yuv422};
 use hivtac_sensing::threshold::{HsvBox, Threshold};
-use hivtac_sensing::{force::Force, markers::Marker, model::CentroidEstimator};
+use hivtac_sensing::{
+    force::{Force, Place},
+    markers::Marker,
+    model::CentroidEstimator,
+};
 use hivtac_wire::message;
 
 /// A force for the wire. Uncertainties are never negative.
@@ -11,9 +15,19 @@ pub fn force_to_wire(force: Force) -> message::Force {
         alpha_mdeg: force.alpha.0,
         beta_mdeg: force.beta.0,
         magnitude_un: force.magnitude.0,
-        cartesian_un: force.cartesian.map(|vector| vector.map(|f| f.0)),
+        cartesian_un: force.cartesian.map(|component| component.0),
         direction_sigma_mdeg: force.direction_sigma.0.unsigned_abs(),
         magnitude_sigma_un: force.magnitude_sigma.0.unsigned_abs(),
+        place: force.place.map(place_to_wire),
+    }
+}
+
+/// A place of contact for the wire.
+fn place_to_wire(place: Place) -> message::Place {
+    message::Place {
+        x_um: place.x.0,
+        y_um: place.y.0,
+        sigma_um: place.sigma.0,
     }
 }
 

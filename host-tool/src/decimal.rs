@@ -8,7 +8,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decimal<const DECIMALS: u32>(pub i64);
 
-/// Thousandths of a degree, printed in degrees; µN in mN.
+/// Thousandths of a degree, printed in degrees; µN in mN; µm in mm.
 pub type Thousandths = Decimal<3>;
 /// µN, printed in N; µs in s.
 pub type Millionths = Decimal<6>;

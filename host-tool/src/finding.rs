@@ -2,7 +2,7 @@
 
 use crate::decimal::Millionths;
 use crate::force_json::ForceJson;
-use crate::lines::to_json;
+use crate::lines::{contact_text, status_text, to_json};
 use hivtac_sensing::blob::Blob;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::settings::Settings;
@@ -19,6 +19,7 @@ pub struct Finding<'a> {
     markers: Option<Vec<MarkerJson>>,
     features: Option<Vec<f64>>,
     force: Option<ForceJson>,
+    contact: Option<bool>,
     status: Vec<&'static str>,
     #[serde(skip)]
     focal_px: f64,
@@ -100,6 +101,9 @@ impl<'a> Finding<'a> {
             markers,
             features,
             force: measurement.force.as_ref().map(ForceJson::from),
+            contact: measurement
+                .force
+                .map(|_| measurement.status.contains(Status::CONTACT)),
             status: measurement.status.names().collect(),
             focal_px: settings.geometry.focal.to_f64(),
             overflow: measurement.status.contains(Status::BLOB_OVERFLOW),
@@ -127,12 +131,11 @@ impl<'a> Finding<'a> {
         lines.extend(self.marker_lines());
         lines.extend(self.feature_line());
         lines.extend(self.force_line());
-        let status = if self.status.is_empty() {
-            "ok".to_owned()
-        } else {
-            self.status.join(" ")
-        };
-        lines.push(format!("  status    {status}"));
+        lines.extend(self.place_line());
+        if self.force.is_some() {
+            lines.push(format!("  contact   {}", contact_text(self.contact)));
+        }
+        lines.push(format!("  status    {}", status_text(&self.status)));
         lines.join("\n")
     }
 
@@ -188,20 +191,25 @@ impl<'a> Finding<'a> {
 
     fn force_line(&self) -> Option<String> {
         let force = self.force.as_ref()?;
-        let vector = match (force.x_n, force.y_n, force.z_n) {
-            (Some(x), Some(y), Some(z)) => {
-                let [x, y, z] = [x, y, z].map(Millionths::in_thousandths);
-                format!(", F ({x}, {y}, {z}) mN")
-            }
-            _ => String::new(),
-        };
+        let [x, y, z] = [force.x_n, force.y_n, force.z_n].map(Millionths::in_thousandths);
         Some(format!(
-            "  force     α {}°, β {}°, |F| {} mN{vector}; ± {}°, ± {} mN",
+            "  force     α {}°, β {}°, |F| {} mN, F ({x}, {y}, {z}) mN; ± {}°, ± {} mN",
             force.alpha_deg,
             force.beta_deg,
             force.magnitude_n.in_thousandths(),
             force.direction_sigma_deg,
             force.magnitude_sigma_n.in_thousandths()
         ))
+    }
+
+    /// Of a force; a dash when the model does not tell the place.
+    fn place_line(&self) -> Option<String> {
+        let [x, y, sigma] = self.force.as_ref()?.place.numbers();
+        Some(match (x, y, sigma) {
+            (Some(x), Some(y), Some(sigma)) => {
+                format!("  place     ({x}, {y}) mm; ± {sigma} mm")
+            }
+            _ => "  place     –".to_owned(),
+        })
     }
 }

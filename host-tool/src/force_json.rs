@@ -14,21 +14,35 @@ pub struct ForceJson {
     pub beta_deg: Thousandths,
     /// |F|, N.
     pub magnitude_n: Millionths,
-    /// Fx, N; `null` where the model's angles are not those of the force.
-    pub x_n: Option<Millionths>,
+    /// Fx, N.
+    pub x_n: Millionths,
     /// Fy, N.
-    pub y_n: Option<Millionths>,
+    pub y_n: Millionths,
     /// Fz, N.
-    pub z_n: Option<Millionths>,
+    pub z_n: Millionths,
     /// Standard uncertainty of the direction, degrees.
     pub direction_sigma_deg: Thousandths,
     /// Standard uncertainty of |F|, N.
     pub magnitude_sigma_n: Millionths,
+    /// Where the tip touches the film, each `null` where the model does not tell.
+    #[serde(flatten)]
+    pub place: PlaceJson,
+}
+
+/// A place of contact: three numbers, or three times none.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct PlaceJson {
+    /// To the right in the image, mm from the film's middle.
+    pub place_x_mm: Option<Thousandths>,
+    /// Down in the image, mm from the film's middle.
+    pub place_y_mm: Option<Thousandths>,
+    /// Standard uncertainty of each coordinate, mm.
+    pub place_sigma_mm: Option<Thousandths>,
 }
 
 impl From<&message::Force> for ForceJson {
     fn from(force: &message::Force) -> ForceJson {
-        let [x_n, y_n, z_n] = components(force.cartesian_un);
+        let [x_n, y_n, z_n] = force.cartesian_un.map(Millionths::from_i32);
         ForceJson {
             alpha_deg: Thousandths::from_i32(force.alpha_mdeg),
             beta_deg: Thousandths::from_i32(force.beta_mdeg),
@@ -38,13 +52,16 @@ impl From<&message::Force> for ForceJson {
             z_n,
             direction_sigma_deg: Thousandths::from_u64(force.direction_sigma_mdeg.into()),
             magnitude_sigma_n: Millionths::from_u64(force.magnitude_sigma_un.into()),
+            place: force.place.map_or_else(PlaceJson::default, |place| {
+                PlaceJson::of_micrometres(place.x_um, place.y_um, place.sigma_um)
+            }),
         }
     }
 }
 
 impl From<&force::Force> for ForceJson {
     fn from(force: &force::Force) -> ForceJson {
-        let [x_n, y_n, z_n] = components(force.cartesian.map(|vector| vector.map(|n| n.0)));
+        let [x_n, y_n, z_n] = force.cartesian.map(|n| Millionths::from_i32(n.0));
         ForceJson {
             alpha_deg: Thousandths::from_i32(force.alpha.0),
             beta_deg: Thousandths::from_i32(force.beta.0),
@@ -54,13 +71,86 @@ impl From<&force::Force> for ForceJson {
             z_n,
             direction_sigma_deg: Thousandths::from_i32(force.direction_sigma.0),
             magnitude_sigma_n: Millionths::from_i32(force.magnitude_sigma.0),
+            place: force.place.map_or_else(PlaceJson::default, |place| {
+                PlaceJson::of_micrometres(place.x.0, place.y.0, place.sigma.0)
+            }),
         }
     }
 }
 
-/// Each component in N, or three times none.
-fn components(vector_un: Option<[i32; 3]>) -> [Option<Millionths>; 3] {
-    vector_un.map_or([None; 3], |vector| {
-        vector.map(|n| Some(Millionths::from_i32(n)))
-    })
+impl PlaceJson {
+    fn of_micrometres(x: i32, y: i32, sigma: u32) -> PlaceJson {
+        PlaceJson {
+            place_x_mm: Some(Thousandths::from_i32(x)),
+            place_y_mm: Some(Thousandths::from_i32(y)),
+            place_sigma_mm: Some(Thousandths::from_u64(sigma.into())),
+        }
+    }
+
+    /// x, y and its uncertainty, in the order of the columns.
+    pub fn numbers(&self) -> [Option<Thousandths>; 3] {
+        [self.place_x_mm, self.place_y_mm, self.place_sigma_mm]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres};
+
+    const WIRE: message::Force = message::Force {
+        alpha_mdeg: -5000,
+        beta_mdeg: 2500,
+        magnitude_un: 100_000,
+        cartesian_un: [-8707, 4362, -99_525],
+        direction_sigma_mdeg: 480,
+        magnitude_sigma_un: 900,
+        place: Some(message::Place {
+            x_um: 1250,
+            y_um: -7,
+            sigma_um: 85,
+        }),
+    };
+
+    const SENSED: force::Force = force::Force {
+        alpha: MilliDegrees(-5000),
+        beta: MilliDegrees(2500),
+        magnitude: MicroNewtons(100_000),
+        cartesian: [
+            MicroNewtons(-8707),
+            MicroNewtons(4362),
+            MicroNewtons(-99_525),
+        ],
+        direction_sigma: MilliDegrees(480),
+        magnitude_sigma: MicroNewtons(900),
+        place: Some(force::Place {
+            x: SignedMicrometres(1250),
+            y: SignedMicrometres(-7),
+            sigma: Micrometres(85),
+        }),
+    };
+
+    fn json(force: ForceJson) -> String {
+        serde_json::to_string(&force).unwrap()
+    }
+
+    #[test]
+    fn a_sample_and_a_picture_give_the_same_json() {
+        assert_eq!(json((&WIRE).into()), json((&SENSED).into()));
+        assert!(
+            json((&WIRE).into())
+                .ends_with(r#","place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085}"#)
+        );
+    }
+
+    #[test]
+    fn a_place_that_is_not_there_is_null() {
+        let (mut wire, mut sensed) = (WIRE, SENSED);
+        (wire.place, sensed.place) = (None, None);
+        assert_eq!(json((&wire).into()), json((&sensed).into()));
+        assert!(
+            json((&wire).into())
+                .ends_with(r#","place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null}"#)
+        );
+    }
 }

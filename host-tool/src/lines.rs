@@ -1,7 +1,7 @@
 //! One line for each sample: for people, as JSON, or as CSV.
 
 use crate::decimal::{Millionths, Thousandths};
-use crate::force_json::ForceJson;
+use crate::force_json::{ForceJson, PlaceJson};
 use crate::truth::Truth;
 use hivtac_wire::message::{Force, Sample};
 use hivtac_wire::status::Status;
@@ -51,6 +51,12 @@ fn names(status: Status) -> Vec<&'static str> {
     status.names().collect()
 }
 
+/// Whether something touches the film; unknown without a force.
+fn contact(sample: &Sample) -> Option<bool> {
+    let touched = sample.status.contains(Status::CONTACT);
+    sample.force.is_some().then_some(touched)
+}
+
 fn human_header(truth: bool) -> String {
     let columns = |names: &[&str]| {
         names
@@ -62,11 +68,13 @@ fn human_header(truth: bool) -> String {
     let mut unit = format!("{:>8}{:>8}{:>13}", "", "", "s");
     name += &columns(&["α", "β", "|F|", "Fx", "Fy", "Fz"]);
     unit += &columns(&["°", "°", "mN", "mN", "mN", "mN"]);
+    name += &columns(&["place x", "place y", "place ±", "contact"]);
+    unit += &columns(&["mm", "mm", "mm", ""]);
     if truth {
-        name += &columns(&["true α", "true β", "true |F|"]);
-        unit += &columns(&["°", "°", "mN"]);
+        name += &columns(&["true α", "true β", "true |F|", "true x", "true y"]);
+        unit += &columns(&["°", "°", "mN", "mm", "mm"]);
     }
-    format!("{name}  status\n{unit}")
+    format!("{name}  status\n{}", unit.trim_end())
 }
 
 fn human_row(row: &Row) -> String {
@@ -81,47 +89,71 @@ fn human_row(row: &Row) -> String {
     let time = Millionths::from_u64(*time_us);
     let mut line = format!("{sequence:>8}{frame:>8}{time:>13}");
     line += &human_force(force.as_ref());
+    line += &format!("{:>9}", contact_text(contact(row.sample)));
     if let Some(truth) = row.truth {
         line += &human_truth(truth);
     }
-    let names = names(*status);
-    let status = if names.is_empty() {
-        "ok".to_owned()
-    } else {
-        names.join(" ")
-    };
-    format!("{line}  {status}")
+    format!("{line}  {}", status_text(&names(*status)))
 }
 
-/// Six columns: ° with three decimals, mN with three decimals; both exact.
+/// Names of status bits for a person, who is told of a contact elsewhere.
+pub fn status_text(names: &[&str]) -> String {
+    let other = |name: &&str| *name != "contact";
+    let names: Vec<_> = names.iter().copied().filter(other).collect();
+    if names.is_empty() {
+        return "ok".to_owned();
+    }
+    names.join(" ")
+}
+
+/// Whether something touches the film, for a person.
+pub fn contact_text(contact: Option<bool>) -> &'static str {
+    match contact {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "–",
+    }
+}
+
+/// Nine columns: degrees, mN and mm with three decimals; all exact.
 fn human_force(force: Option<&Force>) -> String {
     let Some(force) = force else {
-        return format!("{:>9}", "–").repeat(6);
+        return NOTHING.repeat(9);
     };
     let numbers = [force.alpha_mdeg, force.beta_mdeg, force.magnitude_un];
     let mut text: String = numbers.map(column).concat();
-    text += &match force.cartesian_un {
-        Some(vector) => vector.map(column).concat(),
-        None => format!("{:>9}", "–").repeat(3),
-    };
+    text += &force.cartesian_un.map(column).concat();
+    text += &human_place(ForceJson::from(force).place);
     text
 }
+
+/// A column with nothing in it.
+const NOTHING: &str = "        –";
 
 fn column(thousandths: i32) -> String {
     format!("{:>9}", Thousandths::from_i32(thousandths))
 }
 
+fn human_place(place: PlaceJson) -> String {
+    let columns = place.numbers().map(|number| match number {
+        Some(millimetres) => format!("{millimetres:>9}"),
+        None => NOTHING.to_owned(),
+    });
+    columns.concat()
+}
+
 fn human_truth(truth: Option<Truth>) -> String {
-    match truth {
-        Some(truth) => {
-            let millinewtons = truth.magnitude_n * 1e3;
-            format!(
-                "{:>9.3}{:>9.3}{millinewtons:>9.3}",
-                truth.alpha_deg, truth.beta_deg
-            )
-        }
-        None => format!("{:>9}", "?").repeat(3),
-    }
+    let Some(truth) = truth else {
+        return format!("{:>9}", "?").repeat(5);
+    };
+    let millinewtons = truth.magnitude_n * 1e3;
+    let force = [truth.alpha_deg, truth.beta_deg, millinewtons];
+    let mut text = force.map(|number| format!("{number:>9.3}")).concat();
+    text += &match truth.place_mm() {
+        Some(place) => place.map(|number| format!("{number:>9.3}")).concat(),
+        None => NOTHING.repeat(2),
+    };
+    text
 }
 
 #[derive(Serialize)]
@@ -130,6 +162,7 @@ struct SampleJson {
     frame: u32,
     time_us: u64,
     force: Option<ForceJson>,
+    contact: Option<bool>,
     status: Vec<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     truth: Option<Option<Truth>>,
@@ -142,6 +175,7 @@ fn json_row(row: &Row) -> String {
         frame: sample.frame,
         time_us: sample.time_us,
         force: sample.force.as_ref().map(ForceJson::from),
+        contact: contact(sample),
         status: names(sample.status),
         truth: row.truth,
     };
@@ -156,10 +190,12 @@ pub fn to_json(value: &impl Serialize) -> String {
 
 fn csv_header(truth: bool) -> String {
     let mut header = "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,\
-                      direction_sigma_deg,magnitude_sigma_n,status"
+                      direction_sigma_deg,magnitude_sigma_n,\
+                      place_x_mm,place_y_mm,place_sigma_mm,contact,status"
         .to_owned();
     if truth {
-        header += ",true_alpha_deg,true_beta_deg,true_magnitude_n,true_x_n,true_y_n,true_z_n";
+        header += ",true_alpha_deg,true_beta_deg,true_magnitude_n,true_x_n,true_y_n,true_z_n,\
+                   true_place_x_mm,true_place_y_mm";
     }
     header
 }
@@ -173,6 +209,7 @@ fn csv_row(row: &Row) -> String {
         sample.time_us.to_string(),
     ];
     fields.extend(csv_force(sample.force.as_ref()));
+    fields.push(field(contact(sample)));
     fields.push(names(sample.status).join("|"));
     if let Some(truth) = row.truth {
         fields.extend(csv_truth(truth));
@@ -182,36 +219,39 @@ fn csv_row(row: &Row) -> String {
 
 fn csv_force(force: Option<&Force>) -> Vec<String> {
     let Some(force) = force else {
-        return vec![String::new(); 8];
+        return vec![String::new(); 11];
     };
-    let angles =
-        [force.alpha_mdeg, force.beta_mdeg].map(|angle| Thousandths::from_i32(angle).to_string());
-    let vector = force
-        .cartesian_un
-        .map(|vector| vector.map(Millionths::from_i32));
-    let vector = vector.map_or([const { String::new() }; 3], |vector| {
-        vector.map(|n| n.to_string())
-    });
-    let mut fields = angles.to_vec();
-    fields.push(Millionths::from_i32(force.magnitude_un).to_string());
-    fields.extend(vector);
-    fields.push(Thousandths::from_u64(force.direction_sigma_mdeg.into()).to_string());
-    fields.push(Millionths::from_u64(force.magnitude_sigma_un.into()).to_string());
+    let force = ForceJson::from(force);
+    let mut fields = [force.alpha_deg, force.beta_deg]
+        .map(|n| n.to_string())
+        .to_vec();
+    let newtons = [force.magnitude_n, force.x_n, force.y_n, force.z_n];
+    fields.extend(newtons.map(|n| n.to_string()));
+    fields.push(force.direction_sigma_deg.to_string());
+    fields.push(force.magnitude_sigma_n.to_string());
+    fields.extend(force.place.numbers().map(field));
     fields
 }
 
+/// Empty for what is not there.
+fn field(value: Option<impl ToString>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
 fn csv_truth(truth: Option<Truth>) -> Vec<String> {
-    match truth {
-        Some(t) => [t.alpha_deg, t.beta_deg, t.magnitude_n, t.x_n, t.y_n, t.z_n]
-            .map(|number| number.to_string())
-            .to_vec(),
-        None => vec![String::new(); 6],
-    }
+    let Some(t) = truth else {
+        return vec![String::new(); 8];
+    };
+    let force = [t.alpha_deg, t.beta_deg, t.magnitude_n, t.x_n, t.y_n, t.z_n];
+    let mut fields = force.map(|number| number.to_string()).to_vec();
+    fields.extend([t.place_x_mm, t.place_y_mm].map(field));
+    fields
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_wire::message::Place;
 
     fn sample(force: Option<Force>, status: Status) -> Sample {
         Sample {
@@ -224,122 +264,156 @@ mod tests {
         }
     }
 
-    fn force(cartesian_un: Option<[i32; 3]>) -> Force {
+    const PLACE: Place = Place {
+        x_um: 1250,
+        y_um: -7,
+        sigma_um: 85,
+    };
+
+    fn force(place: Option<Place>) -> Force {
         Force {
             alpha_mdeg: -5000,
             beta_mdeg: 2500,
             magnitude_un: 100_000,
-            cartesian_un,
+            cartesian_un: [-8707, 4362, -99_525],
             direction_sigma_mdeg: 480,
             magnitude_sigma_un: 900,
+            place,
         }
     }
 
-    fn truth() -> Truth {
-        serde_json::from_str(
-            r#"{"frame":42,"time_us":1,"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"x_n":-0.01,"y_n":0.004,"z_n":-0.1}"#,
+    fn with_place() -> Sample {
+        sample(
+            Some(force(Some(PLACE))),
+            Status::NOT_CALIBRATED | Status::CONTACT,
         )
-        .unwrap()
+    }
+
+    const TRUTH: &str = r#"{"frame":42,"time_us":1,"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"x_n":-0.01,"y_n":0.004,"z_n":-0.1}"#;
+
+    fn truth() -> Truth {
+        serde_json::from_str(TRUTH).unwrap()
+    }
+
+    fn truth_with_place() -> Truth {
+        let place = r#","place_x_mm":1.2504,"place_y_mm":-0.5}"#;
+        serde_json::from_str(&TRUTH.replace('}', place)).unwrap()
+    }
+
+    fn row(format: Format, sample: &Sample, truth: Option<Option<Truth>>) -> String {
+        format.row(&Row { sample, truth })
     }
 
     fn lines(format: Format, sample: &Sample, truth: Option<Option<Truth>>) -> String {
         let header = format.header(truth.is_some()).unwrap_or_default();
-        format!("{header}\n{}", format.row(&Row { sample, truth }))
+        format!("{header}\n{}", row(format, sample, truth))
     }
 
     #[test]
     fn a_person_sees_aligned_columns() {
-        let sample = sample(
-            Some(force(Some([-8707, 4362, -99_525]))),
-            Status::MODEL_SIMULATED,
-        );
-        let expected = "     seq   frame         time        α        β      |F|       Fx       Fy       Fz   true α   true β true |F|  status
-                            s        °        °       mN       mN       mN       mN        °        °       mN
-      41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525   -5.250    2.500  101.500  model_simulated";
-        assert_eq!(lines(Format::Human, &sample, Some(Some(truth()))), expected);
+        let expected = "     seq   frame         time        α        β      |F|       Fx       Fy       Fz  place x  place y  place ±  contact   true α   true β true |F|   true x   true y  status
+                            s        °        °       mN       mN       mN       mN       mm       mm       mm                 °        °       mN       mm       mm
+      41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.007    0.085      yes   -5.250    2.500  101.500    1.250   -0.500  not_calibrated";
+        let truth = Some(Some(truth_with_place()));
+        assert_eq!(lines(Format::Human, &with_place(), truth), expected);
     }
 
     #[test]
     fn a_person_sees_what_is_missing() {
-        let sample = sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED);
-        let row = Format::Human.row(&Row {
-            sample: &sample,
-            truth: Some(None),
-        });
-        let expected = "      41      42     1.400000        –        –        –        –        –        –        ?        ?        ?  markers_missing frame_dropped";
-        assert_eq!(row, expected);
+        let without = sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED);
+        let dashes = "        –".repeat(10);
+        assert_eq!(
+            row(Format::Human, &without, Some(None)),
+            format!(
+                "      41      42     1.400000{dashes}{}  markers_missing frame_dropped",
+                "        ?".repeat(5)
+            )
+        );
+        let without_place = sample(Some(force(None)), Status::default());
+        let expected = "      41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525        –        –        –       no   -5.250    2.500  101.500        –        –  ok";
+        let truth = Some(Some(truth()));
+        assert_eq!(row(Format::Human, &without_place, truth), expected);
+    }
+
+    #[test]
+    fn a_person_is_told_of_a_contact_once() {
+        let pressed = sample(Some(force(None)), Status::CONTACT);
+        let line = row(Format::Human, &pressed, None);
+        assert!(line.ends_with("      yes  ok"), "{line}");
     }
 
     #[test]
     fn json_has_every_digit_and_null() {
-        let whole = sample(
-            Some(force(Some([-8707, 4362, -99_525]))),
-            Status::MODEL_SIMULATED,
-        );
         assert_eq!(
-            Format::Json.row(&Row {
-                sample: &whole,
-                truth: None
-            }),
+            row(Format::Json, &with_place(), None),
             concat!(
-                r#"{"seq":41,"frame":42,"time_us":1400000,"force":{"alpha_deg":-5.000,"beta_deg":2.500,"#,
-                r#""magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"#,
-                r#""direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900},"status":["model_simulated"]}"#
+                r#"{"seq":41,"frame":42,"time_us":1400000,"force":{"alpha_deg":-5.000,"#,
+                r#""beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"#,
+                r#""z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"#,
+                r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085},"#,
+                r#""contact":true,"status":["not_calibrated","contact"]}"#
             )
         );
         let without = sample(None, Status::IMAGE_DARK);
         assert_eq!(
-            Format::Json.row(&Row {
-                sample: &without,
-                truth: Some(None)
-            }),
-            r#"{"seq":41,"frame":42,"time_us":1400000,"force":null,"status":["image_dark"],"truth":null}"#
+            row(Format::Json, &without, Some(None)),
+            concat!(
+                r#"{"seq":41,"frame":42,"time_us":1400000,"force":null,"contact":null,"#,
+                r#""status":["image_dark"],"truth":null}"#
+            )
         );
     }
 
     #[test]
-    fn json_of_a_force_without_a_vector() {
+    fn json_without_a_place_or_a_contact() {
         let sample = sample(Some(force(None)), Status::default());
-        let row = Format::Json.row(&Row {
-            sample: &sample,
-            truth: Some(Some(truth())),
-        });
-        assert!(row.contains(r#""x_n":null,"y_n":null,"z_n":null"#), "{row}");
-        assert!(row.ends_with(
-            r#""status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"x_n":-0.01,"y_n":0.004,"z_n":-0.1}}"#
-        ), "{row}");
+        let line = row(Format::Json, &sample, Some(Some(truth())));
+        let end = concat!(
+            r#""place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null},"contact":false,"#,
+            r#""status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"#,
+            r#""x_n":-0.01,"y_n":0.004,"z_n":-0.1,"place_x_mm":null,"place_y_mm":null}}"#
+        );
+        assert!(line.ends_with(end), "{line}");
     }
 
     #[test]
     fn csv_has_as_many_fields_in_every_row() {
         let rows = [
-            sample(
-                Some(force(Some([-8707, 4362, -99_525]))),
-                Status::MODEL_SIMULATED,
-            ),
+            with_place(),
             sample(Some(force(None)), Status::default()),
             sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED),
         ];
-        for truth in [None, Some(None), Some(Some(truth()))] {
+        let truths = [truth(), truth_with_place()].map(|truth| Some(Some(truth)));
+        for truth in [None, Some(None)].into_iter().chain(truths) {
             let commas = |line: &str| line.matches(',').count();
             let header = commas(&Format::Csv.header(truth.is_some()).unwrap());
             for sample in &rows {
-                assert_eq!(commas(&Format::Csv.row(&Row { sample, truth })), header);
+                assert_eq!(commas(&row(Format::Csv, sample, truth)), header);
             }
         }
+    }
+
+    #[test]
+    fn csv_fields_that_are_not_there_are_empty() {
+        let force_of_all =
+            "41,42,1400000,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900";
         assert_eq!(
-            Format::Csv.row(&Row {
-                sample: &rows[0],
-                truth: None
-            }),
-            "41,42,1400000,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900,model_simulated"
+            row(Format::Csv, &with_place(), Some(Some(truth_with_place()))),
+            format!(
+                "{force_of_all},1.250,-0.007,0.085,true,not_calibrated|contact,\
+                 -5.25,2.5,0.1015,-0.01,0.004,-0.1,1.2504,-0.5"
+            )
         );
+        let without_place = sample(Some(force(None)), Status::default());
         assert_eq!(
-            Format::Csv.row(&Row {
-                sample: &rows[2],
-                truth: Some(Some(truth()))
-            }),
-            "41,42,1400000,,,,,,,,,markers_missing|frame_dropped,-5.25,2.5,0.1015,-0.01,0.004,-0.1"
+            row(Format::Csv, &without_place, None),
+            format!("{force_of_all},,,,false,")
+        );
+        let without = sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED);
+        assert_eq!(
+            row(Format::Csv, &without, Some(Some(truth()))),
+            "41,42,1400000,,,,,,,,,,,,,markers_missing|frame_dropped,\
+             -5.25,2.5,0.1015,-0.01,0.004,-0.1,,"
         );
     }
 }

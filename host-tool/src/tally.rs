@@ -278,6 +278,8 @@ struct Errors {
     direction_deg: Mean,
     direction_deg_from_floor: Mean,
     magnitude_squared: Mean,
+    /// Of the distance between the places found and true, µm².
+    place_squared: Mean,
 }
 
 impl Errors {
@@ -285,11 +287,13 @@ impl Errors {
         let magnitude_error = f64::from(force.magnitude_un) / 1e6 - truth.magnitude_n;
         self.magnitude_squared
             .add(magnitude_error * magnitude_error);
-        let Some(vector) = force.cartesian_un else {
-            return;
-        };
-        let Some(angle) = angle_deg(vector.map(f64::from), [truth.x_n, truth.y_n, truth.z_n])
-        else {
+        if let (Some(place), Some([x_mm, y_mm])) = (force.place, truth.place_mm()) {
+            let x = f64::from(place.x_um) - x_mm * 1e3;
+            let y = f64::from(place.y_um) - y_mm * 1e3;
+            self.place_squared.add(x * x + y * y);
+        }
+        let found = force.cartesian_un.map(f64::from);
+        let Some(angle) = angle_deg(found, [truth.x_n, truth.y_n, truth.z_n]) else {
             return;
         };
         self.direction_deg.add(angle);
@@ -298,13 +302,17 @@ impl Errors {
         }
     }
 
-    fn lines(&self) -> [String; 2] {
+    fn lines(&self) -> [String; 3] {
         let direction = |mean: &Mean, what: &str| match mean.value() {
             Some(value) => format!("{value:.3}° over {} frames {what}", mean.count),
             None => format!("none over 0 frames {what}"),
         };
         let rmse = match self.magnitude_squared.value() {
             Some(square) => format!("{:.3} mN", square.sqrt() * 1e3),
+            None => "none".to_owned(),
+        };
+        let place = match self.place_squared.value() {
+            Some(square) => format!("{:.1} µm", square.sqrt()),
             None => "none".to_owned(),
         };
         [
@@ -316,6 +324,10 @@ impl Errors {
             format!(
                 "RMSE of |F|: {rmse} over {} frames",
                 self.magnitude_squared.count
+            ),
+            format!(
+                "RMSE of the place: {place} over {} frames",
+                self.place_squared.count
             ),
         ]
     }
@@ -336,6 +348,7 @@ fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_wire::message::Place;
 
     #[test]
     fn gaps_are_told_apart() {
@@ -369,6 +382,45 @@ mod tests {
             device.count(&stats(exposed, uptime));
         }
         assert_eq!(device.grown[0], 39, "30 before the restart and 9 after it");
+    }
+
+    #[test]
+    fn the_error_of_a_place_is_a_distance_over_the_frames_that_have_both() {
+        let force = |place| Force {
+            alpha_mdeg: 0,
+            beta_mdeg: 0,
+            magnitude_un: 0,
+            cartesian_un: [0; 3],
+            direction_sigma_mdeg: 0,
+            magnitude_sigma_un: 0,
+            place,
+        };
+        let place = |x_um, y_um| {
+            force(Some(Place {
+                x_um,
+                y_um,
+                sigma_um: 1,
+            }))
+        };
+        let truth = |place_x_mm, place_y_mm| Truth {
+            alpha_deg: 0.0,
+            beta_deg: 0.0,
+            magnitude_n: 0.0,
+            x_n: 0.0,
+            y_n: 0.0,
+            z_n: 0.0,
+            place_x_mm,
+            place_y_mm,
+        };
+        let mut errors = Errors::default();
+        let line = |errors: &Errors| errors.lines()[2].clone();
+        errors.count(&force(None), &truth(Some(1.0), Some(1.0)));
+        errors.count(&place(5, 5), &truth(None, Some(1.0)));
+        assert_eq!(line(&errors), "RMSE of the place: none over 0 frames");
+        errors.count(&place(1_003, -1_996), &truth(Some(1.0), Some(-2.0)));
+        assert_eq!(line(&errors), "RMSE of the place: 5.0 µm over 1 frames");
+        errors.count(&place(0, 7), &truth(Some(0.0), Some(0.0)));
+        assert_eq!(line(&errors), "RMSE of the place: 6.1 µm over 2 frames");
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The true force of each frame, from the log of a simulated sensor, joined by frame number.
+//! The true force of each frame and where it acts, from the log of a simulated sensor, joined by
+//! frame number.
 
 use hivtac_host::failure::{Failure, Kind};
 use serde::{Deserialize, Serialize};
@@ -21,7 +22,7 @@ struct Line {
     truth: Option<Truth>,
 }
 
-/// The true force of a frame.
+/// The true force of a frame and, where the log tells it, where the tip touches the film.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Truth {
     /// α, degrees.
@@ -36,6 +37,19 @@ pub struct Truth {
     pub y_n: f64,
     /// Fz, N.
     pub z_n: f64,
+    /// To the right in the image, mm from the film's middle.
+    #[serde(default)]
+    pub place_x_mm: Option<f64>,
+    /// Down in the image, mm from the film's middle.
+    #[serde(default)]
+    pub place_y_mm: Option<f64>,
+}
+
+impl Truth {
+    /// Where the tip touches the film, mm along x and y from its middle.
+    pub fn place_mm(&self) -> Option<[f64; 2]> {
+        Some([self.place_x_mm?, self.place_y_mm?])
+    }
 }
 
 /// A log of JSON lines that may still grow while it is read.
@@ -178,6 +192,23 @@ mod tests {
         assert_eq!(truth.take(1).unwrap(), None);
         assert_eq!(truth.take(2).unwrap(), None);
         assert_eq!(truth.take(3).unwrap().unwrap().alpha_deg, 7.0);
+    }
+
+    #[test]
+    fn a_place_is_there_when_the_log_has_both_coordinates() {
+        let mut log = tempfile::NamedTempFile::new().unwrap();
+        let with = |frame, place: &str| line(frame, 1.0).replace('}', &format!(",{place}}}"));
+        writeln!(log, "{}", line(1, 1.0)).unwrap();
+        let whole = with(2, r#""place_x_mm":0.25,"place_y_mm":-1.5"#);
+        writeln!(log, "{whole}").unwrap();
+        writeln!(log, "{}", with(3, r#""place_x_mm":0.25"#)).unwrap();
+        let at_rest = with(4, r#""place_x_mm":null,"place_y_mm":null"#);
+        writeln!(log, "{at_rest}").unwrap();
+        let mut truth = TruthFile::open(log.path().to_str().unwrap()).unwrap();
+        let mut place = |frame| truth.take(frame).unwrap().unwrap().place_mm();
+        assert_eq!(place(1), None);
+        assert_eq!(place(2), Some([0.25, -1.5]));
+        assert_eq!((place(3), place(4)), (None, None));
     }
 
     #[test]

@@ -152,7 +152,29 @@ impl FrameSource for SceneSource {
             "beta_deg": truth.force.beta_deg(),
             "magnitude_n": truth.force.magnitude_n(),
             "x_n": force[0], "y_n": force[1], "z_n": force[2],
+            "place_x_mm": truth.touches_mm.map(|place| place[0]),
+            "place_y_mm": truth.touches_mm.map(|place| place[1]),
             "markers": markers,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is true of a scene file at 0.2 s: |F| and the place.
+    fn truth(file: &str) -> [Value; 3] {
+        let scene = Scene::from_toml(file).unwrap();
+        let truth = SceneSource::of(scene).unwrap().truth(0.2);
+        ["magnitude_n", "place_x_mm", "place_y_mm"].map(|key| truth[key].clone())
+    }
+
+    #[test]
+    fn the_truth_tells_the_place_of_a_tip_that_presses() {
+        let film = "[film]\noffset_mm = [0.2, -0.1]\n";
+        let pressed = format!("{film}[load]\nmotion = \"static\"\n[load.static]\nforce_n = 0.1\n");
+        assert_eq!(truth(&pressed), [json!(0.1), json!(0.2), json!(-0.1)]);
+        assert_eq!(truth(film), [json!(0.0), Value::Null, Value::Null]);
     }
 }

@@ -54,6 +54,9 @@ pub struct Truth {
     pub on_film_n: [f64; 3],
     /// Where the tip went, mm, film frame.
     pub tip_mm: [f64; 3],
+    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None`
+    /// without a force.
+    pub touches_mm: Option<[f64; 2]>,
     /// The markers by identity; `None` where a marker is missing or no part of it is in the frame.
     pub markers: [Option<MarkerTruth>; 4],
 }

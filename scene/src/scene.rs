@@ -225,10 +225,13 @@ impl Scene {
         exposure: &Exposure<'_, L>,
         markers: &[Option<Image>; 4],
     ) -> Truth {
+        let force = self.options.film.completed(&(exposure.load)(0.0));
+        let presses = force.magnitude_n() > 0.0;
         Truth {
-            force: self.options.film.completed(&(exposure.load)(0.0)),
+            force,
             on_film_n: exposure.now.force_n,
             tip_mm: exposure.now.tip_mm,
+            touches_mm: presses.then_some(exposure.now.touches_mm),
             markers: std::array::from_fn(|id| markers[id].as_ref()?.truth(&self.camera)),
         }
     }

@@ -1,8 +1,8 @@
 //! What each option does to a picture.
 
 use hivtac_scene::{
-    Discs, Frame, Lens, Load, Mounting, Options, Paint, Patch, Preset, Projection, Salt, Scene,
-    Shutter, Specks,
+    Contact, Discs, Frame, Lens, Load, Mounting, Options, Paint, Patch, Preset, Projection, Salt,
+    Scene, Shutter, Specks,
 };
 
 fn scene(options: Options) -> Scene {
@@ -306,4 +306,17 @@ fn patches_far_larger_than_the_frame_cost_no_more_than_it() {
     });
     let frame = frame.render_load(&press(), 0).unwrap();
     assert!(redness(&frame).iter().all(|red| *red > 50.0));
+}
+
+#[test]
+fn the_truth_tells_which_point_of_the_film_the_tip_is_on() {
+    let scene = scene(clear());
+    let touches = |load: Load| scene.truth_under(&load).unwrap().touches_mm;
+    assert_eq!(touches(Load::REST), None);
+    let beside = press().with_offset_mm([0.2, -0.1]).unwrap();
+    assert_eq!(touches(beside), Some([0.2, -0.1]));
+    let tilted = Load::from_angles(0.1, 10.0, 0.0).unwrap();
+    let slips = tilted.with_contact(Contact::Slip { mu: 0.05 }).unwrap();
+    let [x, y] = touches(slips).unwrap();
+    assert!(x > 0.05 && y.abs() < 1e-9, "it slid to ({x}, {y})");
 }

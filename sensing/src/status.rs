@@ -3,7 +3,7 @@
 use core::ops::{BitOr, BitOrAssign};
 
 /// A set of status bits. The numbers are those of the wire format (`docs/wire.md`), which also names
-/// the bits that the pipeline itself never sets (capture, USB, contact).
+/// the bits that the pipeline itself never sets (capture, USB, slip).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Status(u32);
 
@@ -26,8 +26,9 @@ bits! {
     BLOB_OVERFLOW = 2, "blob_overflow";
     /// Areas or shapes of the four markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
-    /// The force lies outside the range that the model was calibrated for.
-    OUT_OF_RANGE = 4, "out_of_range";
+    /// |F| lies outside the range that the model was calibrated for, or the markers moved farther
+    /// than the model can take in.
+    MAGNITUDE_OUT_OF_RANGE = 4, "magnitude_out_of_range";
     /// The force is too small for its direction to mean much; its size is still good.
     DIRECTION_UNRELIABLE = 5, "direction_unreliable";
     /// Most of the image passed the threshold, or clipped: no force.
@@ -38,12 +39,21 @@ bits! {
     FRAME_INCOMPLETE = 8, "frame_incomplete";
     /// No rest position was taken on this unit: the model's own was used.
     TARE_MISSING = 12, "tare_missing";
-    /// The model was trained on a simulated sensor, not calibrated on this unit.
-    MODEL_SIMULATED = 13, "model_simulated";
+    /// The model was not calibrated on this unit, but trained on a simulated sensor.
+    NOT_CALIBRATED = 13, "not_calibrated";
     /// There is no usable model: no force.
     MODEL_MISSING = 14, "model_missing";
     /// The model was made for another frame size, format, threshold or centroid estimator: no force.
     MODEL_MISMATCH = 15, "model_mismatch";
+    /// Something touches the film: |F| is at least 2 mN and three times its standard uncertainty.
+    CONTACT = 16, "contact";
+    /// The direction lies outside the range that the model was calibrated for: too much force along
+    /// the film for the force into it.
+    DIRECTION_OUT_OF_RANGE = 18, "direction_out_of_range";
+    /// The place of contact lies outside the range that the model was calibrated for.
+    PLACE_OUT_OF_RANGE = 19, "place_out_of_range";
+    /// No single contact fits the positions of the four markers: no force.
+    UNEXPLAINED = 20, "unexplained";
 }
 
 impl Status {
@@ -60,7 +70,8 @@ impl Status {
             | Self::IMAGE_DARK.0
             | Self::FRAME_INCOMPLETE.0
             | Self::MODEL_MISSING.0
-            | Self::MODEL_MISMATCH.0,
+            | Self::MODEL_MISMATCH.0
+            | Self::UNEXPLAINED.0,
     );
 
     /// The bits as the wire carries them.

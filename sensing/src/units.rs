@@ -48,3 +48,7 @@ pub struct MilliDegrees(pub i32);
 /// A length on the film or in the lens, in thousandths of a millimetre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Micrometres(pub u32);
+
+/// A coordinate on the film, in thousandths of a millimetre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SignedMicrometres(pub i32);

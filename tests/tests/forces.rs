@@ -9,6 +9,7 @@ use hivtac_scene::{Format, Options, Preset, Scene};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
+use hivtac_sensing::status::Status;
 use hivtac_sensing::threshold::ByteOrder;
 use hivtac_tests::artifact;
 use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
@@ -35,21 +36,25 @@ fn model_file(name: &str) -> Vec<u8> {
 /// What `monitor --json` must say of a measurement, in the integers that the force is made of.
 fn expected(measurement: &Measurement) -> Value {
     let force = measurement.force.map(|force| {
-        let vector = force
-            .cartesian
-            .map(|vector| vector.map(|component| component.0));
+        let [x, y, z] = force.cartesian.map(|component| component.0);
+        let place = force.place;
         json!([
             force.alpha.0,
             force.beta.0,
             force.magnitude.0,
-            vector.map(|v| v[0]),
-            vector.map(|v| v[1]),
-            vector.map(|v| v[2]),
+            x,
+            y,
+            z,
             force.direction_sigma.0,
             force.magnitude_sigma.0,
+            place.map(|place| place.x.0),
+            place.map(|place| place.y.0),
+            place.map(|place| place.sigma.0),
         ])
     });
-    json!({ "force": force, "status": measurement.status.names().collect::<Vec<_>>() })
+    let contact = (measurement.force).map(|_| measurement.status.contains(Status::CONTACT));
+    let status = measurement.status.names().collect::<Vec<_>>();
+    json!({ "force": force, "contact": contact, "status": status })
 }
 
 /// The same of a line that it said.
@@ -69,9 +74,12 @@ fn said(line: &Value) -> Value {
             integer("z_n", 1e6),
             integer("direction_sigma_deg", 1e3),
             integer("magnitude_sigma_n", 1e6),
+            integer("place_x_mm", 1e3),
+            integer("place_y_mm", 1e3),
+            integer("place_sigma_mm", 1e3),
         ])
     });
-    json!({ "force": force, "status": line["status"] })
+    json!({ "force": force, "contact": line["contact"], "status": line["status"] })
 }
 
 /// What the host tool shows of the next frames of a rig.

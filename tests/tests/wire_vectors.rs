@@ -2,7 +2,7 @@
 //! the Rust one, equals what `hivtac-wire` writes and reads, and what `docs/wire.md` quotes.
 
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
-use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, Message, encode};
+use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
 use hivtac_wire::message::*;
 use hivtac_wire::status::Status;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
@@ -69,14 +69,15 @@ fn model(threshold: Threshold) -> ModelIdentity {
     }
 }
 
-fn sample(status: Status, cartesian_un: Option<[i32; 3]>) -> DeviceMessage {
+fn sample(status: Status, place: Option<Place>) -> DeviceMessage {
     let force = Force {
         alpha_mdeg: -5000,
         beta_mdeg: 2500,
         magnitude_un: 100_000,
-        cartesian_un,
+        cartesian_un: [-8707, 4362, -99_525],
         direction_sigma_mdeg: 480,
         magnitude_sigma_un: 900,
+        place,
     };
     DeviceMessage::Sample(Sample {
         sequence: 41,
@@ -88,12 +89,18 @@ fn sample(status: Status, cartesian_un: Option<[i32; 3]>) -> DeviceMessage {
     })
 }
 
-fn sample_without_force() -> DeviceMessage {
+const PLACE: Place = Place {
+    x_um: 1250,
+    y_um: -730,
+    sigma_um: 85,
+};
+
+fn sample_without_force(frame: u32, status: Status) -> DeviceMessage {
     DeviceMessage::Sample(Sample {
         sequence: 300,
-        frame: 305,
+        frame,
         time_us: 10_000_000,
-        status: Status::MARKERS_MISSING | Status::FRAME_DROPPED,
+        status,
         force: None,
         markers: None,
     })
@@ -152,16 +159,27 @@ fn reply(id: u16, outcome: Outcome) -> DeviceMessage {
 }
 
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
+    let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
         ("device-hello", hello(Some(model(RED)), RED)),
         ("device-hello-yuv422", hello(Some(model(RED_CR)), RED_CR)),
         ("device-hello-without-model", hello(None, RED)),
         (
             "sample-force",
-            sample(Status::MODEL_SIMULATED, Some([-8707, 4362, -99_525])),
+            sample(Status::NOT_CALIBRATED | Status::CONTACT, Some(PLACE)),
         ),
-        ("sample-without-cartesian", sample(Status::default(), None)),
-        ("sample-without-force", sample_without_force()),
+        (
+            "sample-without-place",
+            sample(out_of_range | Status::CONTACT, None),
+        ),
+        (
+            "sample-unexplained",
+            sample_without_force(301, Status::UNEXPLAINED),
+        ),
+        (
+            "sample-without-force",
+            sample_without_force(305, Status::MARKERS_MISSING | Status::FRAME_DROPPED),
+        ),
         ("sample-with-markers", sample_with_markers()),
         ("stats", stats()),
         ("log", log()),
@@ -263,23 +281,42 @@ fn every_kind_of_message_has_a_vector() {
     assert_eq!(requests.len(), 6);
 }
 
+/// Of an earlier version and of a later one: both sides read who speaks, and nothing else.
 #[test]
-fn a_foreign_hello_is_named() {
-    let expected = HelloPrefix {
-        protocol: 2,
-        schema: 0x1122_3344_5566_7788,
-    };
-    let frame = &frames("foreign")["foreign-hello"];
-    let as_host = decode::<DeviceMessage>(frame);
-    assert_eq!(
-        as_host,
-        (vec![Received::ForeignHello(expected)], Rejected::default())
-    );
-    let as_device = decode::<HostMessage>(frame);
-    assert_eq!(
-        as_device,
-        (vec![Received::ForeignHello(expected)], Rejected::default())
-    );
+fn foreign_hellos_are_named() {
+    let of_version_1 = (1, 0xe67e_c004_10f1_123b);
+    let expected = [
+        ("device-hello-version-1", of_version_1),
+        ("foreign-hello", (3, 0x1122_3344_5566_7788)),
+        ("host-hello-version-1", of_version_1),
+    ];
+    let frames = frames("foreign");
+    assert!(frames.keys().eq(expected.map(|(name, _)| name)));
+    for (name, (protocol, schema)) in expected {
+        let prefix = HelloPrefix { protocol, schema };
+        let as_host = decode::<DeviceMessage>(&frames[name]);
+        let expected = (vec![Received::ForeignHello(prefix)], Rejected::default());
+        assert_eq!(as_host, expected, "{name}");
+        let as_device = decode::<HostMessage>(&frames[name]);
+        let expected = (vec![Received::ForeignHello(prefix)], Rejected::default());
+        assert_eq!(as_device, expected, "{name}");
+    }
+}
+
+/// What every other version reads of this one's: 0, version, schema, each byte as it always lies.
+#[test]
+fn both_hellos_begin_as_in_every_version() {
+    let mut start = vec![0, PROTOCOL_VERSION as u8];
+    let mut schema = SCHEMA_HASH;
+    while schema >= 0x80 {
+        start.push(schema as u8 | 0x80);
+        schema >>= 7;
+    }
+    start.push(schema as u8);
+    for (section, name) in [("device", "device-hello"), ("host", "host-hello")] {
+        let content = remove_cobs(&frames(section)[name]);
+        assert!(content.starts_with(&start), "{name}");
+    }
 }
 
 #[test]
@@ -348,6 +385,9 @@ fn the_document_states_the_limits_of_the_code() {
     let device = <DeviceMessage as Message>::MAX_FRAME;
     let host = <HostMessage as Message>::MAX_FRAME;
     for row in [
+        format!(
+            "| of these, a sample's frame | {MAX_SAMPLE_FRAME} bytes | {DEVICE_FRAME_LIMIT} bytes |"
+        ),
         format!("| frame from the device | {device} bytes | {DEVICE_FRAME_LIMIT} bytes |"),
         format!("| frame from the host | {host} bytes | {HOST_FRAME_LIMIT} bytes |"),
     ] {

@@ -11,7 +11,9 @@ import pathlib
 import sys
 import zlib
 
-SCHEMA = 0xE67EC00410F1123B
+PROTOCOL = 2
+SCHEMA = 0xF7EBCC5BEDCE6B75
+SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
 def varint(value):
@@ -66,20 +68,23 @@ def frame(content):
     return cobs(content + zlib.crc32(content).to_bytes(4, "little")) + b"\0"
 
 
-HOST_HELLO = [raw("Hello", [0]), unsigned("protocol", 1), (varint(SCHEMA), f"schema {SCHEMA:#018x}")]
+def hello_start(protocol, schema):
+    """What both hellos begin with in every version."""
+    start = [raw("Hello", [0]), unsigned("protocol", protocol)]
+    return start + [(varint(schema), f"schema {schema:#018x}")]
+
+
 COMMAND = [raw("Command", [1])]
 RED = [raw("threshold: Rgb565", [0]), raw("H 170–10, S 100–255, V 45–255", [170, 10, 100, 255, 45, 255])]
 RED_CR = [raw("threshold: Yuv422", [1]), raw("cr_low 162", [162])]
 DARK = [raw("threshold: Mono", [2]), raw("luma_low 0, luma_high 88", [0, 88])]
 
-HELLO = [
-    raw("Hello", [0]),
-    unsigned("protocol", 1),
-    (varint(SCHEMA), f"schema {SCHEMA:#018x}"),
+DEVICE_ID_AND_NAMES = [
     raw("device_id", range(1, 13)),
     string("board", "weact-h743 + ov7725"),
     string("firmware", "hivtac 0.1.0"),
 ]
+HELLO = hello_start(PROTOCOL, SCHEMA) + DEVICE_ID_AND_NAMES
 
 
 def hello_end(threshold):
@@ -119,12 +124,18 @@ ANGLES = [
     signed("magnitude_un", 100_000),
 ]
 CARTESIAN = [
-    raw("cartesian_un: Some", [1]),
-    signed("x", -8707),
+    signed("cartesian_un: x", -8707),
     signed("y", 4362),
     signed("z", -99_525),
 ]
 SIGMAS = [unsigned("direction_sigma_mdeg", 480), unsigned("magnitude_sigma_un", 900)]
+PLACE = [
+    raw("place: Some", [1]),
+    signed("x_um", 1250),
+    signed("y_um", -730),
+    unsigned("sigma_um", 85),
+]
+NO_PLACE = [raw("place: None", [0])]
 NO_FORCE = [raw("force: None", [0])]
 NO_MARKERS = [raw("markers: None", [0])]
 MARKERS = [raw("markers: Some", [1])] + [
@@ -159,10 +170,13 @@ DEVICE = {
     "device-hello": HELLO + MODEL + RED + hello_end(RED),
     "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR),
     "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED),
-    "sample-force": sample(41, 42, 1_400_000, 0x2000, "model_simulated") + ANGLES + CARTESIAN + SIGMAS
-    + NO_MARKERS,
-    "sample-without-cartesian": sample(41, 42, 1_400_000, 0, "") + ANGLES
-    + [raw("cartesian_un: None", [0])] + SIGMAS + NO_MARKERS,
+    "sample-force": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact") + ANGLES
+    + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
+    "sample-without-place": sample(41, 42, 1_400_000, 0x50010,
+                                   "magnitude_out_of_range, contact, direction_out_of_range")
+    + ANGLES + CARTESIAN + SIGMAS + NO_PLACE + NO_MARKERS,
+    "sample-unexplained": sample(300, 301, 10_000_000, 0x100000, "unexplained")
+    + NO_FORCE + NO_MARKERS,
     "sample-without-force": sample(300, 305, 10_000_000, 0x201, "markers_missing, frame_dropped")
     + NO_FORCE + NO_MARKERS,
     "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing") + NO_FORCE + MARKERS,
@@ -179,7 +193,7 @@ DEVICE = {
 }
 
 HOST = {
-    "host-hello": HOST_HELLO,
+    "host-hello": hello_start(PROTOCOL, SCHEMA),
     "get-info": COMMAND + [unsigned("id", 1), raw("GetInfo", [0])],
     "start": COMMAND + [unsigned("id", 2), raw("Start", [1])],
     "stop": COMMAND + [unsigned("id", 3), raw("Stop", [2])],
@@ -190,12 +204,13 @@ HOST = {
     "start-with-markers": COMMAND + [unsigned("id", 2), raw("StartWithMarkers", [5])],
 }
 
-FOREIGN = [
-    raw("Hello", [0]),
-    unsigned("protocol", 2),
-    (varint(0x1122334455667788), "schema 0x1122334455667788"),
-    raw("unknown to version 1", [0xDE, 0xAD]),
-]
+FOREIGN = {
+    "host-hello-version-1": hello_start(1, SCHEMA_OF_VERSION_1),
+    "device-hello-version-1": hello_start(1, SCHEMA_OF_VERSION_1) + DEVICE_ID_AND_NAMES
+    + MODEL + RED + hello_end(RED),
+    "foreign-hello": hello_start(3, 0x1122334455667788)
+    + [raw("unknown to version 2", [0xDE, 0xAD])],
+}
 
 
 def bad_crc():
@@ -224,11 +239,11 @@ def document():
     resync = b"\x2a\x55" + b"\0" + frame(body(DEVICE["reply-done"])) + bad_crc() + b"\0\0" \
         + frame(body(DEVICE["sample-without-force"]))
     return {
-        "protocol": 1,
+        "protocol": PROTOCOL,
         "schema": f"{SCHEMA:#018x}",
         "device": {name: frame(body(fields)).hex(" ") for name, fields in DEVICE.items()},
         "host": {name: frame(body(fields)).hex(" ") for name, fields in HOST.items()},
-        "foreign": {"foreign-hello": frame(body(FOREIGN)).hex(" ")},
+        "foreign": {name: frame(body(fields)).hex(" ") for name, fields in FOREIGN.items()},
         "rejected": {
             name: {"cause": cause, "frame": data.hex(" ")} for name, (cause, data) in rejects().items()
         },
@@ -253,9 +268,11 @@ def annotate(name, fields, whole=None):
 def print_documentation():
     for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare", "start-with-markers"]:
         annotate(name, HOST[name])
-    for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers", "stats", "log", "reply-done"]:
+    for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers",
+                 "stats", "log", "reply-done"]:
         annotate(name, DEVICE[name])
-    annotate("foreign-hello", FOREIGN)
+    for name in ["host-hello-version-1", "foreign-hello"]:
+        annotate(name, FOREIGN[name])
     print(f"```text frame bad-crc\n{bad_crc().hex(' ')}\n```")
 
 

@@ -66,7 +66,8 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
     ]
 }
 
-fn longest_sample() -> Sample {
+/// A sample with force, place and markers, each number as long as it can be.
+pub fn longest_sample() -> Sample {
     Sample {
         sequence: u32::MAX,
         frame: u32::MAX,
@@ -76,9 +77,14 @@ fn longest_sample() -> Sample {
             alpha_mdeg: i32::MIN,
             beta_mdeg: i32::MIN,
             magnitude_un: i32::MIN,
-            cartesian_un: Some([i32::MIN; 3]),
+            cartesian_un: [i32::MIN; 3],
             direction_sigma_mdeg: u32::MAX,
             magnitude_sigma_un: u32::MAX,
+            place: Some(Place {
+                x_um: i32::MIN,
+                y_um: i32::MIN,
+                sigma_um: u32::MAX,
+            }),
         }),
         markers: Some(
             [Marker {
@@ -214,21 +220,26 @@ fn any_marker() -> impl Strategy<Value = Marker> {
 }
 
 fn any_force() -> impl Strategy<Value = Force> {
-    (
-        any::<[i32; 3]>(),
-        any::<Option<[i32; 3]>>(),
-        any::<[u32; 2]>(),
+    let numbers = (any::<[i32; 3]>(), any::<[i32; 3]>(), any::<[u32; 2]>());
+    (numbers, proptest::option::of(any_place())).prop_map(
+        |(([alpha_mdeg, beta_mdeg, magnitude_un], cartesian_un, sigma), place)| Force {
+            alpha_mdeg,
+            beta_mdeg,
+            magnitude_un,
+            cartesian_un,
+            direction_sigma_mdeg: sigma[0],
+            magnitude_sigma_un: sigma[1],
+            place,
+        },
     )
-        .prop_map(
-            |([alpha_mdeg, beta_mdeg, magnitude_un], cartesian_un, sigma)| Force {
-                alpha_mdeg,
-                beta_mdeg,
-                magnitude_un,
-                cartesian_un,
-                direction_sigma_mdeg: sigma[0],
-                magnitude_sigma_un: sigma[1],
-            },
-        )
+}
+
+fn any_place() -> impl Strategy<Value = Place> {
+    any::<(i32, i32, u32)>().prop_map(|(x_um, y_um, sigma_um)| Place {
+        x_um,
+        y_um,
+        sigma_um,
+    })
 }
 
 fn any_stats() -> impl Strategy<Value = Stats> {

@@ -14,11 +14,17 @@ pub(crate) const CRC_BYTES: usize = 4;
 /// Longest body a device sends in this protocol version: a hello with full strings.
 pub const MAX_DEVICE_BODY: usize = 171;
 
+/// Longest body of a sample in this protocol version: one with force, place and markers.
+pub const MAX_SAMPLE_BODY: usize = 144;
+
 /// Longest body a host sends in this protocol version: its hello.
 pub const MAX_HOST_BODY: usize = 14;
 
 /// Longest frame from the device in this protocol version, closing zero included.
 pub const MAX_DEVICE_FRAME: usize = frame_length(MAX_DEVICE_BODY);
+
+/// Longest frame of a sample in this protocol version, closing zero included.
+pub const MAX_SAMPLE_FRAME: usize = frame_length(MAX_SAMPLE_BODY);
 
 /// Longest frame from the host in this protocol version, closing zero included.
 pub const MAX_HOST_FRAME: usize = frame_length(MAX_HOST_BODY);
@@ -94,6 +100,8 @@ mod tests {
         let device = examples::longest_device_messages();
         let lengths = device.iter().map(body_length);
         assert_eq!(lengths.max(), Some(MAX_DEVICE_BODY));
+        let sample = DeviceMessage::Sample(examples::longest_sample());
+        assert_eq!(body_length(&sample), MAX_SAMPLE_BODY);
         let host = examples::longest_host_messages();
         let lengths = host.iter().map(body_length);
         assert_eq!(lengths.max(), Some(MAX_HOST_BODY));

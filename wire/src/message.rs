@@ -6,7 +6,7 @@ use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Raised on every incompatible change of this file.
-pub const PROTOCOL_VERSION: u16 = 1;
+pub const PROTOCOL_VERSION: u16 = 2;
 
 /// What the device sends. `Hello` stays variant 0 and keeps its first two fields for ever, so that any two
 /// versions can name each other in an error.
@@ -201,12 +201,26 @@ pub struct Force {
     pub beta_mdeg: i32,
     /// |F|, µN, never negative.
     pub magnitude_un: i32,
-    /// Fx, Fy, Fz in the film frame, µN; `None` where the model's angles are not those of the force.
-    pub cartesian_un: Option<[i32; 3]>,
+    /// Fx, Fy, Fz in the film frame, µN: |F| in the direction of α and β.
+    pub cartesian_un: [i32; 3],
     /// Standard uncertainty of the direction, thousandths of a degree.
     pub direction_sigma_mdeg: u32,
     /// Standard uncertainty of |F|, µN.
     pub magnitude_sigma_un: u32,
+    /// Where the tip touches the film; `None` from a device whose model does not tell.
+    pub place: Option<Place>,
+}
+
+/// The point of the film that the tip touches, by where it rests in the film frame: (0, 0) is the
+/// film's middle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Place {
+    /// To the right in the image, µm.
+    pub x_um: i32,
+    /// Down in the image, µm.
+    pub y_um: i32,
+    /// Standard uncertainty of each coordinate, µm: the root of half the trace of their covariance.
+    pub sigma_um: u32,
 }
 
 /// Counters since boot. They wrap never in practice (32 bits at 1 kHz: 49 days) and saturate then.

@@ -26,8 +26,9 @@ bits! {
     BLOB_OVERFLOW = 2, "blob_overflow";
     /// Areas or shapes of the four markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
-    /// The force lies outside the range that the model was calibrated for.
-    OUT_OF_RANGE = 4, "out_of_range";
+    /// |F| lies outside the range that the model was calibrated for, or the markers moved farther
+    /// than the model can take in.
+    MAGNITUDE_OUT_OF_RANGE = 4, "magnitude_out_of_range";
     /// The force is too small for its direction to mean much; its size is still good.
     DIRECTION_UNRELIABLE = 5, "direction_unreliable";
     /// Most of the image passed the threshold, or clipped: no force.
@@ -44,16 +45,23 @@ bits! {
     CAMERA_RESTARTED = 11, "camera_restarted";
     /// No rest position was taken on this unit: the model's own was used.
     TARE_MISSING = 12, "tare_missing";
-    /// The model was trained on a simulated sensor, not calibrated on this unit.
-    MODEL_SIMULATED = 13, "model_simulated";
+    /// The model was not calibrated on this unit, but trained on a simulated sensor.
+    NOT_CALIBRATED = 13, "not_calibrated";
     /// There is no usable model: no force.
     MODEL_MISSING = 14, "model_missing";
     /// The model was made for another frame size, format, threshold or centroid estimator: no force.
     MODEL_MISMATCH = 15, "model_mismatch";
-    /// Something touches the film. Reserved: not set by protocol version 1.
+    /// Something touches the film: |F| is at least 2 mN and three times its standard uncertainty.
     CONTACT = 16, "contact";
-    /// The contact slips. Reserved: not set by protocol version 1.
+    /// The contact slips. Reserved: not set by protocol version 2.
     SLIP = 17, "slip";
+    /// The direction lies outside the range that the model was calibrated for: too much force along
+    /// the film for the force into it.
+    DIRECTION_OUT_OF_RANGE = 18, "direction_out_of_range";
+    /// The place of contact lies outside the range that the model was calibrated for.
+    PLACE_OUT_OF_RANGE = 19, "place_out_of_range";
+    /// No single contact fits the positions of the four markers: no force.
+    UNEXPLAINED = 20, "unexplained";
 }
 
 impl Status {
@@ -67,7 +75,8 @@ impl Status {
             | Status::IMAGE_DARK.0
             | Status::FRAME_INCOMPLETE.0
             | Status::MODEL_MISSING.0
-            | Status::MODEL_MISMATCH.0,
+            | Status::MODEL_MISMATCH.0
+            | Status::UNEXPLAINED.0,
     );
 
     /// True when every bit of `other` is set here.

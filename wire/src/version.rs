@@ -59,7 +59,7 @@ mod tests {
     /// A change of any message must be seen here, and in `docs/wire.md` and the golden vectors.
     #[test]
     fn the_schema_hash_is_that_of_docs_wire_md() {
-        assert_eq!(SCHEMA_HASH, 0xe67e_c004_10f1_123b, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0xf7eb_cc5b_edce_6b75, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]
@@ -71,6 +71,17 @@ mod tests {
         let host = HostMessage::Hello(HelloPrefix::OURS.into());
         let body = postcard::to_slice(&host, &mut buffer).unwrap();
         assert_eq!(HelloPrefix::of(body), Some(HelloPrefix::OURS));
+    }
+
+    /// Version 1's hello of a host, and the start of that of a device.
+    #[test]
+    fn a_hello_of_version_1_is_named() {
+        let body = [
+            0, 1, 0xbb, 0xa4, 0xc4, 0x87, 0xc1, 0x80, 0xb0, 0xbf, 0xe6, 1,
+        ];
+        let prefix = HelloPrefix::of(&body).unwrap();
+        assert_eq!((prefix.protocol, prefix.schema), (1, 0xe67e_c004_10f1_123b));
+        assert!(!prefix.is_ours());
     }
 
     #[test]

@@ -29,7 +29,7 @@ fn info_for_a_person() {
              device     000102030405060708090aff\n\
              board      fake board\n\
              firmware   fake 1.0\n\
-             protocol   1, schema {SCHEMA_HASH:#018x}\n\
+             protocol   2, schema {SCHEMA_HASH:#018x}\n\
              model      11-64-64-3 ov7725, CRC 0000cafe, trained on: simulated sensor\n\
              frame      320 × 240 px\n\
              threshold  rgb565, H 170–10, S 100–255, V 45–255\n\
@@ -61,12 +61,12 @@ fn info_as_json() {
     assert_eq!(run.stdout.lines().count(), 1);
 }
 
-#[test]
-fn another_version_is_named() {
-    let script: Script = Box::new(|device| {
+/// A device that greets with another version and schema.
+fn of_version(protocol: u16, schema: u64) -> Script {
+    Box::new(move |device| {
         let hello = DeviceHello {
-            protocol: 2,
-            schema: 0x1122_3344_5566_7788,
+            protocol,
+            schema,
             ..hello()
         };
         let mut buffer = [0; 256];
@@ -74,19 +74,29 @@ fn another_version_is_named() {
         device.next();
         device.raw(frame);
         device.serve();
-    });
-    let device = FakeDevice::on_tcp([script]);
-    let run = run(&["monitor", "--port", &device.port]);
-    assert_eq!(
-        run.stderr,
-        format!(
-            "hivtac: the device at {} speaks protocol 2 (schema 0x1122334455667788), \
-             this tool protocol 1 (schema {SCHEMA_HASH:#018x}); \
-             use the hivtac and the firmware of one release\n",
-            device.port
-        )
-    );
-    assert_eq!((run.code, run.stdout.as_str()), (Some(4), ""));
+    })
+}
+
+#[test]
+fn another_version_is_named() {
+    for (protocol, schema) in [
+        (1, 0xe67e_c004_10f1_123b),
+        (2, 0x1122_3344_5566_7788),
+        (3, 0x1122_3344_5566_7788),
+    ] {
+        let device = FakeDevice::on_tcp([of_version(protocol, schema)]);
+        let run = run(&["monitor", "--port", &device.port]);
+        assert_eq!(
+            run.stderr,
+            format!(
+                "hivtac: the device at {} speaks protocol {protocol} (schema {schema:#018x}), \
+                 this tool protocol 2 (schema {SCHEMA_HASH:#018x}); \
+                 use the hivtac and the firmware of one release\n",
+                device.port
+            )
+        );
+        assert_eq!((run.code, run.stdout.as_str()), (Some(4), ""));
+    }
 }
 
 #[test]

@@ -144,14 +144,19 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
         sequence,
         frame,
         time_us: u64::from(frame) * 33_333,
-        status: Status::MODEL_SIMULATED,
+        status: Status::NOT_CALIBRATED | Status::CONTACT,
         force: Some(Force {
             alpha_mdeg: -5000,
             beta_mdeg: 2500,
             magnitude_un: 100_000,
-            cartesian_un: Some([-8707, 4362, -99_525]),
+            cartesian_un: [-8707, 4362, -99_525],
             direction_sigma_mdeg: 480,
             magnitude_sigma_un: 900,
+            place: Some(Place {
+                x_um: 1250,
+                y_um: -730,
+                sigma_um: 85,
+            }),
         }),
         markers: None,
     })

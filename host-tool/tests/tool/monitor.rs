@@ -6,7 +6,7 @@ use hivtac_wire::message::*;
 use hivtac_wire::status::Status;
 use std::io::Write;
 
-const JSON_41: &str = r#"{"seq":41,"frame":42,"time_us":1399986,"force":{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900},"status":["model_simulated"]}"#;
+const JSON_41: &str = r#"{"seq":41,"frame":42,"time_us":1399986,"force":{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"place_x_mm":1.250,"place_y_mm":-0.730,"place_sigma_mm":0.085},"contact":true,"status":["not_calibrated","contact"]}"#;
 
 fn without_force(sequence: u32, frame: u32) -> DeviceMessage {
     DeviceMessage::Sample(Sample {
@@ -23,7 +23,7 @@ fn without_force(sequence: u32, frame: u32) -> DeviceMessage {
 fn json_lines_and_a_summary_on_standard_error() {
     let device = FakeDevice::on_tcp([streaming(vec![sample(41, 42), without_force(42, 43)])]);
     let run = run(&["monitor", "--port", &device.port, "--json", "--frames", "2"]);
-    let second = r#"{"seq":42,"frame":43,"time_us":7,"force":null,"status":["markers_missing","frame_dropped"]}"#;
+    let second = r#"{"seq":42,"frame":43,"time_us":7,"force":null,"contact":null,"status":["markers_missing","frame_dropped"]}"#;
     assert_eq!(run.stdout, format!("{JSON_41}\n{second}\n"));
     assert_eq!(
         run.stderr,
@@ -59,9 +59,10 @@ fn csv_has_a_header() {
     let run = run(&["monitor", "--port", &device.port, "--csv", "--frames", "2"]);
     assert_eq!(
         run.stdout,
-        "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,direction_sigma_deg,magnitude_sigma_n,status\n\
-         41,42,1399986,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900,model_simulated\n\
-         42,43,7,,,,,,,,,markers_missing|frame_dropped\n"
+        "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,direction_sigma_deg,magnitude_sigma_n,\
+         place_x_mm,place_y_mm,place_sigma_mm,contact,status\n\
+         41,42,1399986,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900,1.250,-0.730,0.085,true,not_calibrated|contact\n\
+         42,43,7,,,,,,,,,,,,,markers_missing|frame_dropped\n"
     );
     assert_eq!(run.code, Some(0));
 }
@@ -75,9 +76,9 @@ fn a_person_sees_columns_and_the_summary_on_a_pseudo_terminal() {
     assert_eq!(
         lines[..5],
         [
-            "     seq   frame         time        α        β      |F|       Fx       Fy       Fz  status",
-            "                            s        °        °       mN       mN       mN       mN",
-            "      41      42     1.399986   -5.000    2.500  100.000   -8.707    4.362  -99.525  model_simulated",
+            "     seq   frame         time        α        β      |F|       Fx       Fy       Fz  place x  place y  place ±  contact  status",
+            "                            s        °        °       mN       mN       mN       mN       mm       mm       mm",
+            "      41      42     1.399986   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.730    0.085      yes  not_calibrated",
             "",
             "1 frames shown, 1 received, 0 lost",
         ]
@@ -192,15 +193,26 @@ fn log_lines_go_to_standard_error() {
 #[test]
 fn the_truth_stands_beside_and_is_compared() {
     let mut log = tempfile::NamedTempFile::new().unwrap();
-    // The sample's force exactly, twice the force in the same direction, and one at a right angle.
-    for (frame, magnitude, [x, y, z]) in [
-        (1, 0.1, [-0.008707, 0.004362, -0.099525]),
-        (2, 0.2, [-0.017414, 0.008724, -0.19905]),
-        (3, 0.01, [0.004362, 0.008707, 0.0]),
+    // The sample's force exactly, twice the force in the same direction, and one at a right angle;
+    // the sample's place, one half a millimetre beside it, and none.
+    for (frame, magnitude, [x, y, z], place) in [
+        (
+            1,
+            0.1,
+            [-0.008707, 0.004362, -0.099525],
+            "1.25,\"place_y_mm\":-0.73",
+        ),
+        (
+            2,
+            0.2,
+            [-0.017414, 0.008724, -0.19905],
+            "1.65,\"place_y_mm\":-0.43",
+        ),
+        (3, 0.01, [0.004362, 0.008707, 0.0], "null"),
     ] {
         writeln!(
             log,
-            r#"{{"frame":{frame},"time_us":1,"alpha_deg":-5,"beta_deg":2.5,"magnitude_n":{magnitude},"x_n":{x},"y_n":{y},"z_n":{z}}}"#
+            r#"{{"frame":{frame},"time_us":1,"alpha_deg":-5,"beta_deg":2.5,"magnitude_n":{magnitude},"x_n":{x},"y_n":{y},"z_n":{z},"place_x_mm":{place}}}"#
         )
         .unwrap();
     }
@@ -224,19 +236,29 @@ fn the_truth_stands_beside_and_is_compared() {
     let lines: Vec<_> = run.stdout.lines().collect();
     assert_eq!(
         lines[3],
-        "       1       2     0.066666   -5.000    2.500  100.000   -8.707    4.362  -99.525   -5.000    2.500  200.000  model_simulated"
+        "       1       2     0.066666   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.730    0.085      yes   -5.000    2.500  200.000    1.650   -0.430  not_calibrated"
     );
     assert!(
-        lines[5].ends_with("-99.525        ?        ?        ?  model_simulated"),
+        lines[4].ends_with(
+            "    0.085      yes   -5.000    2.500   10.000        –        –  not_calibrated"
+        ),
+        "{}",
+        lines[4]
+    );
+    assert!(
+        lines[5].ends_with(
+            "    0.085      yes        ?        ?        ?        ?        ?  not_calibrated"
+        ),
         "{}",
         lines[5]
     );
-    let tail = &lines[lines.len() - 2..];
+    let tail = &lines[lines.len() - 3..];
     assert_eq!(
         tail,
         [
             "mean direction error: 30.000° over 3 frames with a force, 0.000° over 2 frames with true |F| ≥ 50 mN",
             "RMSE of |F|: 77.675 mN over 3 frames",
+            "RMSE of the place: 353.6 µm over 2 frames",
         ]
     );
     assert_eq!(run.code, Some(0));

@@ -88,8 +88,8 @@ fn every_blob_is_measured() {
     let expected = json!({
         "image": path, "width": 320, "height": 240,
         "blobs": [{"area": 168, "cx": 24.5, "cy": 45.5, "x0": 19, "y0": 39, "x1": 30, "y1": 52}],
-        "markers": null, "features": null, "force": null,
-        "status": ["markers_missing", "tare_missing", "model_simulated"],
+        "markers": null, "features": null, "force": null, "contact": null,
+        "status": ["markers_missing", "tare_missing", "not_calibrated"],
     });
     assert_eq!(found, expected);
 }
@@ -138,7 +138,7 @@ fn the_force_is_that_of_the_sensing_code() {
     let force = measurement.force.unwrap_or_else(|| panic!("{found}"));
     let micro = |number: i32| f64::from(number) / 1e6;
     let milli = |number: i32| f64::from(number) / 1e3;
-    let [x, y, z] = force.cartesian.unwrap().map(|component| component.0);
+    let [x, y, z] = force.cartesian.map(|component| component.0);
     assert_eq!(
         found["force"],
         json!({
@@ -147,8 +147,10 @@ fn the_force_is_that_of_the_sensing_code() {
             "x_n": micro(x), "y_n": micro(y), "z_n": micro(z),
             "direction_sigma_deg": milli(force.direction_sigma.0),
             "magnitude_sigma_n": micro(force.magnitude_sigma.0),
+            "place_x_mm": null, "place_y_mm": null, "place_sigma_mm": null,
         })
     );
+    assert_eq!(found["contact"], true, "{force:?}");
     let features: Vec<Value> = measurement
         .features
         .unwrap()
@@ -257,13 +259,14 @@ fn a_person_sees_every_stage() {
     );
     assert!(lines[11].starts_with("  features  "), "{}", lines[11]);
     assert!(lines[12].starts_with("  force     α "), "{}", lines[12]);
-    assert!(lines[13].starts_with("  status    "), "{}", lines[13]);
+    assert_eq!(lines[13..15], ["  place     –", "  contact   yes"]);
+    assert!(lines[15].starts_with("  status    "), "{}", lines[15]);
     assert!(
-        lines[13].ends_with("tare_missing model_simulated"),
+        lines[15].ends_with("tare_missing not_calibrated direction_out_of_range"),
         "{}",
-        lines[13]
+        lines[15]
     );
-    assert_eq!(lines.len(), 14);
+    assert_eq!(lines.len(), 16);
 }
 
 #[test]

@@ -9,13 +9,18 @@
 //! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at most 0.5 µN;
 //! a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
 
+mod contact;
+mod place;
 #[cfg(test)]
 mod tests;
+
+pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT};
+pub use place::Place;
 
 use crate::{
     angle::atan2,
     cordic::{ONE_BITS, sin_cos},
-    model::{CalibratedRange, ContactReading, Model, OutputKind},
+    model::{CalibratedRange, Model, OutputKind},
     root::rounded_root,
     status::Status,
     units::{MicroNewtons, MilliDegrees},
@@ -39,13 +44,16 @@ pub struct Force {
     pub beta: MilliDegrees,
     /// |F| ≥ 0.
     pub magnitude: MicroNewtons,
-    /// (Fx, Fy, Fz); `None` where the model's angles are not those of the force (`stick`, `slip`).
-    pub cartesian: Option<[MicroNewtons; 3]>,
+    /// (Fx, Fy, Fz): |F| in the direction of α and β. Where a model's angles are those of the
+    /// pressing direction (`stick`, `slip`), it is |F| along that.
+    pub cartesian: [MicroNewtons; 3],
     /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within 1.731 times this angle of
     /// the one found (`model::Uncertainty`).
     pub direction_sigma: MilliDegrees,
     /// Standard uncertainty of |F|: 95 of 100 are within 1.960 times this.
     pub magnitude_sigma: MicroNewtons,
+    /// Where the tip touches the film; `None` from a model that does not tell.
+    pub place: Option<Place>,
 }
 
 /// Direction and size of a force.
@@ -94,7 +102,8 @@ impl Polar {
 }
 
 impl Force {
-    /// The force that a model's three outputs mean, and its status bits: [`Status::OUT_OF_RANGE`] and
+    /// The force that a model's three outputs mean, and its status bits:
+    /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`] and
     /// [`Status::DIRECTION_UNRELIABLE`]. A negative |F| from a model is one of nothing: it becomes 0.
     pub fn of_outputs(model: &Model<'_>, outputs: [i32; 3]) -> (Force, Status) {
         let (polar, vector) = match model.output {
@@ -108,14 +117,14 @@ impl Force {
             }
         };
         let (direction_sigma, magnitude_sigma) = model.uncertainty.at(polar.magnitude);
-        let is_force = model.conditions.contact == ContactReading::Force;
         let force = Force {
             alpha: polar.alpha,
             beta: polar.beta,
             magnitude: polar.magnitude,
-            cartesian: is_force.then_some(vector),
+            cartesian: vector,
             direction_sigma,
             magnitude_sigma,
+            place: None,
         };
         (force, force.trust(&model.range))
     }
@@ -133,10 +142,10 @@ impl Force {
         if self.direction_sigma > UNRELIABLE_DIRECTION {
             status |= Status::DIRECTION_UNRELIABLE;
         } else if outside(self.alpha, range.alpha) || outside(self.beta, range.beta) {
-            status |= Status::OUT_OF_RANGE;
+            status |= Status::DIRECTION_OUT_OF_RANGE;
         }
         if self.magnitude.0 > largest {
-            status |= Status::OUT_OF_RANGE;
+            status |= Status::MAGNITUDE_OUT_OF_RANGE;
         }
         status
     }

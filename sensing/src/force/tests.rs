@@ -1,6 +1,6 @@
 use super::*;
 use crate::model::samples::spec;
-use crate::model::{LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
+use crate::model::{ContactReading, LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
 use proptest::prelude::*;
 
 fn vector(x: i32, y: i32, z: i32) -> [MicroNewtons; 3] {
@@ -134,14 +134,19 @@ fn both_output_kinds_mean_the_same() {
 }
 
 #[test]
-fn angles_of_a_pressing_direction_make_no_vector() {
+fn the_vector_of_a_pressing_direction_lies_along_it() {
     for contact in [ContactReading::Stick, ContactReading::Slip] {
         let mut spec = spec(&[11, 3]);
         spec.conditions.contact = contact;
         let bytes = spec.encode().unwrap();
         let model = Model::parse(&bytes).unwrap();
-        let (force, _) = Force::of_outputs(&model, [0, 0, -100_000]);
-        assert_eq!((force.cartesian, force.magnitude.0), (None, 100_000));
+        let outputs = [12_000, -9_000, -99_000];
+        let (force, _) = Force::of_outputs(&model, outputs);
+        assert_eq!(force.cartesian, outputs.map(MicroNewtons));
+        let of_angles = polar(force.alpha.0, force.beta.0, force.magnitude.0).to_vector();
+        for (of_angles, component) in of_angles.iter().zip(force.cartesian) {
+            assert!((of_angles.0 - component.0).abs() <= 3, "{contact:?}");
+        }
     }
 }
 
@@ -169,16 +174,33 @@ fn trust_in_a_force() {
         Status::OK,
         "within the margin of a twentieth"
     );
-    assert_eq!(status(0, 0, -1_051_000), Status::OUT_OF_RANGE);
+    assert_eq!(status(0, 0, -1_051_000), Status::MAGNITUDE_OUT_OF_RANGE);
     assert_eq!(
         status(28_000, 0, -100_000),
         Status::OK,
         "15.6°, within the margin of 1°"
     );
-    assert_eq!(status(29_000, 0, -100_000), Status::OUT_OF_RANGE, "16.2°");
+    assert_eq!(
+        status(29_000, 0, -100_000),
+        Status::DIRECTION_OUT_OF_RANGE,
+        "16.2°"
+    );
     assert_eq!(status(0, 26_500, -100_000), Status::OK, "14.8°");
-    assert_eq!(status(0, -27_500, -100_000), Status::OUT_OF_RANGE, "15.4°");
-    assert_eq!(status(0, 0, 100_000), Status::OUT_OF_RANGE, "a pull");
+    assert_eq!(
+        status(0, -27_500, -100_000),
+        Status::DIRECTION_OUT_OF_RANGE,
+        "15.4°"
+    );
+    assert_eq!(
+        status(0, 0, 100_000),
+        Status::DIRECTION_OUT_OF_RANGE,
+        "a pull"
+    );
+    assert_eq!(
+        status(0, 0, 1_051_000),
+        Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE,
+        "a pull beyond the range"
+    );
     // 1,270 µN / |F| is 5° at 14.55 mN.
     assert_eq!(status(0, 0, -14_700), Status::OK);
     assert_eq!(status(0, 0, -14_500), Status::DIRECTION_UNRELIABLE);

@@ -268,7 +268,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             None => status |= Status::MODEL_MISSING,
             Some(model) => {
                 if model.is_simulated() {
-                    status |= Status::MODEL_SIMULATED;
+                    status |= Status::NOT_CALIBRATED;
                 }
                 if !self.settings.fit(&model.conditions) {
                     status |= Status::MODEL_MISMATCH;
@@ -312,7 +312,10 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let (force, trust) = Force::of_outputs(model, output.values);
         *status |= trust;
         if output.input_saturated {
-            *status |= Status::OUT_OF_RANGE;
+            *status |= Status::MAGNITUDE_OUT_OF_RANGE;
+        }
+        if force.is_contact() {
+            *status |= Status::CONTACT;
         }
         Some(force)
     }

@@ -60,8 +60,8 @@ fn a_shift_of_whole_pixels_is_the_force_that_the_model_makes_of_it() {
                 let seen = shifted(f64::from(x), f64::from(y)).feed(sensor);
                 let force = seen.force.unwrap();
                 let expected = [x * PER_PIXEL, y * PER_PIXEL, -100_000].map(MicroNewtons);
-                assert_eq!(force.cartesian, Some(expected));
-                let standing = Status::TARE_MISSING | Status::MODEL_SIMULATED;
+                assert_eq!((force.cartesian, force.place), (expected, None));
+                let standing = Status::TARE_MISSING | Status::NOT_CALIBRATED | Status::CONTACT;
                 assert_eq!(seen.status, standing, "({x}, {y})");
             }
         },
@@ -76,9 +76,9 @@ fn a_tare_takes_the_place_of_the_models_rest() {
             let rest = rest_of(&shifted(3.0, -4.0), sensor);
             sensor.set_tare(Some(rest));
             let seen = shifted(4.0, -4.0).feed(sensor);
-            assert_eq!(seen.status, Status::MODEL_SIMULATED);
+            assert_eq!(seen.status, Status::NOT_CALIBRATED | Status::CONTACT);
             let expected = [PER_PIXEL, 0, -100_000].map(MicroNewtons);
-            assert_eq!(seen.force.unwrap().cartesian, Some(expected));
+            assert_eq!(seen.force.unwrap().cartesian, expected);
             sensor.set_tare(None);
             assert!(
                 shifted(0.0, 0.0)
@@ -160,17 +160,59 @@ fn far_from_all_training_is_out_of_range() {
         |spec| spec.input.shifts = [11; 11],
         |sensor| {
             let seen = shifted(1.0, 0.0).feed(sensor);
-            assert!(seen.status.contains(Status::OUT_OF_RANGE));
+            assert!(seen.status.contains(Status::MAGNITUDE_OUT_OF_RANGE));
             assert!(seen.force.is_some());
         },
     );
 }
 
 #[test]
-fn a_calibrated_unit_is_not_called_simulated() {
+fn a_calibrated_unit_is_not_called_uncalibrated() {
     with_model(
         |spec| spec.conditions.origin = Origin::Unit([7; 12]),
-        |sensor| assert_eq!(shifted(0.0, 0.0).feed(sensor).status, Status::TARE_MISSING),
+        |sensor| {
+            let standing = Status::TARE_MISSING | Status::CONTACT;
+            assert_eq!(shifted(0.0, 0.0).feed(sensor).status, standing);
+        },
+    );
+}
+
+/// Fz is all of the force at rest; its uncertainty is the second number.
+#[test]
+fn a_contact_is_told_from_two_millinewtons_on_when_they_are_certain() {
+    for (press, sigma, expected) in [
+        (100_000, 800, true),
+        (2_000, 600, true),
+        (1_999, 600, false),
+        (2_399, 800, false),
+        (2_400, 800, true),
+        (0, 0, false),
+    ] {
+        with_model(
+            |spec| {
+                spec.layers[0].biases[2] = -press;
+                let knots = &mut spec.uncertainty.knots;
+                knots
+                    .iter_mut()
+                    .for_each(|knot| knot.along = MicroNewtons(sigma));
+            },
+            |sensor| {
+                let seen = shifted(0.0, 0.0).feed(sensor);
+                let told = seen.status.contains(Status::CONTACT);
+                assert_eq!(told, expected, "{press} µN ± {sigma} µN: {seen:?}");
+            },
+        );
+    }
+}
+
+#[test]
+fn a_frame_without_a_force_tells_of_no_contact() {
+    with_model(
+        |spec| spec.conditions.dilations = 2,
+        |sensor| {
+            let seen = shifted(0.0, 0.0).feed(sensor);
+            assert!(seen.force.is_none() && !seen.status.contains(Status::CONTACT));
+        },
     );
 }
 
@@ -404,8 +446,10 @@ proptest! {
         prop_assert_eq!(seen.features.is_some(), seen.markers.is_some());
         prop_assert_eq!(seen.status.contains(Status::TARE_MISSING), !tare);
         if let Some(force) = seen.force {
-            prop_assert!(force.magnitude.0 >= 0 && force.cartesian.is_some());
+            prop_assert!(force.magnitude.0 >= 0);
         }
+        let touched = seen.force.is_some_and(|force| force.is_contact());
+        prop_assert_eq!(seen.status.contains(Status::CONTACT), touched);
     }
 
     /// Whatever lens, rest position and picture: an answer, and no overflow on the way.
