@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use hivtac_film::parallel::in_parallel;
-use hivtac_film::sweep::{Solved, few_tilts, octant, solve_place, tilts};
+use hivtac_film::sweep::{Solved, octant, solve_place};
 use hivtac_film::{Check, Design, FilmError, Neighbours, check, paper_camera, record, tables};
 use hivtac_scene::film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, Unit};
 
@@ -44,8 +44,8 @@ fn main() -> ExitCode {
 }
 
 fn reduce(folder: &Path) -> Result<(), Box<dyn Error>> {
-    let nominal = sweep(NOMINAL_RADIUS_MM, Kind::Tip, &tilts())?;
-    let largest = sweep(LARGEST_RADIUS_MM, Kind::TipRadius, &few_tilts())?;
+    let nominal = sweep(NOMINAL_RADIUS_MM, Kind::Tip)?;
+    let largest = sweep(LARGEST_RADIUS_MM, Kind::TipRadius)?;
     let bytes = tables(&nominal, &largest)?.to_bytes();
     let path = folder.join("film.bin");
     std::fs::write(&path, &bytes)?;
@@ -58,7 +58,7 @@ fn reduce(folder: &Path) -> Result<(), Box<dyn Error>> {
 }
 
 /// All solutions under a tip of a radius at the places of a table: those of its file, and the rest, which are added to it.
-fn sweep(radius_mm: f64, kind: Kind, tilts: &[[f64; 2]]) -> Result<Vec<Solved>, Box<dyn Error>> {
+fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
     let path = PathBuf::from(format!("target/film-{radius_mm}.bin"));
     let known = read(&path)?;
     let is_new = |place: &[f64; 2]| !known.iter().any(|solved| solved.pose.place_mm == *place);
@@ -79,7 +79,7 @@ fn sweep(radius_mm: f64, kind: Kind, tilts: &[[f64; 2]]) -> Result<Vec<Solved>, 
         threads()?,
         progress(&task),
         |film, place| {
-            let solved = solve_place(film, &beside, &camera, *place, tilts)?;
+            let solved = solve_place(film, &beside, &camera, *place)?;
             let numbers = solved.iter().flat_map(record::numbers);
             let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
             let written = file.lock().map(|mut file| file.write_all(&bytes));

@@ -40,7 +40,7 @@ pub struct Solved {
     pub answers: Vec<Moved>,
 }
 
-/// Solves the film with the tip at one place, for all sizes and some of [`tilts`].
+/// Solves the film with the tip at one place, for all sizes and tilts.
 ///
 /// # Errors
 /// When no equilibrium is found.
@@ -49,7 +49,6 @@ pub fn solve_place(
     beside: &Neighbours,
     camera: &Camera,
     place_mm: [f64; 2],
-    tilts: &[[f64; 2]],
 ) -> Result<Vec<Solved>, FilmError> {
     let radius_mm = film.design().tip_radius_mm;
     film.move_tip(place_mm, radius_mm)?;
@@ -59,7 +58,7 @@ pub fn solve_place(
         place_mm,
     };
     let mut solved = vec![look(film, beside, camera, at_rest, &film.rest())?];
-    for &tilt in tilts {
+    for tilt in tilts() {
         let mut path = Path::from_rest(film);
         for part in SIZES {
             let pose = Pose {
@@ -74,8 +73,7 @@ pub fn solve_place(
     Ok(solved)
 }
 
-/// The tilts that the film is solved for: none, and two rings.
-pub fn tilts() -> Vec<[f64; 2]> {
+fn tilts() -> Vec<[f64; 2]> {
     let ring = |(radius, turn): (f64, f64)| {
         (0..4).map(move |k| {
             let angle = (turn + 90.0 * f64::from(k)).to_radians();
@@ -84,12 +82,6 @@ pub fn tilts() -> Vec<[f64; 2]> {
     };
     let rings = TILTS.into_iter().flat_map(ring);
     [[0.0; 2]].into_iter().chain(rings).collect()
-}
-
-/// Those that tell how a larger tip differs: none, and the outer ring.
-pub fn few_tilts() -> Vec<[f64; 2]> {
-    let all = tilts();
-    [&all[..1], &all[5..]].concat()
 }
 
 fn look(

@@ -12,8 +12,7 @@ const MOST_PX: f64 = 0.1;
 /// And on a unit that differs from the nominal film as much as one that is built by hand.
 const MOST_PX_OF_A_UNIT: f64 = 0.3;
 
-static CAMERA: LazyLock<Camera> =
-    LazyLock::new(|| Camera::new(Preset::Ov7725, 320, 240).unwrap());
+static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::new(Preset::Ov7725, 320, 240).unwrap());
 
 /// A force, N, where it presses, mm, and the tip's radius, mm.
 type Case = ([f64; 3], [f64; 2], f64);

@@ -14,7 +14,7 @@ use crate::{Change, FilmError};
 pub struct Sweeps<'a> {
     /// The nominal one.
     pub nominal: &'a [Solved],
-    /// The largest, at some of the loads.
+    /// The largest, at some of the places.
     pub largest: &'a [Solved],
 }
 
@@ -73,7 +73,7 @@ impl<'a> Sweeps<'a> {
     }
 
     /// The coefficients of ρ, ρ² and ρ³ in what a larger tip adds: by the difference at ρ = 1 and the slopes at both ends.
-    /// Nothing of loads that are not solved with the largest.
+    /// Nothing at places that are not solved with the largest.
     fn by_radius(&self, kind: Kind, mirror: &Mirror, index: usize) -> Option<Known> {
         let nominal = &self.nominal[index];
         let same_load = |solved: &&Solved| solved.pose == nominal.pose;

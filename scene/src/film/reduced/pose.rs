@@ -89,7 +89,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn forces_come_back(f in 0.0..0.255, tilt in 0.0..LARGEST_TILT, turn in 0.0..6.3) {
+        fn forces_come_back(f in 0.0..0.255f64, tilt in 0.0..LARGEST_TILT, turn in 0.0..6.3) {
             let (sin, cos) = libm::sincos(turn);
             let sideways = f * libm::sin(tilt);
             let force = [sideways * cos, sideways * sin, -f * libm::cos(tilt)];
