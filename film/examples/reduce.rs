@@ -20,7 +20,7 @@ Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to
 --check: hold the film that is built in against the full solution instead";
 
 /// Loads of a check.
-const LOADS: usize = 200;
+const LOADS: usize = 100;
 /// How far from the middle they are, mm: anywhere, and where a sensor is calibrated.
 const REACHES_MM: [f64; 2] = [5.0, 4.0];
 
