@@ -37,4 +37,4 @@ pub use load::{Loaded, press_load};
 pub use point::Material;
 pub use reduce::fit;
 pub use stuck::solve_stuck;
-pub use view::{Marker, markers, paper_camera};
+pub use view::{Marker, markers, markers_on, paper_camera};
