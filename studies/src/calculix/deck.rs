@@ -9,7 +9,7 @@ use super::mesh::{Cut, Mesh};
 /// Points of the curve by which the load grows, and the first and largest step along it.
 const GROWTH_POINTS: usize = 40;
 const FIRST_STEP: f64 = 0.1;
-const SMALLEST_STEP: f64 = 1e-5;
+const SMALLEST_STEP: f64 = 1e-3;
 const LARGEST_STEP: f64 = 0.25;
 /// What may be left over of the forces, in parts of the mean force (CalculiX's default is 0.005), and the last correction in
 /// parts of the step's largest displacement (0.01).
@@ -23,6 +23,9 @@ pub enum Law {
     StVenant,
     /// The same, with the two shear moduli across the film so many times larger.
     StiffShear(f64),
+    /// The same, that many times stiffer against a change of thickness, too, and without Poisson's ratio across the film: a shell
+    /// that neither shears nor thins.
+    StiffAcross(f64),
     /// Compressible neo-Hooke with the same moduli at rest.
     NeoHooke,
 }
@@ -73,15 +76,17 @@ impl Deck<'_> {
             self.design.material.poisson,
         );
         let shear = e / (2.0 * (1.0 + nu));
+        let layered = |[e_across, nu, nu_across]: [f64; 3], shear: f64, across: f64| {
+            format!(
+                "*ELASTIC,TYPE=ENGINEERING CONSTANTS\n\
+                 {e},{e},{e_across},{nu},{nu_across},{nu_across},{shear:.12e},{across:.12e}\n\
+                 {across:.12e}\n"
+            )
+        };
         let law = match self.law {
             Law::StVenant => format!("*ELASTIC\n{e},{nu}\n"),
-            Law::StiffShear(times) => {
-                let across = times * shear;
-                format!(
-                    "*ELASTIC,TYPE=ENGINEERING CONSTANTS\n\
-                     {e},{e},{e},{nu},{nu},{nu},{shear:.12e},{across:.12e}\n{across:.12e}\n"
-                )
-            }
+            Law::StiffShear(times) => layered([e, nu, nu], shear, times * shear),
+            Law::StiffAcross(times) => layered([times * e, nu, 0.0], shear, times * shear),
             // C10 = G/2 and D1 = 2/K.
             Law::NeoHooke => {
                 let (c10, d1) = (shear / 2.0, 6.0 * (1.0 - 2.0 * nu) / e);
@@ -264,6 +269,9 @@ mod tests {
         assert!(text.contains("*SHELL SECTION,ELSET=FILM,MATERIAL=RUBBER\n0.5\n"));
         let numbers: Vec<f64> = section(&text, "*ELASTIC").flatten().collect();
         assert!((numbers[8] - 10.0 * numbers[6]).abs() < 1e-9);
+        let text = written(Cut::Bricks(1), Law::StiffAcross(10.0));
+        let numbers: Vec<f64> = section(&text, "*ELASTIC").flatten().collect();
+        assert_eq!(numbers[..6], [1.0, 1.0, 10.0, 0.49, 0.0, 0.0]);
         let text = written(Cut::Bricks(1), Law::NeoHooke);
         let numbers: Vec<f64> = section(&text, "*HYPERELASTIC").flatten().collect();
         let (shear, bulk) = (2.0 * numbers[0], 2.0 / numbers[1]);

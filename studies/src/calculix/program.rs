@@ -7,14 +7,16 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
-/// The job's name: CalculiX reads `press.inp` and writes `press.dat`.
+/// The job's name: CalculiX reads `press.inp` and writes `press.dat`; what it says goes to `press.log`.
 const JOB: &str = "press";
+/// What it says at the end of a job that it could do.
+const DONE: &str = "Job finished";
 
 /// Where CalculiX is, and where it may work.
 pub struct Program {
     /// Its name or path.
     pub ccx: PathBuf,
-    /// Holds one folder for each press; temporary without it.
+    /// Holds one folder for each press; temporary without it. What lies there of the same deck is not worked out again.
     pub keep: Option<PathBuf>,
 }
 
@@ -52,11 +54,15 @@ impl Program {
         };
         let folder = keep.join(name);
         fs::create_dir_all(&folder)?;
-        self.run_in(&folder, deck)
+        match kept(&folder, deck) {
+            Some(results) => Ok(results),
+            None => self.run_in(&folder, deck),
+        }
     }
 
     fn run_in(&self, folder: &Path, deck: &str) -> Result<String> {
-        fs::write(folder.join(JOB).with_extension("inp"), deck)?;
+        let file = |extension: &str| folder.join(JOB).with_extension(extension);
+        fs::write(file("inp"), deck)?;
         let output = Command::new(&self.ccx)
             .arg(JOB)
             .current_dir(folder)
@@ -65,7 +71,8 @@ impl Program {
             .output()
             .with_context(|| self.cannot_run())?;
         let said = String::from_utf8_lossy(&output.stdout);
-        if !output.status.success() || !said.contains("Job finished") {
+        fs::write(file("log"), said.as_bytes())?;
+        if !output.status.success() || !said.contains(DONE) {
             let why = said
                 .lines()
                 .skip_while(|line| !line.contains("*ERROR"))
@@ -73,8 +80,7 @@ impl Program {
             let why: Vec<&str> = why.map(str::trim).collect();
             bail!("CalculiX gave up ({}): {}", output.status, why.join(" "));
         }
-        let results = folder.join(JOB).with_extension("dat");
-        fs::read_to_string(&results).context("CalculiX wrote no results")
+        fs::read_to_string(file("dat")).context("CalculiX wrote no results")
     }
 
     fn cannot_run(&self) -> String {
@@ -82,9 +88,30 @@ impl Program {
     }
 }
 
+/// The results of the same deck, if its job came to its end.
+fn kept(folder: &Path, deck: &str) -> Option<String> {
+    let read = |extension: &str| fs::read_to_string(folder.join(JOB).with_extension(extension));
+    let same = read("inp").ok()? == deck && read("log").ok()?.contains(DONE);
+    same.then(|| read("dat").ok()).flatten()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_finished_jobs_of_the_same_deck_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |extension: &str, text: &str| {
+            fs::write(folder.path().join(JOB).with_extension(extension), text).unwrap();
+        };
+        write("inp", "deck");
+        write("dat", "results");
+        assert_eq!(kept(folder.path(), "deck"), None);
+        write("log", "Job finished");
+        assert_eq!(kept(folder.path(), "deck").as_deref(), Some("results"));
+        assert_eq!(kept(folder.path(), "another"), None);
+    }
 
     #[test]
     fn a_missing_program_is_told_with_its_package() {
