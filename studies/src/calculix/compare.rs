@@ -92,8 +92,8 @@ pub fn largest_and_rms(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
     [largest, (squares / f64::max(count, 1.0)).sqrt()]
 }
 
-/// The press (force and place) with which the project's film comes nearest to the markers seen, by Gauss–Newton from the true
-/// one.
+/// The press (force and place) with which the project's film comes nearest to the markers seen, by
+/// Gauss–Newton from the true one.
 ///
 /// # Errors
 /// When the film finds no equilibrium on the way, or the steps do not end.

@@ -11,8 +11,8 @@ const GROWTH_POINTS: usize = 40;
 const FIRST_STEP: f64 = 0.1;
 const SMALLEST_STEP: f64 = 1e-3;
 const LARGEST_STEP: f64 = 0.25;
-/// What may be left over of the forces, in parts of the mean force (CalculiX's default is 0.005), and the last correction in
-/// parts of the step's largest displacement (0.01).
+/// What may be left over of the forces, in parts of the mean force (CalculiX's default is 0.005),
+/// and the last correction in parts of the step's largest displacement (0.01).
 const RESIDUAL: f64 = 1e-5;
 const CORRECTION: f64 = 1e-3;
 
@@ -23,8 +23,8 @@ pub enum Law {
     StVenant,
     /// The same, with the two shear moduli across the film so many times larger.
     StiffShear(f64),
-    /// The same, that many times stiffer against a change of thickness, too, and without Poisson's ratio across the film: a shell
-    /// that neither shears nor thins.
+    /// The same, that many times stiffer against a change of thickness, too, and without Poisson's
+    /// ratio across the film: a shell that neither shears nor thins.
     StiffAcross(f64),
     /// Compressible neo-Hooke with the same moduli at rest.
     NeoHooke,
@@ -103,8 +103,9 @@ impl Deck<'_> {
         format!("*MATERIAL,NAME=RUBBER\n{law}{section}")
     }
 
-    /// A node on springs for each point of the posts, tied to the middle surface there. All springs are alike; a larger part of
-    /// a post is tied with a larger weight: a node that moves √c times as far stores c times the energy.
+    /// A node on springs for each point of the posts, tied to the middle surface there. All springs
+    /// are alike; a larger part of a post is tied with a larger weight: a node that moves √c times
+    /// as far stores c times the energy.
     fn grips(&self) -> String {
         let points = self.design.post_points();
         let mean_mm2 = points.iter().map(|(_, area)| area).sum::<f64>() / points.len() as f64;

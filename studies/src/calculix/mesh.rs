@@ -71,7 +71,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The mesh of a design, small at its tip and its posts; at `fineness` 2 elements have half the sides.
+    /// The mesh of a design, small at its tip and its posts; at `fineness` 2 elements have half the
+    /// sides.
     pub fn new(design: &Design, cut: Cut, fineness: f64) -> Mesh {
         let breaks = design
             .tip_offset_mm
@@ -101,7 +102,8 @@ impl Mesh {
         [across, down, self.layers()]
     }
 
-    /// The nodes that move the point which rests at (x, y) mm, z mm above the middle surface, with their weights.
+    /// The nodes that move the point which rests at (x, y) mm, z mm above the middle surface, with
+    /// their weights.
     pub fn place(&self, [x, y, z]: [f64; 3]) -> Vec<(usize, f64)> {
         let [across, _, layers] = self.counts();
         let (i, x) = within(&self.breaks[0], x);

@@ -83,7 +83,8 @@ impl Page {
 
     fn summary(&self) -> String {
         let mut text = String::from(
-            "| film in CalculiX | presses | tip's depth, µm: largest, rms | markers in space, µm | in the picture, px |\n\
+            "| film in CalculiX | presses | tip's depth, µm: largest, rms | markers in space, µm \
+             | in the picture, px |\n\
              |---|---|---|---|---|\n",
         );
         for (law, name) in LAWS.iter().enumerate() {
@@ -116,8 +117,9 @@ impl Page {
 
     fn presses(&self) -> String {
         let mut text = String::from(
-            "| press | F, mN | place, mm | tip's depth, mm: own | CalculiX | apart, µm | markers apart, µm: largest, rms \
-             | in the picture, px | thickness under the tip; at marker 2, mm |\n\
+            "| press | F, mN | place, mm | tip's depth, mm: own | CalculiX | apart, µm \
+             | markers apart, µm: largest, rms | in the picture, px \
+             | thickness under the tip; at marker 2, mm |\n\
              |---|---|---|---|---|---|---|---|---|\n",
         );
         for one in &self.compared {
@@ -140,7 +142,8 @@ impl Page {
 
     fn markers(&self) -> String {
         let mut text = String::from(
-            "| press, marker | own: x, y, z, mm | CalculiX: x, y, z, mm | apart, µm | own, px | CalculiX, px | apart, px |\n\
+            "| press, marker | own: x, y, z, mm | CalculiX: x, y, z, mm | apart, µm \
+             | own, px | CalculiX, px | apart, px |\n\
              |---|---|---|---|---|---|---|\n",
         );
         for one in &self.compared {
@@ -166,7 +169,8 @@ impl Page {
 
     fn variations(&self) -> String {
         let mut text = String::from(
-            "| press | film | tip's depth, mm | apart, µm (%) | markers apart, µm: largest, rms | in the picture, px |\n\
+            "| press | film | tip's depth, mm | apart, µm (%) | markers apart, µm: largest, rms \
+             | in the picture, px |\n\
              |---|---|---|---|---|---|\n",
         );
         for varied in &self.varied {
@@ -195,7 +199,8 @@ impl Page {
 
     fn readings(&self) -> String {
         let mut text = String::from(
-            "| press | film in CalculiX | \\|F\\|, of the true one | direction off, ° | place off, mm | left over, px rms |\n\
+            "| press | film in CalculiX | \\|F\\|, of the true one | direction off, ° \
+             | place off, mm | left over, px rms |\n\
              |---|---|---|---|---|---|\n",
         );
         for one in &self.compared {
@@ -229,7 +234,8 @@ fn apart(own: &Seen, solved: &Solved) -> String {
     let ([space, space_rms], [picture, picture_rms]) = (found.space_um, found.picture_px);
     let [tip, marker] = solved.thickness_mm;
     format!(
-        "{:.3} | {:+.0} | {space:.0}, {space_rms:.0} | {picture:.2}, {picture_rms:.2} | {tip:.3}; {marker:.3}",
+        "{:.3} | {:+.0} | {space:.0}, {space_rms:.0} | {picture:.2}, {picture_rms:.2} \
+         | {tip:.3}; {marker:.3}",
         -solved.seen.tip_mm[2], found.depth_um
     )
 }
@@ -241,7 +247,8 @@ fn against(own: &Seen, other: &Seen) -> String {
     let depth = -other.tip_mm[2];
     let part = -0.1 * found.depth_um / own.tip_mm[2];
     format!(
-        "{depth:.5} | {:+.2} ({part:+.2}) | {space:.2}, {space_rms:.2} | {picture:.3}, {picture_rms:.3}",
+        "{depth:.5} | {:+.2} ({part:+.2}) | {space:.2}, {space_rms:.2} \
+         | {picture:.3}, {picture_rms:.3}",
         found.depth_um
     )
 }

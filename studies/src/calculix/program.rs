@@ -7,7 +7,8 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
 
-/// The job's name: CalculiX reads `press.inp` and writes `press.dat`; what it says goes to `press.log`.
+/// The job's name: CalculiX reads `press.inp` and writes `press.dat`; what it says goes to
+/// `press.log`.
 const JOB: &str = "press";
 /// What it says at the end of a job that it could do.
 const DONE: &str = "Job finished";
@@ -16,7 +17,8 @@ const DONE: &str = "Job finished";
 pub struct Program {
     /// Its name or path.
     pub ccx: PathBuf,
-    /// Holds one folder for each press; temporary without it. What lies there of the same deck is not worked out again.
+    /// Holds one folder for each press; temporary without it. What lies there of the same deck is
+    /// not worked out again.
     pub keep: Option<PathBuf>,
 }
 
@@ -29,8 +31,9 @@ impl Program {
         let output = match Command::new(&self.ccx).arg("-v").output() {
             Ok(output) => output,
             Err(error) if error.kind() == ErrorKind::NotFound => bail!(
-                "there is no program `{}`: this study needs CalculiX. On Debian and Ubuntu, as root: \
-                 apt-get install calculix-ccx. Elsewhere: https://www.calculix.de, and --ccx FILE",
+                "there is no program `{}`: this study needs CalculiX. On Debian and Ubuntu, \
+                 as root: apt-get install calculix-ccx. \
+                 Elsewhere: https://www.calculix.de, and --ccx FILE",
                 self.ccx.display()
             ),
             Err(error) => return Err(error).with_context(|| self.cannot_run()),

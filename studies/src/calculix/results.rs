@@ -57,7 +57,8 @@ impl<'a> Pressed<'a> {
         sum
     }
 
-    /// How the point of the camera's side moves that rests at (x, y) mm, mm. Shells carry it on their normal.
+    /// How the point of the camera's side moves that rests at (x, y) mm, mm. Shells carry it on
+    /// their normal.
     pub fn camera_side(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         let half = self.mesh.thickness_mm / 2.0;
         if self.mesh.cut != Cut::Shells {
@@ -93,7 +94,8 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// A node's number and displacement. The numbers are of fixed width: a minus may stand where a space would.
+/// A node's number and displacement. The numbers are of fixed width: a minus may stand where a
+/// space would.
 fn row(line: &str) -> Result<(usize, [f64; 3])> {
     let wrong = || format!("not a line of displacements: {line}");
     let (node, rest) = line.split_once(' ').with_context(wrong)?;
