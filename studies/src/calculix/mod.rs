@@ -39,7 +39,7 @@ pub struct Calculix {
     #[arg(long, default_value_t = 2)]
     threads: usize,
     /// How fine CalculiX's mesh is; 2: elements of half the sides.
-    #[arg(long, default_value_t = 0.8)]
+    #[arg(long, default_value_t = 0.7)]
     fineness: f64,
     /// Keep decks and results in this folder.
     #[arg(long)]
