@@ -85,8 +85,9 @@ struct Varied {
 impl Calculix {
     /// Runs the study and writes its page.
     ///
-    /// # Errors When CalculiX is not installed, the project's film finds no equilibrium, or the
-    /// page cannot be written.
+    /// # Errors
+    /// When CalculiX is not installed, the project's film finds no equilibrium, or the page cannot
+    /// be written.
     pub fn run(self) -> Result<()> {
         let program = Program {
             ccx: self.ccx.clone(),
