@@ -4,9 +4,9 @@ use anyhow::Result;
 use hivtac_film::{Contact, Design, Equilibrium, Film, Marker, markers};
 use hivtac_scene::Camera;
 
-/// Gauss–Newton steps at most, and the step in mm at which they end.
-const MAX_STEPS: usize = 12;
-const LAST_STEP_MM: f64 = 1e-6;
+/// Gauss–Newton steps at most, and how small they are (N, mm) at the end.
+const MAX_STEPS: usize = 20;
+const LAST_STEP: [f64; UNKNOWNS] = [1e-7, 1e-7, 1e-7, 1e-5, 1e-5];
 /// Force (N) and place (mm) by which pixels are differentiated.
 const UNITS: [f64; UNKNOWNS] = [1e-5, 1e-5, 1e-5, 1e-4, 1e-4];
 /// Force and place; coordinates of the markers.
@@ -118,7 +118,11 @@ pub fn read(
         for (sum, part) in found.iter_mut().zip(step) {
             *sum += part;
         }
-        if step[3].hypot(step[4]) < LAST_STEP_MM {
+        if step
+            .iter()
+            .zip(LAST_STEP)
+            .all(|(part, last)| part.abs() < last)
+        {
             return Ok(reading(
                 &found,
                 force_n,
@@ -209,9 +213,16 @@ mod tests {
         let seen = seen(&film, &state, &camera);
         let reading = read(&design, &camera, &seen, [0.0, 0.0, -0.06], [0.8, 2.1]).unwrap();
         let size = 0.06 / 0.01f64.hypot(0.005).hypot(0.05);
-        assert!((reading.size * size - 1.0).abs() < 1e-6);
-        assert!((reading.place_mm - 0.2f64.hypot(0.1)).abs() < 1e-6);
-        assert!(reading.left_px < 1e-6);
+        assert!((reading.size * size - 1.0).abs() < 1e-5);
+        assert!((reading.place_mm - 0.2f64.hypot(0.1)).abs() < 1e-4);
+        assert!(reading.left_px < 1e-3);
+        let middle = press(&mut film, [0.0, 0.0, -0.05], [0.0; 2]).unwrap();
+        let seen = super::seen(&film, &middle, &camera);
+        let reading = read(&design, &camera, &seen, [0.0, 0.0, -0.06], [0.0; 2]).unwrap();
+        assert!(
+            (reading.size - 0.05 / 0.06).abs() < 1e-5,
+            "symmetry moves no place"
+        );
     }
 
     #[test]
