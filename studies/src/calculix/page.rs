@@ -269,10 +269,11 @@ fn list(numbers: &[f64], digits: usize) -> String {
 }
 
 /// Why there is no result, in a cell.
-fn short(why: &str) -> String {
-    let end = why.find("*ERROR").unwrap_or(0);
-    let words: Vec<&str> = why[end..].split_whitespace().take(9).collect();
-    words.join(" ").replace('|', " ")
+fn short(why: &str) -> &'static str {
+    if why.contains("increment size smaller than minimum") {
+        return "no equilibrium";
+    }
+    "CalculiX failed"
 }
 
 fn row(text: &mut String, cells: std::fmt::Arguments<'_>) {

@@ -62,7 +62,7 @@ pub const VARIANTS: [Variant; 7] = [
         Law::StVenant,
         1.0,
     ),
-    variant("CalculiX's shells, S8R", Cut::Shells, Law::StVenant, 1.0),
+    variant("S8R shells", Cut::Shells, Law::StVenant, 1.0),
     variant(
         "no shear across",
         Cut::Bricks(1),
