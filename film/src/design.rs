@@ -157,8 +157,8 @@ impl Design {
         self.post_points().into_iter().map(spring).collect()
     }
 
-    /// The points of the film on which the tip presses, with their shares of its force.
-    pub(crate) fn tip_points(&self) -> Vec<([f64; 2], f64)> {
+    /// The points of the film on which the tip presses, mm at rest, with their shares of its force.
+    pub fn tip_points(&self) -> Vec<([f64; 2], f64)> {
         let radius = self.tip_radius_mm;
         let points: Vec<_> = disc(self.tip_offset_mm, radius, TIP_RINGS, TIP_RAYS)
             .map(|(point, area, r)| (point, area * (1.0 - (r / radius).powi(2)).powi(2)))
@@ -170,9 +170,9 @@ impl Design {
             .collect()
     }
 
-    /// The points of the film on posts, with their areas in mm²: Gauss's over the angle whose sine is x, and along the chord
+    /// The points of the film on posts, mm at rest, with their areas in mm²: Gauss's over the angle whose sine is x, and along the chord
     /// there. They follow a post that is shifted, and the film's edge cuts them, without a jump.
-    fn post_points(&self) -> Vec<([f64; 2], f64)> {
+    pub fn post_points(&self) -> Vec<([f64; 2], f64)> {
         let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
         let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];
         let radius = self.post_radius_mm;

@@ -36,4 +36,4 @@ pub use film::{Contact, Equilibrium, Film};
 pub use load::{Loaded, press_load};
 pub use point::Material;
 pub use tables::tables;
-pub use view::{Marker, markers, paper_camera};
+pub use view::{Marker, markers, markers_on, paper_camera};

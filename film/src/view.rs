@@ -34,9 +34,14 @@ pub fn paper_camera() -> Result<Camera, FilmError> {
 
 /// The four markers of a film in a state.
 pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4] {
+    markers_on(|rest| film.displacement(state, rest), camera)
+}
+
+/// The four markers of a film whose camera side moves so: from a place at rest to its displacement, mm.
+pub fn markers_on(moved: impl Fn([f64; 2]) -> [f64; 3], camera: &Camera) -> [Marker; 4] {
     MARKERS.map(|disc| Marker {
-        moved_mm: disc_motion(|rest| film.displacement(state, rest), &disc).moved_mm,
-        seen_px: disc.centroid_px(|rest| film.displacement(state, rest), camera),
+        moved_mm: disc_motion(&moved, &disc).moved_mm,
+        seen_px: disc.centroid_px(&moved, camera),
     })
 }
 

@@ -1,0 +1,279 @@
+//! The film of `film/` beside the same film in CalculiX, under the same presses.
+
+mod compare;
+mod deck;
+mod mesh;
+mod page;
+mod presses;
+mod program;
+mod results;
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use hivtac_film::{Design, Film, markers_on, paper_camera};
+use hivtac_scene::{Camera, MARKER_REST_MM};
+
+use compare::{Reading, Seen};
+use deck::Deck;
+use mesh::Mesh;
+use page::Page;
+use presses::{BASE, FAINT, PRESSES, Press, RUBBER, VARIANTS, VARIED, Variant};
+use program::Program;
+use results::Pressed;
+
+/// What to compare, and where the page goes.
+#[derive(Args)]
+pub struct Calculix {
+    /// The page to write.
+    #[arg(long, default_value = "docs/results/calculix.md")]
+    out: PathBuf,
+    /// CalculiX's program.
+    #[arg(long, default_value = "ccx")]
+    ccx: PathBuf,
+    /// Presses that CalculiX works on at a time.
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
+    /// How fine CalculiX's mesh is; 2: elements of half the sides.
+    #[arg(long, default_value_t = 0.7)]
+    fineness: f64,
+    /// Keep decks and results in this folder.
+    #[arg(long)]
+    keep: Option<PathBuf>,
+}
+
+/// One press of one film in CalculiX.
+#[derive(Clone, Copy)]
+struct Job {
+    press: Press,
+    variant: Variant,
+}
+
+/// What CalculiX made of it.
+#[derive(Clone)]
+struct Solved {
+    seen: Seen,
+    /// The film's thickness under the tip and at marker 2, mm.
+    thickness_mm: [f64; 2],
+    elements: [usize; 3],
+    nodes: usize,
+}
+
+/// A press in the project's film and in CalculiX's two.
+struct Compared {
+    press: Press,
+    own: Seen,
+    /// St Venant's law and neo-Hooke's; why not, where there is no equilibrium.
+    theirs: [Result<Solved, String>; 2],
+    /// What the project's film takes them for.
+    readings: [Option<Reading>; 2],
+}
+
+/// Variations at one press.
+struct Varied {
+    press: Press,
+    own: Seen,
+    /// The project's film on a mesh twice as fine.
+    finer: Seen,
+    theirs: Vec<(Variant, Result<Solved, String>)>,
+}
+
+impl Calculix {
+    /// Runs the study and writes its page.
+    ///
+    /// # Errors
+    /// When CalculiX is not installed, the project's film finds no equilibrium, or the page cannot
+    /// be written.
+    pub fn run(self) -> Result<()> {
+        let program = Program {
+            ccx: self.ccx.clone(),
+            keep: self.keep.clone(),
+        };
+        let version = program.version()?;
+        let camera = paper_camera()?;
+        let study = Study {
+            program,
+            camera,
+            fineness: self.fineness,
+            threads: self.threads,
+        };
+        let page = Page {
+            version,
+            compared: study.compare()?,
+            varied: study.vary()?,
+        };
+        println!("{}", page.tables()?);
+        if let Some(folder) = self.out.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        fs::write(&self.out, page.text()?)
+            .with_context(|| format!("cannot write {}", self.out.display()))?;
+        println!("wrote {}", self.out.display());
+        Ok(())
+    }
+}
+
+struct Study {
+    program: Program,
+    camera: Camera,
+    fineness: f64,
+    threads: usize,
+}
+
+impl Study {
+    fn compare(&self) -> Result<Vec<Compared>> {
+        let jobs = PRESSES.map(|press| [BASE, RUBBER].map(|variant| Job { press, variant }));
+        let solved = self.solve_all(jobs.as_flattened());
+        let mut film = Film::new(&Design::default())?;
+        let pairs = PRESSES.into_iter().zip(solved.chunks(2));
+        pairs
+            .map(|(press, solved)| self.compared(&mut film, press, solved))
+            .collect()
+    }
+
+    fn compared(
+        &self,
+        film: &mut Film,
+        press: Press,
+        solved: &[Result<Solved, String>],
+    ) -> Result<Compared> {
+        let theirs = [0, 1].map(|k| solved[k].clone());
+        let readings = [0, 1].map(|k| {
+            let seen = &theirs[k].as_ref().ok()?.seen;
+            let design = Design::default();
+            compare::read(&design, &self.camera, seen, press.force_n, press.place_mm).ok()
+        });
+        Ok(Compared {
+            press,
+            own: self.own(film, press)?,
+            theirs,
+            readings,
+        })
+    }
+
+    fn vary(&self) -> Result<Vec<Varied>> {
+        let presses = [FAINT]
+            .into_iter()
+            .chain(VARIED.map(|index| PRESSES[index]));
+        let presses: Vec<Press> = presses.collect();
+        let jobs: Vec<Job> = presses
+            .iter()
+            .flat_map(|press| {
+                VARIANTS.map(|variant| Job {
+                    press: *press,
+                    variant,
+                })
+            })
+            .collect();
+        let solved = self.solve_all(&jobs);
+        let mut film = Film::new(&Design::default())?;
+        let mut finer = Film::new(&Design {
+            fineness: 2.0,
+            ..Design::default()
+        })?;
+        let pairs = presses.into_iter().zip(solved.chunks(VARIANTS.len()));
+        let varied = pairs.map(|(press, solved)| {
+            Ok(Varied {
+                press,
+                own: self.own(&mut film, press)?,
+                finer: self.own(&mut finer, press)?,
+                theirs: VARIANTS.into_iter().zip(solved.iter().cloned()).collect(),
+            })
+        });
+        varied.collect()
+    }
+
+    fn own(&self, film: &mut Film, press: Press) -> Result<Seen> {
+        let state = compare::press(film, press.force_n, press.place_mm)?;
+        Ok(compare::seen(film, &state, &self.camera))
+    }
+
+    /// Every job by CalculiX, in the jobs' order, several at a time.
+    fn solve_all(&self, jobs: &[Job]) -> Vec<Result<Solved, String>> {
+        let next = AtomicUsize::new(0);
+        let take = || {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            jobs.get(index).map(|job| (index, job))
+        };
+        let worker = || {
+            let taken = std::iter::from_fn(take);
+            taken
+                .map(|(index, job)| (index, self.timed(job)))
+                .collect::<Vec<_>>()
+        };
+        let mut all: Vec<_> = std::thread::scope(|scope| {
+            let handles: Vec<_> = (0..self.threads.max(1))
+                .map(|_| scope.spawn(worker))
+                .collect();
+            handles
+                .into_iter()
+                .flat_map(|handle| handle.join().unwrap_or_default())
+                .collect()
+        });
+        all.sort_by_key(|(index, _)| *index);
+        all.into_iter().map(|(_, solved)| solved).collect()
+    }
+
+    /// One job, told on the terminal.
+    fn timed(&self, job: &Job) -> Result<Solved, String> {
+        let begin = Instant::now();
+        let solved = self.solve(job).map_err(|error| format!("{error:#}"));
+        let seconds = begin.elapsed().as_secs_f64();
+        match &solved {
+            Ok(_) => eprintln!("{}: {seconds:.0} s", job.name()),
+            Err(why) => eprintln!("{}: {seconds:.0} s, {why}", job.name()),
+        }
+        solved
+    }
+
+    fn solve(&self, job: &Job) -> Result<Solved> {
+        let Variant {
+            cut, law, fineness, ..
+        } = job.variant;
+        let design = Design {
+            tip_offset_mm: job.press.place_mm,
+            ..Design::default()
+        };
+        let mesh = Mesh::new(&design, cut, fineness * self.fineness);
+        let deck = Deck {
+            design: &design,
+            mesh: &mesh,
+            law,
+            force_n: job.press.force_n,
+        };
+        let results = self.program.run(&job.name(), &deck.text())?;
+        let pressed = Pressed::read(&mesh, &results)?;
+        let places = [job.press.place_mm, [MARKER_REST_MM; 2]];
+        Ok(Solved {
+            seen: self.seen(&design, &pressed),
+            thickness_mm: places.map(|place| pressed.thickness_mm(place)),
+            elements: mesh.counts(),
+            nodes: mesh.nodes.len(),
+        })
+    }
+
+    fn seen(&self, design: &Design, pressed: &Pressed<'_>) -> Seen {
+        let mut tip_mm = [0.0; 3];
+        for ([x, y], share) in design.tip_points() {
+            for (sum, part) in tip_mm.iter_mut().zip(pressed.at([x, y, 0.0])) {
+                *sum += share * part;
+            }
+        }
+        Seen {
+            tip_mm,
+            markers: markers_on(|rest| pressed.camera_side(rest), &self.camera),
+        }
+    }
+}
+
+impl Job {
+    /// A name for a folder.
+    fn name(&self) -> String {
+        let words = format!("{} {}", self.press.name, self.variant.name);
+        words.replace(|letter: char| !letter.is_alphanumeric(), "-")
+    }
+}
