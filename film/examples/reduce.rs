@@ -13,7 +13,9 @@ use std::time::Instant;
 use hivtac_film::parallel::in_parallel;
 use hivtac_film::sweep::{Solved, octant, solve_place};
 use hivtac_film::{Check, Design, FilmError, Neighbours, check, paper_camera, record, tables};
-use hivtac_scene::film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, Unit};
+use hivtac_scene::film::reduced::{
+    Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit,
+};
 
 const USAGE: &str = "reduce FOLDER [--check]
 Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are incomplete.
@@ -21,8 +23,14 @@ Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to
 
 /// Loads of a check.
 const LOADS: usize = 100;
-/// How far from the middle they are, mm: anywhere, and where a sensor is calibrated.
-const REACHES_MM: [f64; 2] = [5.0, 4.0];
+/// How far from the middle they are, mm, and the tips' radii, mm: anywhere, where a sensor is calibrated, and with other
+/// tips.
+const DOMAINS_MM: [(f64, [f64; 2]); 4] = [
+    (5.0, [NOMINAL_RADIUS_MM; 2]),
+    (4.0, [NOMINAL_RADIUS_MM; 2]),
+    (4.0, [SMALLEST_RADIUS_MM, 1.0]),
+    (4.0, [1.0, LARGEST_RADIUS_MM]),
+];
 
 fn main() -> ExitCode {
     // Whoever reads the output may have enough of it.
@@ -112,11 +120,12 @@ fn read(path: &Path) -> Result<Vec<Solved>, Box<dyn Error>> {
 }
 
 fn look() -> Result<(), Box<dyn Error>> {
-    for reach_mm in REACHES_MM {
-        let begin = Instant::now();
+    for (reach_mm, radii_mm) in DOMAINS_MM {
+        let unit = Unit::default();
         let found = check(
-            &Unit::default(),
+            &unit,
             reach_mm,
+            radii_mm,
             LOADS,
             threads()?,
             progress("check"),
@@ -128,13 +137,13 @@ fn look() -> Result<(), Box<dyn Error>> {
             worst_tip_mm,
             ..
         } = found;
+        let [from, to] = radii_mm;
         println!(
-            "within ±{reach_mm} mm, {loads} loads: rms {rms_px:.4} px, at most {worst_px:.3} px; the tip within \
-             {worst_tip_mm:.3} mm; {:.0} s",
-            begin.elapsed().as_secs_f64()
+            "{loads} loads within ±{reach_mm} mm, tips of {from} to {to} mm: rms {rms_px:.4} px, at most \
+             {worst_px:.3} px; the tip within {worst_tip_mm:.3} mm"
         );
         if let Some(load) = found.worst_at {
-            println!("  the largest at {:?}", load);
+            println!("  the largest at {load:?}");
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::film::reduced::{NOMINAL_RADIUS_MM, Unit};
+use hivtac_scene::film::reduced::Unit;
 use hivtac_scene::film::{Film as ReducedFilm, MAX_RATIO};
 use hivtac_scene::{Camera, Disc, Load, MARKERS, Preset, SceneError};
 
@@ -10,9 +10,8 @@ use crate::parallel::in_parallel;
 use crate::path::halton;
 use crate::{Design, Film, FilmError, Loaded, press_load};
 
-/// What is drawn: sizes of forces evenly, tilts and places evenly over their areas, radii evenly.
+/// What is drawn: sizes of forces and radii evenly, tilts and places evenly over their areas.
 const FORCE_N: [f64; 2] = [0.002, 0.25];
-const TIP_RADII_MM: [f64; 2] = [0.25, 2.0];
 
 /// How far the tables are from the full solution, over loads that they were not made from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,20 +29,21 @@ pub struct Check {
 }
 
 /// Holds the reduced film against the full solution of a unit at so many random loads: |F| to 0.25 N, tangential
-/// over normal to 0.8, places within ±`reach_mm`, the tip's radius 0.25 to 2 mm (the nominal one in every second load).
+/// over normal to 0.8, places within ±`reach_mm`, the tip's radius within the given ones, mm.
 ///
 /// # Errors
 /// When the film cannot be made or an equilibrium is not found.
 pub fn check(
     unit: &Unit,
     reach_mm: f64,
+    radii_mm: [f64; 2],
     loads: usize,
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Check, FilmError> {
     let scene = |error: SceneError| FilmError::Scene(error.to_string());
     let reduced = ReducedFilm::of(*unit).map_err(scene)?;
-    let cases = (0..loads).map(|index| case(index, reach_mm));
+    let cases = (0..loads).map(|index| case(index, reach_mm, radii_mm));
     let cases = cases.collect::<Result<Vec<_>, _>>().map_err(scene)?;
     let camera = Camera::new(Preset::Ov7725, 320, 240).map_err(scene)?;
     let design = Design::of(unit);
@@ -93,16 +93,13 @@ fn errors(
 }
 
 /// A load of the stated domain, from a sequence that fills it evenly.
-fn case(index: usize, reach_mm: f64) -> Result<Load, SceneError> {
+fn case(index: usize, reach_mm: f64, radii_mm: [f64; 2]) -> Result<Load, SceneError> {
     let part = |base| halton(index + 1000, base);
     let between = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
     let size_n = between(FORCE_N, part(2));
     let (tilt, turn) = ((MAX_RATIO * part(3).sqrt()).atan(), 2.0 * PI * part(5));
     let place = [7, 11].map(|base| reach_mm * (2.0 * part(base) - 1.0));
-    let radius = match index % 2 {
-        0 => NOMINAL_RADIUS_MM,
-        _ => between(TIP_RADII_MM, part(13)),
-    };
+    let radius = between(radii_mm, part(13));
     let sideways = size_n * tilt.sin();
     Load::from_vector([
         sideways * turn.cos(),
