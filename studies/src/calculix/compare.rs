@@ -51,7 +51,7 @@ pub struct Reading {
 /// # Errors
 /// When it finds no equilibrium.
 pub fn press(film: &mut Film, force_n: [f64; 3], place_mm: [f64; 2]) -> Result<Equilibrium> {
-    film.move_tip(place_mm)?;
+    film.move_tip(place_mm, film.design().tip_radius_mm)?;
     Ok(film.press(Contact::Force(force_n), &film.rest())?)
 }
 
@@ -109,7 +109,7 @@ pub fn read(
     let mut state = film.rest();
     for _ in 0..MAX_STEPS {
         let [fx, fy, fz, x, y] = found;
-        film.move_tip([x, y])?;
+        film.move_tip([x, y], film.design().tip_radius_mm)?;
         state = film.press(Contact::Force([fx, fy, fz]), &state)?;
         let here = pixels(&markers(&film, &state, camera));
         let target = pixels(&seen.markers);
