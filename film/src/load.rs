@@ -1,5 +1,6 @@
 //! The film under the loads of a scene.
 
+use hivtac_scene::film::MAX_RATIO;
 use hivtac_scene::{Contact as Reading, Load};
 
 use crate::{Contact, Equilibrium, Film, FilmError};
@@ -43,8 +44,13 @@ pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, FilmError> {
     };
     let state = film.press(contact, &film.rest())?;
     let [x, y, z] = state.force_n;
-    match load.contact() {
-        Reading::Slip { mu } if x.hypot(y) > mu * -z => {
+    let friction = match load.contact() {
+        Reading::Force => f64::INFINITY,
+        Reading::Stick => MAX_RATIO,
+        Reading::Slip { mu } => mu,
+    };
+    match friction {
+        mu if x.hypot(y) > mu * -z => {
             let slide = Slide {
                 film,
                 load,

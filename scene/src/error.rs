@@ -22,8 +22,8 @@ pub enum SceneError {
     },
     /// A load that is no number, pulls, or presses the film further than it can go.
     Load(String),
-    /// A text does not hold a reduced film's curves.
-    Curves(String),
+    /// Bytes do not hold a reduced film's tables.
+    Tables(String),
     /// A scene file that is not one: the line, the key and what is possible.
     #[cfg(feature = "file")]
     File(String),
@@ -69,7 +69,7 @@ impl fmt::Display for SceneError {
                 "frame size {width}×{height}: use a 4:3 size from 160×120 to 800×600, such as 320×240"
             ),
             SceneError::Load(why) => write!(f, "load: {why}"),
-            SceneError::Curves(why) => write!(f, "film's curves: {why}"),
+            SceneError::Tables(why) => write!(f, "film's tables: {why}"),
             #[cfg(feature = "file")]
             SceneError::File(why) => write!(f, "scene file: {why}"),
             #[cfg(feature = "file")]

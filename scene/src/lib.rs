@@ -21,7 +21,7 @@
 //! | file | subject |
 //! |---|---|
 //! | `load` | the force on the film and its convention |
-//! | [`film`] | where a point of the film goes under a load: curves made from finite elements |
+//! | [`film`] | where a point of the film goes under a load: tables made from finite elements |
 //! | [`paper`] | the paper's analytic model, equations 13–25 |
 //! | `camera` | presets, equidistant fisheye |
 //! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |

@@ -74,7 +74,7 @@ impl Mechanics {
     /// Whether a film can take a load.
     ///
     /// # Errors
-    /// When the load is outside what the film's curves hold for.
+    /// When the load is outside what the film's tables hold for.
     pub(crate) fn check(&self, film: &Film, load: &Load) -> Result<(), SceneError> {
         film.check(&self.completed(load))
     }

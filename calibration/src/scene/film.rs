@@ -38,7 +38,7 @@ pub struct FilmArgs {
         allow_hyphen_values = true
     )]
     offset_mm: Offset,
-    /// The curves that scenes use, or the finite elements that they were made from.
+    /// The tables that scenes use, or the finite elements that they were made from.
     #[arg(long, value_enum, default_value_t = Solver::Reduced)]
     solver: Solver,
     /// Print JSON.
@@ -48,7 +48,7 @@ pub struct FilmArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Solver {
-    /// The curves: a microsecond.
+    /// The tables: some microseconds.
     Reduced,
     /// The finite elements: a second, or some.
     Full,

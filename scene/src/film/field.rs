@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn markers_move_by_their_curves_and_the_tip_by_its_own() {
+    fn markers_move_by_their_discs_and_the_tip_by_its_own() {
         let pressed = pressed();
         for (disc, marker) in pressed.discs.iter().zip(MARKERS) {
             close(displacement(&pressed, marker.centre_mm), disc.moved_mm, 0.0);

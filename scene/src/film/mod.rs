@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_curves_is_refused() {
+    fn beyond_the_tables_is_refused() {
         let film = Film::default();
         let refused = |f, a, b| film.check(&load(f, a, b)).unwrap_err().to_string();
         assert!(refused(0.26, 0.0, 0.0).contains("|F| is 0.26 N"));

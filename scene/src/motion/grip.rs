@@ -14,7 +14,7 @@ const GRAVITY: f64 = 9.806_65;
 ///
 /// The grip rises; lifting takes the weight off the table, speeds up and slows down again; all of it backwards at the
 /// end. The paper's objects weigh 30 and 36 g, which pull more steeply than the 12° of its calibration and of the
-/// film's curves: the default object is lighter.
+/// film's default range: the default object is lighter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]

@@ -8,8 +8,7 @@ use crate::{Load, SceneError};
 /// Press, then pull sideways at a constant rate until friction gives way; slide with less friction; release.
 ///
 /// Coulomb friction: the pull grows to `friction_static` · N, then falls to `friction_sliding` · N within 20 ms.
-/// The film's curves hold for forces within 12° of the normal, a ratio of 0.21: what sticks better than that is
-/// out of reach.
+/// The film is known to a ratio of 0.8: what sticks better than that is out of reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]

@@ -117,7 +117,7 @@ impl Table {
         let nodes = axis.nodes().len() * axis.nodes().len();
         let length = 4 * row + 2 * row * nodes;
         let Some((own, rest)) = bytes.split_at_checked(length) else {
-            return Err(SceneError::Curves(format!(
+            return Err(SceneError::Tables(format!(
                 "a table of {length} bytes is cut off after {}: make the file anew",
                 bytes.len()
             )));

@@ -126,7 +126,7 @@ impl Tables {
         }
         match (bytes, tables.try_into()) {
             ([], Ok(tables)) => Ok(Tables(tables)),
-            _ => Err(SceneError::Curves(format!(
+            _ => Err(SceneError::Tables(format!(
                 "{} bytes follow the last table: make the file anew",
                 bytes.len()
             ))),
