@@ -210,7 +210,7 @@ fn extremes_render() {
         }],
         ..Options::default()
     };
-    let deepest = Load::from_angles(0.5, 0.0, 0.0).unwrap();
+    let deepest = Load::from_angles(0.25, 0.0, 0.0).unwrap();
     let frame = rendered(Preset::Ov7725, (160, 120), &hidden, &deepest);
     let middle = &frame.pixels[60 * 160..][..160];
     assert!(middle.iter().all(|&p| is_red(p)), "red from side to side");

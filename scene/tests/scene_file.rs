@@ -178,7 +178,10 @@ fn errors_name_line_key_value_and_what_is_possible() {
             &["line 3, load.vibration.amplitude_n", "0 to 0.1"],
         ),
         ("[light\ngain = 1", &["line 1"]),
-        ("[film]\nunit.thickness = 3", &["line 1, film", "0.7 to 1.3"]),
+        (
+            "[film]\nunit.thickness = 3",
+            &["line 1, film", "0.7 to 1.3"],
+        ),
         ("[film]\ncontact = \"glue\"", &["line 2", "glue", "stick"]),
     ];
     for (text, words) in cases {
