@@ -403,7 +403,8 @@ mod tests {
             assert!(dz < -0.1);
             close(film.displacement(&state, [-x, y]), [-dx, dy, dz], 1e-8);
             close(film.displacement(&state, [x, -y]), [dx, -dy, dz], 1e-8);
-            close(film.displacement(&state, [y, x]), [dy, dx, dz], 1e-8);
+            // Points of posts lie by columns, so that the diagonal is met less closely.
+            close(film.displacement(&state, [y, x]), [dy, dx, dz], 1e-6);
         }
     }
 

@@ -8,6 +8,9 @@ use crate::FilmError;
 /// What differences of a value by size and by tilt count for beside the value itself.
 const SLOPES_COUNT: f64 = 0.05;
 
+/// What is told least of the terms is at least this part of what is told most.
+const LEAST_TOLD: f64 = 1e-7;
+
 /// What is known of outputs at a load: their values and their derivatives by size and tilt, if they are known.
 pub struct Known {
     /// The load.
@@ -45,15 +48,17 @@ pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, FilmError> {
     }
     let matrix = Mat::from_fn(rows.len(), count, |i, j| rows[i][j]);
     let sides = Mat::from_fn(sides.len(), outputs, |i, j| sides[i][j]);
-    let solved = matrix.col_piv_qr().solve_lstsq(sides);
+    let factors = matrix.col_piv_qr();
+    let told = factors.thin_R();
+    if told[(count - 1, count - 1)].abs() < LEAST_TOLD * told[(0, 0)].abs() {
+        return Err(FilmError::Solver(
+            "the loads do not tell the terms apart: solve for more tilts".into(),
+        ));
+    }
+    let solved = factors.solve_lstsq(sides);
     let all = (0..outputs).flat_map(|output| (0..count).map(move |term| (output, term)));
     let found: Vec<f64> = all.map(|(output, term)| solved[(term, output)]).collect();
-    match found.iter().all(|part| part.is_finite()) {
-        true => Ok(found),
-        false => Err(FilmError::Solver(
-            "the loads do not tell the terms apart".into(),
-        )),
-    }
+    Ok(found)
 }
 
 /// Rows of numbers at nodes along two axes.
@@ -98,7 +103,7 @@ mod tests {
     fn terms_come_back_from_values_and_slopes() {
         let terms = Terms::up_to(3, 2, 1);
         let own: Vec<f64> = (0..terms.count()).map(|k| (k as f64).sin()).collect();
-        let known = |k: usize| {
+        let known_at = |k: usize| {
             let pose = Pose {
                 size: 0.1 + 0.07 * (k % 6) as f64,
                 tilt: [0.3 * (k as f64).sin(), 0.4 * (1.7 * k as f64).cos()],
@@ -115,11 +120,13 @@ mod tests {
                 slopes: Some(slopes),
             }
         };
-        let known: Vec<Known> = (0..9).map(known).collect();
+        let known: Vec<Known> = (0..9).map(known_at).collect();
         for (a, b) in nearest(&terms, &known).unwrap().iter().zip(&own) {
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
         assert!(nearest(&terms, &known[..1]).is_err());
+        let alike: Vec<Known> = (0..9).map(|_| known_at(1)).collect();
+        assert!(nearest(&terms, &alike).is_err(), "one load, nine times");
     }
 
     #[test]

@@ -77,7 +77,8 @@ fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
     let near = |from: [f64; 2]| length([place[0] - from[0], place[1] - from[1]]);
     // From the markers outward it falls to nothing at the border.
     let border = place.map(|part| {
-        let [own, marker] = [part, MARKER_REST_MM].map(|part| 1.0 - (part / HALF_SIDE_MM).powi(2));
+        let [own, marker] =
+            [part, MARKER_REST_MM].map(|part| 1.0 - (part / HALF_SIDE_MM) * (part / HALF_SIDE_MM));
         (own / marker).clamp(0.0, 1.0)
     });
     let weigh = |k: usize| {

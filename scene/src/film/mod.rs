@@ -27,7 +27,7 @@ pub const MAX_RATIO: f64 = 0.8;
 /// How far from the middle, along x and along y, a tip may press, mm.
 pub const MAX_PLACE_MM: f64 = 5.0;
 /// The largest label where the tip sticks or slides, N: the force on the film is larger.
-pub const MAX_LABEL_N: f64 = 0.2;
+pub const MAX_LABEL_N: f64 = 0.22;
 /// The largest of |F_x / F_z| and |F_y / F_z| of a label where the tip sticks or slides: tan 12°.
 pub const MAX_TANGENT: f64 = 0.212_556_561_670_022_13;
 /// How far from the middle, along x and along y, such a tip may first touch the film, mm.

@@ -74,9 +74,8 @@ impl Kind {
         match self {
             Kind::Moved | Kind::Tip => Terms::up_to(7, 4, 1),
             Kind::Slopes => Terms::up_to(5, 3, 1),
-            Kind::Bends => Terms::up_to(4, 2, 1),
-            Kind::Radius | Kind::TipRadius => Terms::up_to(4, 2, 1),
-            Kind::Unit => Terms::up_to(4, 3, 1),
+            // Of these no derivatives by the force are known: two rings of tilts tell no third degree.
+            Kind::Bends | Kind::Radius | Kind::TipRadius | Kind::Unit => Terms::up_to(4, 2, 1),
         }
     }
 
