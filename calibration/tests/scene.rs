@@ -302,17 +302,22 @@ fn what_the_film_cannot_do_is_said() {
     let refused = |more: &[&str], words: &[&str]| {
         assert_refused(directory.path(), &[&["film"], more].concat(), words);
     };
-    refused(&["--force-n", "0.6"], &["0.6 N", "0.5"]);
+    refused(&["--force-n", "0.6"], &["0.6 N", "0.25"]);
     refused(&["--force-n", "-0.1"], &["-0.1 N"]);
-    refused(&["--alpha-deg", "40"], &["12°"]);
+    refused(&["--alpha-deg", "40"], &["tangential", "0.8"]);
+    let stuck = ["--contact", "stick"];
+    refused(&[&stuck[..], &["--alpha-deg", "20"]].concat(), &["12°"]);
     refused(&["--contact", "glue"], &["glue", "stick"]);
-    refused(&["--contact", "slip:2"], &["2", "0.05 to 1"]);
-    refused(&["--offset-mm", "0.3,0"], &["offset is 0.3", "0.25"]);
+    refused(&["--contact", "slip:2"], &["2", "0.05 to 0.8"]);
+    refused(&["--offset-mm", "5.3,0"], &["offset is 5.3", "up to 5"]);
     refused(
         &["--contact", "slip:9"],
-        &["friction ratio is 9", "0.05 to 1"],
+        &["friction ratio is 9", "0.05 to 0.8"],
     );
     refused(&["--offset-mm", "1"], &["--offset-mm", "0.1,-0.2"]);
-    refused(&["--offset-mm", "1,0"], &["offset is 1 mm", "0.25"]);
+    refused(
+        &[&stuck[..], &["--offset-mm", "1,0"]].concat(),
+        &["offset is 1 mm", "0.25"],
+    );
     refused(&["--solver", "half"], &["half", "reduced", "full"]);
 }

@@ -165,7 +165,7 @@ mod tests {
             shifts.iter().sum::<f64>() / shifts.len() as f64
         };
         let (force, stick) = (shift(Contact::Force), shift(Contact::Stick));
-        let slip = shift(Contact::Slip { mu: 0.6 });
+        let slip = shift(Contact::Slip { mu: 0.4 });
         assert!(force > 0.0 && slip > 2.0 * force && stick > 1.2 * slip);
     }
 
