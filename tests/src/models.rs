@@ -11,7 +11,7 @@ use hivtac_sensing::model::{
 };
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{PixelFormat, Threshold};
-use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
+use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::pictures::Random;
 use crate::script::features;
@@ -176,12 +176,14 @@ fn spec(
             magnitude: MicroNewtons(200_000),
             alpha: MilliDegrees(10_000),
             beta: MilliDegrees(8_000),
+            place: Micrometres(0),
         },
         uncertainty: Uncertainty {
             step_bits: 14,
             knots: std::array::from_fn(|i| UncertaintyKnot {
                 across: MicroNewtons(1_300 - 37 * i as i32),
                 along: MicroNewtons(500 + 91 * i as i32),
+                place: Micrometres(0),
             }),
         },
     }

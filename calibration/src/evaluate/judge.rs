@@ -111,7 +111,7 @@ fn judge(model: &Model<'_>, dataset: &Dataset, rows: &[usize]) -> Result<Vec<Jud
             continue;
         }
         let output = network.run(model, &features_from_q16(&seen.features_q16)?, &tare);
-        let (force, _) = Force::of_outputs(model, output.values);
+        let (force, _) = Force::of_outputs(model, &output);
         judged.push(compare(row.force_n, &force, row.place));
     }
     Ok(judged)

@@ -309,7 +309,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let model = self.model.as_ref()?;
         let tare = self.tare.as_ref().unwrap_or(&model.rest);
         let output = self.network.run(model, features, &tare.features);
-        let (force, trust) = Force::of_outputs(model, output.values);
+        let (force, trust) = Force::of_outputs(model, &output);
         *status |= trust;
         if output.input_saturated {
             *status |= Status::MAGNITUDE_OUT_OF_RANGE;
