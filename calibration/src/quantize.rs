@@ -10,7 +10,7 @@ use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
     self, InputScaling, MAX_ACTIVATION8, OutputKind, UncertaintyKnot, WeightWidth,
 };
-use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
+use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::closed_form::ClosedForm;
 use crate::network::{Arithmetic, Layer, Meaning, Network, Standardization};
@@ -82,7 +82,12 @@ fn range(range: &Range) -> model::CalibratedRange {
         magnitude: MicroNewtons((range.force_n * 1e6).round() as i32),
         alpha: MilliDegrees((range.alpha_deg * 1e3).round() as i32),
         beta: MilliDegrees((range.beta_deg * 1e3).round() as i32),
+        place: micrometres(range.place_mm),
     }
+}
+
+fn micrometres(mm: f64) -> Micrometres {
+    Micrometres((mm * 1e3).round() as u32)
 }
 
 fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
@@ -92,6 +97,7 @@ fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
         knots: std::array::from_fn(|i| UncertaintyKnot {
             across: micro(uncertainty.across_n[i]),
             along: micro(uncertainty.along_n[i]),
+            place: micrometres(uncertainty.place_mm[i]),
         }),
     }
 }

@@ -77,6 +77,9 @@ pub struct Row {
     /// The force as it is labelled, N, film frame: the force on the film in the contact reading `force`, otherwise |F| along
     /// the pressing direction.
     pub force_n: [f64; 3],
+    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None` without
+    /// a force, and where nobody knows.
+    pub tip_mm: Option<[f64; 2]>,
     /// What was seen, or the status names that say why nothing was.
     pub seen: Result<Observation, String>,
 }
@@ -111,6 +114,17 @@ impl Dataset {
         picked
             .filter_map(|row| Some((row.seen.as_ref().ok()?, row.force_n)))
             .collect()
+    }
+
+    /// As [`Self::pick`], with all that is known of each row.
+    pub fn pick_rows(&self, rows: &[usize]) -> Vec<&Row> {
+        let picked = rows.iter().map(|&i| &self.rows[i]);
+        picked.filter(|row| row.seen.is_ok()).collect()
+    }
+
+    /// Whether its rows know where the tip is.
+    pub fn knows_places(&self) -> bool {
+        self.about.range.knows_places()
     }
 
     /// How many rows were rejected, by status.
@@ -198,21 +212,25 @@ mod tests {
             Row {
                 place: Place::default(),
                 force_n: [0.0; 3],
+                tip_mm: None,
                 seen: Ok(seen(10)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0; 3],
+                tip_mm: None,
                 seen: Ok(seen(11)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0, 0.1, -0.1],
+                tip_mm: None,
                 seen: Ok(seen(1 << 32)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0, 0.0, -0.1],
+                tip_mm: None,
                 seen: Err("markers_missing".into()),
             },
         ];
@@ -224,6 +242,7 @@ mod tests {
         let row = |session: usize, pose: Option<usize>, i: usize| Row {
             place: Place { session, pose },
             force_n: [0.0, 0.0, pose.map_or(0.0, |_| -0.01 * (i + 1) as f64)],
+            tip_mm: None,
             seen: Ok(Observation {
                 features_q16: std::array::from_fn(|f| (1000 * session + 10 * i + f) as i64),
                 areas_px: [200; 4],
