@@ -64,6 +64,7 @@ pub fn spec(weights: &Weights) -> Result<ModelSpec> {
         output: match weights.network.meaning {
             Meaning::ForceVector => OutputKind::ForceVector,
             Meaning::AnglesMagnitude => OutputKind::AnglesMagnitude,
+            Meaning::ForceAndPlace => OutputKind::ForceAndPlace,
         },
         range: range(&weights.range),
         uncertainty: uncertainty(&weights.uncertainty),
@@ -138,7 +139,7 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
         width: WeightWidth::Int16,
         one_scale: network.arithmetic == Arithmetic::Int8PerTensor,
     };
-    // What takes up a hidden layer, and its largest activation. The output layer has three rows only: int16 costs nothing there, and
+    // What takes up a hidden layer, and its largest activation. The output layer has few rows only: int16 costs nothing there, and
     // spares the last activations and the answer itself the coarse steps.
     let held = |layer: usize| match network.is_coarse(layer) {
         true => (WeightWidth::Int8, LARGEST_ACTIVATION8),

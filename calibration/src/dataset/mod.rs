@@ -84,6 +84,27 @@ pub struct Row {
     pub seen: Result<Observation, String>,
 }
 
+/// What is known of a row whose markers were found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<'a> {
+    /// What was seen.
+    pub seen: &'a Observation,
+    /// The force as it is labelled, N: [`Row::force_n`].
+    pub force_n: [f64; 3],
+    /// Where the tip is, mm: [`Row::tip_mm`].
+    pub tip_mm: Option<[f64; 2]>,
+}
+
+impl<'a> Sample<'a> {
+    fn of(row: &'a Row) -> Option<Self> {
+        Some(Self {
+            seen: row.seen.as_ref().ok()?,
+            force_n: row.force_n,
+            tip_mm: row.tip_mm,
+        })
+    }
+}
+
 /// What the pipeline saw in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
@@ -109,17 +130,14 @@ impl Dataset {
     }
 
     /// Accepted rows by their numbers; rejected ones are left out.
-    pub fn pick(&self, rows: &[usize]) -> Vec<(&Observation, [f64; 3])> {
+    pub fn pick(&self, rows: &[usize]) -> Vec<Sample<'_>> {
         let picked = rows.iter().map(|&i| &self.rows[i]);
-        picked
-            .filter_map(|row| Some((row.seen.as_ref().ok()?, row.force_n)))
-            .collect()
+        picked.filter_map(Sample::of).collect()
     }
 
-    /// As [`Self::pick`], with all that is known of each row.
-    pub fn pick_rows(&self, rows: &[usize]) -> Vec<&Row> {
-        let picked = rows.iter().map(|&i| &self.rows[i]);
-        picked.filter(|row| row.seen.is_ok()).collect()
+    /// All accepted rows.
+    pub fn samples(&self) -> impl Iterator<Item = Sample<'_>> {
+        self.rows.iter().filter_map(Sample::of)
     }
 
     /// Whether its rows know where the tip is.
