@@ -161,12 +161,14 @@ mod tests {
             let across_n = sigma * rayleigh();
             // A component of a two-dimensional normal distribution of variance 1.
             let along_n = 0.1 * sigma * std::f64::consts::SQRT_2 * rayleigh();
+            // Millimetres of a place as many as millinewtons across.
+            let place_mm = 1e3 * std::f64::consts::SQRT_2 * sigma * rayleigh();
             let turn: f64 = random.random_range(0.0..std::f64::consts::TAU);
             Miss {
                 found_n,
                 across_n,
                 along_n: (along_n * turn.cos()).abs(),
-                place_mm: sigma * rayleigh(),
+                place_mm,
             }
         };
         (0..count).map(|_| miss()).collect()
@@ -187,6 +189,8 @@ mod tests {
             let along = found.along_n[knot] / (0.1 * sigma * wider[1]);
             assert!((0.97..1.03).contains(&across), "knot {knot}: {across}");
             assert!((0.96..1.04).contains(&along), "knot {knot}: {along}");
+            let place = found.place_mm[knot] / (1e3 * sigma * wider[0]);
+            assert!((0.97..1.03).contains(&place), "knot {knot}: {place}");
         }
     }
 

@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn places_are_labelled_where_they_are_known() {
         let mut recipe = small(3);
-        recipe.range.place_mm = 4.0;
+        (recipe.range.place_mm, recipe.range.force_n) = (4.0, 0.12);
         let dataset = generate(&recipe, || ()).unwrap();
         assert_eq!(dataset.accepted().count(), 24, "{:?}", dataset.rejected());
         for (row, number) in dataset.rows.iter().zip(0..) {
