@@ -79,7 +79,7 @@ fn frames_of_places_teach_the_place() {
     let fitted = fit(&data, Split::WithinPose, Kind::Network, &options, |_| ()).unwrap();
     // Always answering the middle is 2.4 mm off.
     let place_mm = fitted.quantized.place_rmse_mm().unwrap();
-    assert!(place_mm < 0.5, "{place_mm}");
+    assert!(place_mm < 1.2, "{place_mm}");
     assert!(fitted.quantized.magnitude_rmse_n() < 0.012);
     let weights = &fitted.weights;
     assert!(
