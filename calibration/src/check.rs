@@ -84,6 +84,7 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64, friction: f64) -> Recipe
         force_n: f64::from(model.range.magnitude.0) / 1e6,
         alpha_deg: f64::from(model.range.alpha.0) / 1e3,
         beta_deg: f64::from(model.range.beta.0) / 1e3,
+        place_mm: f64::from(model.range.place.0) / 1e3,
     };
     let (width, height) = (geometry.width, geometry.height);
     Recipe {

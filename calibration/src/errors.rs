@@ -11,6 +11,7 @@ pub struct Errors {
     magnitude: MeanSquare,
     lateral: MeanSquare,
     normal: MeanSquare,
+    place: MeanSquare,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,6 +48,18 @@ impl Errors {
                 self.strong_directions_deg.push(angle);
             }
         }
+    }
+
+    /// Takes a place with its truth, mm; both coordinates count.
+    pub fn add_place(&mut self, found_mm: [f64; 2], truth_mm: [f64; 2]) {
+        for (found, truth) in found_mm.iter().zip(truth_mm) {
+            self.place.add(found - truth);
+        }
+    }
+
+    /// Root mean square error of a place's coordinates, mm; `None` when no place was taken.
+    pub fn place_rmse_mm(&self) -> Option<f64> {
+        (self.place.count > 0).then(|| self.place.root())
     }
 
     /// How many forces were taken.
@@ -127,6 +140,9 @@ mod tests {
         errors.add([0.0, 0.0, -0.1], [0.0, 0.0, -0.1]);
         errors.add([0.02, 0.0, -0.02], [0.0, 0.0, -0.02]);
         errors.add([0.0, 0.0, -0.003], [0.0; 3]);
+        assert_eq!(errors.place_rmse_mm(), None);
+        errors.add_place([1.0, 2.0], [1.3, 1.6]);
+        assert!((errors.place_rmse_mm().unwrap() - 0.125_f64.sqrt()).abs() < 1e-12);
         assert_eq!((errors.count(), errors.strong_count()), (3, 1));
         assert!((errors.mean_direction_deg() - 22.5).abs() < 1e-12);
         assert_eq!(errors.mean_strong_direction_deg(), 0.0);

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 
-use crate::network::{Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization};
+use crate::network::{Arithmetic, INPUTS, Layer, Meaning, Network, Standardization};
 
 /// The entry of the file's metadata that says what the outputs are.
 const MEANING: &str = "meaning";
@@ -33,11 +33,12 @@ pub fn parse(bytes: &[u8]) -> Result<Network> {
         .into_iter()
         .map(|number| layer(&tensors, number))
         .collect::<Result<Vec<_>>>()?;
+    let meaning = meaning(bytes)?;
     let network = Network {
-        meaning: meaning(bytes)?,
+        meaning,
         arithmetic: Arithmetic::default(),
         input: scaling(&tensors, "input", INPUTS)?,
-        output: scaling(&tensors, "output", OUTPUTS)?,
+        output: scaling(&tensors, "output", meaning.outputs())?,
         activation_max: vec![1.0; layers.len().saturating_sub(1)],
         saturates: false,
         layers,
@@ -53,7 +54,7 @@ fn meaning(bytes: &[u8]) -> Result<Meaning> {
         .as_ref()
         .and_then(|entries| entries.get(MEANING));
     let name = name.with_context(|| {
-        format!("the file's metadata has no `{MEANING}`: force-vector or angles-magnitude")
+        format!("the file's metadata has no `{MEANING}`: force-vector, angles-magnitude or force-and-place")
     })?;
     serde_json::from_value(name.as_str().into())
         .with_context(|| format!("metadata `{MEANING}` is `{name}`"))

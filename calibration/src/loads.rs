@@ -10,7 +10,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::weights::Range;
 
-/// Loads drawn at random: |F|, α and β uniform and independent from nothing to their limits.
+/// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to their
+/// limits.
 #[derive(Clone, Copy, Debug)]
 pub struct RandomLoads {
     /// The limits.
@@ -31,11 +32,17 @@ impl RandomLoads {
             force_n,
             alpha_deg,
             beta_deg,
+            place_mm,
         } = self.range;
         let force = force_n * random.random_range(0.0..=1.0);
         let alpha = alpha_deg * random.random_range(-1.0..=1.0);
         let beta = beta_deg * random.random_range(-1.0..=1.0);
-        Ok(Load::from_angles(force, alpha, beta)?)
+        let load = Load::from_angles(force, alpha, beta)?;
+        if place_mm == 0.0 {
+            return Ok(load);
+        }
+        let place = [0; 2].map(|_: u8| place_mm * random.random_range(-1.0..=1.0));
+        Ok(load.with_offset_mm(place)?)
     }
 }
 
@@ -159,6 +166,34 @@ mod tests {
             (-8.0..-7.9).contains(&low) && (7.9..=8.0).contains(&high),
             "{low} {high}"
         );
+    }
+
+    #[test]
+    fn places_fill_their_square_and_change_no_force() {
+        let loads = |place_mm| RandomLoads {
+            range: Range {
+                place_mm,
+                ..Range::default()
+            },
+            seed: 5,
+        };
+        let places: Vec<[f64; 2]> = (0..2000)
+            .map(|row| {
+                let (middle, anywhere) = (loads(0.0).load(row).unwrap(), loads(4.0).load(row));
+                let anywhere = anywhere.unwrap();
+                assert_eq!(middle.vector_n(), anywhere.vector_n());
+                assert_eq!(middle.offset_mm(), [0.0; 2]);
+                anywhere.offset_mm()
+            })
+            .collect();
+        for axis in 0..2 {
+            let mean = places.iter().map(|place| place[axis]).sum::<f64>() / 2000.0;
+            let most = places.iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
+            assert!(
+                mean.abs() < 0.2 && (3.98..=4.0).contains(&most),
+                "{mean} {most}"
+            );
+        }
     }
 
     #[test]

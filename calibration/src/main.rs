@@ -206,6 +206,16 @@ struct RecipeArgs {
     /// Largest force, N.
     #[arg(long, default_value_t = Recipe::default().range.force_n)]
     force_n: f64,
+    /// Largest |α|, degrees.
+    #[arg(long, default_value_t = Recipe::default().range.alpha_deg)]
+    alpha_deg: f64,
+    /// Largest |β|, degrees.
+    #[arg(long, default_value_t = Recipe::default().range.beta_deg)]
+    beta_deg: f64,
+    /// The tip presses anywhere up to this far from the film's middle along x and y, mm, and rows say
+    /// where; 0: the middle.
+    #[arg(long, default_value_t = 0.0, conflicts_with_all = ["per_pose", "known_loads", "offset_mm"])]
+    reach_mm: f64,
     /// Sessions: the first is nominal, the others are built, mounted, lit, focused and pressed a little differently.
     #[arg(long, default_value_t = 1)]
     sessions: usize,
@@ -262,7 +272,9 @@ impl RecipeArgs {
             rest: self.rest,
             range: Range {
                 force_n: self.force_n,
-                ..Recipe::default().range
+                alpha_deg: self.alpha_deg,
+                beta_deg: self.beta_deg,
+                place_mm: self.reach_mm,
             },
             sessions: self.sessions,
             spread: Spread {

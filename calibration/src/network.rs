@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 
 /// Features that enter the network (`sensing::features`).
 pub const INPUTS: usize = 11;
-/// Numbers that leave it ([`Meaning`]).
-pub const OUTPUTS: usize = 3;
+/// Numbers that leave it and say a force ([`Meaning`]).
+pub const OUTPUTS: usize = hivtac_sensing::model::OUTPUTS;
+/// Numbers that leave it after those and say where the tip is, if it tells that.
+pub const PLACE_OUTPUTS: usize = hivtac_sensing::model::PLACE_OUTPUTS;
 
-/// What the three outputs are.
+/// What the outputs are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Meaning {
@@ -19,14 +21,32 @@ pub enum Meaning {
     ForceVector,
     /// α and β in degrees, |F| in N (the paper's).
     AnglesMagnitude,
+    /// F_x, F_y, F_z in N, and p_x, p_y in mm: the point of the film that the tip is on, by where it
+    /// rests, film frame.
+    ForceAndPlace,
 }
 
 impl Meaning {
-    /// The outputs that mean this force (N); a force without size has the angles 0.
+    /// Whether the place is among the outputs.
+    pub fn tells_place(self) -> bool {
+        self == Meaning::ForceAndPlace
+    }
+
+    /// Whether the force comes as a vector.
+    pub fn is_vector(self) -> bool {
+        self != Meaning::AnglesMagnitude
+    }
+
+    /// How many outputs there are.
+    pub fn outputs(self) -> usize {
+        self.chip_units().len()
+    }
+
+    /// The outputs that mean this force (N), but for its place; a force without size has the angles 0.
     pub fn of_force(self, force_n: [f64; 3]) -> [f64; OUTPUTS] {
         let [x, y, z] = force_n;
         match self {
-            Meaning::ForceVector => force_n,
+            Meaning::ForceVector | Meaning::ForceAndPlace => force_n,
             Meaning::AnglesMagnitude if force_n == [0.0; 3] => [0.0; 3],
             Meaning::AnglesMagnitude => {
                 let alpha = libm::atan2(x, -z).to_degrees();
@@ -39,7 +59,7 @@ impl Meaning {
     /// The force (N) that these outputs mean.
     pub fn to_force(self, outputs: [f64; OUTPUTS]) -> [f64; 3] {
         match self {
-            Meaning::ForceVector => outputs,
+            Meaning::ForceVector | Meaning::ForceAndPlace => outputs,
             Meaning::AnglesMagnitude => {
                 let (sin_a, cos_a) = libm::sincos(outputs[0].to_radians());
                 let (sin_b, cos_b) = libm::sincos(outputs[1].to_radians());
@@ -48,11 +68,12 @@ impl Meaning {
         }
     }
 
-    /// The chip's steps (µN, m°) in one unit of each output.
-    pub fn chip_units(self) -> [f64; OUTPUTS] {
+    /// The chip's steps (µN, m°, µm) in one unit of each output.
+    pub fn chip_units(self) -> &'static [f64] {
         match self {
-            Meaning::ForceVector => [1e6; 3],
-            Meaning::AnglesMagnitude => [1e3, 1e3, 1e6],
+            Meaning::ForceVector => &[1e6; 3],
+            Meaning::AnglesMagnitude => &[1e3, 1e3, 1e6],
+            Meaning::ForceAndPlace => &[1e6, 1e6, 1e6, 1e3, 1e3],
         }
     }
 }
@@ -207,9 +228,10 @@ impl Network {
             scaling(&self.input, INPUTS),
             "the input scaling needs {INPUTS} means and deviations"
         );
+        let outputs = self.meaning.outputs();
         ensure!(
-            scaling(&self.output, OUTPUTS),
-            "the output scaling needs {OUTPUTS} means and deviations"
+            scaling(&self.output, outputs),
+            "the output scaling needs {outputs} means and deviations"
         );
         self.validate_layers()?;
         let deviations = self
@@ -253,9 +275,14 @@ impl Network {
             );
             inputs = layer.outputs();
         }
+        let outputs = self.meaning.outputs();
         ensure!(
-            inputs == OUTPUTS || self.layers.is_empty(),
-            "the last layer has {inputs} outputs instead of {OUTPUTS}"
+            inputs == outputs || self.layers.is_empty(),
+            "the last layer has {inputs} outputs instead of {outputs}"
+        );
+        ensure!(
+            !self.meaning.tells_place() || !self.layers.is_empty(),
+            "without layers there is no place to tell"
         );
         Ok(())
     }
@@ -275,17 +302,29 @@ impl Network {
         self.meaning.to_force(self.predict(features))
     }
 
-    /// Features (px, px²) to the three outputs, in the units of their meaning.
+    /// The place (mm) of features (px, px²), if the network tells it.
+    pub fn place_mm(&self, features: &[f64; INPUTS]) -> Option<[f64; PLACE_OUTPUTS]> {
+        let outputs = self.outputs(features);
+        let place = outputs.get(OUTPUTS..)?;
+        place.try_into().ok()
+    }
+
+    /// Features (px, px²) to the outputs that say a force, in the units of their meaning.
     pub fn predict(&self, features: &[f64; INPUTS]) -> [f64; OUTPUTS] {
+        let outputs = self.outputs(features);
+        std::array::from_fn(|o| outputs[o])
+    }
+
+    /// Features (px, px²) to all outputs, in the units of their meaning.
+    fn outputs(&self, features: &[f64; INPUTS]) -> Vec<f64> {
         let Some((last, hidden)) = self.layers.split_last() else {
-            return [0.0; OUTPUTS];
+            return vec![0.0; OUTPUTS];
         };
         let mut x = self.input.forward(features);
         for layer in 0..hidden.len() {
             x = self.activations(layer, &x);
         }
-        let y = self.output.backward(&last.apply(&x));
-        [y[0], y[1], y[2]]
+        self.output.backward(&last.apply(&x))
     }
 }
 
@@ -351,6 +390,25 @@ mod tests {
     }
 
     #[test]
+    fn a_place_comes_after_the_force() {
+        let mut network = tiny();
+        assert_eq!(network.place_mm(&[1.0; INPUTS]), None);
+        network.meaning = Meaning::ForceAndPlace;
+        let error = network.validate().unwrap_err().to_string();
+        assert!(error.contains("needs 5 means"), "{error}");
+        network.output.mean.extend([0.5, -0.5]);
+        network.output.sigma.extend([2.0, 2.0]);
+        assert!(network.validate().is_err(), "three outputs are too few");
+        let last = &mut network.layers[1];
+        last.weights.extend([vec![0.1, 0.0], vec![0.0, 0.1]]);
+        last.bias.extend([0.0, 1.0]);
+        network.validate().unwrap();
+        assert_eq!(network.predict(&[1.0; INPUTS]), [11.5, 12.5, 10.5]);
+        let [x, y] = network.place_mm(&[1.0; INPUTS]).unwrap();
+        assert!((x - 2.8).abs() < 1e-6 && (y - 1.5).abs() < 1e-6, "{x} {y}");
+    }
+
+    #[test]
     fn angles_and_vector_mean_the_same_force() {
         for force in [
             [0.01, -0.02, -0.1],
@@ -358,7 +416,11 @@ mod tests {
             [0.0; 3],
             [-0.03, 0.0, -0.01],
         ] {
-            for meaning in [Meaning::ForceVector, Meaning::AnglesMagnitude] {
+            for meaning in [
+                Meaning::ForceVector,
+                Meaning::AnglesMagnitude,
+                Meaning::ForceAndPlace,
+            ] {
                 let back = meaning.to_force(meaning.of_force(force));
                 let off = force
                     .iter()

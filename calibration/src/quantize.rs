@@ -10,7 +10,7 @@ use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
     self, InputScaling, MAX_ACTIVATION8, OutputKind, UncertaintyKnot, WeightWidth,
 };
-use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
+use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::closed_form::ClosedForm;
 use crate::network::{Arithmetic, Layer, Meaning, Network, Standardization};
@@ -64,6 +64,7 @@ pub fn spec(weights: &Weights) -> Result<ModelSpec> {
         output: match weights.network.meaning {
             Meaning::ForceVector => OutputKind::ForceVector,
             Meaning::AnglesMagnitude => OutputKind::AnglesMagnitude,
+            Meaning::ForceAndPlace => OutputKind::ForceAndPlace,
         },
         range: range(&weights.range),
         uncertainty: uncertainty(&weights.uncertainty),
@@ -82,7 +83,12 @@ fn range(range: &Range) -> model::CalibratedRange {
         magnitude: MicroNewtons((range.force_n * 1e6).round() as i32),
         alpha: MilliDegrees((range.alpha_deg * 1e3).round() as i32),
         beta: MilliDegrees((range.beta_deg * 1e3).round() as i32),
+        place: micrometres(range.place_mm),
     }
+}
+
+fn micrometres(mm: f64) -> Micrometres {
+    Micrometres((mm * 1e3).round() as u32)
 }
 
 fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
@@ -92,6 +98,7 @@ fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
         knots: std::array::from_fn(|i| UncertaintyKnot {
             across: micro(uncertainty.across_n[i]),
             along: micro(uncertainty.along_n[i]),
+            place: micrometres(uncertainty.place_mm[i]),
         }),
     }
 }
@@ -132,7 +139,7 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
         width: WeightWidth::Int16,
         one_scale: network.arithmetic == Arithmetic::Int8PerTensor,
     };
-    // What takes up a hidden layer, and its largest activation. The output layer has three rows only: int16 costs nothing there, and
+    // What takes up a hidden layer, and its largest activation. The output layer has few rows only: int16 costs nothing there, and
     // spares the last activations and the answer itself the coarse steps.
     let held = |layer: usize| match network.is_coarse(layer) {
         true => (WeightWidth::Int8, LARGEST_ACTIVATION8),

@@ -29,9 +29,10 @@ pub struct OptionArgs {
     /// Rows that share one step.
     #[arg(long, default_value_t = Options::default().batch)]
     batch: usize,
-    /// What the network answers: force-vector, or the paper's angles-magnitude.
-    #[arg(long, value_parser = named::<Meaning>, default_value = "force-vector")]
-    outputs: Meaning,
+    /// What the network answers: force-vector, force-and-place, or the paper's angles-magnitude. Without
+    /// this, force-and-place for a data set that knows where the tip is, otherwise force-vector.
+    #[arg(long, value_parser = named::<Meaning>)]
+    outputs: Option<Meaning>,
     /// How the chip holds weights: int8-per-channel, int8-per-tensor or int16.
     #[arg(long, value_parser = named::<Arithmetic>, default_value = "int8-per-channel")]
     arithmetic: Arithmetic,
@@ -71,10 +72,13 @@ pub struct OptionArgs {
 }
 
 impl OptionArgs {
-    fn options(&self) -> Result<Options> {
+    fn options(&self, dataset: &Dataset) -> Result<Options> {
         let start = self.start.as_deref().map(Weights::load).transpose()?;
         Ok(Options {
-            meaning: self.outputs,
+            meaning: self.outputs.unwrap_or(match dataset.knows_places() {
+                true => Meaning::ForceAndPlace,
+                false => Meaning::ForceVector,
+            }),
             arithmetic: self.arithmetic,
             patience: self.patience,
             start: start.map(|weights| weights.network),
@@ -99,7 +103,7 @@ fn named<T: DeserializeOwned>(name: &str) -> Result<T, String> {
 
 /// Trains and prints the errors on held-out rows.
 pub fn run(dataset: &Dataset, args: &OptionArgs, kind: Kind) -> Result<Weights> {
-    let options = args.options()?;
+    let options = args.options(dataset)?;
     let mut plot = LossPlot::default();
     let bar =
         hivtac_calibration::progress::bar("training", options.epochs + options.rounded_epochs);
@@ -159,12 +163,16 @@ pub fn import(dataset: &Dataset, tensors: &Path) -> Result<Weights> {
 }
 
 fn print_errors(what: &str, errors: &Errors) {
+    let place = errors.place_rmse_mm().map_or(String::new(), |mm| {
+        format!(", RMSE of the place {:.0} µm along x and y each", mm * 1e3)
+    });
     println!(
-        "{what}: {} rows, mean direction error {:.3}° ({:.3}° from {} mN up), RMSE of |F| {:.3} mN",
+        "{what}: {} rows, mean direction error {:.3}° ({:.3}° from {} mN up), RMSE of |F| {:.3} mN{}",
         errors.count(),
         errors.mean_direction_deg(),
         errors.mean_strong_direction_deg(),
         WEAK_N * 1e3,
         errors.magnitude_rmse_n() * 1e3,
+        place,
     );
 }

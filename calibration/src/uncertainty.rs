@@ -15,6 +15,9 @@ pub const DIRECTION_BOUND: f64 = 1.730_818_382_602_285_4;
 /// The 95 % bound of |F| over its standard uncertainty.
 pub const MAGNITUDE_BOUND: f64 = 1.959_963_984_540_054;
 
+/// The 95 % bound of a place over the standard uncertainty of each of its coordinates: √(−2 ln 0.05).
+pub const PLACE_BOUND: f64 = 2.447_746_830_680_816;
+
 /// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little more than they promise,
 /// for the sessions that come.
 const COVERED: f64 = 0.965;
@@ -33,6 +36,13 @@ pub struct Uncertainty {
     pub across_n: [f64; KNOTS],
     /// Of |F| there, N.
     pub along_n: [f64; KNOTS],
+    /// Of each coordinate of the place there, mm; 0 in a model that does not tell places.
+    #[serde(default, skip_serializing_if = "tells_no_place")]
+    pub place_mm: [f64; KNOTS],
+}
+
+fn tells_no_place(place_mm: &[f64; KNOTS]) -> bool {
+    *place_mm == [0.0; KNOTS]
 }
 
 /// What a force is off by.
@@ -44,6 +54,8 @@ pub struct Miss {
     pub across_n: f64,
     /// |F| found less |F| true, without sign, N.
     pub along_n: f64,
+    /// How far the place as found is from the true one, mm; 0 where none is told.
+    pub place_mm: f64,
 }
 
 impl Miss {
@@ -56,7 +68,13 @@ impl Miss {
             found_n,
             across_n: angle * found_n,
             along_n: (found_n - norm(truth)).abs(),
+            place_mm: 0.0,
         }
+    }
+
+    /// With a place so far from the true one, mm.
+    pub fn with_place_mm(self, place_mm: f64) -> Self {
+        Self { place_mm, ..self }
     }
 }
 
@@ -67,6 +85,7 @@ impl Uncertainty {
             step_bits: 0,
             across_n: [across_n; KNOTS],
             along_n: [along_n; KNOTS],
+            place_mm: [0.0; KNOTS],
         }
     }
 
@@ -90,6 +109,7 @@ impl Uncertainty {
             step_bits,
             across_n: at(|miss| miss.across_n, DIRECTION_BOUND),
             along_n: at(|miss| miss.along_n, MAGNITUDE_BOUND),
+            place_mm: at(|miss| miss.place_mm, PLACE_BOUND),
         })
     }
 }
@@ -141,11 +161,14 @@ mod tests {
             let across_n = sigma * rayleigh();
             // A component of a two-dimensional normal distribution of variance 1.
             let along_n = 0.1 * sigma * std::f64::consts::SQRT_2 * rayleigh();
+            // Millimetres of a place as many as millinewtons across.
+            let place_mm = 1e3 * std::f64::consts::SQRT_2 * sigma * rayleigh();
             let turn: f64 = random.random_range(0.0..std::f64::consts::TAU);
             Miss {
                 found_n,
                 across_n,
                 along_n: (along_n * turn.cos()).abs(),
+                place_mm,
             }
         };
         (0..count).map(|_| miss()).collect()
@@ -166,6 +189,8 @@ mod tests {
             let along = found.along_n[knot] / (0.1 * sigma * wider[1]);
             assert!((0.97..1.03).contains(&across), "knot {knot}: {across}");
             assert!((0.96..1.04).contains(&along), "knot {knot}: {along}");
+            let place = found.place_mm[knot] / (1e3 * sigma * wider[0]);
+            assert!((0.97..1.03).contains(&place), "knot {knot}: {place}");
         }
     }
 

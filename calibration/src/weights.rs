@@ -64,6 +64,22 @@ pub struct Range {
     pub alpha_deg: f64,
     /// Largest |β|, degrees.
     pub beta_deg: f64,
+    /// How far from the film's middle the tip is at most, along x and along y, mm; 0 where it is in
+    /// the middle, as far as anyone knows.
+    #[serde(default, skip_serializing_if = "is_middle")]
+    pub place_mm: f64,
+}
+
+/// Whether a tip so far from the middle is in it.
+fn is_middle(place_mm: &f64) -> bool {
+    *place_mm == 0.0
+}
+
+impl Range {
+    /// Whether the tip's place is known and may be anywhere.
+    pub fn knows_places(&self) -> bool {
+        !is_middle(&self.place_mm)
+    }
 }
 
 impl Default for Range {
@@ -73,6 +89,7 @@ impl Default for Range {
             force_n: 0.2,
             alpha_deg: 10.0,
             beta_deg: 8.0,
+            place_mm: 0.0,
         }
     }
 }
@@ -162,6 +179,7 @@ impl Weights {
             force_n,
             alpha_deg,
             beta_deg,
+            place_mm,
         } = self.range;
         ensure!(
             force_n > 0.0 && force_n <= 1000.0,
@@ -173,10 +191,21 @@ impl Weights {
                 "range.{name} is {angle}: use 0 to 90"
             );
         }
+        ensure!(
+            (0.0..=1000.0).contains(&place_mm),
+            "range.place_mm is {place_mm}: use 0 to 1000"
+        );
         let Uncertainty {
-            across_n, along_n, ..
+            across_n,
+            along_n,
+            place_mm,
+            ..
         } = &self.uncertainty;
-        for (name, sigmas) in [("across_n", across_n), ("along_n", along_n)] {
+        for (name, sigmas) in [
+            ("across_n", across_n),
+            ("along_n", along_n),
+            ("place_mm", place_mm),
+        ] {
             let wrong = sigmas.iter().find(|sigma| !(0.0..=1000.0).contains(*sigma));
             ensure!(
                 wrong.is_none(),

@@ -1,9 +1,12 @@
 //! Training, small: it learns, it is repeatable, it says what it cannot learn from.
 
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
+use hivtac_calibration::evaluate::{Evaluation, by_place};
 use hivtac_calibration::fit::{Kind, fit};
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
+use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
+use hivtac_calibration::weights::Range;
 
 fn data() -> Dataset {
     let recipe = Recipe {
@@ -48,6 +51,74 @@ fn a_few_hundred_frames_teach_the_force() {
     );
     assert!(fitted.quantized.mean_strong_direction_deg() < 3.0);
     assert_eq!(fitted.weights.training.rows, 360);
+}
+
+/// As [`data`], the tip anywhere within 4.2 mm.
+fn data_of_places() -> Dataset {
+    let range = Range {
+        force_n: 0.25,
+        place_mm: 4.2,
+        ..Recipe::default().range
+    };
+    let recipe = Recipe {
+        loads: Loads::Random(1_492),
+        rest: 8,
+        range,
+        ..Recipe::default()
+    };
+    generate(&recipe, || ()).unwrap()
+}
+
+#[test]
+fn frames_of_places_teach_the_place() {
+    let data = data_of_places();
+    let options = Options {
+        meaning: Meaning::ForceAndPlace,
+        ..small()
+    };
+    let fitted = fit(&data, Split::WithinPose, Kind::Network, &options, |_| ()).unwrap();
+    // Always answering the middle is 2.4 mm off.
+    let place_mm = fitted.quantized.place_rmse_mm().unwrap();
+    assert!(place_mm < 1.2, "{place_mm}");
+    assert!(fitted.quantized.magnitude_rmse_n() < 0.012);
+    let weights = &fitted.weights;
+    assert!(
+        (weights.range.place_mm - 4.0).abs() < 1e-9,
+        "{:?}",
+        weights.range
+    );
+    assert!(weights.uncertainty.place_mm.iter().all(|&mm| mm > 0.0));
+
+    let model = export(weights).unwrap();
+    let evaluation = Evaluation::of(&model, &data, None).unwrap();
+    let parts = by_place(&evaluation.judged);
+    assert_eq!(parts.len(), 8, "five distances and three sizes");
+    let places = parts.iter().filter_map(|part| part.place);
+    assert!(places.clone().all(|place| place.each_mm < 1.0));
+    assert_eq!(places.count(), 8);
+    assert!(evaluation.to_html().contains("Off the middle"));
+    assert!(evaluation.to_string().contains("µm along x and y each"));
+
+    // Without the place it is as before.
+    let force = Options {
+        epochs: 2,
+        rounded_epochs: 1,
+        ..small()
+    };
+    let fitted = fit(&data, Split::WithinPose, Kind::Network, &force, |_| ()).unwrap();
+    assert_eq!(fitted.quantized.place_rmse_mm(), None);
+    assert_eq!(fitted.weights.range.place_mm, 0.0);
+}
+
+#[test]
+fn what_no_data_tell_cannot_be_learnt() {
+    let options = Options {
+        meaning: Meaning::ForceAndPlace,
+        ..small()
+    };
+    for kind in [Kind::Network, Kind::Both] {
+        assert!(fit(&data(), Split::WithinPose, kind, &options, |_| ()).is_err());
+    }
 }
 
 #[test]

@@ -14,7 +14,7 @@
 use crate::{
     features::{COORDINATES, FEATURES, Features},
     kernels::{Inputs, Sums, activate, multiply},
-    model::{InputScaling, Layer, MAX_WIDTH, Model, OUTPUTS},
+    model::{InputScaling, Layer, MAX_WIDTH, Model, OUTPUTS, PLACE_OUTPUTS},
     rescale::{rescale_input, rescale_small_input, rescale_sum},
 };
 
@@ -30,8 +30,10 @@ pub struct Network {
 /// What the network makes of one set of features.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
-    /// The three outputs, in the units of the model's output kind.
+    /// The outputs that say a force, in the units of the model's output kind.
     pub values: [i32; OUTPUTS],
+    /// The outputs that say its place, p_x and p_y in µm; 0 from a model that does not tell it.
+    pub place: [i32; PLACE_OUTPUTS],
     /// True when an input met the limits of `i16` (8 σ), or the markers are further apart than the closed form's curves
     /// reach: far from all that the model was made from.
     pub input_saturated: bool,
@@ -66,7 +68,7 @@ impl Network {
     fn run_layers(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
         let scaled = scale_inputs(&model.input, features, tare, &model.rest.features);
         self.inputs.values_mut()[..FEATURES].copy_from_slice(&scaled);
-        let mut values = [0; OUTPUTS];
+        let mut outputs = [0; OUTPUTS + PLACE_OUTPUTS];
         // A parsed model has at least one layer.
         if let Some((last, hidden)) = model.layers().split_last() {
             for layer in hidden {
@@ -74,10 +76,12 @@ impl Network {
                 activate(layer, &self.sums, &mut self.inputs);
             }
             multiply(last, &mut self.inputs, &mut self.sums);
-            output(last, &self.sums, &mut values);
+            output(last, &self.sums, &mut outputs);
         }
+        let [x, y, z, place @ ..] = outputs;
         Output {
-            values,
+            values: [x, y, z],
+            place,
             input_saturated: scaled.iter().any(|&x| x == i16::MIN || x == i16::MAX),
         }
     }
@@ -127,7 +131,7 @@ pub fn scale_inputs(
 }
 
 /// What is left of step 3 after the sums.
-fn output(layer: &Layer<'_>, sums: &Sums, outputs: &mut [i32; OUTPUTS]) {
+fn output(layer: &Layer<'_>, sums: &Sums, outputs: &mut [i32; OUTPUTS + PLACE_OUTPUTS]) {
     for ((row, sum), output) in layer.rows().zip(sums).zip(outputs) {
         *output = rescale_sum(sum + row.bias, row.multiplier, row.shift);
     }
@@ -139,7 +143,7 @@ mod tests {
     use crate::{
         model::{
             encode::{LayerSpec, ModelSpec},
-            samples::{spec, spec16},
+            samples::{place_spec, spec, spec16},
         },
         units::Px,
     };
@@ -147,7 +151,7 @@ mod tests {
     use std::{vec, vec::Vec};
 
     /// The arithmetic of `docs/architecture.md` in 128 bits, where nothing can overflow.
-    fn reference(spec: &ModelSpec, features: &Features, tare: &Features) -> [i128; OUTPUTS] {
+    fn reference(spec: &ModelSpec, features: &Features, tare: &Features) -> Vec<i128> {
         let rescale = |value: i128, multiplier: u32, shift: u8| {
             let exact = value * i128::from(multiplier);
             let unit = 1i128 << shift;
@@ -182,7 +186,15 @@ mod tests {
                 })
                 .collect();
         }
-        [values[0], values[1], values[2]]
+        values
+    }
+
+    /// All outputs that the model has.
+    fn outputs(model: &Model<'_>, output: &Output) -> Vec<i128> {
+        let all = output.values.iter().chain(&output.place);
+        all.take(model.output.count())
+            .map(|&value| value.into())
+            .collect()
     }
 
     fn check(spec: &ModelSpec, features: &Features, tare: &Features) -> Output {
@@ -191,7 +203,10 @@ mod tests {
         let mut network = Network::new();
         let output = network.run(&model, features, tare);
         let expected = reference(spec, features, tare);
-        assert_eq!(output.values.map(i128::from), expected);
+        assert_eq!(outputs(&model, &output), expected);
+        if !model.output.tells_place() {
+            assert_eq!(output.place, [0; PLACE_OUTPUTS]);
+        }
         assert_eq!(
             network.run(&model, features, tare),
             output,
@@ -270,6 +285,15 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_place_comes_after_the_force() {
+        for widths in [&[11, 5][..], &[11, 64, 64, 5]] {
+            let spec = random_spec(place_spec(widths), 3);
+            let found = check(&spec, &features(3), &features(4));
+            assert_ne!(found.place, [0; PLACE_OUTPUTS]);
+        }
+    }
+
     /// Every weight, input and activation at its limit, and the widest layers.
     #[test]
     fn extremes_of_every_number() {
@@ -314,13 +338,10 @@ mod tests {
                 let bytes = spec.encode().unwrap();
                 let model = Model::parse(&bytes).unwrap();
                 let far = (extreme(a, area_a), extreme(b, area_b));
-                let found = Network::new()
-                    .run(&model, &far.0, &far.1)
-                    .values
-                    .map(i128::from);
+                let found = Network::new().run(&model, &far.0, &far.1);
                 // The reference does not saturate the difference itself; that only matters beyond ±2⁶³.
                 if area_a != i64::MIN && area_b != i64::MIN {
-                    assert_eq!(found, reference(&spec, &far.0, &far.1));
+                    assert_eq!(outputs(&model, &found), reference(&spec, &far.0, &far.1));
                 }
             }
         }

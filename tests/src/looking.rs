@@ -7,7 +7,7 @@ use std::vec::Vec;
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensing::geometry::{self, Geometry};
-use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model};
+use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, OutputKind};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
@@ -151,11 +151,23 @@ impl View {
         }
     }
 
-    /// A sensor that looks so.
+    /// A sensor that looks so, with a model of presses in the middle.
     ///
     /// # Errors
     /// When the frame size is not one, or the nominal scene is not found.
     pub fn looker(&self) -> Result<Looker> {
+        self.looker_with(OutputKind::ForceVector)
+    }
+
+    /// The same with a model that tells places.
+    ///
+    /// # Errors
+    /// As [`Self::looker`].
+    pub fn looker_anywhere(&self) -> Result<Looker> {
+        self.looker_with(OutputKind::ForceAndPlace)
+    }
+
+    fn looker_with(&self, output: OutputKind) -> Result<Looker> {
         let lens = match self.preset {
             Preset::Paper => geometry::Preset::Paper,
             Preset::Ov7725 => geometry::Preset::Ov7725,
@@ -181,7 +193,7 @@ impl View {
             rest = builder.add(&markers, &features);
         }
         let rest = rest.context("too few frames at rest")?;
-        let file = models::file_read_so(&settings, rest, self.reading());
+        let file = models::file_read_so(&settings, rest, self.reading(), output);
         // A few hundred bytes that a test keeps to its end.
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let configured = looker.sensor.configure(settings, Some(model));

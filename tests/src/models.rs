@@ -7,11 +7,11 @@ use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
 use hivtac_sensing::model::{
     CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
-    OUTPUTS, Origin, OutputKind, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
+    Origin, OutputKind, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
 };
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{PixelFormat, Threshold};
-use hivtac_sensing::units::{MicroNewtons, MilliDegrees};
+use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::pictures::Random;
 use crate::script::features;
@@ -53,7 +53,7 @@ pub fn rest() -> Features {
     }))
 }
 
-/// The file of a model with these layer widths (first 11, last 3), for QVGA frames of the default preset.
+/// The file of a model with these layer widths (first 11, last as many as there are outputs), for QVGA frames of the default preset.
 pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> Vec<u8> {
     encoded(&spec(qvga(), qvga_rest(), widths, weights, output, seed))
 }
@@ -87,13 +87,17 @@ pub fn file_for(
     encoded(&spec)
 }
 
-/// A small model for frames that are looked at so, of which labels mean that.
-pub fn file_read_so(settings: &Settings, rest: Rest, contact: ContactReading) -> Vec<u8> {
-    let output = OutputKind::ForceVector;
+/// A small model for frames that are looked at so, of which labels mean that; with these outputs.
+pub fn file_read_so(
+    settings: &Settings,
+    rest: Rest,
+    contact: ContactReading,
+    output: OutputKind,
+) -> Vec<u8> {
     let mut spec = spec(
         settings.geometry,
         rest,
-        &[11, 3],
+        &[11, output.count() as u16],
         Weights::Random,
         output,
         1,
@@ -164,7 +168,8 @@ fn spec(
     let mut random = Random::new(seed);
     let layers = widths
         .windows(2)
-        .map(|pair| layer(pair[0], pair[1], weights, &mut random));
+        .enumerate()
+        .map(|(i, pair)| layer(pair, i + 2 == widths.len(), weights, &mut random));
     ModelSpec {
         conditions: conditions(geometry),
         input: input_scaling(rest.features),
@@ -176,12 +181,20 @@ fn spec(
             magnitude: MicroNewtons(200_000),
             alpha: MilliDegrees(10_000),
             beta: MilliDegrees(8_000),
+            place: match output.tells_place() {
+                true => Micrometres(4_000),
+                false => Micrometres(0),
+            },
         },
         uncertainty: Uncertainty {
             step_bits: 14,
             knots: std::array::from_fn(|i| UncertaintyKnot {
                 across: MicroNewtons(1_300 - 37 * i as i32),
                 along: MicroNewtons(500 + 91 * i as i32),
+                place: match output.tells_place() {
+                    true => Micrometres(200 - 9 * i as u32),
+                    false => Micrometres(0),
+                },
             }),
         },
     }
@@ -210,9 +223,9 @@ fn input_scaling(mean: Features) -> InputScaling {
     }
 }
 
-fn layer(inputs: u16, outputs: u16, weights: Weights, random: &mut Random) -> LayerSpec {
+fn layer(widths: &[u16], last: bool, weights: Weights, random: &mut Random) -> LayerSpec {
+    let (inputs, outputs) = (widths[0], widths[1]);
     let first = usize::from(inputs) == FEATURES;
-    let last = usize::from(outputs) == OUTPUTS;
     let wide = matches!(weights, Weights::Wide | Weights::WideExtreme);
     let activation = if wide { WIDE_ACTIVATION } else { 127 };
     let largest_input = if first { 32_768 } else { activation };

@@ -43,8 +43,13 @@ fn frames_of_the_scene_give_the_same_forces() {
         .collect();
     let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
     let mut script = Script::new();
-    for output in [OutputKind::ForceVector, OutputKind::AnglesMagnitude] {
-        script.model(&models::file(&[11, 64, 64, 3], Weights::Random, output, 3));
+    for output in [
+        OutputKind::ForceVector,
+        OutputKind::AnglesMagnitude,
+        OutputKind::ForceAndPlace,
+    ] {
+        let widths = [11, 64, 64, output.count() as u16];
+        script.model(&models::file(&widths, Weights::Random, output, 3));
         for order in [ByteOrder::Native, ByteOrder::Swapped] {
             red(&mut script, order);
             script.sense(320, &frames);
@@ -63,7 +68,7 @@ fn frames_of_the_scene_give_the_same_forces() {
         .lines()
         .filter(|line| line.contains("force: Some"))
         .count();
-    assert_eq!(forces, 5 * frames.len(), "every frame has a force:\n{text}");
+    assert_eq!(forces, 7 * frames.len(), "every frame has a force:\n{text}");
 }
 
 #[test]

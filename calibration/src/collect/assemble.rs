@@ -280,6 +280,7 @@ fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
         } else {
             direction.vector_n()
         },
+        tip_mm: None,
         seen: match &kept.seen {
             Ok(markers) => Ok(observation(markers)?),
             Err(why) => Err(why.clone()),
@@ -324,6 +325,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
             force_n: largest(&|row| crate::errors::norm(row.force_n)),
             alpha_deg: extreme(0),
             beta_deg: extreme(1),
+            place_mm: 0.0,
         },
     }
 }

@@ -16,12 +16,11 @@ use super::{About, Dataset, Observation, PX, Place, Row};
 
 const FORMAT: &str =
     "# hivtac-dataset 2; forces in N in the film frame, features in px (area in px²), areas in px";
-const COLUMNS: [&str; 21] = [
-    "session",
-    "pose",
-    "fx_n",
-    "fy_n",
-    "fz_n",
+/// Of every data set, before and after [`PLACE_COLUMNS`].
+const FIRST_COLUMNS: [&str; 5] = ["session", "pose", "fx_n", "fy_n", "fz_n"];
+/// Of a data set that knows where the tip is.
+const PLACE_COLUMNS: [&str; 2] = ["x_mm", "y_mm"];
+const LAST_COLUMNS: [&str; 16] = [
     "x0_px",
     "y0_px",
     "x1_px",
@@ -40,9 +39,40 @@ const COLUMNS: [&str; 21] = [
     "status",
 ];
 const FORCE_AT: usize = 2;
-const FEATURES_AT: usize = FORCE_AT + 3;
-const AREAS_AT: usize = FEATURES_AT + FEATURES;
-const STATUS_AT: usize = AREAS_AT + 4;
+const PLACE_AT: usize = FORCE_AT + 3;
+
+/// The columns of a data set, and where they are.
+struct Columns {
+    names: Vec<&'static str>,
+    knows_places: bool,
+}
+
+impl Columns {
+    fn of(about: &About) -> Self {
+        let knows_places = about.range.knows_places();
+        let places = if knows_places {
+            &PLACE_COLUMNS[..]
+        } else {
+            &[]
+        };
+        Self {
+            names: [&FIRST_COLUMNS, places, &LAST_COLUMNS].concat(),
+            knows_places,
+        }
+    }
+
+    fn features_at(&self) -> usize {
+        self.names.len() - LAST_COLUMNS.len()
+    }
+
+    fn areas_at(&self) -> usize {
+        self.features_at() + FEATURES
+    }
+
+    fn status_at(&self) -> usize {
+        self.names.len() - 1
+    }
+}
 
 impl Dataset {
     /// Writes the data set.
@@ -51,7 +81,7 @@ impl Dataset {
     /// When the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let mut text = opening(&self.about)?.into_bytes();
-        text.extend(lines(&self.rows)?);
+        text.extend(lines(&self.about, &self.rows)?);
         fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 
@@ -74,18 +104,24 @@ impl Dataset {
             .and_then(|line| line.strip_prefix("# "))
             .context("line 2 says nothing about it")?;
         let about: About = serde_json::from_str(about).context("line 2")?;
+        let columns = Columns::of(&about);
         let mut table = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .from_reader(text.as_bytes());
         ensure!(
-            table.headers()?.iter().eq(COLUMNS),
+            table.headers()?.iter().eq(columns.names.iter().copied()),
             "the columns are not {}",
-            COLUMNS.join(",")
+            columns.names.join(",")
         );
         let rows = table.records().map(|record| {
             let record = record?;
             let line = record.position().map_or(0, csv::Position::line);
-            row(&record).with_context(|| format!("line {line}"))
+            let row = Record {
+                record: &record,
+                columns: &columns,
+            }
+            .row();
+            row.with_context(|| format!("line {line}"))
         });
         Ok(Self {
             about,
@@ -99,26 +135,34 @@ pub(super) fn opening(about: &About) -> Result<String> {
     Ok(format!(
         "{FORMAT}\n# {}\n{}\n",
         serde_json::to_string(about)?,
-        COLUMNS.join(",")
+        Columns::of(about).names.join(",")
     ))
 }
 
-/// The lines of rows.
-pub(super) fn lines(rows: &[Row]) -> Result<Vec<u8>> {
+/// The lines of rows of such a data set.
+pub(super) fn lines(about: &About, rows: &[Row]) -> Result<Vec<u8>> {
+    let columns = Columns::of(about);
     let mut table = csv::Writer::from_writer(Vec::new());
     for row in rows {
-        table.write_record(fields(row))?;
+        table.write_record(fields(row, &columns))?;
     }
     Ok(table.into_inner()?)
 }
 
-fn fields(row: &Row) -> Vec<String> {
+fn fields(row: &Row, columns: &Columns) -> Vec<String> {
     let Place { session, pose } = row.place;
     let mut fields = vec![
         session.to_string(),
         pose.map_or(String::new(), |pose| pose.to_string()),
     ];
     fields.extend(row.force_n.iter().map(f64::to_string));
+    if columns.knows_places {
+        let part = |axis: usize| {
+            row.tip_mm
+                .map_or(String::new(), |tip| tip[axis].to_string())
+        };
+        fields.extend([0, 1].map(part));
+    }
     match &row.seen {
         Ok(seen) => {
             fields.extend(seen.features_px().iter().map(f64::to_string));
@@ -126,63 +170,85 @@ fn fields(row: &Row) -> Vec<String> {
             fields.push(String::new());
         }
         Err(status) => {
-            fields.resize(STATUS_AT, String::new());
+            fields.resize(columns.status_at(), String::new());
             fields.push(status.clone());
         }
     }
     fields
 }
 
-fn row(record: &StringRecord) -> Result<Row> {
-    let place = Place {
-        session: whole(record, 0)?,
-        pose: (!record[1].is_empty())
-            .then(|| whole(record, 1))
-            .transpose()?,
-    };
-    let mut force_n = [0.0; 3];
-    for (i, component) in force_n.iter_mut().enumerate() {
-        *component = number(record, FORCE_AT + i)?;
-    }
-    let seen = match &record[STATUS_AT] {
-        "" => Ok(observation(record)?),
-        status => Err(status.to_owned()),
-    };
-    Ok(Row {
-        place,
-        force_n,
-        seen,
-    })
+/// A line that is to become a row.
+struct Record<'a> {
+    record: &'a StringRecord,
+    columns: &'a Columns,
 }
 
-fn observation(record: &StringRecord) -> Result<Observation> {
-    let mut seen = Observation {
-        features_q16: [0; FEATURES],
-        areas_px: [0; 4],
-    };
-    for (i, feature) in seen.features_q16.iter_mut().enumerate() {
-        *feature = (number(record, FEATURES_AT + i)? * PX).round() as i64;
+impl Record<'_> {
+    fn row(&self) -> Result<Row> {
+        let place = Place {
+            session: self.whole(0)?,
+            pose: self.filled(1).then(|| self.whole(1)).transpose()?,
+        };
+        let mut force_n = [0.0; 3];
+        for (i, component) in force_n.iter_mut().enumerate() {
+            *component = self.number(FORCE_AT + i)?;
+        }
+        let seen = match &self.record[self.columns.status_at()] {
+            "" => Ok(self.observation()?),
+            status => Err(status.to_owned()),
+        };
+        Ok(Row {
+            place,
+            force_n,
+            tip_mm: self.tip()?,
+            seen,
+        })
     }
-    for (i, area) in seen.areas_px.iter_mut().enumerate() {
-        *area = whole(record, AREAS_AT + i)?;
+
+    fn tip(&self) -> Result<Option<[f64; 2]>> {
+        let places = PLACE_AT..PLACE_AT + 2;
+        if !self.columns.knows_places || places.clone().all(|column| !self.filled(column)) {
+            return Ok(None);
+        }
+        Ok(Some([
+            self.number(places.start)?,
+            self.number(places.start + 1)?,
+        ]))
     }
-    Ok(seen)
-}
 
-fn whole<T: FromStr<Err = ParseIntError>>(record: &StringRecord, column: usize) -> Result<T> {
-    let text = &record[column];
-    text.parse()
-        .with_context(|| format!("column {}: `{text}`", COLUMNS[column]))
-}
+    fn observation(&self) -> Result<Observation> {
+        let mut seen = Observation {
+            features_q16: [0; FEATURES],
+            areas_px: [0; 4],
+        };
+        for (i, feature) in seen.features_q16.iter_mut().enumerate() {
+            *feature = (self.number(self.columns.features_at() + i)? * PX).round() as i64;
+        }
+        for (i, area) in seen.areas_px.iter_mut().enumerate() {
+            *area = self.whole(self.columns.areas_at() + i)?;
+        }
+        Ok(seen)
+    }
 
-fn number(record: &StringRecord, column: usize) -> Result<f64> {
-    let text = &record[column];
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => bail!(
-            "column {}: `{text}` is not a finite number",
-            COLUMNS[column]
-        ),
+    fn filled(&self, column: usize) -> bool {
+        !self.record[column].is_empty()
+    }
+
+    fn whole<T: FromStr<Err = ParseIntError>>(&self, column: usize) -> Result<T> {
+        let text = &self.record[column];
+        text.parse()
+            .with_context(|| format!("column {}: `{text}`", self.columns.names[column]))
+    }
+
+    fn number(&self, column: usize) -> Result<f64> {
+        let text = &self.record[column];
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => bail!(
+                "column {}: `{text}` is not a finite number",
+                self.columns.names[column]
+            ),
+        }
     }
 }
 
@@ -213,6 +279,20 @@ mod tests {
         ] {
             assert!(text.contains(words), "no `{words}` in:\n{text}");
         }
+    }
+
+    #[test]
+    fn places_have_columns_of_their_own_and_come_back() {
+        assert!(!saved(&example()).contains("_mm,"));
+        let mut dataset = example();
+        dataset.about.range.place_mm = 4.2;
+        dataset.rows[2].tip_mm = Some([-0.1, 4.2]);
+        let text = saved(&dataset);
+        assert!(text.contains("fz_n,x_mm,y_mm,x0_px"), "{text}");
+        assert!(text.contains("0,,0,0.1,-0.1,-0.1,4.2,"), "{text}");
+        let half = text.replace("-0.1,-0.1,4.2,", "-0.1,-0.1,,");
+        let error = format!("{:#}", Dataset::parse(&half).unwrap_err());
+        assert!(error.contains("column y_mm"), "{error}");
     }
 
     #[test]

@@ -57,9 +57,11 @@ impl<'a> Renderer<'a> {
             let frame = scene.render_load(&self.recipe.load(row)?, row as u64)?;
             let seen = pool.look(&frame)?;
             progress();
+            let known = self.recipe.range.knows_places();
             let row = |seen| Row {
                 place,
                 force_n: frame.truth.force.vector_n(),
+                tip_mm: frame.truth.touches_mm.filter(|_| known),
                 seen,
             };
             Ok(seen.into_iter().map(row).collect())
@@ -139,6 +141,26 @@ mod tests {
                 assert!(error < 0.4, "row {row}, marker {id}: {error} px off");
             }
         }
+    }
+
+    /// Rows know the place of the tip where it may be anywhere, and the markers are found there.
+    #[test]
+    fn places_are_labelled_where_they_are_known() {
+        let mut recipe = small(3);
+        (recipe.range.place_mm, recipe.range.force_n) = (4.0, 0.12);
+        let dataset = generate(&recipe, || ()).unwrap();
+        assert_eq!(dataset.accepted().count(), 24, "{:?}", dataset.rejected());
+        for (row, number) in dataset.rows.iter().zip(0..) {
+            let load = recipe.load(number).unwrap();
+            let pressed = row.force_n != [0.0; 3];
+            assert_eq!(
+                row.tip_mm,
+                pressed.then_some(load.offset_mm()),
+                "row {number}"
+            );
+        }
+        let middle = generate(&small(3), || ()).unwrap();
+        assert!(middle.rows.iter().all(|row| row.tip_mm.is_none()));
     }
 
     /// The label is the tip's way: a tip that sticks moves the markers much further sideways than a force so tilted.

@@ -77,8 +77,32 @@ pub struct Row {
     /// The force as it is labelled, N, film frame: the force on the film in the contact reading `force`, otherwise |F| along
     /// the pressing direction.
     pub force_n: [f64; 3],
+    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None` without
+    /// a force, and where nobody knows.
+    pub tip_mm: Option<[f64; 2]>,
     /// What was seen, or the status names that say why nothing was.
     pub seen: Result<Observation, String>,
+}
+
+/// What is known of a row whose markers were found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<'a> {
+    /// What was seen.
+    pub seen: &'a Observation,
+    /// The force as it is labelled, N: [`Row::force_n`].
+    pub force_n: [f64; 3],
+    /// Where the tip is, mm: [`Row::tip_mm`].
+    pub tip_mm: Option<[f64; 2]>,
+}
+
+impl<'a> Sample<'a> {
+    fn of(row: &'a Row) -> Option<Self> {
+        Some(Self {
+            seen: row.seen.as_ref().ok()?,
+            force_n: row.force_n,
+            tip_mm: row.tip_mm,
+        })
+    }
 }
 
 /// What the pipeline saw in a frame.
@@ -106,11 +130,19 @@ impl Dataset {
     }
 
     /// Accepted rows by their numbers; rejected ones are left out.
-    pub fn pick(&self, rows: &[usize]) -> Vec<(&Observation, [f64; 3])> {
+    pub fn pick(&self, rows: &[usize]) -> Vec<Sample<'_>> {
         let picked = rows.iter().map(|&i| &self.rows[i]);
-        picked
-            .filter_map(|row| Some((row.seen.as_ref().ok()?, row.force_n)))
-            .collect()
+        picked.filter_map(Sample::of).collect()
+    }
+
+    /// All accepted rows.
+    pub fn samples(&self) -> impl Iterator<Item = Sample<'_>> {
+        self.rows.iter().filter_map(Sample::of)
+    }
+
+    /// Whether its rows know where the tip is.
+    pub fn knows_places(&self) -> bool {
+        self.about.range.knows_places()
     }
 
     /// How many rows were rejected, by status.
@@ -198,21 +230,25 @@ mod tests {
             Row {
                 place: Place::default(),
                 force_n: [0.0; 3],
+                tip_mm: None,
                 seen: Ok(seen(10)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0; 3],
+                tip_mm: None,
                 seen: Ok(seen(11)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0, 0.1, -0.1],
+                tip_mm: None,
                 seen: Ok(seen(1 << 32)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0, 0.0, -0.1],
+                tip_mm: None,
                 seen: Err("markers_missing".into()),
             },
         ];
@@ -224,6 +260,7 @@ mod tests {
         let row = |session: usize, pose: Option<usize>, i: usize| Row {
             place: Place { session, pose },
             force_n: [0.0, 0.0, pose.map_or(0.0, |_| -0.01 * (i + 1) as f64)],
+            tip_mm: None,
             seen: Ok(Observation {
                 features_q16: std::array::from_fn(|f| (1000 * session + 10 * i + f) as i64),
                 areas_px: [200; 4],

@@ -75,6 +75,7 @@ impl Default for Recipe {
                 force_n: 0.22,
                 alpha_deg: 11.0,
                 beta_deg: 8.8,
+                place_mm: 0.0,
             },
             sessions: 1,
             spread: Spread::default(),
@@ -154,6 +155,10 @@ impl Recipe {
         ensure!(
             !matches!(self.loads, Loads::Measured(_)),
             "measured loads cannot be rendered"
+        );
+        ensure!(
+            !self.range.knows_places() || matches!(self.loads, Loads::Random(_)),
+            "only random loads press anywhere: the others press the middle"
         );
         ensure!(self.sessions > 0, "a data set needs at least one session");
         ensure!(self.rows() > 0, "a data set needs at least one frame");

@@ -17,7 +17,18 @@ const BLOCK: usize = 512;
 /// A data set on its way into a file.
 struct Target {
     path: PathBuf,
+    about: About,
     opening: String,
+}
+
+impl Target {
+    fn of(path: PathBuf, about: About) -> Result<Self> {
+        Ok(Self {
+            path,
+            opening: opening(&about)?,
+            about,
+        })
+    }
 }
 
 /// Writes the data set of a recipe to a file, block by block, and reads it back. What an interrupted run left there is
@@ -30,10 +41,7 @@ pub fn generate_file(
     path: &Path,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Dataset> {
-    let target = Target {
-        path: path.into(),
-        opening: opening(&recipe.about()?)?,
-    };
+    let target = Target::of(path.into(), recipe.about()?)?;
     write(recipe, &[target], &sensing(recipe), progress)?;
     Dataset::load(path)
 }
@@ -48,13 +56,9 @@ pub fn generate_files<'a>(
     open: impl Fn() -> Result<Eyes<'a>> + Sync + 'a,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Vec<Dataset>> {
-    let target = |(path, about): (PathBuf, About)| {
-        Ok(Target {
-            path,
-            opening: opening(&about)?,
-        })
-    };
-    let targets: Vec<Target> = files.into_iter().map(target).collect::<Result<_>>()?;
+    let files = files.into_iter();
+    let targets = files.map(|(path, about)| Target::of(path, about));
+    let targets: Vec<Target> = targets.collect::<Result<_>>()?;
     write(recipe, &targets, &Pool::new(open), progress)?;
     targets.iter().map(|t| Dataset::load(&t.path)).collect()
 }
@@ -83,7 +87,7 @@ fn write(
             let rows: Option<Vec<_>> = seen.collect();
             let rows = rows.context("there are fewer eyes than files")?;
             let mut file = OpenOptions::new().append(true).open(&target.path)?;
-            file.write_all(&lines(&rows)?)
+            file.write_all(&lines(&target.about, &rows)?)
                 .with_context(|| format!("cannot write {}", target.path.display()))?;
         }
     }

@@ -97,6 +97,8 @@ mod tests {
                 direction_deg,
                 direction_sigma_deg: sigma,
                 magnitude_sigma_n,
+                tip_mm: None,
+                found_place: None,
                 session: 0,
                 pose: None,
             }

@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Result, anyhow, ensure};
-use hivtac_sensing::force::Force;
+use hivtac_sensing::force::{Force, Place};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
 
 use crate::conditions::{ContactName, OriginName};
-use crate::dataset::{Dataset, Place, Split};
+use crate::dataset::{Dataset, Row, Split};
 use crate::weights::features_from_q16;
 
 /// One answer with its truth. Angles in degrees, forces in N.
@@ -26,6 +26,10 @@ pub struct Judged {
     pub direction_sigma_deg: f64,
     /// The standard uncertainty of |F| that came with it, N.
     pub magnitude_sigma_n: f64,
+    /// Where the tip was, mm, where that is known.
+    pub tip_mm: Option<[f64; 2]>,
+    /// Where the model says it was, and the standard uncertainty of each coordinate, mm.
+    pub found_place: Option<([f64; 2], f64)>,
     /// The session.
     pub session: usize,
     /// The pose among the paper's.
@@ -111,14 +115,15 @@ fn judge(model: &Model<'_>, dataset: &Dataset, rows: &[usize]) -> Result<Vec<Jud
             continue;
         }
         let output = network.run(model, &features_from_q16(&seen.features_q16)?, &tare);
-        let (force, _) = Force::of_outputs(model, output.values);
-        judged.push(compare(row.force_n, &force, row.place));
+        let (force, _) = Force::of_outputs(model, &output);
+        judged.push(compare(row, &force));
     }
     Ok(judged)
 }
 
-fn compare(truth: [f64; 3], force: &Force, place: Place) -> Judged {
+fn compare(row: &Row, force: &Force) -> Judged {
     use crate::network::Meaning::AnglesMagnitude as Polar;
+    let (truth, stands) = (row.force_n, row.place);
     let found_polar = [
         f64::from(force.alpha.0) / 1e3,
         f64::from(force.beta.0) / 1e3,
@@ -134,7 +139,15 @@ fn compare(truth: [f64; 3], force: &Force, place: Place) -> Judged {
         direction_deg,
         direction_sigma_deg: f64::from(force.direction_sigma.0) / 1e3,
         magnitude_sigma_n: f64::from(force.magnitude_sigma.0) / 1e6,
-        session: place.session,
-        pose: place.pose,
+        tip_mm: row.tip_mm,
+        found_place: force.place.as_ref().map(place_mm),
+        session: stands.session,
+        pose: stands.pose,
     }
+}
+
+/// A place and the standard uncertainty of its coordinates, mm.
+fn place_mm(place: &Place) -> ([f64; 2], f64) {
+    let found = [place.x, place.y].map(|part| f64::from(part.0) / 1e3);
+    (found, f64::from(place.sigma.0) / 1e3)
 }

@@ -4,8 +4,10 @@ mod coverage;
 mod figures;
 mod judge;
 mod numbers;
+mod places;
 mod report;
 
 pub use coverage::{Coverage, Covered, coverage};
 pub use judge::{Evaluation, Judged};
 pub use numbers::{Interval, Numbers};
+pub use places::{PlaceErrors, PlaceNumbers, by_place};

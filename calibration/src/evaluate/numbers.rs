@@ -201,6 +201,8 @@ mod tests {
             direction_deg: alpha.abs(),
             direction_sigma_deg: 0.2,
             magnitude_sigma_n: 1e-3,
+            tip_mm: None,
+            found_place: None,
             session: 0,
             pose: Some(pose),
         }

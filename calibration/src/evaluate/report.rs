@@ -5,6 +5,7 @@ use std::fmt::{self, Write};
 use super::coverage::{Covered, coverage};
 use super::figures::{error_against_force, found_against_true, histograms, pose_maps};
 use super::numbers::{PoseNumbers, by_pose, errors};
+use super::places::{PlaceNumbers, by_place};
 use super::{Evaluation, Interval, Judged, Numbers};
 use crate::errors::{WEAK_N, norm};
 use crate::plot::escaped;
@@ -61,6 +62,7 @@ impl Evaluation {
         self.push_table(&mut html);
         push_paper(&mut html, self, PoseNumbers::of(&averages));
         push_coverage(&mut html, &self.judged);
+        push_places(&mut html, &by_place(&self.judged));
         let mut section = |title: &str, pictures: Vec<String>| {
             let _ = writeln!(html, "<h2>{title}</h2>{}", pictures.concat());
         };
@@ -181,6 +183,41 @@ fn push_coverage(html: &mut String, frames: &[Judged]) {
     html.push_str("</table>\n");
 }
 
+/// What is told of places: their errors, and how often they lie within their stated 95 % bound.
+fn place_cells(part: &PlaceNumbers) -> Option<[String; 2]> {
+    let place = part.place?;
+    Some([
+        format!("{:.0}", place.each_mm * 1e3),
+        format!("{:.1}", place.within * 100.0),
+    ])
+}
+
+/// How good answers are off the middle; nothing where no place is known.
+fn push_places(html: &mut String, parts: &[PlaceNumbers]) {
+    if parts.is_empty() {
+        return;
+    }
+    html.push_str(
+        "<h2>Off the middle</h2><table><tr><th>tip</th><th>frames</th><th>direction, RMS, °</th>\
+         <th>|F|, RMS, mN</th><th>place, RMS along x and y each, µm</th>\
+         <th>place within its stated 95 % bound, %</th></tr>\n",
+    );
+    for part in parts {
+        let [off, within] = place_cells(part).map_or([None, None], |cells| cells.map(Some));
+        let _ = writeln!(
+            html,
+            "<tr><td>{}</td><td>{}</td><td>{:.3}</td><td>{:.3}</td>{}{}</tr>",
+            escaped(&part.name),
+            part.frames,
+            part.direction_deg,
+            part.magnitude_n * 1e3,
+            cell(off),
+            cell(within)
+        );
+    }
+    html.push_str("</table>\n");
+}
+
 /// The paper's numbers (abstract and Section 7.1) beside ours.
 fn push_paper(html: &mut String, evaluation: &Evaluation, poses: Option<PoseNumbers>) {
     let all = &evaluation.groups()[0].1;
@@ -265,6 +302,25 @@ impl fmt::Display for Evaluation {
                 "  {low:.1} to {high:.1} mN: direction {direction}, |F| {magnitude}"
             )?;
         }
+        write_places(f, &by_place(&self.judged))?;
         write!(f, "rejected: {}", self.rejected.values().sum::<usize>())
     }
+}
+
+fn write_places(f: &mut fmt::Formatter<'_>, parts: &[PlaceNumbers]) -> fmt::Result {
+    if !parts.is_empty() {
+        writeln!(f, "off the middle, root mean squares:")?;
+    }
+    for part in parts {
+        let place = place_cells(part).map_or(String::new(), |[off, within]| {
+            format!(", place {off} µm along x and y each ({within} % within the stated 95 % bound)")
+        });
+        let (degrees, force_mn) = (part.direction_deg, part.magnitude_n * 1e3);
+        writeln!(
+            f,
+            "  {} ({} frames): direction {degrees:.3}°, |F| {force_mn:.3} mN{place}",
+            part.name, part.frames
+        )?;
+    }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 
 use crate::closed_form::{self, ClosedForm, Effort};
-use crate::dataset::{Dataset, Observation, Split};
+use crate::dataset::{About, Dataset, Observation, Sample, Split};
 use crate::errors::{Errors, norm};
 use crate::network::{Meaning, Network, Standardization};
 use crate::quantize::export;
@@ -40,7 +40,7 @@ pub enum Kind {
     Both,
 }
 
-type Rows<'a> = Vec<(&'a Observation, [f64; 3])>;
+type Rows<'a> = Vec<Sample<'a>>;
 
 /// Trains on nine tenths of the accepted rows of a data set, its sessions tared, and measures on the rest.
 ///
@@ -61,7 +61,11 @@ pub fn fit(
     };
     ensure!(
         form.is_none() || options.meaning == Meaning::ForceVector,
-        "beside a closed form a network answers with a force vector"
+        "beside a closed form a network answers with a force vector alone"
+    );
+    ensure!(
+        dataset.knows_places() || !options.meaning_in_use().tells_place(),
+        "the data set does not know where the tip is: no network can learn it"
     );
     let rest = dataset.rest()?.features_px();
     let samples = |rows: &Rows<'_>| {
@@ -70,7 +74,7 @@ pub fn fit(
             None => [0.0; 3],
         })
     };
-    let judges = samples(&in_range(held_out.iter().copied()));
+    let judges = samples(&in_range(&held_out, &calibrated(&dataset.about)));
     let network = train(&samples(&training), &judges, options, report)?;
     let record = Training {
         seed: options.seed,
@@ -110,13 +114,13 @@ pub fn fit_closed_form(dataset: &Dataset, split: Split, seed: u64) -> Result<Fit
 /// chip.
 pub fn adopt(dataset: &Dataset, network: Network, source: &str) -> Result<Fit> {
     let dataset = dataset.clone().tared()?;
-    let rows: Rows<'_> = dataset.accepted().collect();
-    let inside = in_range(rows.iter().copied());
+    let rows: Rows<'_> = dataset.samples().collect();
+    let inside = in_range(&rows, &calibrated(&dataset.about));
     ensure!(
         !inside.is_empty(),
         "the data set has no accepted row inside the calibrated range"
     );
-    let features: Vec<_> = inside.iter().map(|(seen, _)| seen.features_px()).collect();
+    let features: Vec<_> = inside.iter().map(|row| row.seen.features_px()).collect();
     let network = Network {
         activation_max: network.activation_maxima(&features),
         ..network
@@ -142,7 +146,7 @@ pub fn judged_by(weights: Weights, dataset: &Dataset) -> Result<Fit> {
     );
     let dataset = dataset.clone().tared()?;
     let tare = features_from_q16(&dataset.rest()?.features_q16)?;
-    measured(weights, &tare, &dataset.accepted().collect())
+    measured(weights, &tare, &dataset.samples().collect())
 }
 
 /// Rows to train on, and held-out ones.
@@ -156,26 +160,47 @@ fn parts(dataset: &Dataset, split: Split, seed: u64) -> Result<(Rows<'_>, Rows<'
     Ok((training, held_out))
 }
 
-fn in_range<'a>(rows: impl Iterator<Item = (&'a Observation, [f64; 3])>) -> Rows<'a> {
-    rows.filter(|(_, force)| is_inside(force)).collect()
+/// How far a data set that knows places goes beyond what is calibrated with it: forces a tenth, places
+/// a twentieth.
+const BEYOND: f64 = 1.1;
+const PLACE_BEYOND: f64 = 1.05;
+
+/// What a model made from such a data set is calibrated for: the paper's range, or where the tip may be
+/// anywhere, what the data set fills.
+fn calibrated(about: &About) -> Range {
+    if !about.range.knows_places() {
+        return Range::default();
+    }
+    Range {
+        force_n: about.range.force_n / BEYOND,
+        alpha_deg: about.range.alpha_deg / BEYOND,
+        beta_deg: about.range.beta_deg / BEYOND,
+        place_mm: about.range.place_mm / PLACE_BEYOND,
+    }
 }
 
-fn is_inside(force: &[f64; 3]) -> bool {
-    norm(*force) <= Range::default().force_n
+fn in_range<'a>(rows: &[Sample<'a>], range: &Range) -> Rows<'a> {
+    let inside = rows.iter().filter(|row| is_inside(row, range));
+    inside.copied().collect()
+}
+
+fn is_inside(row: &Sample<'_>, range: &Range) -> bool {
+    let near = |tip: [f64; 2]| tip.iter().all(|part| part.abs() <= range.place_mm);
+    norm(row.force_n) <= range.force_n && row.tip_mm.is_none_or(near)
 }
 
 fn form_of(dataset: &Dataset, rows: &Rows<'_>, effort: Effort) -> Result<ClosedForm> {
     let rows: Vec<_> = rows
         .iter()
-        .map(|(seen, force)| (seen.features_px(), *force))
+        .map(|row| (row.seen.features_px(), row.force_n))
         .collect();
     closed_form::fit(&dataset.rest()?.features_px(), &rows, effort)
 }
 
 /// No layers, but the scaling that every model file has.
 fn no_network(rows: &Rows<'_>) -> Result<Network> {
-    let features: Vec<_> = rows.iter().map(|(seen, _)| seen.features_px()).collect();
-    let forces: Vec<_> = rows.iter().map(|(_, force)| *force).collect();
+    let features: Vec<_> = rows.iter().map(|row| row.seen.features_px()).collect();
+    let forces: Vec<_> = rows.iter().map(|row| row.force_n).collect();
     Ok(Network {
         input: Standardization::of(&features)?,
         output: Standardization::of_answers(&forces)?,
@@ -191,11 +216,15 @@ fn finished(
     training: Training,
     rows: &Rows<'_>,
 ) -> Result<Fit> {
+    let mut range = calibrated(&dataset.about);
+    if !network.meaning.tells_place() {
+        range.place_mm = 0.0;
+    }
     let weights = Weights {
         format: Weights::format(),
         conditions: dataset.about.conditions.clone(),
         rest: dataset.rest()?,
-        range: Range::default(),
+        range,
         uncertainty: Uncertainty::default(),
         training,
         closed_form,
@@ -211,18 +240,23 @@ fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fi
     let misses: Vec<Miss> = answers
         .iter()
         .zip(rows)
-        .filter(|(_, (_, truth))| *truth != [0.0; 3])
-        .map(|(found, (_, truth))| Miss::of(*found, *truth))
+        .filter(|(_, row)| row.force_n != [0.0; 3])
+        .map(|(found, row)| found.miss(row))
         .collect();
     weights.uncertainty = Uncertainty::of(&misses, weights.range.force_n)?;
     let (mut float, mut quantized) = (Errors::default(), Errors::default());
-    for ((seen, force), found) in rows
-        .iter()
-        .zip(answers)
-        .filter(|((_, force), _)| is_inside(force))
-    {
-        float.add(weights.force_n(&seen.features_px()), *force);
-        quantized.add(found, *force);
+    let judged = rows.iter().zip(answers);
+    // Where the model tells no place, places do not count.
+    let range = Range {
+        place_mm: match weights.network.meaning.tells_place() {
+            true => weights.range.place_mm,
+            false => f64::INFINITY,
+        },
+        ..weights.range
+    };
+    for (row, found) in judged.filter(|(row, _)| is_inside(row, &range)) {
+        Answer::in_floats(&weights, row.seen).add_to(&mut float, row);
+        found.add_to(&mut quantized, row);
     }
     Ok(Fit {
         weights,
@@ -231,26 +265,66 @@ fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fi
     })
 }
 
-/// What the network shall answer: the force, less what is `known` of it without.
+/// What a model makes of a row.
+struct Answer {
+    force_n: [f64; 3],
+    place_mm: Option<[f64; 2]>,
+}
+
+impl Answer {
+    fn in_floats(weights: &Weights, seen: &Observation) -> Self {
+        let features = seen.features_px();
+        Self {
+            force_n: weights.force_n(&features),
+            place_mm: weights.network.place_mm(&features),
+        }
+    }
+
+    /// The place as it was found, and the true one, mm, where both are known.
+    fn places(&self, row: &Sample<'_>) -> Option<([f64; 2], [f64; 2])> {
+        self.place_mm.zip(row.tip_mm)
+    }
+
+    fn miss(&self, row: &Sample<'_>) -> Miss {
+        let far = |(found, truth): ([f64; 2], [f64; 2])| {
+            let off = [0, 1].map(|axis| found[axis] - truth[axis]);
+            (off[0] * off[0] + off[1] * off[1]).sqrt()
+        };
+        let miss = Miss::of(self.force_n, row.force_n);
+        miss.with_place_mm(self.places(row).map_or(0.0, far))
+    }
+
+    fn add_to(&self, errors: &mut Errors, row: &Sample<'_>) {
+        errors.add(self.force_n, row.force_n);
+        if let Some((found, truth)) = self.places(row) {
+            errors.add_place(found, truth);
+        }
+    }
+}
+
+/// What the network shall answer: the force, less what is `known` of it without, and the place.
 fn samples(
     rows: &Rows<'_>,
     options: &Options,
     known: impl Fn(&Observation) -> [f64; 3],
 ) -> Samples {
-    let meaning = options
-        .start
-        .as_ref()
-        .map_or(options.meaning, |start| start.meaning);
-    let answer = |(seen, force): &(&Observation, [f64; 3])| {
-        let known = known(seen);
-        let left = std::array::from_fn(|i| force[i] - known[i]);
-        (seen.features_px(), meaning.of_force(left))
+    let meaning = options.meaning_in_use();
+    let answer = |row: &Sample<'_>| {
+        let known = known(row.seen);
+        let left = std::array::from_fn(|i| row.force_n[i] - known[i]);
+        (row.seen.features_px(), meaning.of_force(left))
     };
     let (features, answers) = rows.iter().map(answer).unzip();
+    // A film that nothing touches is as if touched in its middle.
+    let place = |row: &Sample<'_>| row.tip_mm.unwrap_or_default();
     Samples {
         features,
         answers,
-        forces_n: rows.iter().map(|(_, force)| *force).collect(),
+        forces_n: rows.iter().map(|row| row.force_n).collect(),
+        places_mm: match meaning.tells_place() {
+            true => rows.iter().map(place).collect(),
+            false => Vec::new(),
+        },
     }
 }
 
@@ -264,21 +338,23 @@ fn record(dataset: &Dataset, split: Split, rows: usize) -> Training {
     }
 }
 
-/// The forces (N) that the exported model gives, run by `sensing`'s own arithmetic.
-fn quantized_answers(weights: &Weights, tare: &Features, rows: &Rows<'_>) -> Result<Vec<[f64; 3]>> {
+/// What the exported model answers, run by `sensing`'s own arithmetic.
+fn quantized_answers(weights: &Weights, tare: &Features, rows: &Rows<'_>) -> Result<Vec<Answer>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes)
         .map_err(|error| anyhow!("{error}"))
         .context("the exported model")?;
     let mut chip = ChipNetwork::new();
-    let (meaning, units) = (
-        weights.network.meaning,
-        weights.network.meaning.chip_units(),
-    );
-    let mut answer = |(seen, _): &(&Observation, [f64; 3])| {
-        let output = chip.run(&model, &features_from_q16(&seen.features_q16)?, tare);
+    let meaning = weights.network.meaning;
+    let units = meaning.chip_units();
+    let mut answer = |row: &Sample<'_>| {
+        let output = chip.run(&model, &features_from_q16(&row.seen.features_q16)?, tare);
         let outputs = std::array::from_fn(|o| f64::from(output.values[o]) / units[o]);
-        Ok(meaning.to_force(outputs))
+        let place_mm = output.place.map(|um| f64::from(um) / 1e3);
+        Ok(Answer {
+            force_n: meaning.to_force(outputs),
+            place_mm: meaning.tells_place().then_some(place_mm),
+        })
     };
     rows.iter().map(&mut answer).collect()
 }

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 
 use super::no_network;
 use crate::closed_form::{self, ClosedForm, Effort};
-use crate::dataset::{Dataset, Observation};
+use crate::dataset::{Dataset, Sample};
 use crate::errors::{angle_deg, mean, norm};
 use crate::network::INPUTS;
 use crate::uncertainty::{MAGNITUDE_BOUND, Miss};
@@ -60,16 +60,16 @@ pub fn quick(dataset: &Dataset) -> Result<Quick> {
         .collect();
     let form = closed_form::fit(&rest.features_px(), &rows, Effort::Few)?;
     let others = closed_form::left_out(&rest.features_px(), &rows, &form)?;
-    let pressed: Vec<(&Observation, [f64; 3])> = dataset.accepted().collect();
+    let pressed: Vec<Sample<'_>> = dataset.samples().collect();
     let found =
         |form: &ClosedForm, features: &[f64; INPUTS]| form.force_n(features, &rest.features_px());
     let misses: Vec<Vec<Miss>> = loads
         .iter()
         .zip(&others)
         .map(|(load, form)| {
-            let of_load = pressed.iter().filter(|(_, force)| *force == load.force_n);
+            let of_load = pressed.iter().filter(|row| row.force_n == load.force_n);
             of_load
-                .map(|(seen, force)| Miss::of(found(form, &seen.features_px()), *force))
+                .map(|row| Miss::of(found(form, &row.seen.features_px()), row.force_n))
                 .collect()
         })
         .collect();

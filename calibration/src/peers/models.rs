@@ -66,7 +66,7 @@ impl Model {
             let Ok(seen) = &row.seen else { return Ok(None) };
             let features = features_from_q16(&seen.features_q16)?;
             let output = network.run(&model, &features, &model.rest.features);
-            let (force, _) = Force::of_outputs(&model, output.values);
+            let (force, _) = Force::of_outputs(&model, &output);
             Ok(Some([row.force_n, vector_n(force)]))
         };
         sets.test.rows.iter().map(answer).collect()

@@ -197,6 +197,7 @@ fn add(
             datasets[i].rows.push(Row {
                 place,
                 force_n,
+                tip_mm: None,
                 seen,
             });
         }

@@ -42,7 +42,8 @@ impl Across {
     }
 }
 
-/// The mean loss of these rows, and its gradient by the outputs; outputs and targets lie component by component.
+/// The mean loss of these rows, and its gradient by the outputs; outputs and targets lie component by component, the
+/// force's first. What a place is off by counts the same in each row.
 pub(super) fn loss(
     outputs: &[f32],
     targets: &[f32],
@@ -100,6 +101,19 @@ mod tests {
         assert!((of(2, [0.3, 0.0, 0.0]) / of(2, [0.0, 0.0, 0.3]) - 1.0).abs() < 1e-6);
         let mean = (0..3).map(|row| of(row, [0.0, 0.3, 0.0])).sum::<f64>() / 3.0;
         assert!((mean - 3.0 * 0.03).abs() < 1e-6, "{mean}");
+    }
+
+    /// Outputs after the force's are not weighed by it.
+    #[test]
+    fn a_place_counts_the_same_whatever_the_force() {
+        let data = samples(vec![[0.0, 0.0, -0.1], [0.0, 0.0, -0.01]]);
+        let across = Across::new(&data, &data, 3.0);
+        for row in [0, 1] {
+            let off = [0.0, 0.0, 0.0, 0.5, -1.0];
+            let (loss, gradient) = loss(&off, &[0.0; 5], Some(&across), &[row]);
+            assert!((loss - 1.25 / 5.0).abs() < 1e-9);
+            assert_eq!(gradient[3..], [0.2, -0.4]);
+        }
     }
 
     #[test]

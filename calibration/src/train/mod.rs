@@ -14,7 +14,9 @@ mod whitening;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::network::{CONSTANT_ANSWER, INPUTS, Meaning, Network, OUTPUTS, Standardization};
+use crate::network::{
+    CONSTANT_ANSWER, INPUTS, Meaning, Network, OUTPUTS, PLACE_OUTPUTS, Standardization,
+};
 pub use options::Options;
 use state::{Phase, State};
 
@@ -23,11 +25,13 @@ use state::{Phase, State};
 pub struct Samples {
     /// Features (px, px²), row by row.
     pub features: Vec<[f64; INPUTS]>,
-    /// Answers in the units of the network's meaning, row by row.
+    /// Answers but for places, in the units of the network's meaning, row by row.
     pub answers: Vec<[f64; OUTPUTS]>,
     /// The whole force (N), of which the answers may be a part, row by row. Only
     /// [`Options::direction_weight`] needs it.
     pub forces_n: Vec<[f64; OUTPUTS]>,
+    /// Where the tip is (mm), row by row, for a network that shall tell it; otherwise none.
+    pub places_mm: Vec<[f64; PLACE_OUTPUTS]>,
 }
 
 /// One finished pass over the data.
@@ -121,8 +125,14 @@ impl Samples {
             options.direction_weight.is_none() || forces == rows,
             "{rows} rows of features, but {forces} of forces to weigh them by"
         );
+        let (places, wanted) = (self.places_mm.len(), options.meaning_in_use().tells_place());
+        ensure!(
+            places == if wanted { rows } else { 0 },
+            "{rows} rows of features, but {places} of places, which the network shall {}tell",
+            if wanted { "" } else { "not " }
+        );
         let finite = |row: &[f64]| row.iter().all(|x| x.is_finite());
-        let odd = (0..rows).find(|&i| !finite(&self.features[i]) || !finite(&self.answers[i]));
+        let odd = (0..rows).find(|&i| !finite(&self.features[i]) || !finite(&self.answer(i)));
         ensure!(
             odd.is_none(),
             "row {} holds a number that is not finite",
@@ -132,16 +142,25 @@ impl Samples {
     }
 }
 
+impl Samples {
+    /// All that the network shall answer to a row.
+    fn answer(&self, row: usize) -> Vec<f64> {
+        let place = self.places_mm.get(row).into_iter().flatten();
+        self.answers[row].iter().chain(place).copied().collect()
+    }
+}
+
 /// What a component's deviation may be above the common one: more is no force that anyone tilts.
 const MOST_APART: f64 = 16.0;
 
 /// Scaling of features and answers, from the data.
 ///
 /// The components of a force that vary share the smallest of their deviations, so that a millinewton counts the same in each:
-/// F_z varies several times as much as F_x and F_y, and would be learnt as much more coarsely with a deviation of its own.
+/// F_z varies several times as much as F_x and F_y, and would be learnt as much more coarsely with a deviation of its own. A place
+/// has deviations of its own.
 fn scaling(training: &Samples, meaning: Meaning) -> Result<[Standardization; 2]> {
     let mut answers = Standardization::of_answers(&training.answers)?;
-    if meaning == Meaning::ForceVector {
+    if meaning.is_vector() {
         let varying = |sigma: &&mut f64| **sigma > CONSTANT_ANSWER;
         let most = answers.sigma.iter().copied().fold(0.0, f64::max);
         let shared = answers.sigma.iter_mut().filter(varying);
@@ -149,6 +168,11 @@ fn scaling(training: &Samples, meaning: Meaning) -> Result<[Standardization; 2]>
         let common = least.max(most / MOST_APART);
         let shared = answers.sigma.iter_mut().filter(varying);
         shared.for_each(|sigma| *sigma = common);
+    }
+    if meaning.tells_place() {
+        let places = Standardization::of_answers(&training.places_mm)?;
+        answers.mean.extend(places.mean);
+        answers.sigma.extend(places.sigma);
     }
     Ok([Standardization::of(&training.features)?, answers])
 }

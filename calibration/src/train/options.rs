@@ -68,6 +68,11 @@ impl Default for Options {
 }
 
 impl Options {
+    /// What the outputs of the trained network are.
+    pub(crate) fn meaning_in_use(&self) -> Meaning {
+        self.start.as_ref().map_or(self.meaning, |it| it.meaning)
+    }
+
     pub(super) fn check(&self) -> Result<()> {
         ensure!(self.batch > 0, "a batch needs at least one row");
         ensure!(
@@ -100,9 +105,8 @@ impl Options {
             weight.is_finite() && weight > 0.0,
             "the weight of directions must be above zero"
         );
-        let meaning = self.start.as_ref().map_or(self.meaning, |it| it.meaning);
         ensure!(
-            meaning == Meaning::ForceVector,
+            self.meaning_in_use().is_vector(),
             "directions are weighed for networks that answer with a force vector only"
         );
         Ok(())

@@ -10,7 +10,7 @@ use super::loss::{Across, loss};
 use super::mlp::Mlp;
 use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
-use crate::network::{Arithmetic, INPUTS, Layer, Network, OUTPUTS, Standardization};
+use crate::network::{Arithmetic, INPUTS, Layer, Network, Standardization};
 use crate::quantize::input_scaling;
 use crate::weights::features_from_q16;
 
@@ -61,7 +61,7 @@ struct Rows {
     /// The features as the chip has them.
     steps: Vec<[i16; INPUTS]>,
     /// Standardized answers.
-    answers: Vec<[f32; OUTPUTS]>,
+    answers: Vec<Vec<f32>>,
     /// How much what is off across each force counts, when that is not the same for all.
     across: Option<Across>,
 }
@@ -84,10 +84,15 @@ impl Rows {
             ))
         });
         let floats = standardized(&samples.features, &network.input);
+        let answer = |row: usize| -> Vec<f32> {
+            let scaled = network.output.forward(&samples.answer(row));
+            scaled.iter().map(|&part| part as f32).collect()
+        };
+        let answers = (0..samples.answers.len()).map(answer);
         Ok(Self {
             components: floats.iter().map(|row| whitening.components(row)).collect(),
             steps: steps.collect::<Result<_>>()?,
-            answers: standardized(&samples.answers, &network.output),
+            answers: answers.collect(),
             across,
         })
     }
@@ -108,9 +113,10 @@ fn standardized<const N: usize>(rows: &[[f64; N]], scaling: &Standardization) ->
 }
 
 /// The chosen rows, feature by feature.
-fn gathered<T: Copy, U: From<T>, const N: usize>(data: &[[T; N]], rows: &[usize]) -> Vec<U> {
-    let feature = |i: usize| rows.iter().map(move |&row| U::from(data[row][i]));
-    (0..N).flat_map(feature).collect()
+fn gathered<T: Copy, U: From<T>, R: AsRef<[T]>>(data: &[R], rows: &[usize]) -> Vec<U> {
+    let feature = |i: usize| rows.iter().map(move |&row| U::from(data[row].as_ref()[i]));
+    let features = rows.first().map_or(0, |&row| data[row].as_ref().len());
+    (0..features).flat_map(feature).collect()
 }
 
 impl State {
@@ -119,7 +125,8 @@ impl State {
         let (mut mlp, network) = match &options.start {
             Some(start) => (Mlp::of_layers(&start.layers), start.clone()),
             None => {
-                let widths = [&[INPUTS], &options.hidden[..], &[OUTPUTS]].concat();
+                let outputs = options.meaning.outputs();
+                let widths = [&[INPUTS], &options.hidden[..], &[outputs]].concat();
                 (Mlp::random(&widths, &mut random), blank(training, options)?)
             }
         };

@@ -115,6 +115,7 @@ fn easy(rows: usize, seed: u64) -> Samples {
         answers: features.iter().map(answer).collect(),
         forces_n: features.iter().map(answer).collect(),
         features,
+        ..Samples::default()
     }
 }
 

@@ -21,9 +21,10 @@ use crate::{
     angle::atan2,
     cordic::{ONE_BITS, sin_cos},
     model::{CalibratedRange, Model, OutputKind},
+    network::Output,
     root::rounded_root,
     status::Status,
-    units::{MicroNewtons, MilliDegrees},
+    units::{MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres},
 };
 
 /// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range of ±10°
@@ -34,6 +35,9 @@ pub const UNRELIABLE_DIRECTION: MilliDegrees = MilliDegrees(5_000);
 pub const RANGE_MARGIN: i32 = 20;
 /// The same, for angles.
 pub const ANGLE_MARGIN: MilliDegrees = MilliDegrees(1_000);
+
+/// The same, for each coordinate of the place.
+pub const PLACE_MARGIN: Micrometres = Micrometres(250);
 
 /// A force with its standard uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -102,12 +106,14 @@ impl Polar {
 }
 
 impl Force {
-    /// The force that a model's three outputs mean, and its status bits:
-    /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`] and
-    /// [`Status::DIRECTION_UNRELIABLE`]. A negative |F| from a model is one of nothing: it becomes 0.
-    pub fn of_outputs(model: &Model<'_>, outputs: [i32; 3]) -> (Force, Status) {
+    /// The force that a model's outputs mean, and its status bits:
+    /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`],
+    /// [`Status::DIRECTION_UNRELIABLE`] and [`Status::PLACE_OUT_OF_RANGE`]. A negative |F| from a model
+    /// is one of nothing: it becomes 0.
+    pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
+        let outputs = output.values;
         let (polar, vector) = match model.output {
-            OutputKind::ForceVector => {
+            OutputKind::ForceVector | OutputKind::ForceAndPlace => {
                 let vector = outputs.map(MicroNewtons);
                 (Polar::of_vector(vector), vector)
             }
@@ -124,7 +130,7 @@ impl Force {
             cartesian: vector,
             direction_sigma,
             magnitude_sigma,
-            place: None,
+            place: place_of(model, output.place, polar.magnitude),
         };
         (force, force.trust(&model.range))
     }
@@ -147,8 +153,20 @@ impl Force {
         if self.magnitude.0 > largest {
             status |= Status::MAGNITUDE_OUT_OF_RANGE;
         }
+        if self.is_contact() && self.place.is_some_and(|place| place.is_beyond(range.place)) {
+            status |= Status::PLACE_OUT_OF_RANGE;
+        }
         status
     }
+}
+
+/// The place that a model tells at this |F|.
+fn place_of(model: &Model<'_>, [x, y]: [i32; 2], magnitude: MicroNewtons) -> Option<Place> {
+    model.output.tells_place().then(|| Place {
+        x: SignedMicrometres(x),
+        y: SignedMicrometres(y),
+        sigma: model.uncertainty.place_at(magnitude),
+    })
 }
 
 /// α and β as the model gives them, brought to the ranges of their meaning.

@@ -1,6 +1,7 @@
 use super::*;
-use crate::model::samples::spec;
+use crate::model::samples::{place_spec, spec};
 use crate::model::{ContactReading, LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
+use crate::network::Output;
 use proptest::prelude::*;
 
 fn vector(x: i32, y: i32, z: i32) -> [MicroNewtons; 3] {
@@ -111,11 +112,19 @@ fn the_largest_vectors_saturate() {
     }
 }
 
+/// What a network says of a force alone.
+fn output(values: [i32; 3]) -> Output {
+    Output {
+        values,
+        ..Output::default()
+    }
+}
+
 fn force_of(outputs: [i32; 3], edit: fn(&mut crate::model::encode::ModelSpec)) -> (Force, Status) {
     let mut spec = spec(&[11, 3]);
     edit(&mut spec);
     let bytes = spec.encode().unwrap();
-    Force::of_outputs(&Model::parse(&bytes).unwrap(), outputs)
+    Force::of_outputs(&Model::parse(&bytes).unwrap(), &output(outputs))
 }
 
 #[test]
@@ -141,7 +150,7 @@ fn the_vector_of_a_pressing_direction_lies_along_it() {
         let bytes = spec.encode().unwrap();
         let model = Model::parse(&bytes).unwrap();
         let outputs = [12_000, -9_000, -99_000];
-        let (force, _) = Force::of_outputs(&model, outputs);
+        let (force, _) = Force::of_outputs(&model, &output(outputs));
         assert_eq!(force.cartesian, outputs.map(MicroNewtons));
         let of_angles = polar(force.alpha.0, force.beta.0, force.magnitude.0).to_vector();
         for (of_angles, component) in of_angles.iter().zip(force.cartesian) {
@@ -226,6 +235,40 @@ fn a_force_carries_the_uncertainty_of_its_size() {
     }
 }
 
+/// Places to 4 mm and a margin of 0.25 mm, told only of what touches the film.
+#[test]
+fn trust_in_a_place() {
+    let mut spec = place_spec(&[11, 5]);
+    spec.uncertainty.step_bits = 15;
+    spec.uncertainty.knots[0].place = Micrometres(800);
+    let bytes = spec.encode().unwrap();
+    let model = Model::parse(&bytes).unwrap();
+    let told = |newtons: i32, place: [i32; 2]| {
+        let values = [0, 0, -newtons];
+        let output = Output {
+            place,
+            ..output(values)
+        };
+        Force::of_outputs(&model, &output)
+    };
+    let (force, status) = told(100_000, [-4_250, 4_250]);
+    let place = force.place.unwrap();
+    assert_eq!((place.x.0, place.y.0, place.sigma.0), (-4_250, 4_250, 120));
+    assert_eq!(status, Status::OK);
+    for place in [[-4_251, 0], [0, 4_251], [i32::MIN, i32::MAX]] {
+        assert_eq!(told(100_000, place).1, Status::PLACE_OUT_OF_RANGE);
+    }
+    let (weak, status) = told(2_048, [9_000, 0]);
+    assert_eq!(weak.place.unwrap().sigma.0, 758);
+    assert!(status.contains(Status::PLACE_OUT_OF_RANGE) == weak.is_contact());
+    assert!(
+        !told(1_000, [9_000, 0])
+            .1
+            .contains(Status::PLACE_OUT_OF_RANGE)
+    );
+    assert_eq!(force_of([0, 0, -100_000], |_| {}).0.place, None);
+}
+
 #[test]
 fn nothing_has_no_known_direction() {
     let (none, status) = force_of([0, 0, 0], |_| {});
@@ -245,6 +288,7 @@ fn extreme_uncertainties_do_not_overflow() {
             let knot = UncertaintyKnot {
                 across: sigma,
                 along: sigma,
+                ..UncertaintyKnot::default()
             };
             spec.uncertainty = Uncertainty::constant(knot);
             spec.uncertainty.step_bits = step_bits;
@@ -252,7 +296,7 @@ fn extreme_uncertainties_do_not_overflow() {
             let bytes = spec.encode().unwrap();
             let model = Model::parse(&bytes).unwrap();
             for value in [i32::MIN, -1, 0, 1, i32::MAX] {
-                let (force, _) = Force::of_outputs(&model, [value; 3]);
+                let (force, _) = Force::of_outputs(&model, &output([value; 3]));
                 assert_eq!(force.magnitude_sigma, sigma);
             }
         }

@@ -34,6 +34,7 @@ mod shape;
 mod tests;
 mod trust;
 
+pub(crate) use reading::Reading;
 pub(crate) use trust::Trust;
 
 use crate::{
@@ -96,9 +97,9 @@ const LARGEST_MULTIPLE: u32 = 8;
 /// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any size and tilt, a
 /// half disc 0.95, two touching discs 0.88, a crescent less.
 const LEAST_FILL: i32 = 60_950;
-/// How far a marker may be from the optical law in width, of 256 (±25 %): threshold, light and blur are unknown
-/// before there is a rest position.
-const SIZE_TOLERANCE: i64 = 64;
+/// How far a marker may be from the optical law in width, of 256 (±37.5 %): threshold, light and blur are unknown
+/// before there is a rest position, and under a tip far off the middle the pattern's centre is not on the axis.
+const SIZE_TOLERANCE: i64 = 96;
 /// Narrowest marker, along the radius over across it, of 256 (0.2): foreshortened by distance and steepest film.
 const LEAST_ASPECT: i64 = 51;
 /// Widest, of 256 (1.15): round, and the noise of a small picture.

@@ -3,8 +3,8 @@
 //! The limits stand between what a load does to the markers and what a false, cut or half dark marker does. The first
 //! was measured on rendered frames of the film's curves at QVGA and 800×600, both presets: forces to 0.25 N tilted by up
 //! to 12°, tip offsets to 0.5 mm. Each limit's comment gives the largest value seen. Lengths do not grow with the frame
-//! where they come of the pixel grid. Presses far off the middle are refused where they strain the pattern: a model of
-//! presses in the middle would read them wrong.
+//! where they come of the pixel grid. A model of presses in the middle would read presses far off it wrong: they are
+//! refused where they strain the pattern. One that tells places has wider limits ([`Reading`]).
 
 use super::{
     Found, Image,
@@ -16,7 +16,7 @@ use crate::{
     dilate::MAX_DILATIONS,
     division::{Reciprocal, limited, scaled},
     geometry::Geometry,
-    model::{CentroidEstimator, ContactReading, Rest},
+    model::{CentroidEstimator, Rest},
     root::root,
     settings::Settings,
     status::Status,
@@ -30,16 +30,13 @@ use crate::{
 const STRAIN_BINARY: i32 = 45_875;
 /// Strain against a model's rest, 0.015 of 65,536: another unit's markers are not quite where this one's are.
 const STRAIN_FOREIGN: i32 = 983;
-/// Taper against the rest's: 0.1 (seen: 0.066), of 65,536.
-const TAPER: i32 = 6_554;
 /// Turn against the rest's: 5° (seen: 0.1°).
 const TURN: MilliDegrees = MilliDegrees(5_000);
 /// Shift of the centre against the rest's: 0.35 of the rest's half side (seen: 0.11), of 256.
 const SHIFT: i64 = 90;
 /// Size against the rest's: 0.85 to 2 (seen: 1 to 1.71), of 256.
 const SCALE: (i64, i64) = (218, 512);
-/// Width across the radius: off by 0.06 of it (of 256) and 0.35 px (seen: 0.03 and 0.3 px). Eaten or swollen edges.
-const WIDTH: i64 = 15;
+/// Width across the radius: off by [`Reading::width`] of it and 0.35 px (seen: 0.3 px). Eaten or swollen edges.
 const WIDTH_PIXELS: i32 = 22_938;
 /// The narrowest marker's aspect over the widest's: 1 less 0.05 less 0.5 px of its width less 6 times the taper less the
 /// shift over the rest's half side: the film is steeper on the side that comes nearer, and where an off-centre tip is.
@@ -93,15 +90,14 @@ pub struct Trust {
 
 impl Trust {
     /// For markers found with these settings that rest there; `own_rest` says whether that was taken on this unit, and
-    /// `contact` what presses.
-    pub fn new(settings: &Settings, rest: &Rest, own_rest: bool, contact: ContactReading) -> Trust {
+    /// `reading` what presses.
+    pub fn new(settings: &Settings, rest: &Rest, own_rest: bool, reading: Reading) -> Trust {
         let geometry = &settings.geometry;
         let at_rest = Pattern::of_centroids(rest.features.centroids);
         let grid = match settings.threshold.format() {
             PixelFormat::Yuv422 => 2,
             PixelFormat::Rgb565 | PixelFormat::Mono => 1,
         };
-        let reading = Reading::of(contact);
         let displacement = match settings.centroid {
             CentroidEstimator::RednessWeighted => grid_of_means(grid, reading.displacement),
             CentroidEstimator::BinaryMask => grid * STRAIN_BINARY,
@@ -146,7 +142,7 @@ impl Trust {
         let taper = change(now.taper, rest.taper);
         let (rest_side, side) = (i64::from(rest.half_side), 256 * i64::from(now.half_side));
         change(now.strain, rest.strain) <= self.strain_limit(now, shift, taper)
-            && taper <= TAPER
+            && taper <= self.reading.taper
             && (now.turn.0 - rest.turn.0).abs() <= TURN.0
             && i64::from(moved.0) * 256 <= rest_side * SHIFT
             && (rest_side * SCALE.0..=rest_side * SCALE.1).contains(&side)
@@ -154,8 +150,9 @@ impl Trust {
 
     /// Of 65,536.
     fn strain_limit(&self, now: &Pattern, shift: i32, taper: i32) -> i32 {
+        let always = self.reading.strain_always;
         let Some(displacement) = self.displacement else {
-            return STRAIN_FOREIGN;
+            return STRAIN_FOREIGN.max(always);
         };
         // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over four of those, and
         // tapers by √2 times as much: that part of a taper is no tip's.
@@ -166,6 +163,7 @@ impl Trust {
         displaced
             .saturating_add(scaled(squared, self.reading.strain_by_shift, 1))
             .saturating_add(scaled(tapered, self.reading.strain_by_taper, 8))
+            .max(always)
     }
 
     fn images_fit(&self, found: &Found, shift: i32) -> bool {
@@ -216,12 +214,19 @@ impl Trust {
         let lean = LEAN
             .max(wider)
             .saturating_add(scaled(bent, self.reading.lean_by_taper, 16));
-        width_fits(*expected, seen, edge, self.grid)
+        self.width_fits(*expected, seen, edge)
             && seen.skew.saturating_abs() <= skew
             && image.hollow <= self.hollow
             && seen.lean <= scaled(lean, self.grid + 1, 1)
             && image.lopsided <= lopsided
-            && is_filled(image, self.rim)
+            && is_filled(image, self.rim, self.reading.holes)
+    }
+
+    /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
+    fn width_fits(&self, expected: i32, seen: &Seen, edge: i32) -> bool {
+        let excess = i64::from(seen.across) - i64::from(edge) - i64::from(expected);
+        let pixels = grid_of_means(self.grid, WIDTH_PIXELS);
+        excess.abs() <= i64::from(expected) * self.reading.width / 256 + i64::from(pixels)
     }
 }
 
@@ -249,24 +254,19 @@ fn inner_density(image: &Image, by_across: &Reciprocal, edge: i32) -> i32 {
     by(65_536_i32.saturating_sub(outer).max(1 << 13)).part(image.density)
 }
 
-/// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
-fn width_fits(expected: i32, seen: &Seen, edge: i32, grid: i32) -> bool {
-    let excess = i64::from(seen.across) - i64::from(edge) - i64::from(expected);
-    excess.abs() <= i64::from(expected) * WIDTH / 256 + i64::from(grid_of_means(grid, WIDTH_PIXELS))
-}
-
 /// A limit of a mean over a marker, in YUV422 nine eighths of what it is in other formats.
 fn grid_of_means(grid: i32, limit: i32) -> i32 {
     (grid + 7) * limit / 8
 }
 
-/// Whether enough pixels passed, for diameters that may be smaller by `rim`, px with 8 fractional bits. Both products are below
+/// Whether enough pixels passed, for diameters that may be smaller by `rim`, px with 8 fractional bits, but for `holes` of 256
+/// of them. Both products are below
 /// 2⁵⁷: diameters are below 2¹⁸ then, and an area is at most 640,000 px.
-fn is_filled(image: &Image, rim: i32) -> bool {
+fn is_filled(image: &Image, rim: i32, holes: i64) -> bool {
     let [across, along] = [image.seen.across, image.seen.along].map(|length| length >> 8);
     let product = |count: u32, a: i32, b: i32| i64::from(count) * (i64::from(a) * i64::from(b));
     let least = product(image.area, (across - rim).max(0), (along - rim).max(0));
-    product(image.passed, across, along) >= least
+    product(image.passed, across, along) >= least - least / 256 * holes
 }
 
 /// By a length, at least the least one.

@@ -3,8 +3,9 @@
 use super::{
     CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
     Model, ModelError, Origin, OutputKind, Rest, Uncertainty, WeightWidth,
-    layout::{CRC, HEADER_LENGTH, MAGIC, PACKING, VERSION, padded_name},
+    layout::{CRC, HEADER_LENGTH, MAGIC, PACKING, padded_name, version},
     packing::{LOADED_AHEAD, pack},
+    place,
 };
 use crate::{features::Features, threshold::PixelFormat};
 use alloc::vec::Vec;
@@ -22,7 +23,7 @@ pub struct ModelSpec {
     pub layers: Vec<LayerSpec>,
     /// What it gives without its layers.
     pub closed_form: Option<ClosedFormSpec>,
-    /// What the three outputs are.
+    /// What the outputs are.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
     pub range: CalibratedRange,
@@ -35,7 +36,7 @@ pub struct ModelSpec {
 pub struct LayerSpec {
     /// Number of inputs, 1–512: 11 in the first layer, the outputs of the layer before in the others.
     pub inputs: u16,
-    /// Number of outputs, 1–512: 3 in the last layer.
+    /// Number of outputs, 1–512: in the last layer as many as [`OutputKind::count`] says.
     pub outputs: u16,
     /// How wide the weights are: int16 in the first layer.
     pub weight_width: WeightWidth,
@@ -73,7 +74,7 @@ impl ModelSpec {
     fn body(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         bytes.extend(MAGIC);
-        bytes.extend(VERSION.to_le_bytes());
+        bytes.extend(version(self.output).to_le_bytes());
         bytes.extend([PACKING, 0]);
         bytes.extend([0; 4]); // the length, filled in when it is known
         // More layers than 16 bits count are more than the reader accepts.
@@ -94,6 +95,9 @@ impl ModelSpec {
             bytes.extend(value.to_le_bytes());
         }
         self.uncertainty.push(&mut bytes);
+        if self.output.tells_place() {
+            place::push(&mut bytes, range.place, &self.uncertainty);
+        }
         if let Some(form) = &self.closed_form {
             form.push(&mut bytes);
         }
@@ -186,6 +190,7 @@ fn output_number(output: OutputKind) -> u8 {
     match output {
         OutputKind::ForceVector => 0,
         OutputKind::AnglesMagnitude => 1,
+        OutputKind::ForceAndPlace => 2,
     }
 }
 

@@ -102,8 +102,9 @@ impl fmt::Display for ModelError {
             Self::NotAModel => write!(f, "not a model file: it does not begin with HVTM"),
             Self::Version { found } => write!(
                 f,
-                "model file version {found}, this program reads version {}: export the model again",
-                super::layout::VERSION
+                "model file version {found}, this program reads versions {} and {}: export the model again",
+                super::layout::FORCE_VERSION,
+                super::layout::PLACE_VERSION
             ),
             Self::Packing { found } => write!(
                 f,

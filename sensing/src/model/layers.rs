@@ -1,7 +1,7 @@
 //! The reader of a model's layers, and the proof that none of their sums can overflow.
 
 use super::{
-    Layer, MAX_LAYERS, MAX_WIDTH, ModelError, OUTPUTS, Row,
+    Layer, MAX_LAYERS, MAX_WIDTH, ModelError, Row,
     packing::{
         LOADED_AHEAD, MAX_ACTIVATION8, MAX_ACTIVATION16, ROWS_TOGETHER, WeightWidth, unpack8,
         unpack16,
@@ -16,6 +16,7 @@ const LARGEST_INPUT: u16 = 1 << 15;
 pub(super) fn layers<'a>(
     reader: &mut Reader<'a>,
     count: usize,
+    outputs: usize,
 ) -> Result<[Layer<'a>; MAX_LAYERS], ModelError> {
     let mut layers = [Layer::default(); MAX_LAYERS];
     let (mut fed, mut largest) = (FEATURES, LARGEST_INPUT);
@@ -38,10 +39,10 @@ pub(super) fn layers<'a>(
         (fed, largest) = (layer.outputs, layer.largest_activation);
         *slot = layer;
     }
-    if count > 0 && fed != OUTPUTS {
+    if count > 0 && fed != outputs {
         return Err(ModelError::Chain {
             layer: count,
-            inputs: OUTPUTS,
+            inputs: outputs,
             fed,
         });
     }

@@ -2,7 +2,7 @@
 
 use super::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, MAX_LAYERS,
-    Model, ModelError, Origin, OutputKind, Rest, curves::closed_form, layers::layers,
+    Model, ModelError, Origin, OutputKind, Rest, curves::closed_form, layers::layers, place::place,
     reader::Reader, uncertainty::uncertainty,
 };
 use crate::{
@@ -15,8 +15,10 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// The first four bytes of a model file.
 pub(super) const MAGIC: [u8; 4] = *b"HVTM";
-/// The layout that this program reads and writes.
-pub(super) const VERSION: u16 = 3;
+/// The layout of models that tell forces.
+pub(super) const FORCE_VERSION: u16 = 3;
+/// The layout of models that tell forces and their places.
+pub(super) const PLACE_VERSION: u16 = 4;
 /// How the weights lie: `packing`.
 pub(super) const PACKING: u8 = 1;
 /// Bytes of the preset's name, filled up with zeros.
@@ -29,17 +31,13 @@ const LARGEST_SIDE: u16 = 800;
 const LARGEST_RECT: i64 = (LARGEST_SIDE as i64 * LARGEST_SIDE as i64) << 16;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
-    let (body, crc) = frame(bytes)?;
+    let (body, crc, version) = frame(bytes)?;
     let mut reader = Reader {
         bytes: body,
         offset: HEADER_LENGTH,
     };
     let layer_count = reader.u16_in("layer count", 0, MAX_LAYERS as u16, "0 to 8")? as usize;
-    let output = reader.choice(
-        "output kind",
-        &[OutputKind::ForceVector, OutputKind::AnglesMagnitude],
-        "0 or 1",
-    )?;
+    let output = output_kind(&mut reader, version)?;
     let has_closed_form = reader.choice("closed form", &[false, true], "0 or 1")?;
     if layer_count == 0 && !has_closed_form {
         return Err(ModelError::Field {
@@ -58,13 +56,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
     let conditions = conditions(&mut reader)?;
     let rest = rest(&mut reader)?;
     let input = input_scaling(&mut reader)?;
-    let range = range(&mut reader)?;
-    let uncertainty = uncertainty(&mut reader)?;
+    let mut range = range(&mut reader)?;
+    let mut uncertainty = uncertainty(&mut reader)?;
+    if output.tells_place() {
+        range.place = place(&mut reader, &mut uncertainty)?;
+    }
     let closed_form = match has_closed_form {
         true => Some(closed_form(&mut reader)?),
         false => None,
     };
-    let layers = layers(&mut reader, layer_count)?;
+    let layers = layers(&mut reader, layer_count, output.count())?;
     if reader.offset != body.len() {
         let announced = (reader.offset + CRC_LENGTH) as u32;
         return Err(ModelError::Length {
@@ -90,8 +91,36 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
 pub(super) const HEADER_LENGTH: usize = 12;
 const CRC_LENGTH: usize = 4;
 
-/// Checks what surrounds the body; gives everything before the checksum, and the checksum.
-fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
+/// The layout that a model of these outputs has.
+#[cfg(any(test, feature = "encode"))]
+pub(super) fn version(output: OutputKind) -> u16 {
+    match output.tells_place() {
+        true => PLACE_VERSION,
+        false => FORCE_VERSION,
+    }
+}
+
+fn output_kind(reader: &mut Reader<'_>, version: u16) -> Result<OutputKind, ModelError> {
+    let offset = reader.offset;
+    let kinds = [
+        OutputKind::ForceVector,
+        OutputKind::AnglesMagnitude,
+        OutputKind::ForceAndPlace,
+    ];
+    let kind = reader.choice("output kind", &kinds, "0, 1 or 2")?;
+    if kind.tells_place() == (version == PLACE_VERSION) {
+        return Ok(kind);
+    }
+    Err(ModelError::Field {
+        name: "output kind",
+        offset,
+        allowed: "0 or 1 in version 3, 2 in version 4",
+    })
+}
+
+/// Checks what surrounds the body; gives everything before the checksum, the checksum and the
+/// version.
+fn frame(bytes: &[u8]) -> Result<(&[u8], u32, u16), ModelError> {
     if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
         return Err(ModelError::NotAModel);
     }
@@ -99,9 +128,9 @@ fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
         bytes,
         offset: MAGIC.len(),
     };
-    let found = reader.u16()?;
-    if found != VERSION {
-        return Err(ModelError::Version { found });
+    let version = reader.u16()?;
+    if ![FORCE_VERSION, PLACE_VERSION].contains(&version) {
+        return Err(ModelError::Version { found: version });
     }
     let found = reader.u8()?;
     if found != PACKING {
@@ -128,7 +157,7 @@ fn frame(bytes: &[u8]) -> Result<(&[u8], u32), ModelError> {
     if body.len() < HEADER_LENGTH {
         return Err(short);
     }
-    Ok((body, stored))
+    Ok((body, stored, version))
 }
 
 fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
@@ -324,5 +353,6 @@ fn range(reader: &mut Reader<'_>) -> Result<CalibratedRange, ModelError> {
         magnitude: MicroNewtons(reader.positive("largest force")?),
         alpha: MilliDegrees(reader.i32_in("largest alpha", 90_000, "0 to 90000")?),
         beta: MilliDegrees(reader.i32_in("largest beta", 90_000, "0 to 90000")?),
+        place: Micrometres(0),
     })
 }

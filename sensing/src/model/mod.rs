@@ -15,6 +15,7 @@ mod layer_tests;
 mod layers;
 mod layout;
 mod packing;
+mod place;
 mod reader;
 #[cfg(test)]
 pub(crate) mod samples;
@@ -39,7 +40,7 @@ use crate::{
     geometry::{Geometry, Preset},
     markers::pattern::{Pattern, distance},
     threshold::Threshold,
-    units::{MicroNewtons, MilliDegrees, Px},
+    units::{MicroNewtons, Micrometres, MilliDegrees, Px},
 };
 use core::fmt::Write;
 
@@ -49,8 +50,10 @@ pub const MAX_WIDTH: usize = 512;
 pub const MAX_LAYERS: usize = 8;
 /// The longest side of a picture, px.
 const LARGEST_SIDE: i32 = 800;
-/// What the last layer gives: three numbers.
+/// Outputs that say a force, the first ones of every model.
 pub const OUTPUTS: usize = 3;
+/// Outputs that say where the tip is, after those of the force.
+pub const PLACE_OUTPUTS: usize = 2;
 
 /// A model, borrowed from the bytes of its file and proven sound.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +64,7 @@ pub struct Model<'a> {
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// What the three outputs are.
+    /// What the outputs are.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
     pub range: CalibratedRange,
@@ -145,16 +148,35 @@ pub struct InputScaling {
     pub shifts: [u8; FEATURES],
 }
 
-/// What the three outputs are.
+/// What the outputs of the last layer are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OutputKind {
     /// Fx, Fy, Fz in µN.
     ForceVector,
     /// α and β in thousandths of a degree, |F| in µN.
     AnglesMagnitude,
+    /// Fx, Fy, Fz in µN, and p_x, p_y in µm: the point of the film that the tip is on, by where it
+    /// rests, film frame.
+    ForceAndPlace,
 }
 
-/// The forces a model was trained or calibrated on: 0 to `magnitude`, both angles to ± their limit.
+impl OutputKind {
+    /// How many outputs there are: 3, or 5 with a place.
+    pub const fn count(self) -> usize {
+        match self {
+            OutputKind::ForceVector | OutputKind::AnglesMagnitude => OUTPUTS,
+            OutputKind::ForceAndPlace => OUTPUTS + PLACE_OUTPUTS,
+        }
+    }
+
+    /// Whether the place of the tip is among them.
+    pub const fn tells_place(self) -> bool {
+        matches!(self, OutputKind::ForceAndPlace)
+    }
+}
+
+/// The forces a model was trained or calibrated on: 0 to `magnitude`, both angles and both
+/// coordinates of the place to ± their limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CalibratedRange {
     /// Largest |F|, > 0.
@@ -163,6 +185,8 @@ pub struct CalibratedRange {
     pub alpha: MilliDegrees,
     /// Largest |β|, 0–90°.
     pub beta: MilliDegrees,
+    /// Largest |p_x| and |p_y|, 1 to 1,000,000 µm; 0 in a model that does not tell places.
+    pub place: Micrometres,
 }
 
 impl Rest {

@@ -48,12 +48,25 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
             magnitude: MicroNewtons(1_000_000),
             alpha: MilliDegrees(15_000),
             beta: MilliDegrees(14_000),
+            place: Micrometres(0),
         },
         uncertainty: Uncertainty::constant(UncertaintyKnot {
             across: MicroNewtons(1_270),
             along: MicroNewtons(800),
+            place: Micrometres(0),
         }),
     }
+}
+
+/// As [`spec`], for a force and its place: places to 4 mm, known to 120 µm.
+pub(crate) fn place_spec(widths: &[u16]) -> ModelSpec {
+    let mut spec = spec(widths);
+    spec.output = OutputKind::ForceAndPlace;
+    spec.range.place = Micrometres(4_000);
+    for knot in &mut spec.uncertainty.knots {
+        knot.place = Micrometres(120);
+    }
+    spec
 }
 
 /// As [`spec`], with int16 weights and activations of up to `largest_activation` in every layer.
@@ -156,7 +169,14 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
     spec.rest.areas = [0; 4].map(|_: u32| 1 + next() % 640_000);
     spec.input.multipliers = [0; 11].map(|_: u32| 1 + (next() >> 9));
     spec.input.shifts = [0; 11].map(|_: u8| 1 + (next() % 62) as u8);
-    spec.output = [OutputKind::ForceVector, OutputKind::AnglesMagnitude][next() as usize % 2];
+    if !spec.output.tells_place() {
+        spec.output = [OutputKind::ForceVector, OutputKind::AnglesMagnitude][next() as usize % 2];
+    } else {
+        spec.range.place = Micrometres(1 + next() % 1_000_000);
+        for knot in &mut spec.uncertainty.knots {
+            knot.place = Micrometres(next() % 1_000_001);
+        }
+    }
     spec.range.magnitude = MicroNewtons(1 + (next() >> 2) as i32);
     spec.range.alpha = MilliDegrees((next() % 90_001) as i32);
     spec.uncertainty.step_bits = (next() % 28) as u8;

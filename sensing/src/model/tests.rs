@@ -1,5 +1,5 @@
 use super::encode::LayerSpec;
-use super::samples::{read_back, scramble, spec};
+use super::samples::{place_spec, read_back, scramble, spec};
 use super::*;
 use proptest::prelude::*;
 use std::{string::ToString, vec, vec::Vec};
@@ -22,6 +22,58 @@ fn what_is_written_is_read() {
         let spec = spec(widths);
         let bytes = spec.encode().unwrap();
         assert_eq!(read_back(&Model::parse(&bytes).unwrap()), spec);
+    }
+}
+
+#[test]
+fn a_model_of_places_is_written_and_read() {
+    for widths in [&[11, 5][..], &[11, 64, 64, 5]] {
+        let spec = place_spec(widths);
+        let bytes = spec.encode().unwrap();
+        assert_eq!(bytes[4..6], [4, 0], "its version");
+        let model = Model::parse(&bytes).unwrap();
+        assert_eq!(read_back(&model), spec);
+        assert_eq!(model.range.place, Micrometres(4_000));
+    }
+    assert_eq!(spec(&[11, 3]).encode().unwrap()[4..6], [3, 0]);
+}
+
+/// Offsets of `docs/model-file.md`, with a forbidden value for each.
+#[test]
+fn every_field_of_places_is_checked() {
+    let good = place_spec(&[11, 5]).encode().unwrap();
+    for (offset, value, name) in [
+        (4, 3, "output kind"),
+        (14, 0, "output kind"),
+        (14, 1, "output kind"),
+        (15, 1, "output kind"),
+        (391, 1, "largest place"),
+        (395, 1, "uncertainty of the place"),
+        (455, 0x80, "uncertainty of the place"),
+        (457, 4, "layer inputs"),
+    ] {
+        let mut bytes = good.clone();
+        bytes[offset] = value;
+        reseal(&mut bytes);
+        match Model::parse(&bytes) {
+            Err(ModelError::Field { name: found, .. }) => assert_eq!(found, name, "byte {offset}"),
+            other => panic!("byte {offset}: {other:?}"),
+        }
+    }
+    let mut nowhere = place_spec(&[11, 5]);
+    nowhere.range.place = Micrometres(0);
+    assert!(nowhere.encode().is_err());
+}
+
+#[test]
+fn as_many_outputs_as_the_kind_says() {
+    for (spec, outputs, fed) in [(spec(&[11, 5]), 3, 5), (place_spec(&[11, 3]), 5, 3)] {
+        let wrong = ModelError::Chain {
+            layer: 1,
+            inputs: outputs,
+            fed,
+        };
+        assert_eq!(spec.encode(), Err(wrong));
     }
 }
 
@@ -58,6 +110,7 @@ fn every_field_is_checked() {
         (12, 0, "layer count"),
         (12, 9, "layer count"),
         (14, 2, "output kind"),
+        (14, 3, "output kind"),
         (15, 2, "closed form"),
         (16, b'O', "preset name"),
         (31, b'x', "preset name"),
@@ -312,8 +365,10 @@ proptest! {
     #[test]
     fn a_changed_file_is_refused_or_sound(
         changes in prop::collection::vec((12usize..700, any::<u8>()), 1..4),
+        tells_place: bool,
     ) {
-        let mut bytes = spec(&[11, 12, 3]).encode().unwrap();
+        let spec = if tells_place { place_spec(&[11, 12, 5]) } else { spec(&[11, 12, 3]) };
+        let mut bytes = spec.encode().unwrap();
         let end = bytes.len() - 4;
         for (offset, value) in changes {
             bytes[offset % end] = value;
@@ -329,9 +384,11 @@ proptest! {
         hidden in prop::collection::vec(1u16..40, 0..4),
         numbers in prop::collection::vec(any::<u32>(), 64),
         unit in prop::option::of(any::<[u8; 12]>()),
+        tells_place: bool,
     ) {
-        let widths: Vec<u16> = [11].into_iter().chain(hidden).chain([3]).collect();
-        let spec = scramble(spec(&widths), &numbers, unit);
+        let of = |last| -> Vec<u16> { [11].into_iter().chain(hidden.clone()).chain([last]).collect() };
+        let plain = if tells_place { place_spec(&of(5)) } else { spec(&of(3)) };
+        let spec = scramble(plain, &numbers, unit);
         let bytes = spec.encode().unwrap();
         prop_assert_eq!(read_back(&Model::parse(&bytes).unwrap()), spec);
     }

@@ -1,16 +1,19 @@
-//! How well a model knows its forces: two standard uncertainties over |F|, by linear interpolation between knots.
+//! How well a model knows its forces, and their places if it tells them: standard uncertainties over |F|, by linear
+//! interpolation between knots.
 //!
 //! A standard uncertainty σ is stated such that 95 of 100 errors lie within what a normal distribution of that σ says: the
 //! angle between true and found force within [`DIRECTION_BOUND`] · σ of the direction (two dimensions across the force), |F|
 //! within [`MAGNITUDE_BOUND`] · σ of |F|. Errors have long tails, so that this is not their root mean square.
 
 use super::{ModelError, reader::Reader};
-use crate::units::{MicroNewtons, MilliDegrees};
+use crate::units::{MicroNewtons, Micrometres, MilliDegrees};
 #[cfg(any(test, feature = "encode"))]
 use alloc::vec::Vec;
 
 /// The largest uncertainty at a knot; keeps sums and products within their types.
 pub const LARGEST_UNCERTAINTY: MicroNewtons = MicroNewtons((1 << 30) - 1);
+/// The largest uncertainty of a place at a knot: a metre.
+pub const LARGEST_PLACE_UNCERTAINTY: Micrometres = Micrometres(1_000_000);
 /// Beyond this no direction is known: half a turn.
 const NO_DIRECTION: MilliDegrees = MilliDegrees(180_000);
 /// The widest distance of knots: the last one is then at 2,013 N.
@@ -25,13 +28,16 @@ pub struct Uncertainty {
     pub knots: [UncertaintyKnot; Uncertainty::KNOTS],
 }
 
-/// Standard uncertainties at one |F|, each 0 to [`LARGEST_UNCERTAINTY`].
+/// Standard uncertainties at one |F|, those of forces 0 to [`LARGEST_UNCERTAINTY`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct UncertaintyKnot {
     /// Of the force's part across itself, in two dimensions: over |F| it is the direction's uncertainty in radians.
     pub across: MicroNewtons,
     /// Of |F|.
     pub along: MicroNewtons,
+    /// Of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 in a model that does
+    /// not tell places.
+    pub place: Micrometres,
 }
 
 impl Uncertainty {
@@ -53,6 +59,11 @@ impl Uncertainty {
         (angle(across, magnitude.0.max(0) as u32), knot.along)
     }
 
+    /// The standard uncertainty of each coordinate of the place, at this |F| ≥ 0.
+    pub fn place_at(&self, magnitude: MicroNewtons) -> Micrometres {
+        self.between(magnitude.0.max(0)).place
+    }
+
     fn between(&self, magnitude: i32) -> UncertaintyKnot {
         let last = self.knots[Self::KNOTS - 1];
         let index = (magnitude >> self.step_bits) as usize;
@@ -62,13 +73,16 @@ impl Uncertainty {
         let part = i64::from(magnitude - ((index as i32) << self.step_bits));
         let half = (1 << self.step_bits) >> 1;
         // At most 2³⁰ · 2²⁷, and the result lies between both ends.
-        let mix = |from: MicroNewtons, to: MicroNewtons| {
-            let rise = i64::from(to.0 - from.0);
-            MicroNewtons(from.0 + ((rise * part + half) >> self.step_bits) as i32)
+        let mix = |from: i32, to: i32| {
+            let rise = i64::from(to - from);
+            from + ((rise * part + half) >> self.step_bits) as i32
         };
+        // Places are below 2³⁰ µm, too.
+        let place = mix(from.place.0 as i32, to.place.0 as i32);
         UncertaintyKnot {
-            across: mix(from.across, to.across),
-            along: mix(from.along, to.along),
+            across: MicroNewtons(mix(from.across.0, to.across.0)),
+            along: MicroNewtons(mix(from.along.0, to.along.0)),
+            place: Micrometres(place.unsigned_abs()),
         }
     }
 
@@ -126,6 +140,7 @@ mod tests {
         UncertaintyKnot {
             across: MicroNewtons(across),
             along: MicroNewtons(along),
+            place: Micrometres(0),
         }
     }
 
@@ -152,6 +167,23 @@ mod tests {
         }
         let falling = growing(1000, -60);
         assert_eq!(falling.between(1536), knot(910, 5));
+    }
+
+    #[test]
+    fn a_place_is_interpolated_rising_and_falling() {
+        let place = |knots: [u32; 3], magnitude: i32| {
+            let mut table = Uncertainty::constant(knot(0, 0));
+            table.step_bits = 10;
+            for (knot, place) in table.knots.iter_mut().zip(knots) {
+                knot.place = Micrometres(place);
+            }
+            table.place_at(MicroNewtons(magnitude)).0
+        };
+        assert_eq!(place([900, 100, 300], 0), 900);
+        assert_eq!(place([900, 100, 300], 512), 500);
+        assert_eq!(place([900, 100, 300], 1024 + 256), 150);
+        assert_eq!(place([LARGEST_PLACE_UNCERTAINTY.0, 0, 0], 1), 999_023);
+        assert_eq!(place([900, 100, 300], i32::MAX), 0);
     }
 
     #[test]

@@ -148,6 +148,7 @@ fn the_largest_curves_and_displacements_are_limited_and_told() {
         let Output {
             values,
             input_saturated,
+            ..
         } = run(&form, &features);
         assert!(values.iter().all(|v| *v != i32::MIN), "{values:?}");
         assert!(input_saturated, "{signs:05b}: {values:?}");

@@ -12,7 +12,7 @@ use crate::{
     force::Force,
     formats::Formats,
     geometry::{Geometry, Preset},
-    markers::{Finder, Found, Marker, Trust},
+    markers::{Finder, Found, Marker, Reading, Trust},
     model::{CentroidEstimator, ContactReading, Model, Rest},
     network::Network,
     scanner::Scanner,
@@ -249,11 +249,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .as_ref()
             .filter(|model| settings.fit(&model.conditions));
         let rest = self.tare.or(fitting.map(|model| model.rest));
-        let contact = fitting.map_or(ContactReading::Force, |model| model.conditions.contact);
+        let reading = fitting.map_or(Reading::of(ContactReading::Force, false), |model| {
+            Reading::of(model.conditions.contact, model.output.tells_place())
+        });
         let own_rest = self.tare.is_some();
         self.prepared = Some(Prepared {
             finder: Finder::new(settings),
-            trust: rest.map(|rest| Trust::new(settings, &rest, own_rest, contact)),
+            trust: rest.map(|rest| Trust::new(settings, &rest, own_rest, reading)),
             standing: self.standing_status(),
             coarse_step: coarse_step(&settings.geometry),
         });
@@ -309,7 +311,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let model = self.model.as_ref()?;
         let tare = self.tare.as_ref().unwrap_or(&model.rest);
         let output = self.network.run(model, features, &tare.features);
-        let (force, trust) = Force::of_outputs(model, output.values);
+        let (force, trust) = Force::of_outputs(model, &output);
         *status |= trust;
         if output.input_saturated {
             *status |= Status::MAGNITUDE_OUT_OF_RANGE;
