@@ -100,7 +100,7 @@ fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
             }
         },
     )?;
-    Ok(read(&path)?)
+    read(&path)
 }
 
 fn read(path: &Path) -> Result<Vec<Solved>, Box<dyn Error>> {

@@ -194,7 +194,7 @@ proptest! {
         let scene = scene(Preset::Ov7725, (160, 120)).with_options(options).unwrap();
         let Ok(frame) = scene.render_load(&press(force_n, alpha, beta), 0) else {
             let [x, y, z] = press(force_n, alpha, beta).vector_n();
-            prop_assert!(force_n > 0.25 || x.hypot(y) > -0.8 * z, "{force_n} N is refused");
+            prop_assert!(force_n > 0.25 || libm::hypot(x, y) > -0.8 * z, "{force_n} N is refused");
             return Ok(());
         };
         for marker in frame.truth.markers.into_iter().flatten() {
