@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use hivtac_calibration::check::check;
 use hivtac_calibration::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, coverage};
+use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, by_place, coverage};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Weights};
 use hivtac_sensing::geometry::{Geometry, Preset};
@@ -26,11 +26,44 @@ fn committed_for_yuv422() -> Vec<u8> {
     fs::read(models().join("yuv422/default.hvtm")).unwrap()
 }
 
+/// The same for a tip anywhere.
+fn committed_for_places() -> Vec<u8> {
+    fs::read(models().join("anywhere/default.hvtm")).unwrap()
+}
+
+/// The tip within ±4 mm of the middle: each ring of a millimetre.
+#[test]
+fn the_model_for_a_tip_anywhere_measures_force_and_place() {
+    let recipe = Recipe {
+        loads: Loads::Random(1_500),
+        rest: 32,
+        seed: 79,
+        range: Range {
+            force_n: 0.25,
+            alpha_deg: 10.0,
+            beta_deg: 10.0,
+            place_mm: 4.0,
+        },
+        ..Recipe::default()
+    };
+    let dataset = generate(&recipe, || ()).unwrap();
+    let evaluation = Evaluation::of(&committed_for_places(), &dataset, None).unwrap();
+    let parts = by_place(&evaluation.judged);
+    assert!(parts.len() >= 8, "{parts:?}");
+    for part in &parts {
+        let place = part.place.unwrap();
+        assert!(part.direction_deg < 0.9, "{part:?}");
+        assert!(part.magnitude_n < 1e-3, "{part:?}");
+        assert!(place.each_mm < 0.08 && place.within > 0.85, "{part:?}");
+    }
+}
+
 #[test]
 fn committed_weights_give_the_committed_models() {
     for (weights, committed) in [
         ("default.weights", committed()),
         ("yuv422/default.weights", committed_for_yuv422()),
+        ("anywhere/default.weights", committed_for_places()),
     ] {
         let bytes = export(&Weights::load(&models().join(weights)).unwrap()).unwrap();
         assert!(
