@@ -104,7 +104,7 @@ fn tables_are_the_full_solution_everywhere() {
     assert!(nominal.rms_px < 0.2 * MOST_PX, "{nominal:?}");
     let other = check([SMALLEST_RADIUS_MM, LARGEST_RADIUS_MM]);
     assert!(other.worst_px < 4.0 * MOST_PX, "{other:?}");
-    assert!(other.rms_px < 0.4 * MOST_PX, "{other:?}");
+    assert!(other.rms_px < 0.5 * MOST_PX, "{other:?}");
 }
 
 #[test]
