@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use hivtac_scene::film::reduced::Unit;
 use hivtac_scene::film::{Film as ReducedFilm, MAX_RATIO};
-use hivtac_scene::{Camera, Disc, Load, MARKERS, Preset, SceneError};
+use hivtac_scene::{Camera, Disc, Load, Preset, SceneError};
 
 use crate::parallel::in_parallel;
 use crate::path::halton;
@@ -79,17 +79,13 @@ fn errors(
         .check(load)
         .map_err(|error| FilmError::Scene(error.to_string()))?;
     let pressed = reduced.press(load);
-    let distance = |k: usize| {
-        let disc = Disc {
-            centre_mm: pressed.centres_mm[k],
-            ..MARKERS[k]
-        };
+    let distance = |disc: Disc| {
         let full = disc.centroid_px(|rest| film.displacement(&state, rest), camera);
         let ours = disc.centroid_px(|rest| pressed.displacement(rest), camera);
         (full[0] - ours[0]).hypot(full[1] - ours[1])
     };
     let tip_mm = (0..3).map(|c| (pressed.tip_mm[c] - state.tip_mm[c]).powi(2));
-    Ok((tip_mm.sum::<f64>().sqrt(), std::array::from_fn(distance)))
+    Ok((tip_mm.sum::<f64>().sqrt(), reduced.markers().map(distance)))
 }
 
 /// A load of the stated domain, from a sequence that fills it evenly.

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use hivtac_film::{Design, Film, check, press_load};
 use hivtac_scene::film::Film as ReducedFilm;
 use hivtac_scene::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
-use hivtac_scene::{Camera, Contact, Disc, Load, MARKERS, Preset};
+use hivtac_scene::{Camera, Contact, Load, Preset};
 
 /// How far the reduced film's markers may be off, px at 320×240 `ov7725`.
 const MOST_PX: f64 = 0.1;
@@ -34,11 +34,7 @@ fn agree(unit: &Unit, loads: &[Load], most_px: f64) {
         for (a, b) in full.state.force_n.iter().zip(pressed.force_n) {
             assert!((a - b).abs() < 2e-3, "{load:?}: force {a} {b} N");
         }
-        for (id, marker) in MARKERS.iter().enumerate() {
-            let disc = Disc {
-                centre_mm: pressed.centres_mm[id],
-                ..*marker
-            };
+        for (id, disc) in reduced.markers().into_iter().enumerate() {
             let [[x, y], [a, b]] = [
                 disc.centroid_px(|rest| film.displacement(&full.state, rest), &CAMERA),
                 disc.centroid_px(|rest| pressed.displacement(rest), &CAMERA),
@@ -74,6 +70,10 @@ fn a_film_built_by_hand_is_its_full_solution() {
         ([0.01, -0.02, -0.1], [0.5, -0.3], 0.5),
         ([-0.03, 0.01, -0.15], [-2.5, 1.0], 0.5),
         ([0.0, 0.01, -0.03], [2.0, 3.0], 0.8),
+        // Beside glued markers.
+        ([0.01, 0.01, -0.1], [3.2, 3.0], 0.5),
+        ([0.0, -0.02, -0.1], [-2.9, -2.6], 0.5),
+        ([0.0, 0.0, -0.05], [-3.5, 2.9], 0.5),
     ];
     agree(&unit, &cases.map(load), MOST_PX_OF_A_UNIT);
 }

@@ -269,29 +269,29 @@ mod tests {
 
     #[test]
     fn every_effect_changes_a_moving_picture_and_says_how() {
-        let demo = Scene::preset("demo", Preset::Ov7725, 320, 240, 1).unwrap();
+        let sweep = Scene::preset("sweep", Preset::Ov7725, 320, 240, 1).unwrap();
         let names: BTreeSet<&str> = effects().iter().map(|effect| effect.name).collect();
         assert_eq!(names.len(), effects().len());
         for effect in effects() {
             assert!(!effect.what.is_empty());
-            let switched = effect.switch(&demo).unwrap();
-            let same = switched.frame(9, 0.4).to_rgb888() == demo.frame(9, 0.4).to_rgb888();
+            let switched = effect.switch(&sweep).unwrap();
+            let same = switched.frame(9, 4.9).to_rgb888() == sweep.frame(9, 4.9).to_rgb888();
             assert_eq!(same, effect.compare == Compare::Truth, "{}", effect.name);
-            assert_eq!(switched.motion(), demo.motion());
+            assert_eq!(switched.motion(), sweep.motion());
         }
     }
 
     #[test]
     fn an_effect_leaves_the_others_alone() {
-        let demo = Scene::preset("demo", Preset::Paper, 320, 240, 1).unwrap();
+        let sweep = Scene::preset("sweep", Preset::Paper, 320, 240, 1).unwrap();
         let dim = Options {
             gain: 0.7,
             ..Options::default()
         };
-        let demo = demo.with_options(dim).unwrap();
+        let sweep = sweep.with_options(dim).unwrap();
         let dims = ["dim light", "dark"];
         for effect in effects() {
-            let kept = effect.switch(&demo).unwrap().options().gain == 0.7;
+            let kept = effect.switch(&sweep).unwrap().options().gain == 0.7;
             assert_eq!(kept, !dims.contains(&effect.name), "{}", effect.name);
         }
     }

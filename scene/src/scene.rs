@@ -7,7 +7,9 @@ use crate::frame::Raster;
 use crate::light::{Light, STEPS};
 use crate::motion::Motion;
 use crate::noise::{LOTS, Noise};
-use crate::{Camera, Disc, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Truth};
+use crate::{
+    Camera, Disc, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Shutter, Truth,
+};
 
 /// A simulated sensor and what presses it. Frames depend on nothing but the scene and the arguments.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,12 +118,23 @@ impl Scene {
 
     /// The frame taken at a time in seconds; its number selects its noise.
     pub fn frame(&self, number: u64, time_s: f64) -> Frame {
-        self.expose(|after_s| self.motion.load(time_s + after_s), number)
+        self.frame_by(&self.options.shutter, number, time_s)
+    }
+
+    /// The same by a camera with another shutter, whose times are in their ranges.
+    pub fn frame_by(&self, shutter: &Shutter, number: u64, time_s: f64) -> Frame {
+        let load = |after_s| self.motion.load(time_s + after_s);
+        self.expose(&self.exposure(shutter, load), number)
     }
 
     /// What is true at a time in seconds, without rendering.
     pub fn truth(&self, time_s: f64) -> Truth {
-        let exposure = self.exposure(|after_s| self.motion.load(time_s + after_s));
+        self.truth_by(&self.options.shutter, time_s)
+    }
+
+    /// The same of a camera with another shutter, whose times are in their ranges.
+    pub fn truth_by(&self, shutter: &Shutter, time_s: f64) -> Truth {
+        let exposure = self.exposure(shutter, |after_s| self.motion.load(time_s + after_s));
         self.truth_of(&exposure, &self.marker_images(&exposure))
     }
 
@@ -131,7 +144,7 @@ impl Scene {
     /// When the film cannot take the load.
     pub fn truth_under(&self, load: &Load) -> Result<Truth, SceneError> {
         self.options.film.check(&self.film, load)?;
-        let exposure = self.exposure(|_| *load);
+        let exposure = self.exposure(&self.options.shutter, |_| *load);
         Ok(self.truth_of(&exposure, &self.marker_images(&exposure)))
     }
 
@@ -141,25 +154,29 @@ impl Scene {
     /// When the film cannot take the load.
     pub fn render_load(&self, load: &Load, number: u64) -> Result<Frame, SceneError> {
         self.options.film.check(&self.film, load)?;
-        Ok(self.expose(|_| *load, number))
+        let exposure = self.exposure(&self.options.shutter, |_| *load);
+        Ok(self.expose(&exposure, number))
     }
 
-    fn exposure<L: Fn(f64) -> Load>(&self, load: L) -> Exposure<'_, L> {
+    fn exposure<'a, L: Fn(f64) -> Load>(
+        &'a self,
+        shutter: &'a Shutter,
+        load: L,
+    ) -> Exposure<'a, L> {
         Exposure {
             film: &self.film,
             mechanics: &self.options.film,
             camera: &self.camera,
             lens: &self.options.lens,
-            shutter: &self.options.shutter,
+            shutter,
             now: self.options.film.seen(&self.film, &load(0.0)),
             load,
         }
     }
 
-    fn expose(&self, load: impl Fn(f64) -> Load, number: u64) -> Frame {
-        let exposure = self.exposure(load);
-        let markers = self.marker_images(&exposure);
-        let picture = self.picture(&exposure, &markers);
+    fn expose<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>, number: u64) -> Frame {
+        let markers = self.marker_images(exposure);
+        let picture = self.picture(exposure, &markers);
         let Raster { words, bytes } = self.digitize(&picture, number);
         Frame {
             width: self.camera.width(),
@@ -167,7 +184,7 @@ impl Scene {
             format: self.options.format,
             pixels: words,
             mono: bytes,
-            truth: self.truth_of(&exposure, &markers),
+            truth: self.truth_of(exposure, &markers),
         }
     }
 

@@ -148,22 +148,8 @@ fn pick([x, _, z]: [f64; 3]) -> Row {
 /// How outputs answer to the force along x, y and z as they are seen.
 fn by_force(mirror: &Mirror, solved: &Solved, of: impl Fn(&Moved) -> Row) -> [Row; 3] {
     let by = |axis: usize| of(&answer(solved, Change::Force(axis)));
-    // A unit of force along a seen axis is one of these along the film's own.
-    let unit = |seen: usize| {
-        let mut sum: Row = Vec::new();
-        for own in 0..3 {
-            let mut along = [0.0; 3];
-            along[own] = 1.0;
-            let part = mirror.vector(along)[seen];
-            let row = by(own);
-            sum.resize(row.len(), 0.0);
-            for (sum, value) in sum.iter_mut().zip(row) {
-                *sum += part * value;
-            }
-        }
-        sum
-    };
-    [unit(0), unit(1), unit(2)]
+    let [x, y] = mirror.components([by(0), by(1)]);
+    [x, y, by(2)]
 }
 
 /// Slopes by size and tilt from those by force.
@@ -193,13 +179,8 @@ fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
 /// Second differences of the motion around a marker: along x by xx, xy and yy, along z by xx and xy.
 fn bends(mirror: &Mirror, around: &[[f64; 3]; 9]) -> Row {
     let at = |i: i32, j: i32| {
-        // The point of the film that is seen there: a mirror's way back is its transpose.
-        let own = |x: [f64; 2]| {
-            Mirror::all()
-                .find(|m| undoes(m, mirror))
-                .map(|m| m.along(x))
-        };
-        let [x, y] = own([f64::from(i), f64::from(j)]).unwrap_or_default();
+        // The point of the film that is seen there.
+        let [x, y] = mirror.back().along([f64::from(i), f64::from(j)]);
         let index = 3 * (y.round() as i32 + 1) + x.round() as i32 + 1;
         mirror.vector(around[index as usize])
     };
@@ -215,11 +196,6 @@ fn bends(mirror: &Mirror, around: &[[f64; 3]; 9]) -> Row {
         second(1, 0, 2),
         mixed(2),
     ]
-}
-
-fn undoes(one: &Mirror, other: &Mirror) -> bool {
-    let there_and_back = |v: [f64; 2]| same(one.along(other.along(v)), v);
-    there_and_back([1.0, 0.0]) && there_and_back([0.0, 1.0])
 }
 
 /// What a film's own differences add at a load that the nominal film would be pressed as far by.
@@ -241,11 +217,8 @@ fn by_unit(mirror: &Mirror, solved: &Solved, pose: &Pose) -> Row {
     row.extend(of(&answer(solved, Change::Grip)));
     for corner in hivtac_scene::MARKERS {
         let post = mirror.seen_as(corner.centre_mm);
-        let by = [0, 1].map(|way| {
-            let told = of(&answer(solved, Change::Post(post, way)));
-            [told[0], told[1]]
-        });
-        row.extend(mirror.components(by).as_flattened());
+        let by = [0, 1].map(|way| of(&answer(solved, Change::Post(post, way))));
+        row.extend(mirror.components(by).concat());
     }
     row
 }

@@ -65,10 +65,18 @@ impl Mirror {
         }
     }
 
-    /// Something that was differentiated by the two or three components of a vector.
-    pub fn components<const N: usize>(&self, by: [[f64; N]; 2]) -> [[f64; N]; 2] {
-        let mix = |[x, y]: [f64; 2]| std::array::from_fn(|k| x * by[0][k] + y * by[1][k]);
-        self.0.map(mix)
+    /// The way back: a mirror's inverse is its transpose.
+    pub fn back(&self) -> Mirror {
+        let [[a, b], [c, d]] = self.0;
+        Mirror([[a, c], [b, d]])
+    }
+
+    /// Rows that were differentiated by the components of a vector along the film.
+    pub fn components(&self, [by_x, by_y]: [Vec<f64>; 2]) -> [Vec<f64>; 2] {
+        self.0.map(|[a, b]| {
+            let pairs = by_x.iter().zip(&by_y);
+            pairs.map(|(x, y)| a * x + b * y).collect()
+        })
     }
 }
 
@@ -94,6 +102,7 @@ mod tests {
             let seen = mirror.disc(&disc);
             for at in [[0.3, 0.1], [-0.2, 0.5]] {
                 let expected = mirror.vector(disc.at(at));
+                assert_eq!(mirror.back().along(mirror.along(at)), at);
                 for (a, b) in seen.at(mirror.along(at)).iter().zip(expected) {
                     assert!((a - b).abs() < 1e-12, "{mirror:?}");
                 }

@@ -70,22 +70,17 @@ impl Stage {
 
     /// The load of a tilt, with the tip slid so far, in parts of its depth.
     fn reached(&self, film: &impl Felt, tilt: [f64; 2], slid: [f64; 2]) -> Reached {
-        let angle = libm::hypot(tilt[0], tilt[1]);
-        let part = if angle > 0.0 {
-            libm::sin(angle) / angle
-        } else {
-            1.0
-        };
-        let [x, y] = self.tangents;
-        let way = libm::sqrt(x * x + y * y + 1.0);
-        let along = (part * (tilt[0] * x + tilt[1] * y) + libm::cos(angle)) / way;
-        let magnitude_n = self.force_n / along;
-        let size = film.size_of(magnitude_n);
         let mut pose = Pose {
-            size,
+            size: 0.0,
             tilt,
             place_mm: self.offset_mm,
         };
+        let [x, y] = self.tangents;
+        let way = libm::sqrt(x * x + y * y + 1.0);
+        let [dx, dy, dz] = pose.direction();
+        let along = (dx * x + dy * y - dz) / way;
+        let magnitude_n = self.force_n / along;
+        pose.size = film.size_of(magnitude_n);
         // The depth hardly depends on the place.
         for _ in 0..if slid == [0.0; 2] { 0 } else { 3 } {
             let depth = -film.tip_mm(&pose)[2];

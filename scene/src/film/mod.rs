@@ -10,8 +10,8 @@ pub mod reduced;
 
 use std::sync::{Arc, LazyLock};
 
-use crate::{Contact, Load, MARKERS, SceneError};
-use label::{Felt, Stage};
+use crate::{Contact, Disc, Load, MARKERS, SceneError};
+use label::{Felt, Reached, Stage};
 use reduced::{
     LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit,
 };
@@ -70,12 +70,6 @@ impl Film {
         })
     }
 
-    /// The same film with other tables.
-    pub fn with_tables(mut self, tables: Tables) -> Film {
-        self.tables = Arc::new(tables);
-        self
-    }
-
     /// Whether the film can take this load.
     ///
     /// # Errors
@@ -121,7 +115,10 @@ impl Film {
             };
         }
         let (pose, force_n) = match load.contact() {
-            Contact::Force => (self.pose(load), load.vector_n()),
+            Contact::Force => (
+                self.pose(load.vector_n(), load.offset_mm()),
+                load.vector_n(),
+            ),
             Contact::Stick => self.on_stage(load, MAX_RATIO),
             Contact::Slip { mu } => self.on_stage(load, mu),
         };
@@ -134,10 +131,10 @@ impl Film {
         }
     }
 
-    /// The load of a force, at the tables' limit where it is beyond.
-    fn pose(&self, load: &Load) -> Pose {
+    /// The load of a force, N, at a place, mm; at the tables' limit where it is beyond.
+    fn pose(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> Pose {
         let stiffness = self.unit.bending_and_stretching();
-        let mut pose = Pose::of_force(load.vector_n(), load.offset_mm(), stiffness);
+        let mut pose = Pose::of_force(force_n, place_mm, stiffness);
         let steep = libm::hypot(pose.tilt[0], pose.tilt[1]) / LARGEST_TILT;
         pose.size = pose.size.min(LARGEST_SIZE);
         pose.tilt = pose.tilt.map(|part| part / steep.max(1.0));
@@ -157,24 +154,18 @@ impl Film {
             film: self,
             radius_mm: load.tip_radius_mm(),
         };
-        let reached = stage.reach(&under);
-        let [x, y] = reached.pose.tilt;
-        let angle = libm::hypot(x, y);
-        let part = if angle > 0.0 {
-            libm::sin(angle) / angle
-        } else {
-            1.0
-        };
-        let direction = [part * x, part * y, -libm::cos(angle)];
-        (
-            reached.pose,
-            direction.map(|part| reached.magnitude_n * part),
-        )
+        let Reached { pose, magnitude_n } = stage.reach(&under);
+        (pose, pose.direction().map(|part| magnitude_n * part))
     }
 
-    /// Where the markers' centres rest, by identity, mm.
-    pub fn centres_mm(&self) -> [[f64; 2]; 4] {
-        std::array::from_fn(|k| MARKERS[k].moved(self.unit.markers_mm[k]).centre_mm)
+    /// The markers at rest, by identity.
+    pub fn markers(&self) -> [Disc; 4] {
+        std::array::from_fn(|k| MARKERS[k].moved(self.unit.markers_mm[k]))
+    }
+
+    /// Where their centres are, mm.
+    fn centres_mm(&self) -> [[f64; 2]; 4] {
+        self.markers().map(|disc| disc.centre_mm)
     }
 }
 
@@ -190,9 +181,7 @@ impl Felt for Under<'_> {
     }
 
     fn size_of(&self, force_n: f64) -> f64 {
-        let stiffness = self.film.unit.bending_and_stretching();
-        let straight = Pose::of_force([0.0, 0.0, -force_n], [0.0; 2], stiffness);
-        straight.size.min(LARGEST_SIZE)
+        self.film.pose([0.0, 0.0, -force_n], [0.0; 2]).size
     }
 }
 

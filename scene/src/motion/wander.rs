@@ -1,4 +1,4 @@
-//! `demo` and `sweep`: through the paper's whole range.
+//! `demo`, all over the film, and `sweep`, in its middle: through the paper's whole range.
 
 use std::f64::consts::PI;
 
@@ -10,13 +10,15 @@ use crate::noise::mix;
 const FULL_N: f64 = 0.2;
 /// How long `demo` rests before the tip comes, s: three frames at 30 per second.
 const DEMO_REST_S: f64 = 0.1;
+/// How far from the film's middle the tip of `demo` comes along x and y, mm.
+const DEMO_REACH_MM: f64 = 3.0;
 /// `sweep` goes up and down once in this time, s.
 const SWEEP_S: f64 = 4.0;
 /// The directions of `sweep`, (α, β) in degrees, one after the other.
 const SWEEP_DIRECTIONS: [(f64, f64); 5] =
     [(0.0, 0.0), (8.0, 0.0), (-8.0, 0.0), (0.0, 6.0), (0.0, -6.0)];
 
-/// A tenth of a second of rest, then a tip whose force wanders smoothly.
+/// A tenth of a second of rest, then a tip that wanders over the film, as its force does.
 pub(super) fn demo(time_s: f64, seed: u64) -> Load {
     let pressed_s = time_s - DEMO_REST_S;
     if pressed_s < 0.0 {
@@ -26,11 +28,14 @@ pub(super) fn demo(time_s: f64, seed: u64) -> Load {
     let phase = |index: u64| (mix(seed.wrapping_add(index)) >> 40) as f64 / f64::from(1 << 24);
     // A quarter period back: the tip comes with the smallest force.
     let magnitude_n = 0.11 + 0.09 * wave(0.9, -0.25);
-    load(
+    let place_mm =
+        [(1.7, 3), (1.1, 4)].map(|(period_s, index)| DEMO_REACH_MM * wave(period_s, phase(index)));
+    let force = load(
         magnitude_n,
         8.0 * wave(1.3, phase(1)),
         6.0 * wave(0.7, phase(2)),
-    )
+    );
+    force.with_offset_mm(place_mm).unwrap_or(force)
 }
 
 /// Up and down, in one direction after the other.
@@ -57,6 +62,8 @@ mod tests {
             let load = at_frame(frame);
             assert!((0.02 - 1e-12..=FULL_N + 1e-12).contains(&load.magnitude_n()));
             assert!(load.alpha_deg().abs() <= 8.0 && load.beta_deg().abs() <= 6.0);
+            let far_mm = load.offset_mm().map(f64::abs);
+            assert!(far_mm.iter().all(|&mm| mm <= DEMO_REACH_MM));
         }
     }
 
@@ -68,9 +75,14 @@ mod tests {
             let sizes = loads.iter().map(Load::magnitude_n);
             assert!(sizes.clone().fold(0.0, f64::max) > 0.19);
             assert!(sizes.fold(1.0, f64::min) < 0.03);
+            let far_mm = loads.iter().map(|load| load.offset_mm()[1].abs());
+            assert!(far_mm.fold(0.0, f64::max) > 2.0);
             for pair in loads.windows(2) {
                 assert!((pair[0].magnitude_n() - pair[1].magnitude_n()).abs() < 0.025);
                 assert!((pair[0].alpha_deg() - pair[1].alpha_deg()).abs() < 1.5);
+                let [from, to] = [0, 1].map(|k| pair[k].offset_mm());
+                let far_mm = libm::hypot(from[0] - to[0], from[1] - to[1]);
+                assert!(far_mm < 0.8, "{far_mm}");
             }
         }
     }

@@ -5,7 +5,7 @@ use super::pose::Pose;
 use super::table::Table;
 use super::terms::Terms;
 use super::unit::Unit;
-use crate::film::DiscMotion;
+use crate::film::{DiscMotion, MAX_PLACE_MM};
 use crate::{MARKERS, SceneError};
 
 /// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the marker is.
@@ -24,6 +24,8 @@ pub const NOMINAL_RADIUS_MM: f64 = 0.5;
 pub const LARGEST_RADIUS_MM: f64 = 2.0;
 /// The smallest, mm.
 pub const SMALLEST_RADIUS_MM: f64 = 0.25;
+/// How far before and behind it is seen what changes on the way of a marker and a tip, in parts of that.
+const STEP: f64 = 0.1;
 /// What a film's own differences are: thickness, grip, and the posts' places along x and y.
 pub const UNIT_PARTS: usize = 10;
 
@@ -140,28 +142,25 @@ impl Tables {
     pub fn tip_mm(&self, pose: &Pose, radius_mm: f64) -> [f64; 3] {
         let signs = pose.place_mm.map(|part| 1.0_f64.copysign(part));
         let here = pose.mirrored(signs);
-        let [[x, z], [y, _]] = [here, here.swapped()].map(|pose| {
-            let table = self.table(Kind::Tip);
-            let [along, down] = table.sums(&table.at(&pose), 0);
-            let [more, deeper] = self.by_radius(Kind::TipRadius, &pose, radius_mm);
-            [along + more, down + deeper]
-        });
+        let kinds = [Kind::Tip, Kind::TipRadius];
+        let [x, z] = self.under(kinds, &here, radius_mm);
+        let [y] = self.under(kinds, &here.swapped(), radius_mm);
         [signs[0] * x, signs[1] * y, z]
     }
 
     /// How the film moves around each marker's place, `markers_mm` beside the nominal one.
     pub fn discs(&self, pose: &Pose, radius_mm: f64, unit: &Unit) -> [DiscMotion; 4] {
+        let parts = unit.parts();
+        let differs = parts != [0.0; UNIT_PARTS];
         std::array::from_fn(|k| {
             let signs = MARKERS[k].centre_mm.map(f64::signum);
             let here = pose.mirrored(signs);
-            let parts = [unit, &Unit::default()].map(|unit| mirrored(unit.parts(), signs));
-            let [own, nominal] = parts;
-            let own = (own != nominal).then_some(own);
-            let mut disc = self.corner_disc(&here, radius_mm, own.as_ref());
-            if unit.markers_mm[k] != [0.0; 2] {
-                let [x, y] = unit.markers_mm[k];
-                disc = self.beside(disc, &here, [signs[0] * x, signs[1] * y]);
-            }
+            let own = differs.then(|| mirrored(parts, signs));
+            let [x, y] = unit.markers_mm[k];
+            let disc = match [signs[0] * x, signs[1] * y] {
+                [0.0, 0.0] => self.corner_disc(&here, radius_mm, own.as_ref()),
+                beside_mm => self.beside(&here, radius_mm, own.as_ref(), beside_mm),
+            };
             mirrored_disc(disc, signs)
         })
     }
@@ -169,12 +168,14 @@ impl Tables {
     /// Marker 2's motion.
     fn corner_disc(&self, pose: &Pose, radius_mm: f64, own: Option<&Parts>) -> DiscMotion {
         let poses = [*pose, pose.swapped()];
-        let [[ux, uz], [uy, _]] = [0, 1].map(|k| {
-            let [along, away] = self.moved(&poses[k], radius_mm);
-            let parts = own.map(|own| if k == 0 { *own } else { swapped(*own) });
-            let [more, farther] = parts.map_or([0.0; 2], |own| self.by_unit(&poses[k], &own));
-            [along + more, away + farther]
-        });
+        let kinds = [Kind::Moved, Kind::Radius];
+        let [mut ux, mut uz] = self.under(kinds, &poses[0], radius_mm);
+        let [mut uy] = self.under(kinds, &poses[1], radius_mm);
+        if let Some(own) = own {
+            let [along, away] = self.by_unit(&poses[0], own);
+            let [across, _] = self.by_unit(&poses[1], &swapped(*own));
+            (ux, uy, uz) = (ux + along, uy + across, uz + away);
+        }
         let table = self.table(Kind::Slopes);
         let slopes = poses.map(|pose| table.sums::<3>(&table.at(&pose), 0));
         let [[xx, xy, zx], [yy, yx, zy]] = slopes;
@@ -185,12 +186,17 @@ impl Tables {
         }
     }
 
-    /// Marker 2's motion along x and z.
-    fn moved(&self, pose: &Pose, radius_mm: f64) -> [f64; 2] {
-        let table = self.table(Kind::Moved);
-        let [along, away] = table.sums(&table.at(pose), 0);
-        let [more, farther] = self.by_radius(Kind::Radius, pose, radius_mm);
-        [along + more, away + farther]
+    /// The first outputs of a table of motions along x and z under a tip of a radius, by the table of what that adds.
+    fn under<const N: usize>(
+        &self,
+        [nominal, by_radius]: [Kind; 2],
+        pose: &Pose,
+        radius_mm: f64,
+    ) -> [f64; N] {
+        let table = self.table(nominal);
+        let own: [f64; N] = table.sums(&table.at(pose), 0);
+        let more = self.by_radius(by_radius, pose, radius_mm);
+        std::array::from_fn(|k| own[k] + more[k])
     }
 
     fn by_radius(&self, kind: Kind, pose: &Pose, radius_mm: f64) -> [f64; 2] {
@@ -212,23 +218,42 @@ impl Tables {
         })
     }
 
-    /// The motion of a marker so far beside marker 2's place.
-    fn beside(&self, disc: DiscMotion, pose: &Pose, [dx, dy]: [f64; 2]) -> DiscMotion {
-        let table = self.table(Kind::Bends);
-        let bends = [*pose, pose.swapped()].map(|pose| table.sums::<5>(&table.at(&pose), 0));
-        let [[xxx, xxy, xyy, zxx, zxy], [yyy, yxy, yxx, zyy, _]] = bends;
-        // By component: xx, xy, yy.
-        let by = [[xxx, xxy, xyy], [yxx, yxy, yyy], [zxx, zxy, zyy]];
-        let turn = |c: usize| {
-            let [xx, xy, yy] = by[c];
-            [xx * dx + xy * dy, xy * dx + yy * dy]
+    /// The motion of a marker glued `beside_mm` marker 2's place: that of marker 2 with the tip as far beside
+    /// it, and what changes on the way as both go on to where they are. That changes little and evenly, where
+    /// the motion of a place near the tip is quite another a little beside.
+    fn beside(
+        &self,
+        pose: &Pose,
+        radius_mm: f64,
+        own: Option<&Parts>,
+        beside_mm: [f64; 2],
+    ) -> DiscMotion {
+        let at = |part: f64| {
+            let place_mm = [0, 1].map(|c| pose.place_mm[c] - part * beside_mm[c]);
+            let pose = Pose {
+                place_mm: place_mm.map(|part| part.clamp(-MAX_PLACE_MM, MAX_PLACE_MM)),
+                ..*pose
+            };
+            (self.corner_disc(&pose, radius_mm, own), pose.place_mm)
         };
-        let at = disc.at([dx, dy]);
-        let bent = |c: usize| (turn(c)[0] * dx + turn(c)[1] * dy) / 2.0;
+        let (disc, place_mm) = at(1.0);
+        let ((back, from), (forth, to)) = (at(1.0 + STEP), at(1.0 - STEP));
+        // Along the way on which it is clamped the tip does not go on.
+        let gone = |c: usize| {
+            let whole = to[c] - from[c];
+            if whole == 0.0 {
+                0.0
+            } else {
+                (pose.place_mm[c] - place_mm[c]) / whole
+            }
+        };
+        let part = gone(0).abs().max(gone(1).abs());
+        let at = disc.at(beside_mm);
         DiscMotion {
-            moved_mm: std::array::from_fn(|c| at[c] + bent(c)),
-            along_x: std::array::from_fn(|c| disc.along_x[c] + turn(c)[0]),
-            along_y: std::array::from_fn(|c| disc.along_y[c] + turn(c)[1]),
+            moved_mm: std::array::from_fn(|c| {
+                at[c] + part * (forth.moved_mm[c] - back.moved_mm[c])
+            }),
+            ..disc
         }
     }
 }

@@ -23,9 +23,14 @@ impl Terms {
     /// Those of tilts up to a degree, with so many sizes without tilt and fewer with it: one less for each
     /// `per_size` degrees of tilt, or part of them.
     pub fn up_to(sizes: u8, degree: u8, per_size: u8) -> Terms {
+        let left = |tilt: u8| sizes.saturating_sub(tilt.div_ceil(per_size));
+        Terms::with_sizes((0..=degree).map(left))
+    }
+
+    /// Those with so many sizes without tilt, so many with its first degree, and so on.
+    pub fn with_sizes(sizes: impl IntoIterator<Item = u8>) -> Terms {
         let mut powers = Vec::new();
-        for tilt in 0..=degree {
-            let left = sizes.saturating_sub(tilt.div_ceil(per_size));
+        for (tilt, left) in (0..).zip(sizes) {
             for b in 0..=tilt {
                 powers.extend((0..left).map(|size| [size, tilt - b, b]));
             }

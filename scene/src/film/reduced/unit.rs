@@ -69,10 +69,9 @@ impl Unit {
 
     /// What the film's tables are multiplied with: see [`super::tables::UNIT_PARTS`].
     pub(super) fn parts(&self) -> [f64; 10] {
-        let [p0, p1, p2, p3] = self.posts_mm;
         let grip = libm::log(self.grip / self.stiffness);
         let thickness = libm::log(self.thickness);
-        let [a, b, c, d] = [p0, p1, p2, p3];
+        let [a, b, c, d] = self.posts_mm;
         [
             thickness, grip, a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1],
         ]
