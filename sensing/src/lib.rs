@@ -1,8 +1,9 @@
-//! Pixels to force: the `no_std`, allocation-free, integer-only pipeline of the HiVTac sensor.
+//! Pixels to force: the `no_std`, allocation-free pipeline of the HiVTac sensor, in integers but for [`forward`].
 //!
 //! ```text
 //! rows ─threshold→ bit rows ─dilate→ runs ─label→ blobs (moments)
 //!    → 4 markers → 11 features → quantized MLP → (α, β, |F|) → force + status
+//!                                   └→ first guess → film run forwards → force, place + status
 //! ```
 //!
 //! Everything here gives the same bits on a microcontroller, in an emulator and on a host.
@@ -20,14 +21,15 @@ pub mod status;
 pub mod units;
 
 pub mod blob;
-pub mod closed_form;
 pub mod features;
 pub mod force;
 pub mod formats;
+pub mod forward;
 pub mod geometry;
 pub mod hsv;
 pub mod markers;
 pub mod model;
+pub mod motion;
 pub mod network;
 pub mod pipeline;
 pub mod scanner;

@@ -34,8 +34,7 @@ pub struct Output {
     pub values: [i32; OUTPUTS],
     /// The outputs that say its place, p_x and p_y in µm; 0 from a model that does not tell it.
     pub place: [i32; PLACE_OUTPUTS],
-    /// True when an input met the limits of `i16` (8 σ), or the markers are further apart than the closed form's curves
-    /// reach: far from all that the model was made from.
+    /// True when an input met the limits of `i16` (8 σ): far from all that the model was made from.
     pub input_saturated: bool,
 }
 
@@ -48,24 +47,8 @@ impl Network {
         }
     }
 
-    /// Runs `model` on `features`, measured from the rest position `tare`: its layers, if it has any, and its closed form,
-    /// if it has one; their forces add up.
+    /// Runs `model` on `features`, measured from the rest position `tare`.
     pub fn run(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
-        let mut output = match model.layers() {
-            [] => Output::default(),
-            _ => self.run_layers(model, features, tare),
-        };
-        if let Some(form) = &model.closed_form {
-            let (force, beyond) = form.force(features, tare);
-            for (value, part) in output.values.iter_mut().zip(force) {
-                *value = value.saturating_add(part);
-            }
-            output.input_saturated |= beyond;
-        }
-        output
-    }
-
-    fn run_layers(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
         let scaled = scale_inputs(&model.input, features, tare, &model.rest.features);
         self.inputs.values_mut()[..FEATURES].copy_from_slice(&scaled);
         let mut outputs = [0; OUTPUTS + PLACE_OUTPUTS];

@@ -17,6 +17,11 @@ impl Px {
         Px(pixels << Self::FRACTION_BITS)
     }
 
+    /// The value in pixels, to 2⁻²⁴ of it.
+    pub fn to_f32(self) -> f32 {
+        self.0 as f32 / 65_536.0
+    }
+
     /// The value in pixels, for display and for tests; exact.
     pub fn to_f64(self) -> f64 {
         f64::from(self.0) / 65_536.0

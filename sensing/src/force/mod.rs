@@ -10,11 +10,13 @@
 //! a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
 
 mod contact;
+mod explained;
 mod place;
 #[cfg(test)]
 mod tests;
 
 pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT};
+pub use explained::Resting;
 pub use place::Place;
 
 use crate::{

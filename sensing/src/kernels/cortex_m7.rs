@@ -9,7 +9,7 @@
 
 use core::arch::global_asm;
 
-use super::{Inputs, LOADED_AHEAD, Sums};
+use super::{Inputs, LOADED_AHEAD, Parts, Sums};
 use crate::dilate::Near;
 use crate::mask::MAX_WIDTH as MAX_ROW_WIDTH;
 use crate::model::{Layer, MAX_ACTIVATION8, MAX_WEIGHT8, MAX_WIDTH, WeightWidth};
@@ -19,6 +19,8 @@ global_asm!(include_str!("any_set.s"), options(raw));
 global_asm!(include_str!("dilate_edges.s"), options(raw));
 global_asm!(include_str!("dot8.s"), options(raw));
 global_asm!(include_str!("dot16.s"), options(raw));
+#[cfg(target_abi = "eabihf")]
+global_asm!(include_str!("spline.s"), options(raw));
 global_asm!(include_str!("threshold_bits.s"), options(raw));
 global_asm!(include_str!("threshold_bytes.s"), options(raw));
 global_asm!(include_str!("threshold_cr.s"), options(raw));
@@ -105,6 +107,25 @@ unsafe extern "C" {
         activations: *mut i16,
         end: *const i16,
         largest: u32,
+    );
+
+    /// Equals `portable::spline`. A pair of products is one SMUAD or SMLAD, a sum along y one SMLAWB or SMLAWT.
+    ///
+    /// *No overflow.* See there: whatever the coefficients are.
+    ///
+    /// *Contract.* `sums`, up to `end`, which lies a positive number of terms after it; `line`: bytes to the next line; `back`:
+    /// bytes from a term's last line to the next term's first one, modulo 2³². `steps`: eight bytes in each line of each term
+    /// are readable, and so are those of one term more in the first line; they may lie at any address.
+    ///
+    /// *Schedule.* A term, 32 products along x and 12 along y: 53 instructions in 36 cycles.
+    #[cfg(target_abi = "eabihf")]
+    fn hivtac_spline(
+        sums: *mut [i32; 3],
+        line: usize,
+        back: usize,
+        parts: *const Parts,
+        end: *const [i32; 3],
+        steps: *const u8,
     );
 
     /// Equals [`any_set`](crate::mask::any_set), when what it gives is compared with 0: all words, or-ed.
@@ -330,6 +351,30 @@ pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> usize
         unsafe { hivtac_threshold_luma(row.as_ptr(), low, range.start, range.end, span) };
     }
     whole.len()
+}
+
+/// As [`portable::spline`](super::portable::spline), for coefficients that are all there; says whether it did anything.
+#[cfg(target_abi = "eabihf")]
+pub fn spline(
+    steps: &[u8],
+    line: usize,
+    node: usize,
+    parts: &Parts,
+    sums: &mut [[i32; 3]],
+) -> bool {
+    // What files may hold is far below 32 bits: `Table` has at most 88 terms and 16 nodes along each axis.
+    let last = sums
+        .len()
+        .checked_sub(1)
+        .map(|last| last * node + 3 * line + 8);
+    if last.is_none_or(|last| last > steps.len()) || line < sums.len() * node {
+        return false;
+    }
+    let (back, end) = (node.wrapping_sub(3 * line), sums.as_mut_ptr_range().end);
+    // SAFETY: there is a term, and the last one's last line ends within the coefficients; a term more in the first line ends
+    // before, as a line holds all terms.
+    unsafe { hivtac_spline(sums.as_mut_ptr(), line, back, parts, end, steps.as_ptr()) };
+    true
 }
 
 /// Whether a word is not 0.

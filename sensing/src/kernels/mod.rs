@@ -56,6 +56,27 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
     portable::activate(layer, sums, inputs.values_mut(), done);
 }
 
+/// Parts of coefficients at four by four nodes, Q15: those of the value and of the slope along each axis, whose sizes each add up
+/// to at most 2¹⁵ and four roundings.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(4))]
+pub struct Parts {
+    /// Along y, for each line: of the value and of the slope.
+    pub y: [[i16; 2]; 4],
+    /// Along x: of the value, of the slope.
+    pub x: [[i16; 4]; 2],
+}
+
+/// For each term its coefficient at a place, its slope along x and its slope along y: see `portable::spline`.
+pub fn spline(steps: &[u8], line: usize, node: usize, parts: &Parts, sums: &mut [[i32; 3]]) {
+    // It keeps numbers in the floating-point unit's registers.
+    #[cfg(all(armv7em, target_abi = "eabihf"))]
+    if cortex_m7::spline(steps, line, node, parts, sums) {
+        return;
+    }
+    portable::spline(steps, line, node, parts, sums);
+}
+
 /// The mask of a row of pixels through a table of bytes: see `portable::threshold_bytes`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {
     #[cfg(armv7em)]

@@ -1,6 +1,6 @@
 //! The definition of every kernel, in portable Rust.
 
-use super::Sums;
+use super::{Parts, Sums};
 use crate::model::{Layer, MAX_WIDTH, ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 use crate::rescale::rescale_sum;
 
@@ -11,6 +11,37 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
         WeightWidth::Int8 => sum_groups(layer, inputs, sums, unpack8),
         WeightWidth::Int16 => sum_groups(layer, inputs, sums, unpack16),
     }
+}
+
+/// For each of `sums` the sum of a term's coefficients at four by four nodes, in parts of 2¹⁴ to a step: its value, its slope along x
+/// and its slope along y. A coefficient is an i16; those of a term that lie beside each other along x follow each other, the next
+/// term's are `node` bytes farther, and those beside each other along y `line` bytes. What lies beyond the end counts as zero.
+///
+/// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹, and one over both axes below
+/// 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
+pub fn spline(steps: &[u8], line: usize, node: usize, parts: &Parts, sums: &mut [[i32; 3]]) {
+    let times = |sum: i32, part: i16| ((i64::from(sum) * i64::from(part)) >> 16) as i32;
+    for (term, sums) in sums.iter_mut().enumerate() {
+        *sums = [0; 3];
+        for (j, [value, slope]) in parts.y.into_iter().enumerate() {
+            let row = four(steps, term * node + j * line);
+            let [here, along_x] = parts.x.map(|parts| {
+                let products = row.iter().zip(parts);
+                products.fold(0, |sum, (step, part)| {
+                    sum + i32::from(*step) * i32::from(part)
+                })
+            });
+            sums[0] += times(here, value);
+            sums[1] += times(along_x, value);
+            sums[2] += times(here, slope);
+        }
+    }
+}
+
+fn four(steps: &[u8], at: usize) -> [i16; 4] {
+    let bytes = steps.get(at..).and_then(|rest| rest.first_chunk::<8>());
+    let pairs = bytes.unwrap_or(&[0; 8]).as_chunks().0;
+    [0, 1, 2, 3].map(|i| i16::from_le_bytes(pairs[i]))
 }
 
 /// `unpack` gives the N weights of a word.

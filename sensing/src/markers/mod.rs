@@ -68,6 +68,18 @@ pub(crate) struct Found {
     pattern: Pattern,
 }
 
+impl Found {
+    /// The same images, whose markers make the pattern that they make elsewhere: little farther
+    /// than they are wide.
+    pub fn moved_to(&self, markers: [Marker; 4]) -> Found {
+        Found {
+            pattern: Pattern::of_centroids(markers.map(|marker| (marker.x, marker.y))),
+            markers,
+            ..*self
+        }
+    }
+}
+
 /// What a rest position is to judge of a marker's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Image {

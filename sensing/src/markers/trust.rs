@@ -189,7 +189,8 @@ impl Trust {
         let aspect = ASPECT
             .saturating_add(by_width.part(self.grid * ASPECT_PIXELS))
             .saturating_add(scaled(taper, ASPECT_TAPER, 0))
-            .saturating_add(scaled(shift, self.reading.aspect_by_shift, 8));
+            .saturating_add(scaled(shift, self.reading.aspect_by_shift, 8))
+            .saturating_add(self.reading.aspect_always);
         let even = scaled(shift, self.reading.density_by_shift, 8);
         let densities = found.images.each_ref().map(|image| image.density);
         let over_square = |area: i32| over_square(self.grid * area, &by_width);
@@ -204,7 +205,8 @@ impl Trust {
         let lopsided = grid_of_means(self.grid, LOPSIDED_PIXELS) + scaled(seen.across, LOPSIDED, 8);
         let skew = by_across
             .part(self.grid * SKEW_PIXELS)
-            .saturating_add(scaled(taper, self.reading.skew_by_taper, 8));
+            .saturating_add(scaled(taper, self.reading.skew_by_taper, 8))
+            .saturating_add(self.reading.skew_always);
         // For a marker that the optics makes so wide now.
         let wider = limited(
             self.by_rest_width

@@ -1,14 +1,19 @@
 //! The writer of the model file.
 
 use super::{
-    CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
+    CalibratedRange, CentroidEstimator, Conditions, ContactReading, ForwardSpec, InputScaling,
     Model, ModelError, Origin, OutputKind, Rest, Uncertainty, WeightWidth,
-    layout::{CRC, HEADER_LENGTH, MAGIC, PACKING, padded_name, version},
+    layout::{
+        CRC, FORWARD_BESIDE, HEADER_LENGTH, MAGIC, NOTHING_BESIDE, PACKING, padded_name, version,
+    },
     packing::{LOADED_AHEAD, pack},
     place,
 };
 use crate::{features::Features, threshold::PixelFormat};
 use alloc::vec::Vec;
+
+/// Where the film run forwards begins, in the models that have one: after places.
+pub const FORWARD_OFFSET: usize = 456;
 
 /// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,10 +24,10 @@ pub struct ModelSpec {
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// Its layers, first to last: 1 to 8, or none with a closed form.
+    /// Its layers, first to last: 1 to 8.
     pub layers: Vec<LayerSpec>,
-    /// What it gives without its layers.
-    pub closed_form: Option<ClosedFormSpec>,
+    /// The film run forwards.
+    pub forward: Option<ForwardSpec>,
     /// What the outputs are.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
@@ -82,7 +87,10 @@ impl ModelSpec {
         bytes.extend(count.to_le_bytes());
         bytes.extend([
             output_number(self.output),
-            u8::from(self.closed_form.is_some()),
+            match self.forward {
+                None => NOTHING_BESIDE,
+                Some(_) => FORWARD_BESIDE,
+            },
         ]);
         push_conditions(&mut bytes, &self.conditions);
         push_features(&mut bytes, &self.rest.features);
@@ -98,14 +106,24 @@ impl ModelSpec {
         if self.output.tells_place() {
             place::push(&mut bytes, range.place, &self.uncertainty);
         }
-        if let Some(form) = &self.closed_form {
-            form.push(&mut bytes);
+        if let Some(forward) = &self.forward {
+            forward.push(&mut bytes);
         }
         for layer in &self.layers {
             push_layer(&mut bytes, layer);
         }
         bytes
     }
+}
+
+/// A model file that takes another number of steps; `None` when it takes none, or is no model file.
+pub fn with_steps(file: &[u8], steps: u8) -> Option<Vec<u8>> {
+    Model::parse(file).ok()?.forward?;
+    let mut bytes = file[..file.len() - 4].to_vec();
+    bytes[FORWARD_OFFSET] = steps;
+    let crc = CRC.checksum(&bytes);
+    bytes.extend(crc.to_le_bytes());
+    Model::parse(&bytes).is_ok().then_some(bytes)
 }
 
 impl LayerSpec {

@@ -39,7 +39,7 @@ pub(super) fn layers<'a>(
         (fed, largest) = (layer.outputs, layer.largest_activation);
         *slot = layer;
     }
-    if count > 0 && fed != outputs {
+    if fed != outputs {
         return Err(ModelError::Chain {
             layer: count,
             inputs: outputs,

@@ -2,7 +2,7 @@
 
 use super::{
     CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, MAX_LAYERS,
-    Model, ModelError, Origin, OutputKind, Rest, curves::closed_form, layers::layers, place::place,
+    Model, ModelError, Origin, OutputKind, Rest, forward::forward, layers::layers, place::place,
     reader::Reader, uncertainty::uncertainty,
 };
 use crate::{
@@ -21,6 +21,9 @@ pub(super) const FORCE_VERSION: u16 = 3;
 pub(super) const PLACE_VERSION: u16 = 4;
 /// How the weights lie: `packing`.
 pub(super) const PACKING: u8 = 1;
+/// What there is beside the layers: nothing, or the film run forwards.
+pub(super) const NOTHING_BESIDE: u8 = 0;
+pub(super) const FORWARD_BESIDE: u8 = 2;
 /// Bytes of the preset's name, filled up with zeros.
 pub(super) const NAME_LENGTH: usize = 16;
 /// The checksum at the end, over all bytes before it: CRC-32 of IEEE 802.3.
@@ -36,23 +39,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         bytes: body,
         offset: HEADER_LENGTH,
     };
-    let layer_count = reader.u16_in("layer count", 0, MAX_LAYERS as u16, "0 to 8")? as usize;
+    let layer_count = reader.u16_in("layer count", 1, MAX_LAYERS as u16, "1 to 8")? as usize;
     let output = output_kind(&mut reader, version)?;
-    let has_closed_form = reader.choice("closed form", &[false, true], "0 or 1")?;
-    if layer_count == 0 && !has_closed_form {
-        return Err(ModelError::Field {
-            name: "layer count",
-            offset: HEADER_LENGTH,
-            allowed: "1 to 8 without a closed form",
-        });
-    }
-    if has_closed_form && output != OutputKind::ForceVector {
-        return Err(ModelError::Field {
-            name: "output kind",
-            offset: HEADER_LENGTH + 2,
-            allowed: "0 with a closed form",
-        });
-    }
+    let has_forward = has_forward(&mut reader, output)?;
     let conditions = conditions(&mut reader)?;
     let rest = rest(&mut reader)?;
     let input = input_scaling(&mut reader)?;
@@ -61,8 +50,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
     if output.tells_place() {
         range.place = place(&mut reader, &mut uncertainty)?;
     }
-    let closed_form = match has_closed_form {
-        true => Some(closed_form(&mut reader)?),
+    let forward = match has_forward {
+        true => Some(forward(&mut reader)?),
         false => None,
     };
     let layers = layers(&mut reader, layer_count, output.count())?;
@@ -80,7 +69,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         output,
         range,
         uncertainty,
-        closed_form,
+        forward,
         crc,
         layers,
         layer_count,
@@ -116,6 +105,20 @@ fn output_kind(reader: &mut Reader<'_>, version: u16) -> Result<OutputKind, Mode
         offset,
         allowed: "0 or 1 in version 3, 2 in version 4",
     })
+}
+
+/// Whether the film run forwards is beside the layers.
+fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, ModelError> {
+    let offset = reader.offset;
+    match reader.u8()? {
+        NOTHING_BESIDE => Ok(false),
+        FORWARD_BESIDE if output.tells_place() => Ok(true),
+        _ => Err(ModelError::Field {
+            name: "beside the layers",
+            offset,
+            allowed: "0, or 2 with the output kind 2 (1, a closed form, is not read: train a network)",
+        }),
+    }
 }
 
 /// Checks what surrounds the body; gives everything before the checksum, the checksum and the

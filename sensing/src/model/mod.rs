@@ -1,14 +1,15 @@
-//! The model file: a quantized network with its input scaling, a closed form or both, and the conditions it was made under.
+//! The model file: a quantized network with its input scaling, the film run forwards, and the
+//! conditions they were made under.
 //!
 //! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves it sound before it can
 //! be used. It may lie anywhere; kernels run one that lies at a multiple of four ([`AlignedFile`]). Feature `encode` adds the writer, `encode::ModelSpec`.
 //! Both follow `docs/model-file.md`.
 
 mod aligned;
-mod curves;
 #[cfg(any(test, feature = "encode"))]
 pub mod encode;
 mod error;
+mod forward;
 mod layer;
 #[cfg(test)]
 mod layer_tests;
@@ -24,19 +25,20 @@ mod tests;
 mod uncertainty;
 
 pub use aligned::AlignedFile;
-#[cfg(any(test, feature = "encode"))]
-pub use curves::ClosedFormSpec;
 pub use error::ModelError;
+#[cfg(any(test, feature = "encode"))]
+pub use forward::{ForwardSpec, TableSpec};
 pub use layer::{Layer, Row};
 pub use packing::{
     MAX_ACTIVATION8, MAX_ACTIVATION16, MAX_WEIGHT8, MAX_WEIGHT16, ROWS_TOGETHER, WeightWidth,
 };
 pub(crate) use packing::{unpack8, unpack16};
+pub(crate) use uncertainty::{LARGEST_PLACE_UNCERTAINTY, NO_DIRECTION};
 pub use uncertainty::{LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
 
 use crate::{
-    closed_form::ClosedForm,
     features::{FEATURES, Features},
+    forward::Forward,
     geometry::{Geometry, Preset},
     markers::pattern::{Pattern, distance},
     threshold::Threshold,
@@ -70,8 +72,8 @@ pub struct Model<'a> {
     pub range: CalibratedRange,
     /// How well it knows them.
     pub uncertainty: Uncertainty,
-    /// What it gives without its network; the network's answer is added to it.
-    pub closed_form: Option<ClosedForm<'a>>,
+    /// The film run forwards, which betters the network's answer.
+    pub forward: Option<Forward<'a>>,
     crc: u32,
     layers: [Layer<'a>; MAX_LAYERS],
     layer_count: usize,
@@ -232,7 +234,7 @@ impl<'a> Model<'a> {
         self.crc
     }
 
-    /// Its layers, first to last; none when it is a closed form alone.
+    /// Its layers, first to last: at least one.
     pub fn layers(&self) -> &[Layer<'a>] {
         &self.layers[..self.layer_count]
     }
@@ -248,16 +250,11 @@ impl<'a> Model<'a> {
         self.conditions.origin == Origin::Simulated
     }
 
-    /// Layer widths and preset, such as `11-64-64-3 ov7725`, `closed form ov7725` or `closed form + 11-8-3 ov7725`; cut
-    /// after 32 bytes.
+    /// Layer widths and preset, such as `11-64-64-5 ov7725`; cut after 32 bytes.
     pub fn name(&self) -> heapless::String<32> {
         let mut name = heapless::String::new();
         // A full string keeps what it has: the end of a very long name is cut.
-        let _ = match (&self.closed_form, self.layers()) {
-            (None, _) => write!(name, "{FEATURES}"),
-            (Some(_), []) => write!(name, "closed form"),
-            (Some(_), _) => write!(name, "closed form + {FEATURES}"),
-        };
+        let _ = write!(name, "{FEATURES}");
         for layer in self.layers() {
             let _ = write!(name, "-{}", layer.outputs());
         }

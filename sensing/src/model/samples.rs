@@ -42,7 +42,7 @@ pub(crate) fn spec(widths: &[u16]) -> ModelSpec {
             .enumerate()
             .map(|(i, pair)| layer(pair[0], pair[1], i == 0, i + 2 == widths.len()))
             .collect(),
-        closed_form: None,
+        forward: None,
         output: OutputKind::ForceVector,
         range: CalibratedRange {
             magnitude: MicroNewtons(1_000_000),
@@ -120,7 +120,7 @@ pub(super) fn read_back(model: &Model<'_>) -> ModelSpec {
         rest: model.rest,
         input: model.input,
         layers: layers.collect(),
-        closed_form: model.closed_form.as_ref().map(ClosedFormSpec::of),
+        forward: None,
         output: model.output,
         range: model.range,
         uncertainty: model.uncertainty,

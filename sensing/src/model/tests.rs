@@ -46,7 +46,8 @@ fn every_field_of_places_is_checked() {
         (4, 3, "output kind"),
         (14, 0, "output kind"),
         (14, 1, "output kind"),
-        (15, 1, "output kind"),
+        (15, 1, "beside the layers"),
+        (15, 3, "beside the layers"),
         (391, 1, "largest place"),
         (395, 1, "uncertainty of the place"),
         (455, 0x80, "uncertainty of the place"),
@@ -111,7 +112,8 @@ fn every_field_is_checked() {
         (12, 9, "layer count"),
         (14, 2, "output kind"),
         (14, 3, "output kind"),
-        (15, 2, "closed form"),
+        (15, 1, "beside the layers"),
+        (15, 2, "beside the layers"),
         (16, b'O', "preset name"),
         (31, b'x', "preset name"),
         (33, 4, "width"),
@@ -167,6 +169,18 @@ fn every_field_is_checked() {
             other => panic!("byte {offset}: {other:?}"),
         }
     }
+}
+
+#[test]
+fn a_closed_form_is_refused_by_its_name() {
+    let mut bytes = spec(&[11, 5, 3]).encode().unwrap();
+    bytes[15] = 1;
+    reseal(&mut bytes);
+    let error = Model::parse(&bytes).unwrap_err().to_string();
+    assert!(
+        error.contains("at byte 15") && error.contains("a closed form"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub const LARGEST_UNCERTAINTY: MicroNewtons = MicroNewtons((1 << 30) - 1);
 /// The largest uncertainty of a place at a knot: a metre.
 pub const LARGEST_PLACE_UNCERTAINTY: Micrometres = Micrometres(1_000_000);
 /// Beyond this no direction is known: half a turn.
-const NO_DIRECTION: MilliDegrees = MilliDegrees(180_000);
+pub(crate) const NO_DIRECTION: MilliDegrees = MilliDegrees(180_000);
 /// The widest distance of knots: the last one is then at 2,013 N.
 const MAX_STEP_BITS: u8 = 27;
 

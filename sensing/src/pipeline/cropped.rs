@@ -30,6 +30,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             false => Err(Status::FRAME_INCOMPLETE),
         });
         let measurement = self.measurement(found);
+        self.motion.ended(measurement.markers.as_ref());
         match self.to_follow(&measurement) {
             Some(markers) => tracks.tracked(markers),
             None => tracks.lost(),

@@ -9,11 +9,12 @@ mod whole_frame;
 use crate::{
     blob::Blob,
     features::Features,
-    force::Force,
+    force::{Force, Resting},
     formats::Formats,
     geometry::{Geometry, Preset},
     markers::{Finder, Found, Marker, Reading, Trust},
     model::{CentroidEstimator, ContactReading, Model, Rest},
+    motion::Motion,
     network::Network,
     scanner::Scanner,
     settings::{Settings, SettingsError},
@@ -29,9 +30,9 @@ use ahead::Ahead;
 pub struct Measurement {
     /// Why there is no force, or how far to trust it.
     pub status: Status,
-    /// The four markers, when they were found.
+    /// The four markers where the frame shows them, when they were found.
     pub markers: Option<[Marker; 4]>,
-    /// Their features, exactly when there are markers.
+    /// Their features, at one time ([`Sensor::set_motion`]), exactly when there are markers.
     pub features: Option<Features>,
     /// The force; `None` exactly when `status` has a bit of [`Status::NO_FORCE`].
     pub force: Option<Force>,
@@ -57,6 +58,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     /// `None` until it is configured.
     prepared: Option<Prepared>,
     ahead: Ahead,
+    motion: Motion,
 }
 
 /// What follows from settings, model and tare before there is a frame.
@@ -65,6 +67,8 @@ struct Prepared {
     finder: Finder,
     /// `None` without a rest position to compare with.
     trust: Option<Trust>,
+    /// `None` without a film run forwards.
+    resting: Option<Resting>,
     /// The bits that every frame has, whatever it shows.
     standing: Status,
     /// Rows from one to the next of those that are looked at first in a frame that lies in memory.
@@ -90,6 +94,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             network: Network::new(),
             prepared: None,
             ahead: Ahead::Off,
+            motion: Motion::GLOBAL,
         }
     }
 
@@ -168,7 +173,18 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.tare.as_ref()
     }
 
-    /// Starts a frame and forgets the one before.
+    /// Says when which row of a frame is exposed, and forgets the frame before. At first all are at
+    /// once.
+    pub fn set_motion(&mut self, motion: Motion) {
+        self.motion = motion;
+    }
+
+    /// The next frame does not follow the one before at once: how the markers move is not known.
+    pub fn forget_motion(&mut self) {
+        self.motion.forget();
+    }
+
+    /// Starts a frame and forgets the one before, but for where its markers were.
     pub fn begin_frame(&mut self) {
         // An error cannot happen after `configure`, and makes every frame incomplete before it.
         let _ = self.scanner.begin(self.settings.scan());
@@ -197,6 +213,12 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
+        let measurement = self.measure_scanned();
+        self.motion.ended(measurement.markers.as_ref());
+        measurement
+    }
+
+    fn measure_scanned(&mut self) -> Measurement {
         if let Err(reason) = self.end_scan() {
             return self.measurement(Err(reason));
         }
@@ -209,11 +231,17 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// What follows from the markers.
     fn measurement(&mut self, found: Result<Found, Status>) -> Measurement {
-        let (found, mut status) = match &found {
+        let (seen, mut status) = match &found {
             Ok(found) => (Some(found), Status::OK),
             Err(reason) => (None, *reason),
         };
-        match (&self.prepared, found) {
+        let rows = self.settings.geometry.height;
+        let moved = seen.and_then(|seen| {
+            let markers = self.motion.at_the_middle(&seen.markers, rows)?;
+            Some(seen.moved_to(markers))
+        });
+        let still = moved.as_ref().or(seen);
+        match (&self.prepared, still) {
             (None, _) => status |= self.standing_status(),
             (Some(prepared), None) => status |= prepared.standing,
             (Some(prepared), Some(found)) => {
@@ -221,14 +249,15 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 status |= prepared.standing | trust.map_or(Status::OK, |trust| trust.judge(found));
             }
         }
-        let markers = found.map(|found| found.markers);
-        let features = markers.as_ref().map(Features::of_markers);
+        let markers = still.map(|still| &still.markers);
+        let features = markers.map(Features::of_markers);
         let force = features
             .as_ref()
-            .and_then(|features| self.measure(features, &mut status));
+            .zip(markers)
+            .and_then(|(features, markers)| self.measure(features, markers, &mut status));
         Measurement {
             status,
-            markers,
+            markers: seen.map(|seen| seen.markers),
             features,
             force,
         }
@@ -255,6 +284,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let own_rest = self.tare.is_some();
         self.prepared = Some(Prepared {
             finder: Finder::new(settings),
+            resting: fitting
+                .zip(rest)
+                .and_then(|(model, rest)| Resting::of_model(model, &rest)),
             trust: rest.map(|rest| Trust::new(settings, &rest, own_rest, reading)),
             standing: self.standing_status(),
             coarse_step: coarse_step(&settings.geometry),
@@ -304,15 +336,30 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     }
 
     /// The force of a frame's features, unless `status` already forbids one.
-    fn measure(&mut self, features: &Features, status: &mut Status) -> Option<Force> {
+    fn measure(
+        &mut self,
+        features: &Features,
+        markers: &[Marker; 4],
+        status: &mut Status,
+    ) -> Option<Force> {
         if status.intersects(Status::NO_FORCE) {
             return None;
         }
         let model = self.model.as_ref()?;
         let tare = self.tare.as_ref().unwrap_or(&model.rest);
         let output = self.network.run(model, features, &tare.features);
-        let (force, trust) = Force::of_outputs(model, &output);
+        let resting = self
+            .prepared
+            .as_ref()
+            .and_then(|prepared| prepared.resting.as_ref());
+        let (force, trust) = match model.forward.as_ref().zip(resting) {
+            Some((forward, resting)) => resting.force(forward, &model.range, markers, &output),
+            None => Force::of_outputs(model, &output),
+        };
         *status |= trust;
+        if status.contains(Status::UNEXPLAINED) {
+            return None;
+        }
         if output.input_saturated {
             *status |= Status::MAGNITUDE_OUT_OF_RANGE;
         }

@@ -16,7 +16,11 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// (n = 4 at 800 × 600 and at 320 × 240) and no speck of less height touches one; and when this finds no markers.
     pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
         match self.find_coarsely(frame) {
-            Some(found) => self.measurement(Ok(found)),
+            Some(found) => {
+                let measurement = self.measurement(Ok(found));
+                self.motion.ended(measurement.markers.as_ref());
+                measurement
+            }
             None => self.measure_all(frame),
         }
     }
@@ -29,6 +33,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             let measurement = self.measurement(Ok(found));
             if let Some(markers) = self.to_follow(&measurement) {
                 tracks.tracked(markers);
+                self.motion.ended(Some(markers));
                 return measurement;
             }
         }

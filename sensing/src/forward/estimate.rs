@@ -1,0 +1,143 @@
+//! Gauss–Newton steps from a first guess to the load that explains the markers best.
+
+use super::Forward;
+use super::descent::Descent;
+use super::mounting::Mounting;
+use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
+use super::solve::{Column, Solved};
+
+/// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ² of three degrees of freedom is
+/// more than 17.7 then.
+pub const UNEXPLAINED: f32 = 17.7;
+/// Steps that a frame takes at most: more than the model asks for while what they led to does not explain the markers. Units of
+/// which little is known begin far from where they end.
+pub const STEPS_AT_MOST: u8 = 6;
+
+/// How the markers' images moved since the rest position, and how well that is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observed {
+    /// x and y of markers 0–3, focal lengths along the film's axes.
+    pub moved: Column,
+    /// Standard uncertainty of each marker, away from the pattern's middle and across that, focal lengths, > 0: what markers weigh
+    /// by.
+    pub sigma: Column,
+    /// How many times that their variance is on the mean with what is not known of the unit and weighs nothing, ≥ 1.
+    pub wider: f32,
+}
+
+/// A load and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The load.
+    pub pose: Pose,
+    /// What it does not explain: the sum of squares in parts of their variances.
+    pub unexplained: f32,
+    /// What the markers say at this load; `None` where they do not tell its parts.
+    pub solved: Option<Solved>,
+    /// [`Observed::wider`].
+    pub wider: f32,
+    /// How often the film was run forwards: once where the steps begin, and once for each step.
+    pub looks: u8,
+}
+
+impl Forward<'_> {
+    /// Takes steps from a guess; if they lead to a load that does not explain the markers, from the film's middle, too: from
+    /// there steps find their way where a guess was bad.
+    pub fn estimate(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
+        let found = self.descend(observed, mounting, guess);
+        // What noise explains.
+        if found.unexplained * found.wider <= UNEXPLAINED {
+            return found;
+        }
+        let middle = Pose {
+            size: guess.size,
+            ..Pose::default()
+        };
+        let other = self.descend(observed, mounting, middle);
+        let looks = found.looks + other.looks;
+        let nearer = if other.unexplained < found.unexplained {
+            other
+        } else {
+            found
+        };
+        Estimate { looks, ..nearer }
+    }
+
+    /// Takes as many steps as the model asks for, and more where these do not explain the markers.
+    fn descend(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
+        let mut descent = Descent::new(self, observed, mounting, guess);
+        for step in 0..STEPS_AT_MOST {
+            if step >= self.steps && descent.is_done() {
+                break;
+            }
+            if !descent.step() {
+                break;
+            }
+        }
+        descent.estimate()
+    }
+}
+
+/// Standard uncertainties of a load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sigma {
+    /// Of the direction, both ways across it together, rad.
+    pub direction: f32,
+    /// Of |F|, N.
+    pub magnitude_n: f32,
+    /// Of each coordinate of the place, mm: the root of half their covariance's trace.
+    pub place_mm: f32,
+}
+
+impl Estimate {
+    /// Whether a load explains the markers; what is no number explains nothing.
+    pub fn is_explained(&self) -> bool {
+        (0.0..=UNEXPLAINED).contains(&self.unexplained)
+    }
+
+    /// How well the load is known; `None` where the markers do not tell its parts.
+    /// `softer` is the standard uncertainty of the film's stiffness, in parts of it.
+    pub fn sigma(&self, stiffness: &Stiffness, softer: f32) -> Option<Sigma> {
+        let solved = self.solved.as_ref()?;
+        let covariance = |(a, b): (usize, usize)| self.wider * solved.covariance(a, b);
+        let tilt = [(1, 1), (1, 2), (2, 2)].map(covariance);
+        let place = [(3, 3), (3, 4), (4, 4)].map(covariance);
+        let per_size_n = stiffness.per_size_n(self.pose.size);
+        let magnitude_n = per_size_n * libm::sqrtf(covariance((0, 0)));
+        let softer = softer * stiffness.magnitude_n(self.pose.size);
+        Some(Sigma {
+            direction: stated(across(&self.pose, tilt)),
+            magnitude_n: libm::sqrtf(magnitude_n * magnitude_n + softer * softer),
+            place_mm: stated(place) * core::f32::consts::FRAC_1_SQRT_2,
+        })
+    }
+}
+
+/// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across that so much less as the circle
+/// is shorter than its angle.
+fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
+    let [x, y] = pose.tilt;
+    let square = x * x + y * y;
+    if square <= f32::MIN_POSITIVE {
+        return [xx, xy, yy];
+    }
+    let (sine, _) = sine_over_angle_and_cosine(square);
+    let away = (x * x * xx + 2.0 * x * y * xy + y * y * yy) / square;
+    let along = (y * y * xx - 2.0 * x * y * xy + x * x * yy) / square;
+    let both = (x * y * (yy - xx) + (x * x - y * y) * xy) / square;
+    [away, sine * both, sine * sine * along]
+}
+
+/// What a covariance (xx, xy, yy) states as its σ: 95 of 100 errors are within 1.731 times it (√(−ln 0.05)), however long and
+/// narrow their ellipse is. A round one's is the root of its trace; of a narrow one's 95 of 100 are within 1.960 times that.
+fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
+    let trace = xx + yy;
+    let apart = (xx - yy) * (xx - yy) + 4.0 * xy * xy;
+    // Fits the quantiles of all ellipses to 0.7 %.
+    let narrow = if trace > 0.0 {
+        apart / (trace * trace)
+    } else {
+        0.0
+    };
+    libm::sqrtf(trace) * (1.0 + 0.132 * narrow)
+}

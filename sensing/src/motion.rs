@@ -1,0 +1,153 @@
+//! Markers at one common time: a rolling shutter sees those below later than those above.
+//!
+//! A row is exposed one line after the row above it, and a frame every so many lines. A marker that
+//! is seen in row y of one frame and in row y′ of the frame before has moved for L + y − y′ lines,
+//! L being the lines of a frame. By this velocity it is moved to the time of the frame's middle
+//! row: by (y − middle) / (L + y − y′) of what it has moved.
+//!
+//! Two frames instead of one change a position's noise: the weights are 1 − c and c with c = (y −
+//! middle) / L while nothing moves, so that of markers 54 rows off the middle of 278 lines the
+//! upper ones have 1.21 times the noise and the lower ones 0.83 times.
+
+use crate::{markers::Marker, units::Px};
+
+/// What the markers of the frame before say of those of this one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Motion {
+    /// Lines from frame to frame, blank ones included; `None` with a global shutter.
+    lines: Option<u16>,
+    before: Option<[Marker; 4]>,
+}
+
+impl Motion {
+    /// All markers of a frame are seen at once.
+    pub const GLOBAL: Motion = Motion {
+        lines: None,
+        before: None,
+    };
+
+    /// A frame every so many lines, blank ones included, of which each exposes a row.
+    pub const fn rolling(lines: u16) -> Motion {
+        Motion {
+            lines: Some(lines),
+            before: None,
+        }
+    }
+
+    /// The next frame does not follow the one before at once.
+    pub fn forget(&mut self) {
+        self.before = None;
+    }
+
+    /// The frame ended, and showed these markers or none.
+    pub fn ended(&mut self, seen: Option<&[Marker; 4]>) {
+        self.before = seen.copied();
+    }
+
+    /// Markers as they were while the middle row of a frame of so many rows was exposed; `None` when
+    /// they were where they are seen, or nothing tells.
+    pub fn at_the_middle(&self, seen: &[Marker; 4], rows: u16) -> Option<[Marker; 4]> {
+        let (lines, before) = (self.lines?, self.before.as_ref()?);
+        let mut moved = *seen;
+        for (marker, before) in moved.iter_mut().zip(before) {
+            move_to_the_middle(marker, before, rows, lines);
+        }
+        Some(moved)
+    }
+}
+
+/// Coordinates are less than 2¹⁰ px, 2²⁶ in 1/65,536 px: products fit `i64` with 10 bits to spare.
+/// The divisor is more than 0 as a frame has more lines than rows.
+#[inline(never)]
+fn move_to_the_middle(marker: &mut Marker, before: &Marker, rows: u16, lines: u16) {
+    let middle = (i64::from(rows) - 1) << 15;
+    let below = i64::from(marker.y.0) - middle;
+    let lines = (i64::from(lines) << 16) + i64::from(marker.y.0) - i64::from(before.y.0);
+    let back = |now: Px, before: Px| {
+        let moved = i64::from(now.0) - i64::from(before.0);
+        Px(now.0 - (moved * below / lines.max(1)) as i32)
+    };
+    (marker.x, marker.y) = (back(marker.x, before.x), back(marker.y, before.y));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROWS: u16 = 240;
+    const LINES: u16 = 278;
+
+    fn marker(x: f64, y: f64) -> Marker {
+        let px = |value: f64| Px((value * 65_536.0).round() as i32);
+        Marker {
+            x: px(x),
+            y: px(y),
+            area: 130,
+        }
+    }
+
+    /// Where a marker is seen that moves steadily and passes (`x`, `y`) at time 0, in the frame
+    /// whose middle is `at` frames' time later.
+    fn seen(place: [f64; 2], velocity: [f64; 2], at: f64) -> Marker {
+        // The row in which it is seen decides when: y = y₀ + v·(at + (y − middle) / L).
+        let middle = (f64::from(ROWS) - 1.0) / 2.0;
+        let lines = f64::from(LINES);
+        let y = (place[1] + velocity[1] * (at - middle / lines)) / (1.0 - velocity[1] / lines);
+        let time = at + (y - middle) / lines;
+        marker(place[0] + velocity[0] * time, y)
+    }
+
+    const PLACES: [[f64; 2]; 4] = [[105.0, 65.0], [214.0, 65.0], [214.0, 174.0], [105.0, 174.0]];
+
+    #[test]
+    fn markers_that_move_steadily_are_where_they_were_at_the_middle() {
+        for velocity in [[0.0, 0.0], [1.5, 0.0], [0.0, 3.0], [-2.0, 5.0], [8.0, -8.0]] {
+            let frame = |at| PLACES.map(|place| seen(place, velocity, at));
+            let mut motion = Motion::rolling(LINES);
+            motion.ended(Some(&frame(-1.0)));
+            let moved = motion.at_the_middle(&frame(0.0), ROWS).unwrap();
+            for (moved, place) in moved.iter().zip(PLACES) {
+                let there = marker(place[0], place[1]);
+                let off = [moved.x.0 - there.x.0, moved.y.0 - there.y.0];
+                assert!(
+                    off.iter().all(|off| off.abs() <= 3),
+                    "{velocity:?}: {off:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_frame_before_or_with_a_global_shutter_nothing_moves() {
+        let [before, now] = [0.0, 4.0].map(|x| PLACES.map(|[x0, y]| marker(x0 + x, y)));
+        let mut motion = Motion::rolling(LINES);
+        assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        motion.ended(Some(&before));
+        assert!(
+            motion
+                .at_the_middle(&now, ROWS)
+                .is_some_and(|moved| moved != now)
+        );
+        motion.forget();
+        assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        motion.ended(None);
+        assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        let mut global = Motion::GLOBAL;
+        global.ended(Some(&before));
+        assert_eq!(global.at_the_middle(&now, ROWS), None);
+    }
+
+    #[test]
+    fn coordinates_at_their_limits_do_not_overflow() {
+        let corners = [[0.0, 0.0], [799.0, 0.0], [799.0, 599.0], [0.0, 599.0]];
+        let [first, turned] = [0, 2].map(|by| {
+            std::array::from_fn(|id| {
+                let [x, y] = corners[(id + by) % 4];
+                marker(x, y)
+            })
+        });
+        let mut motion = Motion::rolling(600);
+        motion.ended(Some(&first));
+        assert!(motion.at_the_middle(&turned, 600).is_some());
+    }
+}
