@@ -12,7 +12,7 @@ import sys
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xF7EBCC5BEDCE6B75
+SCHEMA = 0xA39E1B64313A7F1E
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -163,6 +163,7 @@ STATS = [
     ("frames_tracked", 940),
     ("tracking_lost", 25),
     ("processing_us", 5300),
+    ("latency_us", 4800),
     ("uptime_us", 34_000_000),
 ]
 
@@ -202,6 +203,7 @@ HOST = {
     "set-threshold-mono": COMMAND + [unsigned("id", 200), raw("SetThreshold", [3])] + DARK,
     "tare": COMMAND + [unsigned("id", 7), raw("Tare", [4]), unsigned("frames", 128)],
     "start-with-markers": COMMAND + [unsigned("id", 2), raw("StartWithMarkers", [5])],
+    "expose": COMMAND + [unsigned("id", 9), raw("Expose", [6])],
 }
 
 FOREIGN = {
@@ -266,7 +268,7 @@ def annotate(name, fields, whole=None):
 
 
 def print_documentation():
-    for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare", "start-with-markers"]:
+    for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare", "start-with-markers", "expose"]:
         annotate(name, HOST[name])
     for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers",
                  "stats", "log", "reply-done"]:

@@ -111,6 +111,7 @@ fn longest_stats() -> Stats {
         frames_tracked: u32::MAX,
         tracking_lost: u32::MAX,
         processing_us: u32::MAX,
+        latency_us: u32::MAX,
         uptime_us: u64::MAX,
     }
 }
@@ -124,6 +125,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::SetThreshold(RED),
         Request::Tare { frames: u16::MAX },
         Request::StartWithMarkers,
+        Request::Expose,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -158,6 +160,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         any_threshold().prop_map(Request::SetThreshold),
         any::<u16>().prop_map(|frames| Request::Tare { frames }),
         Just(Request::StartWithMarkers),
+        Just(Request::Expose),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -243,7 +246,7 @@ fn any_place() -> impl Strategy<Value = Place> {
 }
 
 fn any_stats() -> impl Strategy<Value = Stats> {
-    (any::<[u32; 13]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
+    (any::<[u32; 14]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
         frames_exposed: counts[0],
         frames_processed: counts[1],
         dropped_busy: counts[2],
@@ -257,6 +260,7 @@ fn any_stats() -> impl Strategy<Value = Stats> {
         frames_tracked: counts[10],
         tracking_lost: counts[11],
         processing_us: counts[12],
+        latency_us: counts[13],
         uptime_us,
     })
 }

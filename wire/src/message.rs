@@ -171,7 +171,7 @@ pub struct Sample {
     /// Counts VSYNC edges since the camera was set up; a gap while streaming is a frame that was not
     /// processed.
     pub frame: u32,
-    /// Device time of that VSYNC edge, µs since boot.
+    /// Device time of the middle of the frame's exposure, when the force is true, µs since boot.
     pub time_us: u64,
     /// Why there is no force, or how far to trust it.
     pub status: Status,
@@ -252,6 +252,8 @@ pub struct Stats {
     pub tracking_lost: u32,
     /// Duration of the last frame's processing, µs.
     pub processing_us: u32,
+    /// From the middle of the last frame's exposure until its sample was ready, µs.
+    pub latency_us: u32,
     /// Device time, µs since boot.
     pub uptime_us: u64,
 }
@@ -305,6 +307,8 @@ pub enum Request {
     },
     /// Start streaming samples with their markers, and stats.
     StartWithMarkers,
+    /// Let exposure and gain find what the light needs, and keep that. Answered when done.
+    Expose,
 }
 
 /// The answer to a command.

@@ -11,10 +11,11 @@ use core::fmt::{self, Write};
 use core::ops::Range;
 
 use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::force::Polar;
+use hivtac_sensing::force::{Polar, Resting};
 use hivtac_sensing::formats::Formats;
 use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::{AlignedFile, CentroidEstimator, Model};
+use hivtac_sensing::markers::Marker;
+use hivtac_sensing::model::{AlignedFile, CentroidEstimator, Model, Rest};
 use hivtac_sensing::network::Network;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
@@ -116,6 +117,7 @@ impl<'b> Runner<'b> {
                 Kind::Network => self.network(source, results)?,
                 Kind::Force => self.force(source, results)?,
                 Kind::Windows => self.windows(source, results)?,
+                Kind::Press => self.press(source, results)?,
             }
             self.cases += 1;
         }
@@ -259,6 +261,38 @@ impl<'b> Runner<'b> {
         let output = network.run(&model, &features, &tare);
         counting_ends();
         say(results, self.cases, format_args!("{output:?}"))
+    }
+
+    fn press(
+        &mut self,
+        source: &mut impl Source,
+        results: &mut impl Write,
+    ) -> Result<(), ScriptError> {
+        let mut markers = [Marker::default(); 4];
+        for marker in &mut markers {
+            marker.x = Px(i32::from_le_bytes(bytes(source)?));
+            marker.y = Px(i32::from_le_bytes(bytes(source)?));
+            marker.area = u32::from_le_bytes(bytes(source)?);
+        }
+        let mut rest = Rest {
+            features: features(source)?,
+            areas: [0; 4],
+        };
+        for area in &mut rest.areas {
+            *area = u32::from_le_bytes(bytes(source)?);
+        }
+        let model = model(&self.buffers.model.0[self.model_place.clone()])?;
+        let model = model.ok_or(ScriptError::NoModel)?;
+        let resting = Resting::of_model(&model, &rest);
+        let forward = model.forward.as_ref().zip(resting);
+        let (forward, resting) = forward.ok_or(ScriptError::NoSteps)?;
+        let mut network = Network::new();
+        counting_begins();
+        let features = Features::of_markers(&markers);
+        let output = network.run(&model, &features, &rest.features);
+        let found = resting.force(forward, &model.range, &markers, &output);
+        counting_ends();
+        say(results, self.cases, format_args!("{found:?}"))
     }
 
     fn force(

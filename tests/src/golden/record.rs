@@ -29,10 +29,13 @@ pub enum Kind {
     /// follow the markers, 2 cropped to these windows' rectangle), then the pixels: the pipeline on frames that lie in
     /// memory.
     Windows = 7,
+    /// x, y (i32) and area (u32) of markers 0–3, then eleven features (i64) and four areas (u32) of the rest position: the
+    /// network and the steps from its answer.
+    Press = 8,
 }
 
 impl Kind {
-    pub(super) const ALL: [Kind; 7] = [
+    pub(super) const ALL: [Kind; 8] = [
         Kind::Model,
         Kind::Threshold,
         Kind::Scan,
@@ -40,6 +43,7 @@ impl Kind {
         Kind::Network,
         Kind::Force,
         Kind::Windows,
+        Kind::Press,
     ];
 }
 
@@ -74,6 +78,8 @@ pub enum ScriptError {
     ModelTooLarge(usize),
     /// A record needs a model, and none came before.
     NoModel,
+    /// A record needs a model that takes steps.
+    NoSteps,
     /// The model is not sound.
     Model(ModelError),
     /// No pixel format has this number.
