@@ -1,4 +1,5 @@
-//! Links anew when the memory map changes, which cargo does not look at by itself, and names the model file to embed.
+//! Links anew when the memory map changes, which cargo does not look at by itself, and names the
+//! model file to embed and the camera's frame rate.
 
 use std::path::Path;
 
@@ -16,4 +17,7 @@ fn main() {
     });
     println!("cargo:rerun-if-changed={}", file.display());
     println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());
+    println!("cargo:rerun-if-env-changed=HIVTAC_FRAME_RATE");
+    let rate = std::env::var("HIVTAC_FRAME_RATE").unwrap_or_else(|_| "156".into());
+    println!("cargo:rustc-env=HIVTAC_FRAME_RATE={rate}");
 }

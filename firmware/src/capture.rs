@@ -14,16 +14,19 @@
 //! # Note
 //! Coherence: the core never reads the ring (see `band_copy`).
 //!
-//! Deadlines, for 39 frames a second (line 92 µs, band 738 µs, frame 25.6 ms; at 150 frames a second all but the FIFO's
-//! are four times shorter):
-//! - *The DMA*: DCMI's FIFO holds 4 words, 1.3 µs at 12.5 MB/s. When missed, DCMI reports an overrun: the frame is
-//!   dropped and counted.
-//! - *The handler of a band*: until the end of the next band, 738 µs. When missed, the DMA writes over a band; the
-//!   handler sees that it has changed its target twice, or the frame's number of bands is wrong: the frame is dropped.
-//! - *The handler of a frame's end*: within the VSYNC pulse, 370 µs. When missed after a good frame, the frame counts as
-//!   dropped; when missed after a bad one, the next frame is not captured either.
-//! - *The pipeline*: a band is overwritten 30 bands after it was finished, 22 ms. When missed, its frame is dropped and
-//!   counted as `dropped_busy`; the camera never waits.
+//! Deadlines, for 156 frames a second (line 23 µs, band 184 µs, frame 6.4 ms; at 78 and 39 frames a
+//! second all are two and four times longer):
+//! - *The DMA*: DCMI's FIFO holds 4 words, 0.32 µs at 50 MB/s, 76 bus cycles. A word goes in some
+//!   ten of them, and a burst of the MDMA holds AXI SRAM for 16 to 32 (estimates, not measured).
+//!   When missed, DCMI reports an overrun: the frame is dropped and counted.
+//! - *The handler of a band*: until the end of the next band, 184 µs. When missed, the DMA writes
+//!   over a band; the handler sees that it has changed its target twice, or the frame's number of
+//!   bands is wrong: the frame is dropped.
+//! - *The handler of a frame's end*: within the VSYNC pulse, 92 µs. When missed after a good frame,
+//!   the frame counts as dropped; when missed after a bad one, the next frame is not captured
+//!   either.
+//! - *The pipeline*: a band is overwritten 30 bands after it was finished, 5.5 ms. When missed, its
+//!   frame is dropped and counted as `dropped_busy`; the camera never waits.
 //!
 //! # Limitations
 //! A frame in which the camera lost bytes and gained as many is not noticed. Nor is it noticed that the handler of a

@@ -1,15 +1,18 @@
-//! Keeps the camera going: sets it up, changes its pixel format, and starts it again when it falls silent.
+//! Keeps the camera going: sets it up, changes its pixel format or has it expose anew, and starts
+//! it again when it falls silent.
 
 use crate::camera::{self, Camera, FRAME_TIME, Format};
 use crate::capture::Capture;
 use crate::health::{self, Condition};
-use crate::{log, stats, vsync};
-use embassy_futures::select::{Either, select};
+use crate::session::Asked;
+use crate::{log, outbox, stats, vsync};
+use core::sync::atomic::{AtomicBool, Ordering};
+use embassy_futures::select::{Either3, select3};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
-use hivtac_wire::message::LogLevel;
+use hivtac_wire::message::{DeviceMessage, LogLevel, Outcome, Reply};
 
 /// So many frame times without a band or the end of a frame are a silence. Bands come all the time but for the vertical
 /// blanking, a seventh of a frame, or what a crop window leaves out.
@@ -21,6 +24,20 @@ const RETRY: Duration = Duration::from_millis(500);
 
 /// What pixels the camera shall send. Done once it does.
 pub static WANTED_FORMAT: Signal<CriticalSectionRawMutex, Format> = Signal::new();
+
+/// Who wants exposure and gain to be found anew. Replied to when they are.
+static WANTED_EXPOSURE: Signal<CriticalSectionRawMutex, Asked> = Signal::new();
+
+/// Has exposure and gain found anew for the command `id`; `Busy` while they are.
+pub fn expose(id: u16) -> Option<Outcome> {
+    if EXPOSING.swap(true, Ordering::Relaxed) {
+        return Some(Outcome::Busy);
+    }
+    WANTED_EXPOSURE.signal(Asked::by(id));
+    None
+}
+
+static EXPOSING: AtomicBool = AtomicBool::new(false);
 
 /// Runs for ever at the capture executor's priority. The camera begins with `format`.
 #[embassy_executor::task]
@@ -36,9 +53,11 @@ pub async fn run(camera: Camera, capture: Capture, format: Format) {
     };
     task.start_camera().await;
     loop {
-        match select(WANTED_FORMAT.wait(), Timer::after(FRAME_TIME)).await {
-            Either::First(format) => task.change_format(format).await,
-            Either::Second(()) => task.listen().await,
+        let frame_time = Timer::after(FRAME_TIME);
+        match select3(WANTED_FORMAT.wait(), WANTED_EXPOSURE.wait(), frame_time).await {
+            Either3::First(format) => task.change_format(format).await,
+            Either3::Second(asked) => task.expose(asked).await,
+            Either3::Third(()) => task.listen().await,
         }
     }
 }
@@ -101,11 +120,28 @@ impl CaptureTask {
         self.go_on(from, restart).await;
     }
 
-    /// Has the camera send other pixels; when it does not answer, it is set up anew.
+    /// Has the camera send other pixels.
     async fn change_format(&mut self, format: Format) {
         let from = self.stop();
         self.format = format;
         let answered = self.camera.set_format(format).await;
+        self.go_on_when_set_up(from, answered).await;
+    }
+
+    /// Has the camera find exposure and gain anew.
+    async fn expose(&mut self, asked: Asked) {
+        let from = self.stop();
+        let answered = self.camera.lock_exposure().await;
+        self.go_on_when_set_up(from, answered).await;
+        EXPOSING.store(false, Ordering::Relaxed);
+        if let Some(id) = asked.id() {
+            let outcome = Outcome::Done;
+            outbox::offer(DeviceMessage::Reply(Reply { id, outcome }));
+        }
+    }
+
+    /// Captures again; a camera that did not answer is set up anew before.
+    async fn go_on_when_set_up(&mut self, from: u32, answered: Result<(), camera::Error>) {
         if let Err(error) = answered {
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             self.try_until_it_answers().await;

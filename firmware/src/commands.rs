@@ -1,7 +1,7 @@
 //! What the host asks for, and the answers.
 
 use crate::pipeline_task::{self, Order};
-use crate::{info, outbox, session, stats};
+use crate::{capture_task, info, outbox, session, stats};
 use hivtac_sensing::model::Model;
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
@@ -50,6 +50,11 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
         }
         // The pipeline replies itself, between two frames.
         Request::SetThreshold(threshold) => match order(Order::SetThreshold { id, threshold }) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        // The capture task replies itself, when the camera is ready.
+        Request::Expose => match capture_task::expose(id) {
             Some(outcome) => outcome,
             None => return,
         },

@@ -5,6 +5,7 @@
 //! | breathes, 4 s | frames give forces |
 //! | blinks once a second | frames arrive but give no force: markers, light or model |
 //! | blinks five times a second | no camera |
+//! | two flashes a second | silicon too old: `board/silicon.rs` |
 
 use core::sync::atomic::{AtomicU8, Ordering};
 use embassy_stm32::gpio::Output;

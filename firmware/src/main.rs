@@ -46,6 +46,7 @@ use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
 use hivtac_sensing::model::Model;
+use hivtac_sensing::motion::Motion;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
 use pipeline_task::Sensor;
@@ -106,6 +107,7 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
     }
+    sensor.set_motion(Motion::rolling(camera::LINES));
     info::set_looking(sensor.settings());
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(Format::Rgb565)

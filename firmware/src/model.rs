@@ -30,7 +30,7 @@ const fn beginning<const N: usize>(bytes: &[u8]) -> [u8; N] {
 
 /// The model; `None`, with a log line, when the file is not usable. Samples then say so and have no force.
 pub fn embedded() -> Option<Model<'static>> {
-    let file = if NEAR > 0 { &COPY.0[..] } else { &FILE.0 };
+    let file = if NEAR != 0 { &COPY.0[..] } else { &FILE.0 };
     match Model::parse(file) {
         Ok(model) => Some(model),
         Err(error) => {

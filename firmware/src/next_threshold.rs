@@ -7,9 +7,10 @@
 //! the threshold into use, so that no frame is of two thresholds or read as what it is not.
 
 use crate::camera::Format;
+use crate::capture_task;
 use crate::near_table::NearTable;
 use crate::pipeline_task::Sensor;
-use crate::{capture_task, session};
+use crate::session::Asked;
 use hivtac_sensing::tables::{ByteTable, Table};
 use hivtac_sensing::threshold::{ByteOrder, HsvBox, Threshold};
 use hivtac_wire::message::Outcome;
@@ -39,26 +40,6 @@ struct Wanted {
     done: usize,
     /// The camera was asked for its format.
     camera_asked: bool,
-}
-
-/// Who asked.
-#[derive(Clone, Copy)]
-pub struct Asked {
-    id: u16,
-    conversation: u32,
-}
-
-impl Asked {
-    /// By the command `id` of the present conversation.
-    fn by(id: u16) -> Self {
-        let conversation = session::number();
-        Self { id, conversation }
-    }
-
-    /// The command to reply to, unless its host has gone.
-    pub fn id(self) -> Option<u16> {
-        (self.conversation == session::number()).then_some(self.id)
-    }
 }
 
 impl Wanted {

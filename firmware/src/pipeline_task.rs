@@ -2,7 +2,7 @@
 
 use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
-use crate::camera::Format;
+use crate::camera::{self, Format};
 use crate::capture::{self, EVENTS, Told};
 use crate::convert;
 use crate::follow::Follow;
@@ -57,6 +57,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
         follower: Follower::new(SHAPE),
         follow: Follow::new(),
         busy_us: 0,
+        newest: 0,
         sequence: 0,
         first: true,
         taring: None,
@@ -76,6 +77,8 @@ struct PipelineTask {
     follow: Follow,
     /// Spent on the frame under way, µs.
     busy_us: u32,
+    /// The frame that was measured last.
+    newest: u32,
     /// Samples produced.
     sequence: u32,
     /// No frame was measured yet.
@@ -152,6 +155,9 @@ impl PipelineTask {
         let begun = Instant::now();
         if band.index == 0 {
             self.busy_us = 0;
+            if band.edge.number != self.newest.wrapping_add(1) {
+                self.sensor.forget_motion();
+            }
             self.follow.begin(self.sensor, band.window);
         }
         let fetched = self.bands.fetch(band, capture::finished);
@@ -193,6 +199,7 @@ impl PipelineTask {
         self.sent = format;
         self.use_next_threshold();
         self.sensor.set_tare(None);
+        self.sensor.forget_motion();
         self.give_up_tare();
         self.follow = Follow::new();
     }
@@ -201,9 +208,12 @@ impl PipelineTask {
     fn deliver(&mut self, delivery: &Delivery) {
         let begun = Instant::now();
         let measurement = self.follow.finish(self.sensor);
+        self.newest = delivery.edge.number;
         let sample = self.sample(delivery, &measurement);
         self.busy_us += begun.elapsed().as_micros() as u32;
         stats::PROCESSING_US.set(self.busy_us);
+        let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
+        stats::LATENCY_US.set(latency_us as u32);
         self.tare_with(&measurement);
         health::set(match measurement.force {
             Some(_) => Condition::Good,
@@ -230,7 +240,7 @@ impl PipelineTask {
         Sample {
             sequence: self.sequence,
             frame: delivery.edge.number,
-            time_us: delivery.edge.time_us,
+            time_us: delivery.edge.time_us + u64::from(camera::exposure_middle_us()),
             status,
             force: measurement.force.map(convert::force_to_wire),
             markers: measurement

@@ -23,5 +23,5 @@ pub const BAND_DIVISOR: u16 = if cfg!(feature = "bug-half-buffer") {
     1
 };
 
-/// True when the oscillator that clocks USB stays off.
-pub const NO_HSI48: bool = cfg!(feature = "bug-no-hsi48");
+/// True when USB is clocked by an oscillator that nothing trims.
+pub const USB_FROM_HSI48: bool = cfg!(feature = "bug-usb-clock");

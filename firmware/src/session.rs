@@ -48,3 +48,23 @@ pub fn wants_markers() -> bool {
 pub fn is_streaming() -> bool {
     STREAMING.load(Ordering::Relaxed)
 }
+
+/// Who asked.
+#[derive(Clone, Copy)]
+pub struct Asked {
+    id: u16,
+    conversation: u32,
+}
+
+impl Asked {
+    /// By the command `id` of the present conversation.
+    pub fn by(id: u16) -> Self {
+        let conversation = number();
+        Self { id, conversation }
+    }
+
+    /// The command to reply to, unless its host has gone.
+    pub fn id(self) -> Option<u16> {
+        (self.conversation == number()).then_some(self.id)
+    }
+}

@@ -93,4 +93,5 @@ counters! {
     FRAMES_TRACKED => frames_tracked;
     TRACKING_LOST => tracking_lost;
     PROCESSING_US => processing_us;
+    LATENCY_US => latency_us;
 }

@@ -49,8 +49,12 @@ pub fn restart_count() {
 
 #[embassy_stm32::interrupt]
 fn EXTI9_5() {
+    let pending = EXTI.pr(0);
+    pending.write(|w| w.set_line(LINE, true));
+    // The bus takes a write and delivers it later. Before the line falls this handler must not
+    // return, or it runs twice and counts an edge that there was not; a read waits for the write.
+    let _ = pending.read();
     let time_us = Instant::now().as_micros();
-    EXTI.pr(0).write(|w| w.set_line(LINE, true));
     NEWEST.lock(|newest| {
         let number = newest.get().number.saturating_add(1);
         newest.set(Edge { number, time_us });

@@ -6,30 +6,33 @@
 //! | VSYNC, HSYNC (HREF), PIXCLK | PB7, PA4, PA6 |
 //! | XCLK | PA8 (MCO1) |
 //! | SCCB clock, data | PB8, PB9 (I2C1) |
-//! | camera power-down | PA7, high = off |
+//! | camera power-down | PA7, high = standby: the camera's supplies stay on, and its registers keep their values |
 //! | USB D−, D+ | PA11, PA12 |
 //! | LED | PE3, high = on |
 //! | crystal | 25 MHz |
 
+use super::free_bus::{self, Lines};
+use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
-use crate::camera::Camera;
+use crate::camera::{Camera, Sccb};
 use crate::capture::Capture;
 use crate::{priorities, seeded_bugs};
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull, Speed};
 use embassy_stm32::i2c::{self, I2c};
-use embassy_stm32::pac::CRS;
-use embassy_stm32::pac::crs::vals::Syncsrc;
 use embassy_stm32::rcc::*;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Config, Peri, peripherals};
+use embassy_stm32::{Peri, pac, peripherals};
 use embassy_time::Duration;
 
 /// Name in the device's hello.
 pub const NAME: &str = "weact-h743";
 /// The camera's clock: the crystal halved.
 pub const XCLK_HZ: u32 = HSE_HZ / 2;
+
+/// Of the camera's control bus. The pins' own pull-ups help those on the board, 4.7 kΩ.
+pub const SCCB_CLOCK: Hertz = Hertz::khz(100);
 
 const HSE_HZ: u32 = 25_000_000;
 /// DCMI's alternate function on each of its pins.
@@ -64,10 +67,14 @@ pub struct UsbPort {
 }
 
 impl Board {
-    /// Starts the clocks and sets up every pin. Call once.
+    /// Starts the clocks and sets up every pin. Call once. On silicon that is too old it does not
+    /// return.
     pub fn start() -> Board {
+        silicon::refuse_old(&Led {
+            port: pac::GPIOE,
+            pin: 3,
+        });
         let p = embassy_stm32::init(clocks());
-        synchronize_hsi48();
         start_camera_clock(p.MCO1, p.PA8);
         connect_camera([
             p.PC6.into(),
@@ -85,7 +92,7 @@ impl Board {
         let sccb = I2c::new_blocking(p.I2C1, p.PB8, p.PB9, sccb_config());
         let power_down = Output::new(p.PA7, Level::High, Speed::Low);
         Board {
-            camera: Camera::new(sccb, power_down),
+            camera: Camera::new(Sccb::new(sccb), power_down),
             capture: Capture::new(p.DCMI, BandDma::new(p.DMA1_CH0), priorities::CAPTURE),
             bands: BandCopy::new(p.MDMA_CH0),
             usb: UsbPort {
@@ -100,8 +107,8 @@ impl Board {
 }
 
 /// 25 MHz crystal / 5 · 192 / 2 = 480 MHz for the core, 240 MHz for the buses, 120 MHz for the peripherals.
-fn clocks() -> Config {
-    let mut config = Config::default();
+fn clocks() -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
     config.rcc.hse = Some(Hse {
         freq: Hertz(HSE_HZ),
         mode: HseMode::Oscillator,
@@ -112,7 +119,7 @@ fn clocks() -> Config {
         mul: PllMul::MUL192,
         fracn: None,
         divp: Some(PllDiv::DIV2),
-        divq: None,
+        divq: (!seeded_bugs::USB_FROM_HSI48).then_some(PllDiv::DIV20),
         divr: None,
     });
     // 480 MHz needs the highest core voltage.
@@ -124,22 +131,22 @@ fn clocks() -> Config {
     config.rcc.apb2_pre = APBPrescaler::DIV2;
     config.rcc.apb3_pre = APBPrescaler::DIV2;
     config.rcc.apb4_pre = APBPrescaler::DIV2;
-    config.rcc.hsi48 = usb_oscillator();
-    config.rcc.mux.usbsel = mux::Usbsel::HSI48;
+    clock_usb(&mut config.rcc);
     config
 }
 
-/// USB runs from the internal 48 MHz oscillator, trimmed to the host's start-of-frame packets.
-fn usb_oscillator() -> Option<Hsi48Config> {
-    (!seeded_bugs::NO_HSI48).then_some(Hsi48Config {
-        sync_from_usb: true,
-    })
-}
-
-/// The HAL selects source 2, the other USB core (OTG_HS). This board's plug is on OTG_FS, source 3 (RM0433, CRS_CFGR;
-/// silicon revision V).
-fn synchronize_hsi48() {
-    CRS.cfgr().modify(|w| w.set_syncsrc(Syncsrc::from_bits(3)));
+/// USB runs from the crystal, too: 960 MHz / 20 = 48 MHz. The internal 48 MHz oscillator is off by
+/// more than the 0.25 % that full speed allows until it is trimmed to the host's packets, and the
+/// HAL has it trimmed to those of the other USB core, OTG_HS: its source is write-protected from
+/// then on (RM0433, CRS_CFGR).
+fn clock_usb(rcc: &mut Config) {
+    rcc.mux.usbsel = mux::Usbsel::PLL1_Q;
+    if seeded_bugs::USB_FROM_HSI48 {
+        rcc.hsi48 = Some(Hsi48Config {
+            sync_from_usb: true,
+        });
+        rcc.mux.usbsel = mux::Usbsel::HSI48;
+    }
 }
 
 /// The camera's clock comes from the crystal: its frame rate is exact, and needs no other oscillator.
@@ -161,10 +168,21 @@ fn connect_camera(pins: [Peri<'static, AnyPin>; 11]) {
     }
 }
 
+/// Has a camera that holds the control bus let go of it, and brings I²C1 to its state after a
+/// reset.
+pub fn free_sccb() {
+    let lines = Lines {
+        port: pac::GPIOB,
+        clock: 8,
+        data: 9,
+    };
+    lines.free();
+    free_bus::reset_i2c1();
+}
+
 fn sccb_config() -> i2c::Config {
     let mut config = i2c::Config::default();
-    config.frequency = Hertz::khz(100);
-    // The camera module has no pull-ups of its own on every make.
+    config.frequency = SCCB_CLOCK;
     config.sda_pullup = true;
     config.scl_pullup = true;
     // A byte takes 90 µs. A bus that hangs must not hold up the tasks below for long.

@@ -2,8 +2,10 @@
 
 mod ov7725;
 mod ov7725_registers;
+mod sccb;
 pub use ov7725::*;
 pub use ov7725_registers::Format;
+pub use sccb::Sccb;
 
 use hivtac_sensing::geometry::Geometry;
 

@@ -1,7 +1,8 @@
 //! The OV7725's registers that the firmware writes, and why. Everything else keeps its value after reset.
 //!
-//! Numbers and names: OV7725 data sheet 1.31, table 17.
+//! Numbers and names: OV7725 data sheet 1.31, table 17. Application note: OV7725 1.04.
 
+use super::FRAMES_PER_SECOND;
 use crate::seeded_bugs;
 use hivtac_sensing::threshold::PixelFormat;
 
@@ -50,21 +51,45 @@ impl Format {
             _ if seeded_bugs::YUV_FORMAT => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
             // High byte of each pixel first. The pipeline unswaps the bytes in its threshold table.
             Format::Rgb565 => &[(COM7, COM7_QVGA_RGB565), (COM3, 0)],
-            // Cb before Cr, as DSP_CTRL3 (0x66) has it after a reset.
+            // Cb before Cr, as DSP_CTRL3 (0x66) is set.
             Format::Yuv422 => &[(COM7, COM7_QVGA_YUV), (COM3, COM3_LUMA_FIRST)],
         }
     }
 }
 
-/// Register, value: written in this order after a reset and a [`Format`]'s.
+/// What is automatic: [`AUTOMATIC`] or [`LOCKED`].
+pub const COM8: u8 = 0x13;
+/// [`COM8`]: exposure and gain, fast and to a part of a line. White balance off: it would turn the
+/// hue that the threshold asks for with whatever is in view. Banding filter off: the light is DC.
+pub const AUTOMATIC: u8 = 0x8D;
+/// [`COM8`]: nothing. What exposure and gain were they stay.
+pub const LOCKED: u8 = 0x88;
+/// Gain, and exposure in lines, low and high byte: what the automatic control has found.
+pub const EXPOSURE: [u8; 3] = [0x00, 0x10, 0x08];
+
+/// How often the camera sends a frame. A lower rate leaves more time for light.
+const CLOCK: (u8, u8) = match FRAMES_PER_SECOND {
+    // No prescaler: PCLK = XCLK · 4 = 50 MHz.
+    156 => (CLKRC, 0xC0),
+    // Prescaler 2 · (0 + 1).
+    78 => (CLKRC, 0x80),
+    // Prescaler 2 · (1 + 1).
+    39 => (CLKRC, 0x81),
+    _ => panic!("HIVTAC_FRAME_RATE must be 156, 78 or 39"),
+};
+const CLKRC: u8 = 0x11;
+
+/// Register, value: written in this order after a reset and a [`Format`]'s, and read back. It has
+/// every register that the picture depends on and whose value after a reset is not the same in all
+/// of OmniVision's data sheets and the drivers of Linux and OpenMV.
 pub const TABLE: &[(u8, u8)] = &[
-    // CLKRC: pixel clock = PLL output / (2·(1 + 1)). With COM4: 12.5 MHz XCLK → 12.5 MHz PCLK, 39 frames/s, which
-    // leaves up to 25 ms of exposure and two thirds of the processing time free.
-    (0x11, 0x01),
+    CLOCK,
     // COM4: PLL × 4; exposure is judged on the whole frame.
     (0x0D, 0x41),
     // COM5: no automatic frame rate. Dim light must not change the time between frames.
     (0x0E, 0x01),
+    // COM6: as in OpenMV's table; its meaning is not public.
+    (0x0F, 0xC5),
     // COM10: HREF high while data is valid, PCLK runs freely and data changes on its falling edge, VSYNC high
     // during its pulse. `ov7725.rs` tells DCMI the same.
     (0x15, 0x00),
@@ -79,14 +104,55 @@ pub const TABLE: &[(u8, u8)] = &[
     // HOUTSIZE, VOUTSIZE: 320 × 240 out, no scaling.
     (0x29, 0x50),
     (0x2C, 0x78),
-    // COM8: automatic exposure and gain on, so that the markers stay above the threshold's lowest value while the
-    // light ages or differs from unit to unit. Automatic white balance off: it would turn the hue that the threshold
-    // asks for with whatever is in view. Banding filter off: the light is DC.
-    (0x13, 0x8D),
-    // COM9: gain at most 4×: beyond it noise costs more than light gains. Bits 2 and 1 clear: never drop the VSYNC
+    // COM8, COM9: automatic exposure and gain until the film is well exposed. Gain at most 4×:
+    // beyond it noise costs more than light gains. COM9's bits 2 and 1 clear: never drop the VSYNC
     // or HREF of a frame during an exposure change, so that every VSYNC edge has a whole frame.
+    (COM8, AUTOMATIC),
     (0x14, 0x18),
-    // BLUE, RED: unity, as automatic white balance is off.
-    (0x01, 0x80),
-    (0x02, 0x80),
+    // AEW, AEB, VPT: mean luma between 0x64 and 0x96, as in OpenMV's table: a white film is bright
+    // and not saturated.
+    (0x24, 0x96),
+    (0x25, 0x64),
+    (0x26, 0xA1),
+    // COM12: direct offset of the analog part, as in the tables of OpenMV and gspca.
+    (0x3D, 0x03),
+    // COM16, and the black levels of blue, red and both greens: equal, so that black is neutral.
+    (0x41, 0x08),
+    (0x42, 0x80),
+    (0x43, 0x80),
+    (0x44, 0x80),
+    (0x45, 0x80),
+    // LC_CTR: no lens correction. It is made for another lens.
+    (0x46, 0x00),
+    // AWB_CTRL0, AWB_CTRL1: gains are applied and not calculated; 0x40 is a gain of one.
+    (0x63, 0xA0),
+    (0x69, 0x5E),
+    // BLUE, RED, GREEN: gains of one. A white measured on a real unit would go here.
+    (0x01, 0x40),
+    (0x02, 0x40),
+    (0x03, 0x40),
+    // DSP_CTRL1: FIFO, colour matrix, interpolation, and correction of defective pixels. No gamma:
+    // levels stay in proportion to light, by which the sensing weighs a marker's rim. No special
+    // effects, no adjustment of colours to gain.
+    (0x64, 0x9B),
+    // DSP_CTRL2, DSP_CTRL3: for QVGA, as in the tables of OpenMV and gspca; Cb before Cr, no test
+    // picture.
+    (0x65, 0x2F),
+    (0x66, 0x00),
+    // DSP_CTRL4: YUV or RGB, no raw data.
+    (0x67, 0x00),
+    // DNSTH, EDGE0: no smoothing and no sharpening, which would move rims; DSPAUTO: neither by
+    // itself, only scaling.
+    (0x8E, 0x00),
+    (0x8F, 0x00),
+    (0xAC, 0x0F),
+    // MTX1 to MTX6, MTX_CTRL: the application note's colour matrix. Half of it, the value after a
+    // reset in some sheets, makes red dots half as red.
+    (0x94, 0xB0),
+    (0x95, 0x9D),
+    (0x96, 0x13),
+    (0x97, 0x16),
+    (0x98, 0x7B),
+    (0x99, 0x91),
+    (0x9A, 0x1E),
 ];

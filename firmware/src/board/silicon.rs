@@ -1,0 +1,53 @@
+//! Which revision of the silicon this is, and the end of the program on one that is too old.
+
+use embassy_stm32::pac::gpio::{Gpio, vals::Moder};
+use embassy_stm32::pac::{DBGMCU, RCC};
+
+/// REV_ID of the first revision with 480 MHz, X. V, the usual one, is 0x2003; Z and Y are 0x1001
+/// and 0x1003.
+const FIRST_REVISION: u16 = 0x2001;
+/// Tenth of a second, core cycles at the 64 MHz after a reset.
+const TENTH: u32 = 6_400_000;
+
+/// The LED's pin, high = on.
+pub struct Led {
+    /// Its port.
+    pub port: Gpio,
+    /// Its number.
+    pub pin: usize,
+}
+
+/// Returns on silicon that runs this program. Before it the core has no more than 400 MHz, setting
+/// up 480 MHz would wait for ever for a voltage that is not there, and the DMA's memory is read
+/// wrongly (errata ES0396, "Reading from AXI SRAM may lead to data read corruption").
+pub fn refuse_old(led: &Led) {
+    let revision = DBGMCU.idc().read().rev_id();
+    if revision >= FIRST_REVISION {
+        return;
+    }
+    defmt::error!(
+        "silicon revision {=u16:x}: needs {=u16:x} (X) or later, which runs at 480 MHz",
+        revision,
+        FIRST_REVISION
+    );
+    flash_for_ever(led);
+}
+
+/// Two flashes a second.
+fn flash_for_ever(led: &Led) -> ! {
+    RCC.ahb4enr().modify(|w| w.set_gpioeen(true));
+    // The clock runs after this.
+    let _ = RCC.ahb4enr().read();
+    led.port
+        .moder()
+        .modify(|w| w.set_moder(led.pin, Moder::OUTPUT));
+    loop {
+        for _ in 0..2 {
+            led.port.bsrr().write(|w| w.set_bs(led.pin, true));
+            cortex_m::asm::delay(TENTH);
+            led.port.bsrr().write(|w| w.set_br(led.pin, true));
+            cortex_m::asm::delay(TENTH);
+        }
+        cortex_m::asm::delay(6 * TENTH);
+    }
+}
