@@ -13,6 +13,7 @@ use rigless::soc::stm32h743::peripherals::rcc::{HSI_HZ, HSI48_HZ, Pll, Tap};
 use rigless::soc::{Bus, Error};
 
 use crate::camera::Supply;
+use crate::crs;
 use crate::dcmi::Pins;
 
 /// The crystal on OSC_IN, Hz.
@@ -61,6 +62,10 @@ pub struct Wiring {
     pub hclk_hz: u64,
     /// The USB transceiver has its 3.3 V and the pins.
     pub usb: bool,
+    /// USB's clock, Hz, with the error of what makes it; 0 without one.
+    pub usb_hz: u64,
+    /// The LED is on.
+    pub led: bool,
 }
 
 /// Where the part keeps the registers that decide the wiring.
@@ -69,6 +74,9 @@ pub struct Slots {
     ports: [usize; 5],
     rcc: usize,
     pwr: usize,
+    crs: usize,
+    /// Of the identity.
+    pub dbgmcu: usize,
 }
 
 impl Slots {
@@ -85,6 +93,8 @@ impl Slots {
             ports,
             rcc: bus.slot("RCC")?,
             pwr: bus.slot("PWR")?,
+            crs: bus.slot("CRS")?,
+            dbgmcu: bus.slot("DBGMCU")?,
         })
     }
 
@@ -120,14 +130,24 @@ impl Slots {
             },
             hclk_hz: part.rcc.hclk(registers(part, self.rcc)),
             usb: carries(A, 11, AF_USB) && carries(A, 12, AF_USB) && self.usb_supplied(part),
+            usb_hz: self.usb_hz(part),
+            led: self.led(part),
         }
+    }
+
+    /// PE3, driven high.
+    fn led(&self, part: &Stm32h743) -> bool {
+        const OUTPUT: u64 = 1;
+        let port = self.port(part, E);
+        port.get(Port::Moder) >> 6 & 3 == OUTPUT && part.gpio[E].level(pin(3), port) == Level::High
     }
 
     fn port<'a>(&self, part: &'a Stm32h743, port: usize) -> &'a RegisterFile {
         registers(part, self.ports[port])
     }
 
-    /// PA7 high is power-down, and the line is pulled up: the camera is on only while PA7 is driven low.
+    /// PA7 high is power-down; the rig has the camera run only while PA7 is driven low, though the
+    /// board pulls it down.
     fn camera_powered(&self, part: &Stm32h743) -> bool {
         const OUTPUT: u64 = 1;
         let port = self.port(part, A);
@@ -138,6 +158,21 @@ impl Slots {
     /// PWR_CR3: USB33DEN, which the firmware sets once the 3.3 V are there.
     fn usb_supplied(&self, part: &Stm32h743) -> bool {
         registers(part, self.pwr).get(pwr::Register::Cr3) >> 24 & 1 == 1
+    }
+
+    /// RM0433 RCC_D2CCIP2R bits 21:20: nothing, PLL1, PLL3, or the internal oscillator, which is
+    /// off by its error until it is trimmed.
+    fn usb_hz(&self, part: &Stm32h743) -> u64 {
+        let registers = registers(part, self.rcc);
+        let pll = |pll| part.rcc.pll_output(registers, pll, Tap::Q);
+        match registers.get(rcc::Register::D2ccip2r) >> 20 & 3 {
+            1 => pll(Pll::One),
+            2 => pll(Pll::Three),
+            3 if registers.get(rcc::Register::Cr) >> 13 & 1 == 0 => 0,
+            3 if crs::trims(self::registers(part, self.crs)) => HSI48_HZ,
+            3 => crs::HSI48_UNTRIMMED_HZ,
+            _ => 0,
+        }
     }
 
     /// MCO1, RM0433 RCC_CFGR bits 24:22 (source) and 21:18 (divider, 0 is off).

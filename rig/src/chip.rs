@@ -1,20 +1,25 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
 //! core that it lacks.
 //!
-//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for five slots itself: DCMI, MDMA, and the
-//! three blocks of OTG2; everything else goes to the part's own models.
+//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for six slots itself:
+//! DCMI, MDMA, CRS, and the three blocks of OTG2; everything else goes to the part's own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
+use rigless::emulator::Access;
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
+use rigless::soc::stm32h743::generated::dbgmcu;
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 
 use crate::board::{self, Wiring};
 use crate::camera::{Sccb, SharedCamera};
+use crate::control_bus::{ControlBus, HeldBus};
+use crate::crs::Crs;
 use crate::dcmi::Dcmi;
 use crate::dormant::Dormant;
 use crate::faults::Faults;
+use crate::late_line::LateLine;
 use crate::mdma::Mdma;
 use crate::otg::{Blocks, SharedCore};
 use crate::rules::Rules;
@@ -22,6 +27,34 @@ use crate::usb_host::SharedHost;
 
 /// The board's supply, mV.
 const SUPPLY_MV: u32 = 3300;
+
+/// Revision of the silicon.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Revision {
+    /// 400 MHz at most.
+    Y,
+    /// 480 MHz.
+    #[default]
+    V,
+}
+
+impl Revision {
+    /// DBGMCU_IDC.
+    fn identity(self) -> u64 {
+        match self {
+            Revision::Y => 0x1003_6450,
+            Revision::V => 0x2003_6450,
+        }
+    }
+
+    /// Fastest bus clock, Hz: half the core's (DS12110).
+    fn fastest_bus_hz(self) -> u64 {
+        match self {
+            Revision::Y => 200_000_000,
+            Revision::V => 240_000_000,
+        }
+    }
+}
 
 /// The part with what the rig adds to it.
 #[derive(Debug)]
@@ -32,6 +65,13 @@ pub struct Chip {
     pub dcmi: Dcmi,
     /// The controller that reaches DTCM.
     pub mdma: Mdma,
+    crs: Crs,
+    control_bus: ControlBus,
+    held_bus: HeldBus,
+    late: LateLine,
+    rules: Rules,
+    revision: Revision,
+    led_flashes_ns: Vec<u64>,
     camera: SharedCamera,
     otg: Blocks,
     core: SharedCore,
@@ -40,6 +80,7 @@ pub struct Chip {
     slots: board::Slots,
     dcmi_slot: usize,
     mdma_slot: usize,
+    crs_slot: usize,
     vsync: Level,
     wiring: Wiring,
 }
@@ -54,6 +95,8 @@ impl Chip {
         host: SharedHost,
         faults: Faults,
         rules: Rules,
+        revision: Revision,
+        seed: u64,
     ) -> Result<Self, Error> {
         let mut part = Stm32h743::new()?;
         part.rcc.attach_crystals(board::CRYSTAL_HZ, 0);
@@ -66,10 +109,19 @@ impl Chip {
         let slots = board::Slots::of(part.bus())?;
         let dcmi_slot = part.bus().slot("DCMI")?;
         let mdma_slot = part.bus().slot("MDMA")?;
-        Ok(Self {
+        let crs_slot = part.bus().slot("CRS")?;
+        let i2c_slot = part.bus().slot("I2C1")?;
+        let mut chip = Self {
             dormant: Dormant::new(part.bus()),
-            dcmi: Dcmi::new(camera.clone(), faults, rules.clone()),
-            mdma: Mdma::new(rules),
+            dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone()),
+            control_bus: ControlBus::new(faults.clone(), slots.vsync_port(), i2c_slot),
+            held_bus: HeldBus,
+            mdma: Mdma::new(rules.clone(), faults.clone(), seed),
+            rules,
+            revision,
+            led_flashes_ns: Vec::new(),
+            late: LateLine::default(),
+            crs: Crs::default(),
             part,
             camera,
             otg,
@@ -78,9 +130,24 @@ impl Chip {
             slots,
             dcmi_slot,
             mdma_slot,
+            crs_slot,
             vsync: Level::Low,
             wiring: Wiring::default(),
-        })
+        };
+        chip.identify();
+        Ok(chip)
+    }
+
+    /// Writes the revision where the program reads it.
+    fn identify(&mut self) {
+        let slot = self.slots.dbgmcu;
+        let registers = self.part.bus_mut().slot_mut(slot).registers_mut();
+        registers.set(dbgmcu::Register::Idc, self.revision.identity());
+    }
+
+    /// When the LED went on, ns.
+    pub fn led_flashes_ns(&self) -> &[u64] {
+        &self.led_flashes_ns
     }
 
     /// Words that the firmware wrote into full USB FIFOs.
@@ -92,15 +159,36 @@ impl Chip {
     pub fn rewire(&mut self, at: VirtualNanos) {
         let wiring = self.slots.wiring(&self.part);
         if wiring != self.wiring {
+            if wiring.hclk_hz > self.revision.fastest_bus_hz() {
+                let (hclk, revision) = (wiring.hclk_hz, self.revision);
+                self.rules.broken(|| format!("RCC: HCLK is {hclk} Hz, too fast for silicon revision {revision:?} (DS12110)"));
+            }
+            if wiring.led && !self.wiring.led {
+                self.led_flashes_ns.push(at.0);
+            }
             self.wiring = wiring;
             self.dcmi.wire(wiring.pins, wiring.hclk_hz);
-            self.core.lock().wired = wiring.usb;
+            let mut core = self.core.lock();
+            (core.wired, core.clock_hz) = (wiring.usb, wiring.usb_hz);
+            drop(core);
             self.camera.lock().supply(wiring.supply);
         }
         if self.camera.lock().restarts() {
             let (registers, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
             self.dcmi.start_over(registers, &mut context);
         }
+    }
+
+    /// Looks at what an access may have changed on the camera's control bus, and at lines that are
+    /// late to fall.
+    pub fn settle(&mut self, at: VirtualNanos) {
+        self.control_bus.settle(&mut self.part, at);
+        self.late.settle(&mut self.part, at);
+    }
+
+    /// The core has read or written something.
+    pub fn accessed(&mut self, access: &Access, value: u64) {
+        self.late.accessed(access, value);
     }
 
     /// Puts the VSYNC line's level on its pin.
@@ -135,10 +223,12 @@ impl Mcu for Chip {
         self.otg.wake_host(self.part.bus_mut(), at);
         self.dormant = Dormant::new(self.part.bus());
         Device::reset(&mut self.mdma);
+        Device::reset(&mut self.crs);
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);
         self.wiring = Wiring::default();
+        self.identify();
         self.rewire(at);
     }
 
@@ -154,6 +244,12 @@ impl Mcu for Chip {
         }
         if slot == self.mdma_slot {
             return (self.part.bus_mut(), Some(&mut self.mdma));
+        }
+        if self.control_bus.holds(slot) {
+            return (self.part.bus_mut(), Some(&mut self.held_bus));
+        }
+        if slot == self.crs_slot {
+            return (self.part.bus_mut(), Some(&mut self.crs));
         }
         if slot == self.slots.vsync_port() {
             self.drive_vsync(self.dcmi.vsync_at());

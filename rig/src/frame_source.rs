@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use crate::truth::Exposed;
 use anyhow::{Context, bail};
-use hivtac_scene::{Format, Options, Preset, Scene};
+use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
 use serde_json::{Value, json};
 
 /// How a picture's pixels are coded.
@@ -30,12 +31,12 @@ pub struct Picture {
 
 /// What stands before the camera.
 pub trait FrameSource: Send + std::fmt::Debug {
-    /// The picture of one exposure; `exposure` counts from 1 since the run began, `time_s` is the run's virtual time.
-    /// `wanted` is what the sensor sends; a source that knows only RGB565 gives that.
-    fn picture(&self, exposure: u64, time_s: f64, wanted: Coding) -> Picture;
+    /// The picture of one exposure. `wanted` is what the sensor sends; a source that knows only
+    /// RGB565 gives that.
+    fn picture(&self, exposed: Exposed, wanted: Coding) -> Picture;
 
-    /// What is true then, for the truth log.
-    fn truth(&self, time_s: f64) -> Value;
+    /// What is true in the middle of it, for the truth log.
+    fn truth(&self, exposed: Exposed) -> Value;
 }
 
 /// A moving white square over a gradient, every pixel known.
@@ -43,7 +44,8 @@ pub trait FrameSource: Send + std::fmt::Debug {
 pub struct TestPicture;
 
 impl FrameSource for TestPicture {
-    fn picture(&self, exposure: u64, _time_s: f64, _wanted: Coding) -> Picture {
+    fn picture(&self, exposed: Exposed, _wanted: Coding) -> Picture {
+        let exposure = exposed.exposure;
         let square = [40 + exposure * 3 % 240, 40 + exposure * 2 % 160];
         let pixel = |x: u64, y: u64| {
             let inside = x.abs_diff(square[0]) < 12 && y.abs_diff(square[1]) < 12;
@@ -64,7 +66,7 @@ impl FrameSource for TestPicture {
         }
     }
 
-    fn truth(&self, _time_s: f64) -> Value {
+    fn truth(&self, _exposed: Exposed) -> Value {
         json!({})
     }
 }
@@ -100,6 +102,12 @@ impl SceneSource {
                 path.display()
             );
         }
+        if scene.options().shutter != Shutter::default() {
+            bail!(
+                "--scene {}: the camera's registers say how it exposes: leave `shutter` out",
+                path.display()
+            );
+        }
         Self::of(scene).with_context(context)
     }
 
@@ -124,12 +132,12 @@ impl SceneSource {
 }
 
 impl FrameSource for SceneSource {
-    fn picture(&self, exposure: u64, time_s: f64, wanted: Coding) -> Picture {
+    fn picture(&self, exposed: Exposed, wanted: Coding) -> Picture {
         let scene = match wanted {
             Coding::Rgb565 => &self.rgb565,
             Coding::Yuv422 => &self.yuv422,
         };
-        let frame = scene.frame(exposure, time_s);
+        let frame = scene.frame_by(&exposed.shutter(), exposed.exposure, exposed.time_s());
         Picture {
             width: frame.width,
             height: frame.height,
@@ -138,8 +146,8 @@ impl FrameSource for SceneSource {
         }
     }
 
-    fn truth(&self, time_s: f64) -> Value {
-        let truth = self.rgb565.truth(time_s);
+    fn truth(&self, exposed: Exposed) -> Value {
+        let truth = self.rgb565.truth_by(&exposed.shutter(), exposed.time_s());
         let force = truth.force.vector_n();
         let markers: Vec<Value> = (truth.markers.iter())
             .map(|marker| match marker {
@@ -166,7 +174,11 @@ mod tests {
     /// What is true of a scene file at 0.2 s: |F| and the place.
     fn truth(file: &str) -> [Value; 3] {
         let scene = Scene::from_toml(file).unwrap();
-        let truth = SceneSource::of(scene).unwrap().truth(0.2);
+        let exposed = Exposed {
+            middle_ns: 200_000_000,
+            ..Exposed::default()
+        };
+        let truth = SceneSource::of(scene).unwrap().truth(exposed);
         ["magnitude_n", "place_x_mm", "place_y_mm"].map(|key| truth[key].clone())
     }
 

@@ -11,25 +11,31 @@
 //! | module | subject |
 //! |---|---|
 //! | [`run`], [`report`] | one run from options to outcome |
-//! | [`chip`], [`board`], `machine`, `dormant` | the microcontroller; which pins and clocks reach the camera and USB |
-//! | [`dcmi`], [`camera`], [`frame_source`] | the camera interface; the sensor; what it looks at |
+//! | [`chip`], [`board`], [`crs`], [`machine`], `rom`, `dormant` | the microcontroller; which pins and clocks reach the camera and USB |
+//! | [`dcmi`], [`camera`], [`frame_source`], `control_bus` | the camera interface; the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`mdma`] | the DMA controller that reaches DTCM |
 //! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
-//! | [`faults`], [`rules`], [`dma_reach`], [`truth`] | what goes wrong on request; what firmware must not do; what is true |
+//! | [`faults`], [`rules`], `late_line`, [`dma_reach`] | what goes wrong on request; what firmware must not do |
+//! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
+pub mod arrivals;
 pub mod board;
 pub mod camera;
 pub mod chip;
+mod control_bus;
+pub mod crs;
 pub mod dcmi;
 pub mod dma_reach;
 mod dormant;
 pub mod faults;
 pub mod frame_source;
+mod late_line;
 pub mod link;
-mod machine;
+pub mod machine;
 pub mod mdma;
 pub mod otg;
 pub mod report;
+mod rom;
 pub mod rules;
 pub mod run;
 pub mod script;

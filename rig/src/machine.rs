@@ -1,14 +1,13 @@
 //! The board as the emulator runs it: one microcontroller, and what its core is made as.
 
 use std::num::{NonZeroU32, NonZeroU64};
-use std::path::Path;
 
-use rigless::image::Image;
 use rigless::machine::{Board, Target, armv7m};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
 
 use crate::chip::Chip;
+use crate::rom;
 
 /// The core's clock, Hz. Only SysTick's reference depends on it.
 const CORE_HZ: u64 = 480_000_000;
@@ -20,6 +19,18 @@ pub struct Sensor {
     pub chip: Chip,
     /// What the core is assumed to execute in a second of virtual time.
     pub instructions_per_second: NonZeroU64,
+    /// How the program is entered.
+    pub entry: Entry,
+}
+
+/// How a program is entered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Entry {
+    /// By a reset, from flash.
+    #[default]
+    Reset,
+    /// By the ROM's loader, with its vector table in use.
+    Loader,
 }
 
 // Snapshots are not taken.
@@ -59,15 +70,13 @@ impl Board for Sensor {
             ctr: 0x8303_C003,
             ccsidr: &[0xF00F_E019, 0xF01F_E009],
         });
-        config.vector_table = Some(0x0800_0000);
+        let vectors = match self.entry {
+            Entry::Reset => rom::FLASH,
+            Entry::Loader => rom::BASE,
+        };
+        config.vector_table = Some(vectors);
         let mut core = config.spec();
-        core.factory_images = vec![unique_id()];
+        core.factory_images = vec![rom::unique_id(), rom::loader()];
         vec![Target::new("stm32h743", &mut self.chip, core)]
     }
-}
-
-/// The 96-bit number that every part is made with, at its address in system memory (RM0433 chapter 61).
-fn unique_id() -> Image {
-    let bytes = b"hivtac-rig-1".to_vec();
-    Image::new(Path::new("unique-id"), bytes, Some(0x1FF1_E800)).expect("plain bytes are an image")
 }

@@ -9,9 +9,12 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Context;
 use clap::Parser;
+use hivtac_rig::arrivals::Arrivals;
+use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::{Fault, Faults};
 use hivtac_rig::frame_source::{FrameSource, SceneSource, TestPicture};
 use hivtac_rig::link::{Endpoint, Link, Pty, Tcp};
+use hivtac_rig::machine::Entry;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::Script;
 use hivtac_rig::truth::TruthLog;
@@ -30,7 +33,7 @@ struct Arguments {
     /// (FILE.toml), which has seed and preset of its own.
     #[arg(long, default_value = "demo")]
     scene: String,
-    /// Decides the noise, and where the demo starts.
+    /// Decides the noise, where the demo starts, and what the camera's data sheets leave open.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Geometry of the simulated sensor: ov7725 or paper.
@@ -51,9 +54,14 @@ struct Arguments {
     /// End when the client leaves.
     #[arg(long)]
     exit_on_hangup: bool,
-    /// Write one JSON object per exposure: frame, exposure, time_us, time_s, and the true force and markers.
+    /// Write one JSON object per exposure: frame, exposure, time_us, time_s, exposure_s, readout_s,
+    /// and the true force and markers.
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// Write one JSON object per sample that the device sends: frame, and time_s at which its last
+    /// byte had left.
+    #[arg(long, value_name = "FILE")]
+    arrivals: Option<PathBuf>,
     /// End after so many captured frames.
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
@@ -66,13 +74,20 @@ struct Arguments {
     /// Write what the device sent to the scripted host.
     #[arg(long, value_name = "FILE", requires = "script")]
     out: Option<PathBuf>,
-    /// Something that goes wrong, KIND[@MS[-MS]] in virtual time: camera-absent, camera-wrong-id, camera-silent,
-    /// frame-short, frame-long, dcmi-overrun, host-not-reading, cable-pulled. May be repeated.
+    /// Something that goes wrong, KIND[@MS[-MS]] in virtual time: camera-absent, camera-wrong-id,
+    /// camera-used, sda-stuck, scl-stretch, berr-once, camera-silent, frame-short, frame-long,
+    /// dcmi-overrun, bus-busy, host-not-reading, cable-pulled. May be repeated.
     #[arg(long, value_name = "KIND[@MS[-MS]]")]
     fault: Vec<Fault>,
     /// Instructions per second of virtual time that the core is assumed to execute.
     #[arg(long, value_name = "N", default_value_t = INSTRUCTIONS_PER_SECOND)]
     instructions_per_second: u64,
+    /// Revision of the silicon.
+    #[arg(long, value_enum, default_value_t)]
+    silicon: Revision,
+    /// Enter the firmware as the ROM's loader does, with its vector table in use.
+    #[arg(long)]
+    by_loader: bool,
     /// Write the run's counters as JSON.
     #[arg(long, value_name = "FILE")]
     stats_json: Option<PathBuf>,
@@ -105,12 +120,23 @@ fn options(arguments: &Arguments, interrupt: Arc<AtomicBool>) -> anyhow::Result<
         .map(TruthLog::create)
         .transpose()?
         .unwrap_or_default();
+    let arrivals = (arguments.arrivals.as_deref())
+        .map(Arrivals::create)
+        .transpose()?
+        .unwrap_or_default();
     let rate = arguments.instructions_per_second;
     Ok(Options {
         elf: arguments.elf.clone(),
         source: source(arguments)?,
         truth,
+        arrivals,
         faults: Faults::new(arguments.fault.clone()),
+        seed: arguments.seed,
+        revision: arguments.silicon,
+        entry: match arguments.by_loader {
+            true => Entry::Loader,
+            false => Entry::Reset,
+        },
         program: program(arguments)?,
         limits: Limits {
             frames: arguments.frames,
@@ -183,8 +209,11 @@ fn finish(arguments: &Arguments, outcome: &Outcome) -> anyhow::Result<()> {
     if let Some(path) = &arguments.stats_json {
         write(path, format!("{:#}\n", outcome.report.json()).as_bytes())?;
     }
-    match &outcome.report.truth_failure {
-        Some(why) => anyhow::bail!("the truth log ended early: {why}"),
-        None => Ok(()),
+    if let Some(why) = &outcome.report.truth_failure {
+        anyhow::bail!("the truth log ended early: {why}");
     }
+    if let Some(why) = &outcome.report.arrivals_failure {
+        anyhow::bail!("the log of arrivals is not whole: {why}");
+    }
+    Ok(())
 }

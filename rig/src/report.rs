@@ -18,6 +18,8 @@ pub struct Report {
     pub virtual_ns: u64,
     /// Wall time.
     pub wall: Duration,
+    /// When the LED went on, ns.
+    pub led_flashes_ns: Vec<u64>,
     /// Resets of the microcontroller.
     pub resets: usize,
     /// VSYNC pulses of the sensor.
@@ -28,6 +30,8 @@ pub struct Report {
     pub camera_fault: Option<String>,
     /// Why the truth log ended early.
     pub truth_failure: Option<String>,
+    /// Why the log of arrivals is not whole.
+    pub arrivals_failure: Option<String>,
     /// The camera interface.
     pub dcmi: dcmi::Counters,
     /// Bytes that the MDMA moved.
@@ -69,10 +73,12 @@ impl Report {
             virtual_ns,
             wall,
             resets: session.resets().len(),
+            led_flashes_ns: chip.led_flashes_ns().to_vec(),
             exposures: camera.exposures(),
             sccb_writes: camera.sccb_writes(),
             camera_fault: camera.faulty_output().map(str::to_owned),
             truth_failure: camera.truth_failure().map(str::to_owned),
+            arrivals_failure: host.arrivals_failure().map(str::to_owned),
             dcmi: chip.dcmi.counters(),
             mdma_bytes: chip.mdma.bytes(),
             port: host.port(),

@@ -13,13 +13,14 @@ use rigless::mcu::Mcu;
 use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
+use crate::arrivals::Arrivals;
 use crate::camera::{Camera, SharedCamera};
-use crate::chip::Chip;
+use crate::chip::{Chip, Revision};
 use crate::dma_reach;
 use crate::faults::Faults;
 use crate::frame_source::FrameSource;
 use crate::link::Link;
-use crate::machine::Sensor;
+use crate::machine::{Entry, Sensor};
 use crate::report::Report;
 use crate::rules::Rules;
 use crate::script::Script;
@@ -69,8 +70,16 @@ pub struct Options {
     pub source: Box<dyn FrameSource>,
     /// Where the truth goes.
     pub truth: TruthLog,
+    /// Where it goes when samples arrive.
+    pub arrivals: Arrivals,
     /// What goes wrong.
     pub faults: Faults,
+    /// Decides what a data sheet leaves open.
+    pub seed: u64,
+    /// Of the silicon.
+    pub revision: Revision,
+    /// How the program is entered.
+    pub entry: Entry,
     /// Who uses the port.
     pub program: Program,
     /// When to end.
@@ -101,12 +110,22 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         options.source,
         options.truth,
         options.faults.clone(),
+        rules.clone(),
+        options.seed,
     ));
-    let host = SharedHost::new(Host::new(options.faults.clone()));
-    let chip = Chip::new(camera.clone(), host.clone(), options.faults, rules.clone())?;
+    let host = SharedHost::new(Host::new(options.faults.clone(), options.arrivals));
+    let chip = Chip::new(
+        camera.clone(),
+        host.clone(),
+        options.faults,
+        rules.clone(),
+        options.revision,
+        options.seed,
+    )?;
     let board = Sensor {
         chip,
         instructions_per_second: options.instructions_per_second,
+        entry: options.entry,
     };
     let session = Session::new(Box::new(board), 0, VirtualNanos(0))?;
     let driver = Conductor {
@@ -185,6 +204,8 @@ fn settles_in(address: u64) -> Option<u64> {
         0x5802_0000..=0x5802_13FF => Some(0),
         // RCC, PWR
         0x5802_4400..=0x5802_4BFF => Some(SETTLING_NS),
+        // CRS
+        0x4000_8400..=0x4000_87FF => Some(0),
         _ => None,
     }
 }
@@ -201,12 +222,14 @@ impl Driver<Sensor> for Conductor {
                 if access.kind == AccessKind::Write {
                     self.written(session, access.address, value, access.virtual_time);
                 }
+                session.board_mut().chip.accessed(&access, value);
                 access.virtual_time
             }
             Settled::Stop(stop) => stop.at,
             _ => return,
         };
         self.settled_at_ns = now.0;
+        session.board_mut().chip.settle(now);
         if now.0 < self.settling_until || self.camera.lock().restarts() {
             session.board_mut().chip.rewire(now);
         }

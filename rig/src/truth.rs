@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::Path;
 
 use anyhow::Context;
+use hivtac_scene::Shutter;
 use serde_json::{Value, json};
 
 /// Where the truth goes. It never enters the firmware.
@@ -15,7 +16,7 @@ pub struct TruthLog {
 }
 
 /// One exposure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposed {
     /// Ends of VSYNC pulses since the camera's first register reset after the microcontroller's reset; the first one is
     /// 1. Zero before that.
@@ -24,12 +25,26 @@ pub struct Exposed {
     pub exposure: u64,
     /// Virtual time of the edge, ns.
     pub at_ns: u64,
+    /// Virtual time of the middle of the exposure of the middle row, ns.
+    pub middle_ns: u64,
+    /// How long each row is exposed, ns.
+    pub exposure_ns: u64,
+    /// From the exposure of the first row to that of one below the last, ns.
+    pub readout_ns: u64,
 }
 
 impl Exposed {
     /// The time the scene was asked for, s.
     pub fn time_s(&self) -> f64 {
-        self.at_ns as f64 / 1e9
+        self.middle_ns as f64 / 1e9
+    }
+
+    /// When which row was exposed.
+    pub fn shutter(&self) -> Shutter {
+        Shutter {
+            exposure_s: self.exposure_ns as f64 / 1e9,
+            readout_s: self.readout_ns as f64 / 1e9,
+        }
     }
 }
 
@@ -59,6 +74,8 @@ impl TruthLog {
             "exposure": exposed.exposure,
             "time_us": exposed.at_ns / 1000,
             "time_s": exposed.time_s(),
+            "exposure_s": exposed.shutter().exposure_s,
+            "readout_s": exposed.shutter().readout_s,
         });
         if let (Some(line), Value::Object(truth)) = (line.as_object_mut(), truth) {
             line.extend(truth);

@@ -11,7 +11,7 @@ use hivtac_wire::status::Status;
 /// The camera is plugged in late. It is looked for again and again, and frames come.
 #[test]
 fn an_absent_camera_is_reported_and_found_later() {
-    let run = Setup::new(firmware(), 1500)
+    let run = Setup::new(firmware(), 1300)
         .fault("camera-absent@0-700")
         .run();
     assert!(run.log().contains("no OV7725"), "{}", run.log());
@@ -27,11 +27,39 @@ fn a_camera_with_another_id_is_refused() {
     assert_eq!(run.report.sccb_writes, 0);
 }
 
+/// A microcontroller that was reset amid a byte finds the camera holding SDA; nine clocks free it.
+#[test]
+fn a_camera_that_holds_sda_is_freed() {
+    let run = Setup::new(firmware(), 240).fault("sda-stuck").run();
+    assert!(run.samples().len() >= 3, "{}", run.log());
+    assert_eq!(run.report.resets, 0);
+}
+
+/// Errata: I²C1 reports bus errors that there were not. One register write more is all that it
+/// costs.
+#[test]
+fn a_bus_error_that_there_was_not_costs_one_transfer() {
+    for ms in [20, 42, 51] {
+        let fault = Box::leak(format!("berr-once@{ms}").into_boxed_str());
+        let run = Setup::new(firmware(), 240).fault(fault).run();
+        assert!(run.samples().len() >= 3, "{ms} ms: {}", run.log());
+        assert_eq!(run.log(), "", "{ms} ms");
+    }
+}
+
+/// The camera holds SCL for longer than a transfer may take: it is set up again when it lets go.
+#[test]
+fn a_held_clock_is_waited_for() {
+    let run = Setup::new(firmware(), 860).fault("scl-stretch@60-90").run();
+    assert!(run.samples().len() >= 3, "{}", run.log());
+    assert!(run.stats().frames_processed >= 3);
+}
+
 /// The camera's clock stops for a while: time-outs, then a restart, and frames again.
 #[test]
 fn a_silent_camera_is_restarted() {
-    let run = Setup::new(firmware(), 1000)
-        .fault("camera-silent@300-550")
+    let run = Setup::new(firmware(), 640)
+        .fault("camera-silent@230-360")
         .run();
     let stats = run.stats();
     assert!(
@@ -43,9 +71,11 @@ fn a_silent_camera_is_restarted() {
         .into_iter()
         .find(|sample| sample.status.contains(Status::CAMERA_RESTARTED));
     let restarted = restarted.expect("a sample says that the camera was restarted");
+    assert!(restarted.time_us > 360_000, "{restarted:?}");
+    let last = run.followed().pop().expect("frames after that");
     assert!(
-        restarted.time_us > 550_000
-            && restarted.force.is_some() | restarted.status.contains(Status::MODEL_MISSING)
+        last.frame > restarted.frame && last.force.is_some(),
+        "{last:?}"
     );
     // Frame numbers go on: they still name the exposures.
     run.assert_times();
@@ -55,7 +85,7 @@ fn a_silent_camera_is_restarted() {
 /// and the next sample says so.
 #[test]
 fn an_overrun_costs_a_frame_and_is_told() {
-    let run = Setup::new(firmware(), 480).fault("dcmi-overrun@260").run();
+    let run = Setup::new(firmware(), 300).fault("dcmi-overrun@240").run();
     let stats = run.stats();
     assert_eq!(
         (
@@ -78,10 +108,20 @@ fn an_overrun_costs_a_frame_and_is_told() {
     assert_eq!(run.frames_after_a_loss(), [missing[0] + 1]);
 }
 
+/// Copies of bands wait for the bus, at random: they catch up, and no frame is lost.
+#[test]
+fn a_busy_bus_costs_nothing() {
+    let run = Setup::new(firmware(), 280).fault("bus-busy").run();
+    assert!(run.samples().len() >= 4, "{}", run.log());
+    assert_eq!(run.missing_frames(), Vec::<u32>::new());
+    assert_eq!(run.frames_after_a_loss(), Vec::<u32>::new());
+    assert_eq!(run.report.dcmi.overruns, 0);
+}
+
 /// The camera sends half a frame: it is dropped and counted, and the next one is captured.
 #[test]
 fn a_short_frame_costs_itself_and_no_other() {
-    let run = Setup::new(firmware(), 480).fault("frame-short@250").run();
+    let run = Setup::new(firmware(), 300).fault("frame-short@230").run();
     let (stats, missing) = (run.stats(), run.missing_frames());
     assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
     assert_eq!(missing.len(), stats.dropped_size as usize, "{missing:?}");
@@ -95,7 +135,7 @@ fn a_short_frame_costs_itself_and_no_other() {
 /// core, not yet; the next sample says so. That one is whole.
 #[test]
 fn a_long_frame_is_told_and_costs_no_other() {
-    let run = Setup::new(firmware(), 480).fault("frame-long@250").run();
+    let run = Setup::new(firmware(), 300).fault("frame-long@230").run();
     let stats = run.stats();
     assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
     let told = run.frames_after_a_loss();
@@ -112,8 +152,8 @@ fn a_long_frame_is_told_and_costs_no_other() {
 /// stream is in step again at once.
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
-    let run = Setup::new(firmware(), 1300)
-        .fault("host-not-reading@250-900")
+    let run = Setup::new(firmware(), 600)
+        .fault("host-not-reading@220-420")
         .run();
     let stats = run.stats();
     assert!(stats.usb_dropped >= 1, "{stats:?}");
@@ -123,7 +163,7 @@ fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
     assert!(
         samples
             .last()
-            .is_some_and(|sample| sample.time_us > 1_000_000)
+            .is_some_and(|sample| sample.time_us > 500_000)
     );
     let gaps = samples
         .windows(2)
@@ -136,10 +176,10 @@ fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
 #[test]
 fn a_pulled_cable_is_survived() {
     let ms = HELLO_MS;
-    let run = Setup::new(firmware(), 900)
-        .fault("cable-pulled@300-420")
-        .at(ms + 500, Action::Send(hello()))
-        .at(ms + 502, Action::Send(command(3, Request::Start)))
+    let run = Setup::new(firmware(), 640)
+        .fault("cable-pulled@230-350")
+        .at(ms + 400, Action::Send(hello()))
+        .at(ms + 402, Action::Send(command(3, Request::Start)))
         .run();
     assert_eq!(
         (run.report.port, run.report.usb.enumerations),
@@ -149,10 +189,10 @@ fn a_pulled_cable_is_survived() {
     );
     assert!(run.hellos().len() >= 2);
     let samples = run.samples();
-    assert!(samples.iter().any(|sample| sample.time_us < 310_000));
+    assert!(samples.iter().any(|sample| sample.time_us < 240_000));
     let after = samples
         .iter()
-        .filter(|sample| sample.time_us > 600_000)
+        .filter(|sample| sample.time_us > 560_000)
         .count();
     assert!(after >= 3, "{after} samples after the cable was put back");
     assert_eq!(run.report.resets, 0);

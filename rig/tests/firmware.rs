@@ -40,7 +40,7 @@ fn undisturbed(setup: Setup) -> common::Run {
 
 #[test]
 fn every_sample_is_of_an_exposure_and_shows_its_markers() {
-    let run = undisturbed(Setup::new(firmware(), 480));
+    let run = undisturbed(Setup::new(firmware(), 280));
     let frames: Vec<u32> = run.samples().iter().map(|sample| sample.frame).collect();
     assert!(frames.is_sorted_by(|a, b| a < b), "{frames:?}");
     let stats = run.stats();
@@ -57,7 +57,7 @@ fn every_sample_is_of_an_exposure_and_shows_its_markers() {
 /// The camera sends without a pause, and every frame becomes a sample.
 #[test]
 fn frames_back_to_back_are_all_measured() {
-    let run = undisturbed(Setup::new(firmware(), 600));
+    let run = undisturbed(Setup::new(firmware(), 300));
     assert!(run.samples().len() >= 14, "{}", run.samples().len());
     assert_eq!(run.missing_frames(), Vec::<u32>::new());
     assert_eq!(run.frames_after_a_loss(), Vec::<u32>::new());
@@ -65,7 +65,9 @@ fn frames_back_to_back_are_all_measured() {
     // All frames that began before the first captured one passed during the camera's set-up; one is under way.
     let whole = stats.frames_exposed - stats.dropped_busy - 1;
     assert!(stats.frames_processed.abs_diff(whole) <= 1, "{stats:?}");
-    assert_eq!(dcmi.words / 38_400, dcmi.frames, "{dcmi:?}");
+    // All words of every frame that has ended, and some of the one under way, or all.
+    let under_way = dcmi.words - dcmi.frames * 38_400;
+    assert!((0..=38_400).contains(&under_way), "{dcmi:?}");
     // Each band reached the core once.
     let words = run.report.mdma_bytes / 4;
     assert!(dcmi.words.abs_diff(words) <= 2 * 640, "{words} of {dcmi:?}");
@@ -73,7 +75,7 @@ fn frames_back_to_back_are_all_measured() {
 
 #[test]
 fn the_same_seed_gives_the_same_bytes() {
-    let [first, second] = [(); 2].map(|()| Setup::new(firmware(), 330).run());
+    let [first, second] = [(); 2].map(|()| Setup::new(firmware(), 240).run());
     assert!(!first.bytes.is_empty());
     assert_eq!(first.bytes, second.bytes);
     assert_eq!(first.truth, second.truth);
@@ -85,7 +87,7 @@ fn another_seed_gives_other_forces() {
     let forces = |seed| {
         let run = undisturbed(Setup {
             seed,
-            ..Setup::new(firmware(), 380)
+            ..Setup::new(firmware(), 240)
         });
         run.samples()
             .iter()
@@ -99,7 +101,7 @@ fn another_seed_gives_other_forces() {
 fn half_as_many_instructions_per_second_are_enough() {
     let setup = Setup {
         instructions_per_second: INSTRUCTIONS_PER_SECOND / 2,
-        ..Setup::new(firmware(), 480)
+        ..Setup::new(firmware(), 280)
     };
     undisturbed(setup);
 }

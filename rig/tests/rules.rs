@@ -6,8 +6,11 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use hivtac_rig::arrivals::Arrivals;
+use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
 use hivtac_rig::frame_source::TestPicture;
+use hivtac_rig::machine::Entry;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::Script;
 use hivtac_rig::truth::TruthLog;
@@ -52,7 +55,11 @@ fn run_program(elf: &Path) -> anyhow::Result<Outcome> {
         elf: elf.to_owned(),
         source: Box::new(TestPicture),
         truth: TruthLog::default(),
+        arrivals: Arrivals::default(),
         faults: Faults::default(),
+        seed: 1,
+        revision: Revision::V,
+        entry: Entry::Reset,
         program: Program::Script(Script::default()),
         limits: Limits {
             frames: None,

@@ -4,10 +4,15 @@
 //! values included. Geometry, format and clock are taken over at the start of a frame; a register reset, a change of
 //! the input clock and power-up start the frame timing afresh, and the first VSYNC edge comes one frame later.
 //!
-//! Not simulated: exposure, gain and colour registers (the scene decides the picture), the zoom registers (the window
-//! is scaled to the output size by taking the nearest pixel), automatic frame rate.
+//! Exposure, gain and colours follow the registers (`exposure`, `colour`). Registers that sources
+//! disagree about hold other values for each seed after a reset; capturing a frame that depends on
+//! one that was never written breaks a rule. Not simulated: the zoom registers (the window is
+//! scaled to the output size by taking the nearest pixel), automatic frame rate, automatic white
+//! balance.
 
+pub mod colour;
 pub mod encode;
+mod exposure;
 pub mod output;
 pub mod registers;
 mod sccb;
@@ -16,8 +21,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::faults::{Faults, Kind};
 use crate::frame_source::{Coding, FrameSource, Picture};
+use crate::rules::Rules;
 use crate::truth::{Exposed, TruthLog};
-use output::{Format, Output};
+use colour::Colour;
+use exposure::Exposure;
+use output::{Format, Output, VSYNC_LINES};
 use registers::Registers;
 pub use sccb::Sccb;
 
@@ -39,10 +47,14 @@ pub struct Supply {
 #[derive(Debug)]
 pub struct Camera {
     registers: Registers,
+    exposing: Exposure,
+    /// Light of the frame under way, over what exposes it well.
+    light: f64,
     supply: Supply,
     source: Box<dyn FrameSource>,
     truth: TruthLog,
     faults: Faults,
+    rules: Rules,
     frame: u64,
     exposure: u64,
     restarted: bool,
@@ -69,10 +81,23 @@ impl SharedCamera {
 }
 
 impl Camera {
-    /// A sensor without power, looking at `source`.
-    pub fn new(source: Box<dyn FrameSource>, truth: TruthLog, faults: Faults) -> Self {
+    /// A sensor in power-down, looking at `source`. `seed` decides what no source agrees about.
+    pub fn new(
+        source: Box<dyn FrameSource>,
+        truth: TruthLog,
+        faults: Faults,
+        rules: Rules,
+        seed: u64,
+    ) -> Self {
+        let registers = match faults.on(Kind::CameraUsed, 0) {
+            true => Registers::used(seed),
+            false => Registers::of_seed(seed),
+        };
         Self {
-            registers: Registers::default(),
+            exposing: Exposure::of(&registers),
+            light: 1.0,
+            rules,
+            registers,
             supply: Supply::default(),
             source,
             truth,
@@ -87,13 +112,10 @@ impl Camera {
         }
     }
 
-    /// Takes over what the board gives the sensor. Without power it forgets its registers.
+    /// Takes over what the board gives the sensor. In power-down it stands by: its registers stay.
     pub fn supply(&mut self, supply: Supply) {
         if supply == self.supply {
             return;
-        }
-        if !supply.powered {
-            self.registers = Registers::default();
         }
         let before = std::mem::replace(&mut self.supply, supply);
         self.restarted |= (before.powered, before.clock_hz) != (supply.powered, supply.clock_hz);
@@ -148,19 +170,33 @@ impl Camera {
 
     /// The edge of VSYNC that ends its pulse, which numbers the frame that follows.
     pub fn count_edge(&mut self, now_ns: u64) -> Exposed {
+        let mut exposed = Exposed {
+            at_ns: now_ns,
+            middle_ns: now_ns,
+            ..Exposed::default()
+        };
+        if let Some(output) = self.output(now_ns) {
+            self.light = self.exposing.next(&mut self.registers, &output);
+            let lines_ns = |lines: u64| output.clocks_ns(lines * u64::from(output.line_clocks));
+            exposed.exposure_ns = lines_ns(self.exposing.lines());
+            exposed.readout_ns = lines_ns(output.rows.into());
+            // A row's exposure ends when it is read, which is when it is sent.
+            let middle_row = output.first_row - VSYNC_LINES + output.rows / 2;
+            exposed.middle_ns = now_ns + lines_ns(middle_row.into()) - exposed.exposure_ns / 2;
+        }
         self.frame += u64::from(self.counting);
         self.exposure += 1;
         Exposed {
             frame: self.frame,
             exposure: self.exposure,
-            at_ns: now_ns,
+            ..exposed
         }
     }
 
     /// Logs what is true of an exposure.
     pub fn log_truth(&mut self, exposed: Exposed) {
         if self.truth.wanted() {
-            let truth = self.source.truth(exposed.time_s());
+            let truth = self.source.truth(exposed);
             self.truth.exposed(exposed, truth);
         }
     }
@@ -171,8 +207,16 @@ impl Camera {
             Format::Yuv => Coding::Yuv422,
             _ => Coding::Rgb565,
         };
-        self.source
-            .picture(exposed.exposure, exposed.time_s(), wanted)
+        if let Some(address) = self.registers.unwritten() {
+            self.rules.broken(|| {
+                format!(
+                    "OV7725: a frame was captured that depends on register 0x{address:02X}, which was never written and has no \
+                     value after a reset that its data sheets agree about"
+                )
+            });
+        }
+        let picture = self.source.picture(exposed, wanted);
+        Colour::of(&self.registers, self.light).apply(picture)
     }
 
     /// VSYNC edges since the run began.
@@ -222,6 +266,7 @@ impl Camera {
     fn write_register(&mut self, address: u8, value: u8) {
         self.sccb_writes += 1;
         if self.registers.write(address, value) {
+            self.exposing = Exposure::of(&self.registers);
             self.restarted = true;
             self.count_begins |= !self.counting;
         }
@@ -241,7 +286,13 @@ mod tests {
 
     fn camera(faults: &[&str]) -> Camera {
         let faults = Faults::new(faults.iter().map(|fault| fault.parse().unwrap()).collect());
-        Camera::new(Box::new(TestPicture), TruthLog::default(), faults)
+        Camera::new(
+            Box::new(TestPicture),
+            TruthLog::default(),
+            faults,
+            Rules::default(),
+            1,
+        )
     }
 
     #[test]
@@ -265,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn without_power_there_is_no_output_and_no_memory() {
+    fn in_power_down_there_is_no_output_and_the_registers_stay() {
         let mut camera = camera(&[]);
         assert_eq!(camera.output(0), None);
         camera.supply(SUPPLY);
@@ -276,7 +327,7 @@ mod tests {
         });
         assert!(camera.output(0).is_none() && !camera.answers(0));
         camera.supply(SUPPLY);
-        assert_eq!(camera.read_register(registers::COM7, 0), 0);
+        assert_eq!(camera.read_register(registers::COM7, 0), 0x46);
     }
 
     #[test]

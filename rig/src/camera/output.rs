@@ -1,15 +1,17 @@
 //! What the OV7725's registers make it send: size, format, clock, polarities and the timing of a frame.
 //!
-//! Frame timing (datasheet, "Timing specifications"): VGA 784 × 510 pixel periods with 640 × 480 active, QVGA
-//! 576 × 278 with 320 × 240 active, VSYNC for the first four lines. A pixel period is two pixel clocks, one for raw
-//! data. At 24 MHz with the power-up divider and loop (×4 ÷ 2) that is VGA at 60 frames per second.
+//! Frame timing (datasheet, "Timing specifications"): VGA 784 × 510 pixel periods with 640 × 480
+//! active, QVGA 576 × 278 with 320 × 240 active, VSYNC for the first four lines, then 18 or 22
+//! blank ones before the first row. A pixel period is two pixel clocks, one for raw data. At 24 MHz
+//! with the power-up divider and loop (×4 ÷ 2) that is VGA at 60 frames per second.
 
 use super::registers::{self as reg, Registers};
 
 /// Lines that VSYNC lasts.
 pub const VSYNC_LINES: u32 = 4;
-/// Fastest pixel clock of the sensor, Hz.
-const FASTEST_PIXEL_CLOCK_HZ: u64 = 48_000_000;
+/// Fastest pixel clock of the sensor, Hz. Its data sheet says 48 MHz; drivers run it up to 187
+/// frames per second of QVGA (Linux, gspca's `ov534.c`), which is 60 MHz.
+const FASTEST_PIXEL_CLOCK_HZ: u64 = 60_000_000;
 /// Range of the input clock, Hz.
 const INPUT_CLOCK_HZ: std::ops::RangeInclusive<u64> = 10_000_000..=48_000_000;
 
@@ -96,7 +98,7 @@ impl Output {
 
     fn unchecked(registers: &Registers, input_clock_hz: u64) -> Output {
         let qvga = registers.get(reg::COM7) & 0x40 != 0;
-        let [total, blank_before, lines] = if qvga { [576, 26, 278] } else { [784, 18, 510] };
+        let [total, blank_before, lines] = if qvga { [576, 22, 278] } else { [784, 18, 510] };
         let format = format(registers.get(reg::COM7));
         let clocks = if format == Format::Bayer { 1 } else { 2 };
         let dummy_pixels = registers.wide(
@@ -149,7 +151,7 @@ impl Output {
         }
         if self.pixel_clock_hz > FASTEST_PIXEL_CLOCK_HZ {
             return Some(format!(
-                "pixel clock {} Hz is over 48 MHz (CLKRC, COM4)",
+                "pixel clock {} Hz is over 60 MHz (CLKRC, COM4)",
                 self.pixel_clock_hz
             ));
         }

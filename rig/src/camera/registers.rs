@@ -1,8 +1,51 @@
-//! The OV7725's register file: addresses, power-up values, and which registers only the sensor writes.
+//! The OV7725's register file: addresses, values after a reset, and which registers only the sensor
+//! writes.
 //!
-//! Source: OmniVision OV7725 datasheet 1.31, "Register set". Registers that change brightness, colour or gain are
-//! stored and read back, but do not change the picture: the scene decides it.
+//! Source: OmniVision OV7725 datasheet 1.31, "Register set", beside datasheet 1.1 and the drivers
+//! of Linux and OpenMV. Where these disagree about the value after a reset, it is as good as
+//! unknown: [`Registers::of_seed`] has another one for each seed, and [`Registers::unwritten`]
+//! names such a register that the picture depends on.
 
+/// Gain.
+pub const GAIN: u8 = 0x00;
+/// Gain of blue.
+pub const BLUE: u8 = 0x01;
+/// Gain of red.
+pub const RED: u8 = 0x02;
+/// Gain of green.
+pub const GREEN: u8 = 0x03;
+/// Exposure in lines, high byte.
+pub const AECH: u8 = 0x08;
+/// Exposure in lines, low byte.
+pub const AEC: u8 = 0x10;
+/// What is automatic: exposure (bit 0), white balance (1), gain (2).
+pub const COM8: u8 = 0x13;
+/// Largest automatic gain, bits 6:4.
+pub const COM9: u8 = 0x14;
+/// Lens correction.
+pub const LC_CTR: u8 = 0x46;
+/// White balance: gains applied (bit 7), calculated (6).
+pub const AWB_CTRL0: u8 = 0x63;
+/// FIFO, special effects, colour matrix, gamma.
+pub const DSP_CTRL1: u8 = 0x64;
+/// White balance: what a gain's unit is.
+pub const AWB_CTRL1: u8 = 0x69;
+/// Gamma curve, fifteen points.
+pub const GAM1: u8 = 0x7E;
+/// Colour matrix, six coefficients.
+pub const MTX1: u8 = 0x94;
+/// Their signs, and whether they count twice.
+pub const MTX_CTRL: u8 = 0x9A;
+/// Brightness.
+pub const BRIGHT: u8 = 0x9B;
+/// Contrast.
+pub const CNST: u8 = 0x9C;
+/// Which special effects are on.
+pub const SDE: u8 = 0xA6;
+/// Saturation of Cb.
+pub const USAT: u8 = 0xA7;
+/// Saturation of Cr.
+pub const VSAT: u8 = 0xA8;
 /// Product id, high byte; read-only.
 pub const PID: u8 = 0x0A;
 /// Product id, low byte; read-only.
@@ -48,9 +91,9 @@ pub const DSP_CTRL3: u8 = 0x66;
 pub const COM7_RESET: u8 = 0x80;
 
 /// Power-up values that are not zero.
-const POWER_UP: [(u8, u8); 43] = [
-    (0x01, 0x80),
-    (0x02, 0x80),
+const POWER_UP: [(u8, u8); 56] = [
+    (BLUE, 0x80),
+    (RED, 0x80),
     (COM2, 0x01),
     (PID, 0x77),
     (VER, 0x21),
@@ -58,10 +101,10 @@ const POWER_UP: [(u8, u8); 43] = [
     (COM4, 0x41),
     (0x0E, 0x01),
     (0x0F, 0x43),
-    (0x10, 0x40),
+    (AEC, 0x40),
     (CLKRC, 0x80),
-    (0x13, 0x8F),
-    (0x14, 0x4A),
+    (COM8, 0x8F),
+    (COM9, 0x4A),
     (HSTART, 0x23),
     (HSIZE, 0xA0),
     (VSTRT, 0x07),
@@ -87,11 +130,50 @@ const POWER_UP: [(u8, u8); 43] = [
     (0x3E, 0xE2),
     (0x41, 0x20),
     (0x42, 0x80),
-    (0x63, 0xE0),
-    (0x64, 0xFF),
+    (0x43, 0x80),
+    (0x44, 0x80),
+    (0x45, 0x80),
+    (AWB_CTRL0, 0xE0),
+    (DSP_CTRL1, 0xFF),
     (DSP_CTRL3, 0x10),
-    (0x9C, 0x20),
+    (AWB_CTRL1, 0x5C),
+    (MTX1, 0x2C),
+    (0x95, 0x24),
+    (0x96, 0x08),
+    (0x97, 0x14),
+    (0x98, 0x24),
+    (0x99, 0x38),
+    (MTX_CTRL, 0x9E),
+    (CNST, 0x20),
+    (USAT, 0x40),
+    (VSAT, 0x40),
     (0xAC, 0xFF),
+];
+
+/// Registers that sources give different values after a reset, or none, first and last of each
+/// range.
+const DISPUTED: [(u8, u8); 13] = [
+    (0x0F, 0x0F),
+    (0x24, 0x26),
+    (0x3D, 0x3D),
+    (0x41, 0x45),
+    (LC_CTR, LC_CTR),
+    (AWB_CTRL0, DSP_CTRL3),
+    (AWB_CTRL1, AWB_CTRL1),
+    (GAM1, 0x8D),
+    (0x8E, 0x8F),
+    (MTX1, MTX_CTRL),
+    (CNST, CNST),
+    (SDE, SDE),
+    (0xAC, 0xAC),
+];
+/// Of these, what a picture depends on only where a bit of another register is set: range, that
+/// register, the bit.
+const CONDITIONAL: [(u8, u8, u8, u8); 4] = [
+    (GAM1, 0x8D, DSP_CTRL1, 0x04),
+    (MTX1, MTX_CTRL, DSP_CTRL1, 0x10),
+    (CNST, CNST, DSP_CTRL1, 0x20),
+    (SDE, SDE, DSP_CTRL1, 0x20),
 ];
 
 /// Registers that a write does not change: ids and measured averages.
@@ -99,41 +181,97 @@ const READ_ONLY: [u8; 8] = [0x05, 0x06, 0x07, PID, VER, 0x1C, 0x1D, 0x2F];
 
 /// The register file as the sensor's outputs follow it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Registers([u8; 256]);
+pub struct Registers {
+    values: [u8; 256],
+    after_reset: [u8; 256],
+    written: [bool; 256],
+}
 
 impl Default for Registers {
+    /// Values of datasheet 1.31.
     fn default() -> Self {
         let mut values = [0; 256];
         for (address, value) in POWER_UP {
             values[usize::from(address)] = value;
         }
-        Self(values)
+        Self {
+            values,
+            after_reset: values,
+            written: [false; 256],
+        }
     }
 }
 
 impl Registers {
-    /// The value of a register.
-    pub fn get(&self, address: u8) -> u8 {
-        self.0[usize::from(address)]
+    /// After a reset, with another value for each seed where sources disagree.
+    pub fn of_seed(seed: u64) -> Self {
+        let mut registers = Self::default();
+        for address in DISPUTED.into_iter().flat_map(|(first, last)| first..=last) {
+            registers.after_reset[usize::from(address)] = random(seed, address);
+        }
+        registers.values = registers.after_reset;
+        registers
     }
 
-    /// Writes a register. Answers whether it was the register reset, after which every register holds its power-up
-    /// value.
+    /// As a program before this one has left them: any value in any register, another one for each
+    /// seed.
+    pub fn used(seed: u64) -> Self {
+        let mut registers = Self::of_seed(seed);
+        for address in (0..=0xAC).filter(|address| !READ_ONLY.contains(address)) {
+            registers.values[usize::from(address)] = random(!seed, address);
+        }
+        registers
+    }
+
+    /// The value of a register.
+    pub fn get(&self, address: u8) -> u8 {
+        self.values[usize::from(address)]
+    }
+
+    /// Writes a register. Answers whether it was the register reset, after which every register
+    /// holds its value after a reset.
     pub fn write(&mut self, address: u8, value: u8) -> bool {
         if address == COM7 && value & COM7_RESET != 0 {
-            *self = Self::default();
+            (self.values, self.written) = (self.after_reset, [false; 256]);
             return true;
         }
         if !READ_ONLY.contains(&address) {
-            self.0[usize::from(address)] = value;
+            self.values[usize::from(address)] = value;
+            self.written[usize::from(address)] = true;
         }
         false
+    }
+
+    /// The sensor itself sets a register.
+    pub(super) fn measured(&mut self, address: u8, value: u8) {
+        self.values[usize::from(address)] = value;
+    }
+
+    /// A register that the picture depends on, that nobody wrote since the reset, and that has no
+    /// agreed value after one.
+    pub fn unwritten(&self) -> Option<u8> {
+        let mut disputed = DISPUTED.into_iter().flat_map(|(first, last)| first..=last);
+        disputed.find(|&address| !self.written[usize::from(address)] && self.matters(address))
+    }
+
+    fn matters(&self, address: u8) -> bool {
+        let mut conditions = CONDITIONAL.into_iter();
+        let condition = conditions.find(|(first, last, ..)| (*first..=*last).contains(&address));
+        condition.is_none_or(|(.., control, bit)| self.get(control) & bit != 0)
     }
 
     /// A value of `HIGH:low bits`: the register at `high` shifted up, joined with bits of another.
     pub(super) fn wide(&self, high: u8, shift: u32, low: u32) -> u32 {
         u32::from(self.get(high)) << shift | low
     }
+}
+
+/// A value of a register that depends on the seed alone.
+fn random(seed: u64, address: u8) -> u8 {
+    let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(address) << 32;
+    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (z >> 56) as u8
 }
 
 #[cfg(test)]
@@ -149,6 +287,36 @@ mod tests {
         assert!(registers.write(COM7, 0x80 | 0x46));
         assert_eq!(registers, Registers::default());
         assert_eq!((registers.get(COM7), registers.get(HSIZE)), (0, 0xA0));
+    }
+
+    #[test]
+    fn disputed_values_differ_by_seed_and_come_back_with_the_register_reset() {
+        let [first, second] = [1, 2].map(Registers::of_seed);
+        assert_ne!(first.get(DSP_CTRL1), second.get(DSP_CTRL1));
+        assert_eq!(first.get(HSIZE), second.get(HSIZE));
+        let mut used = Registers::used(1);
+        assert_ne!(used.get(HSIZE), first.get(HSIZE));
+        assert!(used.write(COM7, COM7_RESET));
+        assert_eq!(used, first);
+    }
+
+    #[test]
+    fn what_the_picture_depends_on_must_be_written() {
+        let mut registers = Registers::of_seed(1);
+        registers.write(DSP_CTRL1, 0x98);
+        let mut missing = Vec::new();
+        while let Some(address) = registers.unwritten() {
+            missing.push(address);
+            registers.write(address, registers.get(address));
+        }
+        assert!(
+            missing.contains(&AWB_CTRL0) && missing.contains(&MTX1),
+            "{missing:02X?}"
+        );
+        assert!(
+            !missing.contains(&GAM1) && !missing.contains(&CNST),
+            "{missing:02X?}"
+        );
     }
 
     #[test]

@@ -146,6 +146,7 @@ mod tests {
                 frame: 1,
                 exposure: 1,
                 at_ns: 2000,
+                ..Exposed::default()
             }),
             ..Frame::new(1000, output)
         }
@@ -205,7 +206,7 @@ mod tests {
     fn bytes_are_those_of_the_row() {
         let mut frame = vga();
         let run = frame.run_from(22, 510, false).unwrap();
-        let picture = TestPicture.picture(1, 0.0, Coding::Rgb565);
+        let picture = TestPicture.picture(frame.exposed.unwrap(), Coding::Rgb565);
         let expected = encode::row(&frame.output, &picture, 0);
         assert_eq!(frame.bytes(&run, 16, 32, |_| picture), expected[16..32]);
     }

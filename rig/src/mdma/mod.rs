@@ -12,6 +12,7 @@ use rigless::soc::stm32h743::generated::mdma::Register;
 use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 
+use crate::faults::{Faults, Kind};
 use crate::rules::Rules;
 use block::{Block, asked_for};
 
@@ -23,6 +24,9 @@ const ROWS: usize = 13;
 const BUFFER_BYTES: u64 = 128;
 const BUFFER_CYCLES: u64 = 64;
 const BUS_HZ: u64 = 240_000_000;
+/// A block on a busy bus takes at most so many times as long: 84 µs for a band, half of what the
+/// camera takes to send it.
+const LONGEST_WAIT: u64 = 16;
 /// Rows of a channel.
 mod row {
     pub const ISR: usize = 0;
@@ -65,6 +69,9 @@ struct Channel {
 #[derive(Debug)]
 pub struct Mdma {
     rules: Rules,
+    faults: Faults,
+    /// Decides the next block's wait.
+    chance: u64,
     channels: [Channel; CHANNELS],
     interrupt: Level,
     bytes: u64,
@@ -72,9 +79,12 @@ pub struct Mdma {
 
 impl Mdma {
     /// A controller at rest.
-    pub fn new(rules: Rules) -> Self {
+    /// `seed` decides how long others hold the bus under [`Kind::BusBusy`].
+    pub fn new(rules: Rules, faults: Faults, seed: u64) -> Self {
         Self {
             rules,
+            faults,
+            chance: seed,
             channels: Default::default(),
             interrupt: Level::Low,
             bytes: 0,
@@ -86,6 +96,18 @@ impl Mdma {
         self.bytes
     }
 
+    /// How often a block takes the time that it takes alone.
+    fn patience(&mut self, now_ns: u64) -> u64 {
+        if !self.faults.on(Kind::BusBusy, now_ns) {
+            return 1;
+        }
+        self.chance = self
+            .chance
+            .wrapping_mul(0x5851_F42D_4C95_7F2D)
+            .wrapping_add(1);
+        1 + (self.chance >> 33) % LONGEST_WAIT
+    }
+
     fn control_written(
         &mut self,
         nth: usize,
@@ -93,6 +115,7 @@ impl Mdma {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        let patience = self.patience(context.now().0);
         let channel = &mut self.channels[nth];
         if value & ENABLE == 0 {
             channel.under_way = None;
@@ -105,7 +128,7 @@ impl Mdma {
         match asked_for(&|row| registers.get(register(nth, row)), value) {
             Ok(block) => {
                 let cycles = block.bytes.div_ceil(BUFFER_BYTES) * BUFFER_CYCLES;
-                let end = context.now().0 + cycles * 1_000_000_000 / BUS_HZ;
+                let end = context.now().0 + patience * cycles * 1_000_000_000 / BUS_HZ;
                 channel.under_way = Some((block, context.schedule(VirtualNanos(end))));
             }
             Err(why) => self

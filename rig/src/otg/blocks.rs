@@ -231,15 +231,13 @@ impl ErasedDevice for Block {
         self.drive(context);
     }
 
+    /// The board tells the clock, with its error ([`crate::board::Wiring`]).
     fn on_clock(
         &mut self,
-        hz: u64,
+        _hz: u64,
         _registers: &mut RegisterFile,
         _context: &mut DeviceContext<'_>,
     ) {
-        if self.which == Which::Global {
-            self.core.lock().clock_hz = hz;
-        }
     }
 
     fn reset(&mut self) {

@@ -158,12 +158,13 @@ impl Core {
         };
     }
 
-    /// Whether the device pulls D+ up: transceiver on, 48 MHz, device mode, session valid, not soft-disconnected.
+    /// Whether the device pulls D+ up: transceiver on and clocked, device mode, session valid, not
+    /// soft-disconnected.
     pub fn attached(&self) -> bool {
         const TRANSCEIVER_ON: u32 = 1 << 16;
         const DEVICE_MODE: u32 = 1 << 30;
         self.wired
-            && self.clock_hz.abs_diff(48_000_000) <= 120_000
+            && self.clock_hz != 0
             && self.gccfg & TRANSCEIVER_ON != 0
             && self.gusbcfg & DEVICE_MODE != 0
             && self.session_valid()
@@ -274,7 +275,13 @@ impl Core {
     }
 
     fn answers(&self, address: u8) -> bool {
-        self.attached() && !self.suspended && self.address == u32::from(address)
+        self.attached() && self.in_step() && !self.suspended && self.address == u32::from(address)
+    }
+
+    /// Whether host and device understand each other: full speed allows 48 MHz ± 0.25 % (USB 2.0,
+    /// section 7.1.11).
+    fn in_step(&self) -> bool {
+        self.clock_hz.abs_diff(48_000_000) <= 120_000
     }
 
     /// Free words of the receive FIFO.

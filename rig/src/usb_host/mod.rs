@@ -9,6 +9,7 @@ mod descriptors;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use crate::arrivals::Arrivals;
 use crate::faults::{Faults, Kind};
 use crate::otg::{Answer, Core};
 use control::{Progress, Transfer};
@@ -90,6 +91,7 @@ pub struct Host {
     /// Bytes for the device.
     pub to_device: VecDeque<u8>,
     counters: Counters,
+    arrivals: Arrivals,
     log: Vec<String>,
 }
 
@@ -111,7 +113,7 @@ impl SharedHost {
 
 impl Host {
     /// A host with the cable plugged in and no program on the port.
-    pub fn new(faults: Faults) -> Self {
+    pub fn new(faults: Faults, arrivals: Arrivals) -> Self {
         Self {
             port: Port::Empty,
             faults,
@@ -130,6 +132,7 @@ impl Host {
             from_device: VecDeque::new(),
             to_device: VecDeque::new(),
             counters: Counters::default(),
+            arrivals,
             log: Vec::new(),
         }
     }
@@ -142,6 +145,11 @@ impl Host {
     /// Counters so far.
     pub fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// Why the log of arrivals is not whole.
+    pub fn arrivals_failure(&self) -> Option<&str> {
+        self.arrivals.failure()
     }
 
     /// What happened on the port, a line each.
@@ -348,6 +356,7 @@ impl Host {
         };
         self.counters.bytes_in += packet.len() as u64;
         self.counters.packets_in += 1;
+        self.arrivals.packet(&packet, now + TRANSACTION_NS);
         self.from_device.extend(packet);
         true
     }

@@ -11,8 +11,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use hivtac_rig::arrivals::Arrivals;
+use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
 use hivtac_rig::frame_source::SceneSource;
+use hivtac_rig::machine::Entry;
 use hivtac_rig::report::Report;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::{Action, Script};
@@ -96,6 +99,8 @@ pub struct Setup {
     pub actions: Vec<(u64, Action)>,
     pub virtual_ms: u64,
     pub instructions_per_second: u64,
+    pub revision: Revision,
+    pub entry: Entry,
 }
 
 impl Setup {
@@ -108,6 +113,8 @@ impl Setup {
             actions: Vec::new(),
             virtual_ms,
             instructions_per_second: instructions_per_second(),
+            revision: Revision::V,
+            entry: Entry::Reset,
         }
     }
 
@@ -154,17 +161,22 @@ impl Setup {
             ),
         ];
         let source = Box::new(self.source()?);
+        let seed = self.seed;
         actions.extend(self.actions);
         run(Options {
             elf: self.elf,
             source,
             truth: TruthLog::create(truth)?,
+            arrivals: Arrivals::create(&truth.with_extension("arrivals"))?,
             faults: Faults::new(
                 self.faults
                     .iter()
                     .map(|fault| fault.parse().unwrap())
                     .collect(),
             ),
+            seed,
+            revision: self.revision,
+            entry: self.entry,
             program: Program::Script(Script::new(actions)),
             limits: Limits {
                 frames: None,
@@ -238,6 +250,17 @@ impl Run {
                     None
                 }
             })
+            .collect()
+    }
+
+    /// Samples right after one of the frame before. Of others nobody knows how fast their markers
+    /// move, and a force that changes while they are exposed may be unexplained.
+    pub fn followed(&self) -> Vec<&Sample> {
+        let samples = self.samples();
+        let pairs = samples.windows(2);
+        pairs
+            .filter(|pair| pair[1].frame == pair[0].frame + 1)
+            .map(|pair| pair[1])
             .collect()
     }
 
@@ -328,6 +351,6 @@ impl Run {
     fn true_time_us(&self, frame: u32) -> i64 {
         let exposed = self.truth.iter().find(|t| t["frame"] == frame);
         let exposed = exposed.unwrap_or_else(|| panic!("frame {frame} was never exposed"));
-        exposed["time_us"].as_i64().unwrap()
+        (exposed["time_s"].as_f64().unwrap() * 1e6) as i64
     }
 }

@@ -1,0 +1,62 @@
+//! When each sample's last byte had left the device: one JSON object per sample, for whoever
+//! measures latency.
+
+use std::fmt;
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Context;
+use hivtac_wire::decoder::{Decoder, Received};
+use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
+use hivtac_wire::message::DeviceMessage;
+use serde_json::json;
+
+/// Where the log goes.
+#[derive(Default)]
+pub struct Arrivals {
+    file: Option<File>,
+    decoder: Decoder<DEVICE_FRAME_LIMIT>,
+    failed: Option<String>,
+}
+
+impl Arrivals {
+    /// A log in a file, which is emptied first.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn create(path: &Path) -> anyhow::Result<Self> {
+        let file = File::create(path).with_context(|| format!("arrivals {}", path.display()))?;
+        Ok(Self {
+            file: Some(file),
+            ..Self::default()
+        })
+    }
+
+    /// A packet was on the bus until `at_ns`.
+    pub fn packet(&mut self, mut bytes: &[u8], at_ns: u64) {
+        let Some(file) = &mut self.file else { return };
+        while let Some(received) = self.decoder.feed(&mut bytes) {
+            let Received::Message(DeviceMessage::Sample(sample)) = received else {
+                continue;
+            };
+            let line = json!({"frame": sample.frame, "time_s": at_ns as f64 / 1e9});
+            if let Err(error) = writeln!(file, "{line}") {
+                self.failed = Some(error.to_string());
+            }
+        }
+    }
+
+    /// Why the log is not whole.
+    pub fn failure(&self) -> Option<&str> {
+        self.failed.as_deref()
+    }
+}
+
+impl fmt::Debug for Arrivals {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Arrivals")
+            .field("file", &self.file)
+            .finish_non_exhaustive()
+    }
+}

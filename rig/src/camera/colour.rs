@@ -1,0 +1,332 @@
+//! What the sensor's registers make of brightness and colours.
+//!
+//! The scene's pixels are what the sensor sends at the settings of OmniVision's application note:
+//! equal gains, its colour matrix, levels in proportion to light, well exposed. Other settings
+//! change them from there. Gains act before the matrix, which gives Cr and Cb from red, green and
+//! blue; luma is theirs by BT.601. Not simulated: the sensor's own filters and noise, automatic
+//! white balance, lens correction, edges, hue and special effects.
+
+use super::registers::{self as reg, Registers};
+use crate::frame_source::{Coding, Picture};
+
+type Matrix = [[f64; 3]; 3];
+
+/// Luma, Cb, Cr of red, green, blue: ITU-R BT.601, full range.
+const BT601: Matrix = [
+    [0.299, 0.587, 0.114],
+    [-0.168_736, -0.331_264, 0.5],
+    [0.5, -0.418_688, -0.081_312],
+];
+/// The application note's coefficients 1 to 6: Cr, then Cb.
+const APPLICATION_NOTE: [f64; 6] = [176.0, -157.0, -19.0, -22.0, -123.0, 145.0];
+
+/// DSP_CTRL1 bits.
+const SPECIAL_EFFECTS: u8 = 0x20;
+const COLOUR_MATRIX: u8 = 0x10;
+const GAMMA: u8 = 0x04;
+/// MTX_CTRL bit 7: coefficients count twice.
+const DOUBLED: u8 = 0x80;
+/// SDE bits.
+const CONTRAST_AND_BRIGHTNESS: u8 = 0x04;
+const SATURATION: u8 = 0x02;
+/// AWB_CTRL0 bit 7: the gains are applied. AWB_CTRL1 bit 1: 0x40 is a gain of one, instead of 0x80.
+const GAINS_APPLIED: u8 = 0x80;
+const UNITY_IS_0X40: u8 = 0x02;
+
+/// From the scene's colours to those that are sent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Colour {
+    /// Red, green, blue to red, green, blue.
+    linear: Matrix,
+    /// Added to luma after that.
+    brightness: f64,
+    /// Output of each level, when the sensor's curve is on.
+    curve: Option<Vec<u8>>,
+}
+
+impl Colour {
+    /// What the registers say, for a picture that is `exposed` as well as it should be, times.
+    pub fn of(registers: &Registers, exposed: f64) -> Self {
+        let control = registers.get(reg::DSP_CTRL1);
+        let gains = gains(registers);
+        let mut raw = product(&inverse(&from_raw(&APPLICATION_NOTE)), &BT601);
+        for (row, gain) in raw.iter_mut().zip(gains) {
+            *row = row.map(|term| term * gain * exposed);
+        }
+        let seen = if control & COLOUR_MATRIX != 0 {
+            product(&from_raw(&coefficients(registers)), &raw)
+        } else {
+            product(&BT601, &raw)
+        };
+        let (contrast, brightness) = contrast(registers, control);
+        let saturation = saturation(registers, control);
+        let mut scaled = seen;
+        for (row, factor) in scaled
+            .iter_mut()
+            .zip([contrast, saturation[0], saturation[1]])
+        {
+            *row = row.map(|term| term * factor);
+        }
+        Self {
+            linear: product(&inverse(&BT601), &scaled),
+            brightness,
+            curve: (control & GAMMA != 0).then(|| curve(registers)),
+        }
+    }
+
+    /// Whether it leaves every picture as it is.
+    pub fn is_plain(&self) -> bool {
+        let unit = |(i, row): (usize, &[f64; 3])| {
+            let terms = row.iter().enumerate();
+            terms
+                .map(|(j, term)| (term - f64::from(u8::from(i == j))).abs())
+                .fold(0.0, f64::max)
+        };
+        let off = self.linear.iter().enumerate().map(unit);
+        // The coefficients are whole numbers and their inverse is not.
+        off.fold(0.0, f64::max) < 1e-6 && self.brightness == 0.0 && self.curve.is_none()
+    }
+
+    /// The picture that is sent.
+    pub fn apply(&self, mut picture: Picture) -> Picture {
+        if self.is_plain() {
+            return picture;
+        }
+        match picture.coding {
+            Coding::Rgb565 => {
+                for pixel in &mut picture.pixels {
+                    *pixel = rgb565(self.seen(rgb(*pixel)));
+                }
+            }
+            Coding::Yuv422 => {
+                for pair in picture.pixels.chunks_exact_mut(2) {
+                    self.apply_to_pair(pair);
+                }
+            }
+        }
+        picture
+    }
+
+    /// Two pixels of YUV422: luma in the low bytes, Cb and Cr in the high ones.
+    fn apply_to_pair(&self, pair: &mut [u16]) {
+        let bytes = [pair[0].to_le_bytes(), pair[1].to_le_bytes()];
+        let chroma = [bytes[0][1], bytes[1][1]].map(|c| f64::from(c) - 128.0);
+        let back = inverse(&BT601);
+        let sent = [0, 1].map(|i| {
+            let luma = f64::from(bytes[i][0]);
+            times(
+                &BT601,
+                self.seen(times(&back, [luma, chroma[0], chroma[1]])),
+            )
+        });
+        for (i, pixel) in pair.iter_mut().enumerate() {
+            let luma = byte(sent[i][0]);
+            let chroma = byte((sent[0][1 + i] + sent[1][1 + i]) / 2.0 + 128.0);
+            *pixel = u16::from_le_bytes([luma, chroma]);
+        }
+    }
+
+    fn seen(&self, rgb: [f64; 3]) -> [f64; 3] {
+        let levels = times(&self.linear, rgb).map(|level| level + self.brightness);
+        match &self.curve {
+            Some(curve) => levels.map(|level| f64::from(curve[usize::from(byte(level))])),
+            None => levels.map(|level| level.clamp(0.0, 255.0)),
+        }
+    }
+}
+
+/// Of red, green and blue.
+fn gains(registers: &Registers) -> [f64; 3] {
+    if registers.get(reg::AWB_CTRL0) & GAINS_APPLIED == 0 {
+        return [1.0; 3];
+    }
+    let unity = match registers.get(reg::AWB_CTRL1) & UNITY_IS_0X40 {
+        0 => 128.0,
+        _ => 64.0,
+    };
+    [reg::RED, reg::GREEN, reg::BLUE].map(|gain| f64::from(registers.get(gain)) / unity)
+}
+
+/// Coefficients 1 to 6 of the colour matrix with their signs, which every source has alike.
+fn coefficients(registers: &Registers) -> [f64; 6] {
+    let doubled = registers.get(reg::MTX_CTRL) & DOUBLED != 0;
+    let strength = if doubled { 2.0 } else { 1.0 };
+    let signs = [1.0, -1.0, -1.0, -1.0, -1.0, 1.0];
+    std::array::from_fn(|i| {
+        let value = registers.get(reg::MTX1 + i as u8);
+        f64::from(value) * strength * signs[i]
+    })
+}
+
+/// Luma, Cb and Cr of the sensor's own red, green, blue, by coefficients in 256ths.
+fn from_raw(coefficients: &[f64; 6]) -> Matrix {
+    let [r1, g1, b1, r2, g2, b2] = coefficients.map(|coefficient| coefficient / 256.0);
+    [BT601[0], [r2, g2, b2], [r1, g1, b1]]
+}
+
+/// Factor of luma, and what is added to it.
+fn contrast(registers: &Registers, control: u8) -> (f64, f64) {
+    let effects = registers.get(reg::SDE);
+    if control & SPECIAL_EFFECTS == 0 || effects & CONTRAST_AND_BRIGHTNESS == 0 {
+        return (1.0, 0.0);
+    }
+    let contrast = f64::from(registers.get(reg::CNST)) / 32.0;
+    (contrast, f64::from(registers.get(reg::BRIGHT)))
+}
+
+/// Factors of Cb and Cr.
+fn saturation(registers: &Registers, control: u8) -> [f64; 2] {
+    let effects = registers.get(reg::SDE);
+    if control & SPECIAL_EFFECTS == 0 || effects & SATURATION == 0 {
+        return [1.0; 2];
+    }
+    [reg::USAT, reg::VSAT].map(|address| f64::from(registers.get(address)) / 64.0)
+}
+
+/// Output of each level, by fifteen points in between.
+fn curve(registers: &Registers) -> Vec<u8> {
+    const INPUTS: [u16; 15] = [4, 8, 16, 32, 40, 48, 56, 64, 72, 80, 96, 112, 144, 176, 208];
+    let outputs = (reg::GAM1..).map(|address| u16::from(registers.get(address)));
+    let mut points = vec![(0, 0)];
+    points.extend(INPUTS.into_iter().zip(outputs));
+    points.push((255, 255));
+    let level = |level: u16| {
+        let above = points.partition_point(|(input, _)| *input <= level);
+        let above = above.min(points.len() - 1);
+        let ((x0, y0), (x1, y1)) = (points[above - 1], points[above]);
+        let share = f64::from(level - x0) / f64::from(x1 - x0);
+        byte(f64::from(y0) + share * (f64::from(y1) - f64::from(y0)))
+    };
+    (0..256).map(level).collect()
+}
+
+fn rgb(pixel: u16) -> [f64; 3] {
+    [
+        f64::from(pixel >> 11) * 255.0 / 31.0,
+        f64::from(pixel >> 5 & 63) * 255.0 / 63.0,
+        f64::from(pixel & 31) * 255.0 / 31.0,
+    ]
+}
+
+fn rgb565([r, g, b]: [f64; 3]) -> u16 {
+    let level = |value: f64, top: f64| (value * top / 255.0).round() as u16;
+    level(r, 31.0) << 11 | level(g, 63.0) << 5 | level(b, 31.0)
+}
+
+fn byte(level: f64) -> u8 {
+    level.round().clamp(0.0, 255.0) as u8
+}
+
+fn times(matrix: &Matrix, vector: [f64; 3]) -> [f64; 3] {
+    matrix.map(|row| row.iter().zip(vector).map(|(a, b)| a * b).sum())
+}
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let column = |j: usize| times(a, [b[0][j], b[1][j], b[2][j]]);
+    let columns = [column(0), column(1), column(2)];
+    std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
+}
+
+/// By cofactors; `m` is not singular.
+fn inverse(m: &Matrix) -> Matrix {
+    let minor = |i: usize, j: usize| {
+        let [r0, r1] = [(i + 1) % 3, (i + 2) % 3];
+        let [c0, c1] = [(j + 1) % 3, (j + 2) % 3];
+        m[r0][c0] * m[r1][c1] - m[r0][c1] * m[r1][c0]
+    };
+    let determinant: f64 = (0..3).map(|j| m[0][j] * minor(0, j)).sum();
+    std::array::from_fn(|i| std::array::from_fn(|j| minor(j, i) / determinant))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gains of one, the application note's matrix, no gamma, no effects.
+    fn application_note() -> Registers {
+        let mut registers = Registers::default();
+        let matrix = [0xB0, 0x9D, 0x13, 0x16, 0x7B, 0x91, 0x1E];
+        for (address, value) in (reg::MTX1..).zip(matrix) {
+            registers.write(address, value);
+        }
+        for (address, value) in [
+            (reg::DSP_CTRL1, 0x98),
+            (reg::AWB_CTRL0, 0xE0),
+            (reg::AWB_CTRL1, 0x5E),
+            (reg::RED, 0x40),
+            (reg::GREEN, 0x40),
+            (reg::BLUE, 0x40),
+        ] {
+            registers.write(address, value);
+        }
+        registers
+    }
+
+    fn sent(registers: &Registers, exposed: f64, pixel: u16) -> u16 {
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            coding: Coding::Rgb565,
+            pixels: vec![pixel; 2],
+        };
+        Colour::of(registers, exposed).apply(picture).pixels[0]
+    }
+
+    const GREY: u16 = 16 << 11 | 32 << 5 | 16;
+    const RED: u16 = 24 << 11 | 10 << 5 | 5;
+
+    #[test]
+    fn the_scenes_colours_are_those_of_the_application_note() {
+        assert!(Colour::of(&application_note(), 1.0).is_plain());
+        assert_eq!(sent(&application_note(), 1.0, RED), RED);
+    }
+
+    #[test]
+    fn without_a_gain_of_green_a_neutral_film_is_not_neutral() {
+        let mut registers = application_note();
+        registers.write(reg::GREEN, 0);
+        let [red, green, blue] = rgb(sent(&registers, 1.0, GREY));
+        assert!(
+            green < red / 2.0 && green < blue / 2.0,
+            "{red} {green} {blue}"
+        );
+    }
+
+    #[test]
+    fn half_the_matrix_is_half_the_colour() {
+        let saturation = |pixel: u16| {
+            let [red, green, _] = rgb(pixel);
+            1.0 - green / red
+        };
+        let mut registers = application_note();
+        let power_up = [0x2C, 0x24, 0x08, 0x14, 0x24, 0x38, 0x9E];
+        for (address, value) in (reg::MTX1..).zip(power_up) {
+            registers.write(address, value);
+        }
+        let [full, half] = [application_note(), registers].map(|r| saturation(sent(&r, 1.0, RED)));
+        assert!(half < 0.75 * full, "{half} of {full}");
+    }
+
+    #[test]
+    fn exposure_scales_levels_and_both_codings_see_the_same() {
+        let [red, ..] = rgb(sent(&application_note(), 0.5, GREY));
+        assert!((red - 66.0).abs() < 5.0, "{red}");
+        let mut pair = [u16::from_le_bytes([120, 128]); 2];
+        Colour::of(&application_note(), 0.5).apply_to_pair(&mut pair);
+        assert_eq!(pair, [u16::from_le_bytes([60, 128]); 2]);
+    }
+
+    #[test]
+    fn a_curve_bends_what_is_between_black_and_white() {
+        let mut registers = application_note();
+        registers.write(reg::DSP_CTRL1, 0x9C);
+        for address in reg::GAM1..reg::GAM1 + 15 {
+            registers.write(address, 0xF0);
+        }
+        let [black, grey, white] = [0, GREY, 0xFFFF].map(|p| rgb(sent(&registers, 1.0, p))[0]);
+        assert!(
+            black < 1.0 && grey > 200.0 && white > 250.0,
+            "{black} {grey} {white}"
+        );
+    }
+}

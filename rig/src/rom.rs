@@ -1,0 +1,46 @@
+//! The part's ROM: its unique number, and the loader's jump to the program in flash.
+//!
+//! After `dfu-util …:leave` the loader sets the stack pointer and jumps, with its own vector table
+//! still in use: the program has to set its own (AN3156). Every vector of the table here but the
+//! first leads to a loop.
+
+use std::path::Path;
+
+use rigless::image::Image;
+
+/// Where the ROM begins, and its vector table with it.
+pub const BASE: u32 = 0x1FF0_0000;
+/// Where the program begins.
+pub const FLASH: u32 = 0x0800_0000;
+
+/// Vectors: the core's 16 and more than the part's interrupts.
+const VECTORS: u32 = 256;
+const STACK: u32 = 0x2000_1000;
+/// ldr r0, flash; ldr r1, [r0]; msr msp, r1; ldr r1, [r0, #4]; bx r1; flash: .word; trap: b trap
+const JUMP: [u16; 6] = [0x4802, 0x6801, 0xF381, 0x8808, 0x6841, 0x4708];
+const TRAP: u16 = 0xE7FE;
+
+/// The 96-bit number that every part is made with, at its address in system memory (RM0433 chapter
+/// 61).
+pub fn unique_id() -> Image {
+    image("unique-id", b"hivtac-rig-1".to_vec(), 0x1FF1_E800)
+}
+
+/// The loader.
+pub fn loader() -> Image {
+    let code = BASE + 4 * VECTORS;
+    let trap = code + 16;
+    let mut bytes: Vec<u8> = [STACK, code + 1]
+        .into_iter()
+        .chain((2..VECTORS).map(|_| trap + 1))
+        .flat_map(u32::to_le_bytes)
+        .collect();
+    bytes.extend(JUMP.into_iter().flat_map(u16::to_le_bytes));
+    bytes.extend(FLASH.to_le_bytes());
+    bytes.extend(TRAP.to_le_bytes());
+    image("loader", bytes, BASE)
+}
+
+fn image(name: &str, bytes: Vec<u8>, address: u32) -> Image {
+    Image::new(Path::new(name), bytes, Some(address.into())).expect("plain bytes are an image")
+}

@@ -1,0 +1,46 @@
+//! The chip as it may be met: an old revision, and a program that the ROM's loader starts.
+
+mod common;
+
+use common::{Setup, firmware};
+use hivtac_rig::chip::Revision;
+use hivtac_rig::machine::Entry;
+use hivtac_rig::usb_host::Port;
+
+/// Revision Y ends at 400 MHz: the LED flashes twice a second and nothing is set up, least of all
+/// 480 MHz, which would end the run.
+#[test]
+fn an_old_revision_is_refused_with_a_flashing_led() {
+    let setup = Setup {
+        revision: Revision::Y,
+        ..Setup::new(firmware(), 1_600)
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let report = setup
+        .try_run(&directory.path().join("truth"))
+        .unwrap()
+        .report;
+    assert_eq!(
+        (report.port, report.exposures, report.resets),
+        (Port::Empty, 0, 0)
+    );
+    let flashes = report.led_flashes_ns;
+    assert!(flashes.len() >= 4, "{flashes:?}");
+    let [short, long] = [flashes[1] - flashes[0], flashes[2] - flashes[1]];
+    assert!(
+        (long - short).abs_diff(3 * short) < short / 2,
+        "{flashes:?}"
+    );
+}
+
+/// `dfu-util …:leave` enters the program with the ROM's vector table in use.
+#[test]
+fn a_program_that_the_loader_started_takes_its_own_interrupts() {
+    let setup = Setup {
+        entry: Entry::Loader,
+        ..Setup::new(firmware(), 220)
+    };
+    let run = setup.run();
+    assert!(run.samples().len() >= 3, "{:?}", run.report);
+    assert_eq!(run.report.resets, 0);
+}
