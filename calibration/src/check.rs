@@ -56,11 +56,8 @@ pub fn check(
         let frame = scene.render_load(&recipe.load(row)?, row as u64)?;
         let measurement = measure(sensor, &frame);
         progress();
-        let force = measurement
-            .force
-            .map(vector_n)
-            .ok_or_else(|| reasons(measurement.status));
-        Ok((frame.truth.force.vector_n(), force))
+        let force = measurement.force.ok_or_else(|| reasons(measurement.status));
+        Ok((frame.truth.force, force))
     });
     let mut report = Report {
         model: describe(&model),
@@ -70,7 +67,15 @@ pub fn check(
     };
     for (truth, found) in measured.collect::<Result<Vec<_>>>()? {
         match found {
-            Ok(found) => report.errors.add(found, truth),
+            Ok(found) => {
+                report.errors.add(vector_n(found), truth.vector_n());
+                // A weak press has no place worth telling.
+                let place = found.place.filter(|_| truth.magnitude_n() >= WEAK_N);
+                if let Some(place) = place {
+                    let found_mm = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
+                    report.errors.add_place(found_mm, truth.offset_mm());
+                }
+            }
             Err(status) => *report.rejected.entry(status).or_default() += 1,
         }
     }
@@ -173,6 +178,13 @@ impl fmt::Display for Report {
             "RMSE of Fx, Fy        {:.3} mN",
             errors.lateral_rmse_n() * 1e3
         )?;
+        if let Some(each_mm) = errors.place_rmse_mm() {
+            writeln!(
+                f,
+                "RMSE of place x, y    {:.1} µm from {weak} mN up",
+                each_mm * 1e3
+            )?;
+        }
         write!(
             f,
             "frames without force  {}",

@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
-use hivtac_scene::{Contact, SceneError};
+use hivtac_scene::{Camera, Contact, SceneError};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin};
 use hivtac_sensing::threshold::{PixelFormat, Threshold};
@@ -198,6 +198,15 @@ impl Conditions {
             contact: ContactName::default(),
             origin: OriginName::Simulated,
         }
+    }
+
+    /// The simulated camera of these conditions.
+    ///
+    /// # Errors
+    /// When there is no such camera.
+    pub fn camera(&self) -> Result<Camera> {
+        let preset = preset(&self.preset)?.name().parse()?;
+        Ok(Camera::new(preset, self.width.into(), self.height.into())?)
     }
 
     /// The same as the model file holds it.

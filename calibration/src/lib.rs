@@ -9,7 +9,8 @@
 //! |---|---|
 //! | `loads`, `dataset` | which forces; frames seen by `sensing` itself; the CSV file |
 //! | `collect` | data from a real unit and a force gauge |
-//! | `train`, `closed_form`, `fit` | networks; closed forms; from a data set to weights |
+//! | `train`, `fit` | networks; from a data set to weights |
+//! | `forward` | the film run forwards, from what is known of a unit |
 //! | `import` | networks trained in PyTorch |
 //! | `network`, `weights`, `conditions` | the network in floats, its file, and what it holds for |
 //! | `quantize` | weights to a model file, the same bytes on every machine |
@@ -21,8 +22,8 @@
 //! | `progress` | bars on the terminal |
 //! | `scene` | pictures and figures of the simulated sensor |
 
+pub mod answer;
 pub mod check;
-pub mod closed_form;
 pub mod collect;
 pub mod conditions;
 pub mod dataset;
@@ -30,6 +31,7 @@ pub mod document;
 pub mod errors;
 pub mod evaluate;
 pub mod fit;
+pub mod forward;
 pub mod import;
 pub mod loads;
 pub mod loss_plot;

@@ -106,33 +106,6 @@ impl PaperPoses {
     }
 }
 
-/// Ten loads that are enough for a closed form: sizes from 4 to 100 % of the largest, each tilted by 8° another way.
-#[derive(Clone, Copy, Debug)]
-pub struct KnownLoads {
-    /// The largest |F|, N.
-    pub force_n: f64,
-}
-
-impl KnownLoads {
-    const PARTS: [f64; 10] = [0.04, 0.08, 0.15, 0.25, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0];
-    /// How many there are.
-    pub const COUNT: usize = Self::PARTS.len();
-
-    /// The load of that number, below [`Self::COUNT`].
-    ///
-    /// # Errors
-    /// When the limit is no force.
-    pub fn load(&self, number: usize) -> Result<Load> {
-        const TILTS: [[f64; 2]; 4] = [[8.0, 0.0], [0.0, 8.0], [-8.0, 0.0], [0.0, -8.0]];
-        let [alpha, beta] = TILTS[number % TILTS.len()];
-        Ok(Load::from_angles(
-            self.force_n * Self::PARTS[number],
-            alpha,
-            beta,
-        )?)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

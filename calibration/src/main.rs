@@ -12,13 +12,13 @@ use hivtac_calibration::collect::CollectCommand;
 use hivtac_calibration::conditions::{CentroidName, PixelName, preset};
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, Spread, generate, generate_file};
 use hivtac_calibration::evaluate::Evaluation;
-use hivtac_calibration::fit::Kind;
-use hivtac_calibration::fit::quick::quick;
+use hivtac_calibration::network::Meaning;
 use hivtac_calibration::peers::PeersArgs;
 use hivtac_calibration::progress::bar;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::scene::SceneCommand;
 use hivtac_calibration::tradeoff::{Step, TradeoffArgs};
+use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::{Range, Weights};
 use hivtac_scene::Contact;
 
@@ -51,34 +51,6 @@ enum Command {
         data: PathBuf,
         #[command(flatten)]
         options: training::OptionArgs,
-        /// Fit a closed form first, and train the network on what it leaves.
-        #[arg(long)]
-        with_closed_form: bool,
-        /// The weights file to write.
-        #[arg(long)]
-        out: PathBuf,
-    },
-    /// Fit a closed form (mean radius and mean shift of the markers to the force) to a data set; writes a weights file.
-    ClosedForm {
-        /// The data set.
-        #[arg(long)]
-        data: PathBuf,
-        /// What is held out together.
-        #[arg(long, value_enum, default_value_t)]
-        held_out: Split,
-        /// Decides what is held out.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-        /// The weights file to write.
-        #[arg(long)]
-        out: PathBuf,
-    },
-    /// Fit a closed form to a handful of known loads (4 to 10 and more, some of them tilted, several frames each), and say how
-    /// good it is; writes a weights file.
-    Quick {
-        /// The data set: frames without force, and frames of each load.
-        #[arg(long)]
-        data: PathBuf,
         /// The weights file to write.
         #[arg(long)]
         out: PathBuf,
@@ -103,6 +75,42 @@ enum Command {
         /// The data set: best many sessions (`dataset --sessions 60`).
         #[arg(long)]
         data: PathBuf,
+        /// The weights file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Put the nominal film, run forwards, beside the network of a weights file that tells places; the noise of markers is taken
+    /// from a data set. Writes a weights file.
+    Film {
+        /// The weights file.
+        #[arg(long)]
+        weights: PathBuf,
+        /// Presses anywhere (`dataset --reach-mm 4`), 200 and more.
+        #[arg(long)]
+        data: PathBuf,
+        /// Gauss–Newton steps from the network's answer, 0 to 3.
+        #[arg(long, default_value_t = 1)]
+        steps: u8,
+        /// The weights file to write.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Fit a unit's film and camera to a handful of known loads (4 and more, best ten: some tilted, four of them 2 to 3 mm off the
+    /// middle, several frames each), and print what was found; writes a weights file for that unit.
+    Unit {
+        /// A weights file with a film (`film`).
+        #[arg(long)]
+        weights: PathBuf,
+        /// The unit's data set: frames without force, and frames of each load, with its place
+        /// (`x_mm`, `y_mm`); without places, all in the film's middle.
+        #[arg(long)]
+        data: PathBuf,
+        /// Standard uncertainty of a load's |F|, N.
+        #[arg(long, default_value_t = 0.001)]
+        gauge_n: f64,
+        /// Standard uncertainty of where the stage's zero is on the film, mm.
+        #[arg(long, default_value_t = 0.1)]
+        stage_mm: f64,
         /// The weights file to write.
         #[arg(long)]
         out: PathBuf,
@@ -145,12 +153,11 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
-    /// All of this from scratch, for the model that firmware and host tool embed.
+    /// All of this from scratch, for the model that firmware and host tool embed: a tip anywhere within ±4 mm.
     DefaultModel {
-        #[command(flatten)]
-        recipe: RecipeArgs,
-        #[command(flatten)]
-        options: training::OptionArgs,
+        /// Pixel format.
+        #[arg(long, value_enum, default_value = "rgb565")]
+        format: PixelName,
         /// Where default.weights and default.hvtm go.
         #[arg(long, default_value = "calibration/models")]
         out_dir: PathBuf,
@@ -189,7 +196,7 @@ struct RecipeArgs {
     #[arg(long, default_value_t)]
     contact: Contact,
     /// Random loads in each session, besides the frames of the untouched film.
-    #[arg(long, default_value_t = 40_000, conflicts_with_all = ["per_pose", "known_loads"])]
+    #[arg(long, default_value_t = 40_000, conflicts_with = "per_pose")]
     samples: usize,
     /// Instead: as many loads for each of the paper's 357 poses.
     #[arg(long)]
@@ -197,9 +204,6 @@ struct RecipeArgs {
     /// Which of those poses: all, or the four fifths or the fifth that comparisons train on and hold out.
     #[arg(long, value_enum, default_value_t, requires = "per_pose")]
     poses: PosesArg,
-    /// Instead: as many frames of each of ten tilted loads, for `quick`.
-    #[arg(long, conflicts_with = "per_pose")]
-    known_loads: Option<usize>,
     /// Frames of the untouched film in each session.
     #[arg(long, default_value_t = Recipe::default().rest)]
     rest: usize,
@@ -214,7 +218,7 @@ struct RecipeArgs {
     beta_deg: f64,
     /// The tip presses anywhere up to this far from the film's middle along x and y, mm, and rows say
     /// where; 0: the middle.
-    #[arg(long, default_value_t = 0.0, conflicts_with_all = ["per_pose", "known_loads", "offset_mm"])]
+    #[arg(long, default_value_t = 0.0, conflicts_with_all = ["per_pose", "offset_mm"])]
     reach_mm: f64,
     /// Sessions: the first is nominal, the others are built, mounted, lit, focused and pressed a little differently.
     #[arg(long, default_value_t = 1)]
@@ -260,14 +264,13 @@ impl RecipeArgs {
             format: self.format,
             centroid: self.centroid,
             contact: self.contact,
-            loads: match (self.per_pose, self.known_loads) {
-                (Some(each), _) => match self.poses {
+            loads: match self.per_pose {
+                Some(each) => match self.poses {
                     PosesArg::All => Loads::PaperPoses(each),
                     PosesArg::Training => Loads::TrainingPoses(each),
                     PosesArg::HeldOut => Loads::HeldOutPoses(each),
                 },
-                (None, Some(each)) => Loads::Known(each),
-                (None, None) => Loads::Random(self.samples),
+                None => Loads::Random(self.samples),
             },
             rest: self.rest,
             range: Range {
@@ -290,37 +293,35 @@ fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
     match Cli::parse().command {
-        Command::Dataset { recipe, out } => make_dataset(&recipe, Some(&out)).map(drop),
+        Command::Dataset { recipe, out } => rendered(&recipe.recipe()?, Some(&out)).map(drop),
         Command::Collect(command) => command.run(),
-        Command::Train {
-            data,
-            options,
-            with_closed_form,
-            out,
-        } => {
-            let kind = if with_closed_form {
-                Kind::Both
-            } else {
-                Kind::Network
-            };
-            training::run(&Dataset::load(&data)?, &options, kind)?.save(&out)
-        }
-        Command::ClosedForm {
-            data,
-            held_out,
-            seed,
-            out,
-        } => training::closed_form(&Dataset::load(&data)?, held_out, seed)?.save(&out),
-        Command::Quick { data, out } => {
-            let quick = quick(&Dataset::load(&data)?)?;
-            println!("{quick}");
-            quick.weights.save(&out)
-        }
+        Command::Train { data, options, out } => options.train(&Dataset::load(&data)?)?.save(&out),
         Command::Import { tensors, data, out } => {
             training::import(&Dataset::load(&data)?, &tensors)?.save(&out)
         }
         Command::Uncertainty { weights, data, out } => {
             training::judged(Weights::load(&weights)?, &Dataset::load(&data)?)?.save(&out)
+        }
+        Command::Film {
+            weights,
+            data,
+            steps,
+            out,
+        } => {
+            let weights = Weights::load(&weights)?;
+            weights.with_film(steps, &Dataset::load(&data)?)?.save(&out)
+        }
+        Command::Unit {
+            weights,
+            data,
+            gauge_n,
+            stage_mm,
+            out,
+        } => {
+            let weights = Weights::load(&weights)?;
+            let (weights, fit) = weights.for_unit(&Dataset::load(&data)?, gauge_n, stage_mm)?;
+            print!("{fit}");
+            weights.save(&out)
         }
         Command::Export { weights, rest, out } => export_file(&weights, rest.as_deref(), &out),
         Command::Evaluate {
@@ -334,23 +335,18 @@ fn main() -> Result<()> {
             evaluate_file(&model, &data, split, &out)
         }
         Command::Check { model, frames } => check_file(&model, &frames),
-        Command::DefaultModel {
-            recipe,
-            options,
-            out_dir,
-        } => default_model(&recipe, &options, &out_dir),
+        Command::DefaultModel { format, out_dir } => default_model(format, &out_dir),
         Command::Tradeoff(args) => args.run(sweep_bars),
         Command::Peers(args) => args.run(),
         Command::Scene(command) => command.run(),
     }
 }
 
-fn make_dataset(args: &RecipeArgs, out: Option<&Path>) -> Result<Dataset> {
-    let recipe = args.recipe()?;
+fn rendered(recipe: &Recipe, out: Option<&Path>) -> Result<Dataset> {
     let bar = bar("rendering", recipe.rows());
     let dataset = match out {
-        Some(out) => generate_file(&recipe, out, |rows| bar.inc(rows))?,
-        None => generate(&recipe, || bar.inc(1))?,
+        Some(out) => generate_file(recipe, out, |rows| bar.inc(rows))?,
+        None => generate(recipe, || bar.inc(1))?,
     };
     bar.finish_and_clear();
     let rejected = dataset.rejected();
@@ -404,30 +400,45 @@ fn check_file(model: &Path, args: &CheckArgs) -> Result<()> {
     Ok(())
 }
 
-fn default_model(
-    recipe: &RecipeArgs,
-    options: &training::OptionArgs,
-    out_dir: &Path,
-) -> Result<()> {
+fn default_model(format: PixelName, out_dir: &Path) -> Result<()> {
     let (weights, model) = (
         out_dir.join("default.weights"),
         out_dir.join("default.hvtm"),
     );
-    let sessions = recipe.recipe()?.other_sessions();
-    let trained = training::run(&make_dataset(recipe, None)?, options, Kind::Both)?;
-    let bar = bar("rendering", sessions.rows());
-    let sessions = generate(&sessions, || bar.inc(1))?;
-    bar.finish_and_clear();
-    training::judged(trained, &sessions)?.save(&weights)?;
-    export_file(&weights, None, &model)?;
-    check_file(
-        &model,
-        &CheckArgs {
-            samples: 4000,
-            seed: 1_000_001,
-            friction: 0.6,
+    let recipe = Recipe {
+        format,
+        loads: Loads::Random(80_000),
+        range: Range {
+            force_n: 0.25,
+            alpha_deg: 10.0,
+            beta_deg: 10.0,
+            place_mm: 4.2,
         },
-    )
+        ..Recipe::default()
+    };
+    let film = Recipe {
+        loads: Loads::Random(6_000),
+        seed: 5,
+        ..recipe
+    };
+    let options = Options {
+        meaning: Meaning::ForceAndPlace,
+        epochs: 400,
+        rounded_epochs: 300,
+        direction_weight: Some(3.0),
+        ..Options::default()
+    };
+    let network = training::run(&rendered(&recipe, None)?, Split::default(), &options, None)?;
+    network
+        .with_film(1, &rendered(&film, None)?)?
+        .save(&weights)?;
+    export_file(&weights, None, &model)?;
+    let frames = CheckArgs {
+        samples: 4000,
+        seed: 1_000_001,
+        friction: 0.6,
+    };
+    check_file(&model, &frames)
 }
 
 /// What to call at every step of so many frames and trainings.

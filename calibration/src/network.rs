@@ -194,8 +194,7 @@ impl Standardization {
     }
 }
 
-/// A network with its input and output scaling: features in pixels to a force in newtons. One without layers answers
-/// nothing: a closed form does then.
+/// A network with its input and output scaling: features in pixels to a force in newtons.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Network {
     /// What its outputs are.
@@ -253,6 +252,7 @@ impl Network {
     }
 
     fn validate_layers(&self) -> Result<()> {
+        ensure!(!self.layers.is_empty(), "it has no layers");
         let hidden = self.layers.len().saturating_sub(1);
         ensure!(
             self.activation_max.len() == hidden,
@@ -277,12 +277,8 @@ impl Network {
         }
         let outputs = self.meaning.outputs();
         ensure!(
-            inputs == outputs || self.layers.is_empty(),
+            inputs == outputs,
             "the last layer has {inputs} outputs instead of {outputs}"
-        );
-        ensure!(
-            !self.meaning.tells_place() || !self.layers.is_empty(),
-            "without layers there is no place to tell"
         );
         Ok(())
     }
@@ -444,7 +440,8 @@ mod tests {
             let error = network.validate().unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         };
-        refused(|n| n.layers.clear(), "activation maxima");
+        refused(|n| n.layers.clear(), "no layers");
+        refused(|n| n.layers.truncate(1), "activation maxima");
         refused(|n| n.layers[0].weights[1].truncate(3), "layer 0");
         refused(|n| n.layers[1].bias.truncate(2), "biases");
         refused(|n| n.layers[1].weights.truncate(2), "layer 1");

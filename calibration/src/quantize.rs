@@ -12,7 +12,7 @@ use hivtac_sensing::model::{
 };
 use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
 
-use crate::closed_form::ClosedForm;
+use crate::forward::FilmModel;
 use crate::network::{Arithmetic, Layer, Meaning, Network, Standardization};
 use crate::weights::{Range, Rest, Uncertainty, Weights, features_from_q16};
 
@@ -56,11 +56,7 @@ pub fn spec(weights: &Weights) -> Result<ModelSpec> {
             .into_iter()
             .map(|layer| layer.spec)
             .collect(),
-        closed_form: weights
-            .closed_form
-            .as_ref()
-            .map(ClosedForm::to_chip)
-            .transpose()?,
+        forward: weights.film.as_ref().map(FilmModel::spec).transpose()?,
         output: match weights.network.meaning {
             Meaning::ForceVector => OutputKind::ForceVector,
             Meaning::AnglesMagnitude => OutputKind::AnglesMagnitude,

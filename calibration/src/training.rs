@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use hivtac_calibration::dataset::{Dataset, Split};
 use hivtac_calibration::errors::{Errors, WEAK_N};
-use hivtac_calibration::fit::{Fit, Kind, adopt, fit, fit_closed_form, judged_by};
+use hivtac_calibration::fit::{Fit, adopt, fit, judged_by};
 use hivtac_calibration::loss_plot::LossPlot;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::train::{Options, Progress};
@@ -72,6 +72,13 @@ pub struct OptionArgs {
 }
 
 impl OptionArgs {
+    /// Trains with these options and prints the errors on held-out rows.
+    pub fn train(&self, dataset: &Dataset) -> Result<Weights> {
+        let options = self.options(dataset)?;
+        let loss_plot = self.loss_plot.as_deref();
+        run(dataset, self.held_out, &options, loss_plot)
+    }
+
     fn options(&self, dataset: &Dataset) -> Result<Options> {
         let start = self.start.as_deref().map(Weights::load).transpose()?;
         Ok(Options {
@@ -101,46 +108,36 @@ fn named<T: DeserializeOwned>(name: &str) -> Result<T, String> {
     serde_json::from_value(name.into()).map_err(|error| error.to_string())
 }
 
-/// Trains and prints the errors on held-out rows.
-pub fn run(dataset: &Dataset, args: &OptionArgs, kind: Kind) -> Result<Weights> {
-    let options = args.options(dataset)?;
+/// Trains and prints the errors on held-out rows; draws the losses into a file, where one is named.
+pub fn run(
+    dataset: &Dataset,
+    held_out: Split,
+    options: &Options,
+    loss_plot: Option<&Path>,
+) -> Result<Weights> {
     let mut plot = LossPlot::default();
     let bar =
         hivtac_calibration::progress::bar("training", options.epochs + options.rounded_epochs);
-    let fitted = fit(
-        dataset,
-        args.held_out,
-        kind,
-        &options,
-        |progress: Progress| {
-            bar.inc(1);
-            let phase = if progress.rounded {
-                "with rounding"
-            } else {
-                "in floats"
-            };
-            bar.set_message(format!("loss {:.5} {phase}", progress.loss));
-            plot.add(progress);
-            if let Some(path) = &args.loss_plot {
-                // The last write is checked below: a plot is no reason to lose a training.
-                let _ = fs::write(path, plot.to_svg());
-            }
-        },
-    )?;
+    let fitted = fit(dataset, held_out, options, |progress: Progress| {
+        bar.inc(1);
+        let phase = if progress.rounded {
+            "with rounding"
+        } else {
+            "in floats"
+        };
+        bar.set_message(format!("loss {:.5} {phase}", progress.loss));
+        plot.add(progress);
+        if let Some(path) = loss_plot {
+            // The last write is checked below: a plot is no reason to lose a training.
+            let _ = fs::write(path, plot.to_svg());
+        }
+    })?;
     bar.finish_and_clear();
-    if let Some(path) = &args.loss_plot {
+    if let Some(path) = loss_plot {
         fs::write(path, plot.to_svg())
             .with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(told(fitted, "held-out rows"))
-}
-
-/// Fits a closed form and prints the errors on held-out rows.
-pub fn closed_form(dataset: &Dataset, held_out: Split, seed: u64) -> Result<Weights> {
-    Ok(told(
-        fit_closed_form(dataset, held_out, seed)?,
-        "held-out rows",
-    ))
 }
 
 fn told(fitted: Fit, rows: &str) -> Weights {

@@ -79,16 +79,6 @@ impl Miss {
 }
 
 impl Uncertainty {
-    /// The same for every |F|.
-    pub fn constant(across_n: f64, along_n: f64) -> Self {
-        Self {
-            step_bits: 0,
-            across_n: [across_n; KNOTS],
-            along_n: [along_n; KNOTS],
-            place_mm: [0.0; KNOTS],
-        }
-    }
-
     /// Of what a model is off by on rows that it was not made from, for forces up to `largest_n`.
     ///
     /// # Errors

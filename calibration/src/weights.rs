@@ -7,9 +7,9 @@ use hivtac_sensing::features::{FEATURES, Features};
 use hivtac_sensing::units::Px;
 use serde::{Deserialize, Serialize};
 
-use crate::closed_form::ClosedForm;
 use crate::conditions::Conditions;
 use crate::dataset::Split;
+use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
 pub use crate::uncertainty::Uncertainty;
 
@@ -32,10 +32,10 @@ pub struct Weights {
     pub uncertainty: Uncertainty,
     /// How it came to be, for the reader.
     pub training: Training,
-    /// What it gives without the network; the network's answer is added to it.
+    /// The film run forwards, which betters the network's answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub closed_form: Option<ClosedForm>,
-    /// The network; without layers when the closed form does it alone.
+    pub film: Option<FilmModel>,
+    /// The network.
     pub network: Network,
 }
 
@@ -152,26 +152,19 @@ impl Weights {
     /// Says which part is wrong.
     pub fn check(&self) -> Result<()> {
         self.network.validate()?;
-        ensure!(
-            self.closed_form.is_some() || !self.network.layers.is_empty(),
-            "it has neither layers nor a closed form"
-        );
-        if let Some(form) = &self.closed_form {
-            form.validate().context("closed_form")?;
+        if let Some(film) = &self.film {
+            film.check()?;
+            ensure!(
+                self.network.meaning.tells_place(),
+                "film: only a network that tells places can have one"
+            );
         }
         self.check_numbers()
     }
 
     /// The force (N) of features (px) that were taken from the same rest position, without the chip's rounding.
     pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
-        let network = self.network.force_n(features);
-        match &self.closed_form {
-            None => network,
-            Some(form) => {
-                let form = form.force_n(features, &self.rest.features_px());
-                std::array::from_fn(|i| form[i] + network[i])
-            }
-        }
+        self.network.force_n(features)
     }
 
     fn check_numbers(&self) -> Result<()> {

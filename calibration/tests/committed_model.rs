@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use hivtac_calibration::check::check;
 use hivtac_calibration::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, by_place, coverage};
+use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Weights};
 use hivtac_sensing::geometry::{Geometry, Preset};
@@ -26,14 +26,9 @@ fn committed_for_yuv422() -> Vec<u8> {
     fs::read(models().join("yuv422/default.hvtm")).unwrap()
 }
 
-/// The same for a tip anywhere.
-fn committed_for_places() -> Vec<u8> {
-    fs::read(models().join("anywhere/default.hvtm")).unwrap()
-}
-
 /// The tip within ±4 mm of the middle: each ring of a millimetre.
 #[test]
-fn the_model_for_a_tip_anywhere_measures_force_and_place() {
+fn it_measures_force_and_place_wherever_the_tip_presses() {
     let recipe = Recipe {
         loads: Loads::Random(1_500),
         rest: 32,
@@ -47,15 +42,37 @@ fn the_model_for_a_tip_anywhere_measures_force_and_place() {
         ..Recipe::default()
     };
     let dataset = generate(&recipe, || ()).unwrap();
-    let evaluation = Evaluation::of(&committed_for_places(), &dataset, None).unwrap();
+    let evaluation = Evaluation::of(&committed(), &dataset, None).unwrap();
     let parts = by_place(&evaluation.judged);
     assert!(parts.len() >= 8, "{parts:?}");
     for part in &parts {
         let place = part.place.unwrap();
-        assert!(part.direction_deg < 0.9, "{part:?}");
-        assert!(part.magnitude_n < 1e-3, "{part:?}");
-        assert!(place.each_mm < 0.08 && place.within > 0.85, "{part:?}");
+        assert!(part.direction_deg < 0.7, "{part:?}");
+        assert!(part.magnitude_n < 0.2e-3, "{part:?}");
+        assert!(place.each_mm < 0.02 && place.within > 0.93, "{part:?}");
     }
+}
+
+/// Of loads too weak for a direction or a place, too, the model refuses hardly any.
+#[test]
+fn the_weakest_presses_are_measured() {
+    let weak = Recipe {
+        loads: Loads::Random(1_000),
+        seed: 81,
+        range: Range {
+            force_n: 2e-3,
+            alpha_deg: 10.0,
+            beta_deg: 10.0,
+            place_mm: 4.0,
+        },
+        ..Recipe::default()
+    };
+    let dataset = generate(&weak, || ()).unwrap();
+    let evaluation = Evaluation::of(&committed(), &dataset, None).unwrap();
+    assert!(evaluation.judged.len() >= 995, "{evaluation}");
+    let off = |judged: &Judged| (judged.found_polar[2] - judged.truth_polar[2]).abs();
+    let worst = evaluation.judged.iter().map(off).fold(0.0, f64::max);
+    assert!(worst < 0.5e-3, "{worst} N");
 }
 
 #[test]
@@ -63,7 +80,6 @@ fn committed_weights_give_the_committed_models() {
     for (weights, committed) in [
         ("default.weights", committed()),
         ("yuv422/default.weights", committed_for_yuv422()),
-        ("anywhere/default.weights", committed_for_places()),
     ] {
         let bytes = export(&Weights::load(&models().join(weights)).unwrap()).unwrap();
         assert!(
@@ -82,7 +98,7 @@ fn the_model_for_yuv422_is_made_for_the_same_unit_and_measures_its_frames() {
     assert_eq!(conditions, expected);
     let report = check(&bytes, 400, 77, 0.6, || ()).unwrap();
     let errors = &report.errors;
-    assert_eq!(errors.count(), 400, "rejected: {:?}", report.rejected);
+    assert!(errors.count() >= 380, "{report}");
     // It sees half as many columns in colour.
     assert!(errors.mean_strong_direction_deg() < 0.3, "{report}");
     assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
@@ -101,35 +117,56 @@ fn it_is_made_for_the_firmware() {
     assert_eq!(conditions.dilations, 1);
     assert_eq!(conditions.contact, ContactReading::Force);
     assert_eq!(conditions.origin, Origin::Simulated);
-    assert_eq!(model.output, OutputKind::ForceVector);
+    assert_eq!(model.output, OutputKind::ForceAndPlace);
     assert_eq!(conditions.centroid, CentroidEstimator::RednessWeighted);
-    assert_eq!(model.name().as_str(), "closed form + 11-64-64-3 ov7725");
+    assert_eq!(model.name().as_str(), "11-64-64-5 ov7725");
 }
 
 #[test]
 fn it_measures_frames_that_no_training_saw() {
-    let report = check(&committed(), 400, 77, 0.6, || ()).unwrap();
+    let report = check(&committed(), 1000, 77, 0.6, || ()).unwrap();
     let errors = &report.errors;
-    assert_eq!(errors.count(), 400, "rejected: {:?}", report.rejected);
+    // Where a strong press is far off the middle, a marker leaves the picture.
+    let hidden = report.rejected.get("markers_missing").copied();
+    assert!(errors.count() + hidden.unwrap_or(0) >= 997, "{report}");
+    assert!(errors.count() >= 930, "{report}");
     // A tilted force hardly moves the markers sideways: 0.2 px per degree at 0.2 N and 800×600.
     assert!(errors.mean_strong_direction_deg() < 0.2, "{report}");
     assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
+    assert!(errors.place_rmse_mm().unwrap() < 0.01, "{report}");
 }
 
-/// Over |F|, and in sessions that were mounted, lit and focused like none that it was made from: a tenth of the frames are
-/// 200, of which 95 to 97 in a hundred give or take 1.5, and somewhat more for 40 sessions only.
-#[test]
-fn its_uncertainties_are_honest_in_sessions_that_it_does_not_know() {
+/// Presses within ±4 mm, as many in each session.
+fn presses(each: usize, sessions: usize) -> Evaluation {
     let recipe = Recipe {
-        loads: Loads::Random(50),
+        loads: Loads::Random(each),
         rest: 32,
-        sessions: 40,
+        sessions,
         seed: 78,
-        range: Range::default(),
+        range: Range {
+            place_mm: 4.0,
+            ..Range::default()
+        },
         ..Recipe::default()
     };
     let dataset = generate(&recipe, || ()).unwrap();
-    let evaluation = Evaluation::of(&committed(), &dataset, None).unwrap();
+    Evaluation::of(&committed(), &dataset, None).unwrap()
+}
+
+/// A camera that is mounted otherwise cannot be told from dots that are glued otherwise: what is stated allows for both.
+#[test]
+fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
+    let evaluation = presses(50, 40);
+    for part in coverage(&evaluation.judged) {
+        let least = part.direction.within.min(part.magnitude.within);
+        assert!(least >= 0.95, "{evaluation}");
+    }
+}
+
+/// Over |F|: a tenth of the frames are 200, of which 95 to 97 in a hundred give or take 1.5.
+#[test]
+fn its_uncertainties_are_honest() {
+    let evaluation = presses(2_000, 1);
     let parts = coverage(&evaluation.judged);
     assert_eq!(parts.len(), 10);
     let kinds: [fn(&Coverage) -> Covered; 2] = [|part| part.direction, |part| part.magnitude];
@@ -154,7 +191,14 @@ fn damaged_models_are_not_checked() {
 #[test]
 fn unusable_weights_are_refused_with_the_reason() {
     let text = fs::read_to_string(models().join("default.weights")).unwrap();
+    // A key's number, or the first of its numbers, made negative or another one.
+    let with = |key: &str, number: &str| {
+        let at = text.find(key).unwrap() + key.len();
+        let end = at + text[at..].find([',', '}']).unwrap();
+        format!("{}{number}{}", &text[..at], &text[end..])
+    };
     let refused = |bad: String, words: &str| {
+        assert_ne!(bad, text);
         let error = format!("{:#}", Weights::parse(&bad).unwrap_err());
         assert!(error.contains(words), "{error}");
     };
@@ -162,18 +206,10 @@ fn unusable_weights_are_refused_with_the_reason() {
         text.replace("hivtac-weights 2", "hivtac-weights 1"),
         "hivtac-weights 1",
     );
-    refused(
-        text.replace("\"force_n\":0.2", "\"force_n\":-0.2"),
-        "range.force_n",
-    );
-    refused(
-        text.replace("\"alpha_deg\":10.0", "\"alpha_deg\":100.0"),
-        "range.alpha_deg",
-    );
-    refused(
-        text.replace("\"across_n\":[", "\"across_n\":[-"),
-        "uncertainty.across_n",
-    );
+    refused(with("\"force_n\":", "-0.2"), "range.force_n");
+    refused(with("\"alpha_deg\":", "100.0"), "range.alpha_deg");
+    refused(with("\"across_n\":[", "-1.0"), "uncertainty.across_n");
+    refused(with("\"steps\":", "4"), "film.steps");
     refused(
         text.replace("\"contact\":\"force\"", "\"contact\":\"feel\""),
         "feel",

@@ -5,8 +5,10 @@ use std::sync::LazyLock;
 use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
 use hivtac_calibration::evaluate::Evaluation;
-use hivtac_calibration::fit::fit_closed_form;
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
 
 fn data(loads: Loads, seed: u64) -> Dataset {
     let recipe = Recipe {
@@ -20,7 +22,16 @@ fn data(loads: Loads, seed: u64) -> Dataset {
 
 fn model() -> &'static [u8] {
     static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| {
-        let fitted = fit_closed_form(&data(Loads::Random(1500), 1), Split::WithinPose, 1).unwrap();
+        let options = Options {
+            hidden: vec![16, 16],
+            epochs: 300,
+            rounded_epochs: 60,
+            batch: 64,
+            arithmetic: Arithmetic::Int16,
+            ..Options::default()
+        };
+        let data = data(Loads::Random(1500), 1);
+        let fitted = fit(&data, Split::WithinPose, &options, |_| ()).unwrap();
         export(&fitted.weights).unwrap()
     });
     &MODEL

@@ -39,7 +39,7 @@ fn weights(network: Network) -> Weights {
             split: Split::WithinPose,
             ..Training::default()
         },
-        closed_form: None,
+        film: None,
         network,
     }
 }

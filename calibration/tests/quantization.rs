@@ -57,7 +57,7 @@ fn weights(network: Network) -> Weights {
         range: Range::default(),
         uncertainty: Uncertainty::default(),
         training: Training::default(),
-        closed_form: None,
+        film: None,
         network,
     }
 }

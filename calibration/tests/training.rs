@@ -2,7 +2,7 @@
 
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
 use hivtac_calibration::evaluate::{Evaluation, by_place};
-use hivtac_calibration::fit::{Kind, fit};
+use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
@@ -30,13 +30,9 @@ fn small() -> Options {
 #[test]
 fn a_few_hundred_frames_teach_the_force() {
     let mut losses = Vec::new();
-    let fitted = fit(
-        &data(),
-        Split::WithinPose,
-        Kind::Network,
-        &small(),
-        |progress| losses.push(progress),
-    )
+    let fitted = fit(&data(), Split::WithinPose, &small(), |progress| {
+        losses.push(progress)
+    })
     .unwrap();
     assert_eq!(losses.len(), 90);
     assert_eq!(losses.iter().filter(|p| p.rounded).count(), 30);
@@ -76,7 +72,7 @@ fn frames_of_places_teach_the_place() {
         meaning: Meaning::ForceAndPlace,
         ..small()
     };
-    let fitted = fit(&data, Split::WithinPose, Kind::Network, &options, |_| ()).unwrap();
+    let fitted = fit(&data, Split::WithinPose, &options, |_| ()).unwrap();
     // Always answering the middle is 2.4 mm off.
     let place_mm = fitted.quantized.place_rmse_mm().unwrap();
     assert!(place_mm < 1.2, "{place_mm}");
@@ -105,7 +101,7 @@ fn frames_of_places_teach_the_place() {
         rounded_epochs: 1,
         ..small()
     };
-    let fitted = fit(&data, Split::WithinPose, Kind::Network, &force, |_| ()).unwrap();
+    let fitted = fit(&data, Split::WithinPose, &force, |_| ()).unwrap();
     assert_eq!(fitted.quantized.place_rmse_mm(), None);
     assert_eq!(fitted.weights.range.place_mm, 0.0);
 }
@@ -116,9 +112,7 @@ fn what_no_data_tell_cannot_be_learnt() {
         meaning: Meaning::ForceAndPlace,
         ..small()
     };
-    for kind in [Kind::Network, Kind::Both] {
-        assert!(fit(&data(), Split::WithinPose, kind, &options, |_| ()).is_err());
-    }
+    assert!(fit(&data(), Split::WithinPose, &options, |_| ()).is_err());
 }
 
 #[test]
@@ -130,7 +124,7 @@ fn the_same_seed_gives_the_same_weights() {
         ..small()
     };
     let weights = |options: &Options| {
-        fit(&data, Split::WithinPose, Kind::Network, options, |_| ())
+        fit(&data, Split::WithinPose, options, |_| ())
             .unwrap()
             .weights
     };
@@ -261,14 +255,8 @@ fn what_cannot_be_trained_on_is_said() {
 
     let mut untouched_missing = data();
     untouched_missing.rows.drain(..8);
-    let error = fit(
-        &untouched_missing,
-        Split::WithinPose,
-        Kind::Network,
-        &small(),
-        |_| (),
-    )
-    .unwrap_err()
-    .to_string();
+    let error = fit(&untouched_missing, Split::WithinPose, &small(), |_| ())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("without force"), "{error}");
 }

@@ -8,6 +8,7 @@ use hivtac_sensing::units::Px;
 use super::align::{Alignment, Search, Seen, align};
 use super::folder::{Kept, Recording};
 use super::holds;
+use super::poses::Pose;
 use super::report::{Report, RunReport};
 use super::series::{Joined, Series};
 use crate::dataset::{About, Dataset, Loads, Observation, Place, Row, Spread};
@@ -102,6 +103,9 @@ pub fn assemble(
         );
     }
     let about = about(recording, &rows, &report);
+    if !about.range.knows_places() {
+        rows.iter_mut().for_each(|row| row.tip_mm = None);
+    }
     Ok((Dataset { about, rows }, report))
 }
 
@@ -268,24 +272,32 @@ impl Run<'_> {
 }
 
 fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
-    let [alpha, beta] = kept.pose.unwrap_or_default();
+    let [alpha, beta] = kept.pose.unwrap_or_default().angles_deg;
     let direction = hivtac_scene::Load::from_angles(force_n, alpha, beta)?;
     Ok(Row {
         place: Place {
             session,
-            pose: kept.pose.and_then(PaperPoses::numbered),
+            pose: (kept.pose.filter(|pose| pose.place_mm == [0.0; 2]))
+                .and_then(|pose| PaperPoses::numbered(pose.angles_deg)),
         },
         force_n: if force_n == 0.0 {
             [0.0; 3]
         } else {
             direction.vector_n()
         },
-        tip_mm: None,
+        tip_mm: (kept.pose.filter(|_| force_n != 0.0)).map(|pose| pose.place_mm),
         seen: match &kept.seen {
             Ok(markers) => Ok(observation(markers)?),
             Err(why) => Err(why.clone()),
         },
     })
+}
+
+/// The farthest that a pose's tip is from the film's middle along x or y, mm.
+fn reach_mm(recording: &Recording) -> f64 {
+    let poses = recording.samples.iter().filter_map(|kept| kept.pose);
+    let far = poses.flat_map(|pose| pose.place_mm).map(f64::abs);
+    far.fold(0.0, f64::max)
 }
 
 fn observation(markers: &[[i64; 3]; 4]) -> Result<Observation> {
@@ -305,13 +317,18 @@ fn observation(markers: &[[i64; 3]; 4]) -> Result<Observation> {
 
 fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
     let largest = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).fold(0.0, f64::max);
-    let mut poses: Vec<[f64; 2]> = Vec::new();
+    let mut poses: Vec<Pose> = Vec::new();
     for pose in recording.samples.iter().filter_map(|kept| kept.pose) {
         if !poses.contains(&pose) {
             poses.push(pose);
         }
     }
-    let extreme = |axis: usize| poses.iter().map(|p| p[axis].abs()).fold(0.0, f64::max);
+    let extreme = |axis: usize| {
+        poses
+            .iter()
+            .map(|p| p.angles_deg[axis].abs())
+            .fold(0.0, f64::max)
+    };
     let at_rest = rows.iter().filter(|row| row.force_n == [0.0; 3]).count();
     About {
         conditions: recording.conditions.clone(),
@@ -325,7 +342,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
             force_n: largest(&|row| crate::errors::norm(row.force_n)),
             alpha_deg: extreme(0),
             beta_deg: extreme(1),
-            place_mm: 0.0,
+            place_mm: reach_mm(recording),
         },
     }
 }

@@ -18,10 +18,8 @@ use hivtac_wire::message::{Centroid, DeviceHello, Sample};
 use hivtac_wire::status::Status;
 use serde::{Deserialize, Serialize};
 
+use super::poses::Pose;
 use crate::conditions::{CentroidName, Conditions, ContactName, OriginName};
-
-/// A pose: α and β in degrees, or nothing while the film is untouched.
-pub type Pose = Option<[f64; 2]>;
 
 const SAMPLES: &str = "samples.csv";
 const GAUGE: &str = "gauge.csv";
@@ -29,9 +27,9 @@ const TAKES: &str = "takes.csv";
 const UNIT: &str = "unit.json";
 
 const SAMPLE_COLUMNS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status,\
-x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,x3_q16,y3_q16,area3_px";
+x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,x3_q16,y3_q16,area3_px,x_mm,y_mm";
 const GAUGE_COLUMNS: &str = "run,host_s,line";
-const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost";
+const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
 
 /// A recording's folder, open for writing.
 #[derive(Debug)]
@@ -43,7 +41,7 @@ pub struct Folder {
     /// Number of this run, from 0.
     pub run: usize,
     /// Poses whose takes were finished in earlier runs.
-    pub done: Vec<[f64; 2]>,
+    pub done: Vec<Pose>,
 }
 
 impl Folder {
@@ -72,14 +70,14 @@ impl Folder {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn sample(&mut self, host_s: f64, pose: Pose, sample: &Sample) -> Result<()> {
+    pub fn sample(&mut self, host_s: f64, pose: Option<Pose>, sample: &Sample) -> Result<()> {
         let mut line = format!(
             "{},{host_s:.6},{},{},{},{},{}",
             self.run,
             sample.time_us,
             sample.frame,
             sample.sequence,
-            angles(pose),
+            pair(pose.map(|pose| pose.angles_deg)),
             match &sample.markers {
                 Some(_) => String::new(),
                 None => reasons(sample.status),
@@ -91,6 +89,7 @@ impl Folder {
             }),
             None => line += &",".repeat(12),
         }
+        line += &format!(",{}", pair(pose.map(|pose| pose.place_mm)));
         write_line(&mut self.samples, &line, SAMPLES)
     }
 
@@ -98,8 +97,17 @@ impl Folder {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn take_done(&mut self, pose: Pose, samples: usize, lost: u32) -> Result<()> {
-        let line = format!("{},{},{samples},{lost}", self.run, angles(pose));
+    pub fn take_done(&mut self, pose: Option<Pose>, samples: usize, lost: u32) -> Result<()> {
+        let [angles, place] = [
+            pose.map(|pose| pose.angles_deg),
+            pose.map(|pose| pose.place_mm),
+        ];
+        let line = format!(
+            "{},{},{samples},{lost},{}",
+            self.run,
+            pair(angles),
+            pair(place)
+        );
         write_line(&mut self.takes, &line, TAKES)
     }
 }
@@ -127,8 +135,8 @@ fn write_line(file: &mut File, line: &str, name: &str) -> Result<()> {
         .with_context(|| format!("cannot write {name}"))
 }
 
-fn angles(pose: Pose) -> String {
-    pose.map_or(",".to_owned(), |[alpha, beta]| format!("{alpha},{beta}"))
+fn pair(numbers: Option<[f64; 2]>) -> String {
+    numbers.map_or(",".to_owned(), |[a, b]| format!("{a},{b}"))
 }
 
 /// The names of the bits that forbid a force; a missing or another model says nothing about the markers.
@@ -235,7 +243,7 @@ pub struct Kept {
     /// When it was exposed, µs of the sensor.
     pub device_us: u64,
     /// The pose, or nothing for the untouched film.
-    pub pose: Pose,
+    pub pose: Option<Pose>,
     /// The markers' (x, y) in 1/65,536 px and area in px, or the status names that say why there are none.
     pub seen: Result<[[i64; 3]; 4], String>,
 }
@@ -263,11 +271,12 @@ impl Recording {
         })?;
         let conditions = serde_json::from_str(&text)
             .with_context(|| format!("{} is damaged", unit.display()))?;
-        let samples = rows(&path.join(SAMPLES), sample)?;
-        let gauge_lines = rows(&path.join(GAUGE), |record| {
+        let samples = rows(&path.join(SAMPLES), sample, SAMPLE_COLUMNS)?;
+        let gauge_line = |record: &csv::StringRecord| {
             let line: GaugeLine = record.deserialize(Some(&GAUGE_COLUMNS.split(',').collect()))?;
             Ok((line.run, line.host_s, line.line))
-        })?;
+        };
+        let gauge_lines = rows(&path.join(GAUGE), gauge_line, GAUGE_COLUMNS)?;
         Ok(Self {
             conditions,
             samples,
@@ -284,11 +293,20 @@ impl Recording {
 }
 
 /// The whole lines of one of the folder's tables.
-fn rows<T>(path: &Path, parse: impl Fn(&csv::StringRecord) -> Result<T>) -> Result<Vec<T>> {
+fn rows<T>(
+    path: &Path,
+    parse: impl Fn(&csv::StringRecord) -> Result<T>,
+    columns: &str,
+) -> Result<Vec<T>> {
     let text =
         fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let mut table = csv::Reader::from_reader(whole.as_bytes());
+    ensure!(
+        whole.is_empty() || table.headers()?.iter().eq(columns.split(',')),
+        "{} has other columns than this release writes ({columns}): record into another folder",
+        path.display()
+    );
     let rows = table.records().map(|record| {
         let record = record?;
         let line = record.position().map_or(0, csv::Position::line);
@@ -316,20 +334,25 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
         run: record[0].parse()?,
         host_s: record[1].parse()?,
         device_us: record[2].parse()?,
-        pose: pose(&record[5], &record[6])?,
+        pose: pose(record, [5, 20])?,
         seen,
     })
 }
 
-fn pose(alpha: &str, beta: &str) -> Result<Pose> {
-    match (alpha, beta) {
-        ("", "") => Ok(None),
-        (alpha, beta) => Ok(Some([alpha.parse()?, beta.parse()?])),
+/// The pose whose angles and place begin at these columns.
+fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Option<Pose>> {
+    if record[angles].is_empty() && record[angles + 1].is_empty() {
+        return Ok(None);
     }
+    let pair = |at: usize| Ok::<_, anyhow::Error>([record[at].parse()?, record[at + 1].parse()?]);
+    Ok(Some(Pose {
+        angles_deg: pair(angles)?,
+        place_mm: pair(place)?,
+    }))
 }
 
-fn takes_done(path: &Path) -> Result<Vec<[f64; 2]>> {
-    let poses = rows(path, |record| pose(&record[1], &record[2]))?;
+fn takes_done(path: &Path) -> Result<Vec<Pose>> {
+    let poses = rows(path, |record| pose(record, [1, 5]), TAKE_COLUMNS)?;
     Ok(poses.into_iter().flatten().collect())
 }
 
@@ -371,6 +394,13 @@ mod tests {
         }
     }
 
+    fn tilted() -> Pose {
+        Pose {
+            angles_deg: [4.0, -3.5],
+            place_mm: [0.5, -2.0],
+        }
+    }
+
     #[test]
     fn a_recording_goes_on_after_an_interruption() {
         let directory = tempfile::tempdir().unwrap();
@@ -379,10 +409,10 @@ mod tests {
         assert_eq!((folder.run, folder.done.len()), (0, 0));
         folder.sample(0.5, None, &sample(1, true)).unwrap();
         folder
-            .sample(0.6, Some([4.0, -3.5]), &sample(2, false))
+            .sample(0.6, Some(tilted()), &sample(2, false))
             .unwrap();
         keep_gauge_line(&mut folder.gauge, 0, 0.55, "+0.1\"2,N").unwrap();
-        folder.take_done(Some([4.0, -3.5]), 1, 0).unwrap();
+        folder.take_done(Some(tilted()), 1, 0).unwrap();
         drop(folder);
         // Cut in the middle of a line.
         let file = path.join(SAMPLES);
@@ -394,7 +424,7 @@ mod tests {
 
         let mut again = Folder::open(&path, &conditions()).unwrap();
         assert_eq!(fs::read(&file).unwrap().len(), whole);
-        assert_eq!((again.run, &again.done[..]), (1, &[[4.0, -3.5]][..]));
+        assert_eq!((again.run, &again.done[..]), (1, &[tilted()][..]));
         again.sample(0.1, None, &sample(1, true)).unwrap();
         let recording = Recording::read(&path).unwrap();
         assert_eq!(recording.conditions, conditions());
@@ -402,7 +432,7 @@ mod tests {
         let kept = &recording.samples[0];
         assert_eq!((kept.pose, kept.device_us), (None, 25_600));
         assert_eq!(kept.seen.as_ref().unwrap()[1], [131_072, -2, 190]);
-        assert_eq!(recording.samples[1].pose, Some([4.0, -3.5]));
+        assert_eq!(recording.samples[1].pose, Some(tilted()));
         assert_eq!(recording.samples[1].seen, Err("markers_missing".into()));
         assert_eq!(recording.gauge_lines, [(0, 0.55, "+0.1\u{fffd}2,N".into())]);
     }
@@ -461,10 +491,11 @@ mod tests {
         let mut folder = Folder::open(path, &conditions()).unwrap();
         folder.sample(0.5, None, &sample(1, true)).unwrap();
         let file = path.join(SAMPLES);
-        let text = fs::read_to_string(&file)
-            .unwrap()
-            .replace("131072", "131o72");
-        fs::write(&file, text).unwrap();
+        let text = fs::read_to_string(&file).unwrap();
+        fs::write(&file, text.replace(",x_mm,y_mm", "")).unwrap();
+        let error = format!("{:#}", Recording::read(path).unwrap_err());
+        assert!(error.contains("record into another folder"), "{error}");
+        fs::write(&file, text.replace("131072", "131o72")).unwrap();
         let error = format!("{:#}", Recording::read(path).unwrap_err());
         assert!(error.contains("samples.csv is damaged: line 2"), "{error}");
     }

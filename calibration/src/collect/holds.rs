@@ -58,14 +58,22 @@ fn stretch(frames: &[Loaded<'_>], noise_n: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::super::folder::Kept;
+    use super::super::poses::Pose;
     use super::*;
 
-    fn kept(pose: [f64; 2]) -> Kept {
+    fn pose(angles_deg: [f64; 2]) -> Pose {
+        Pose {
+            angles_deg,
+            ..Pose::default()
+        }
+    }
+
+    fn kept(angles_deg: [f64; 2]) -> Kept {
         Kept {
             run: 0,
             host_s: 0.0,
             device_us: 0,
-            pose: Some(pose),
+            pose: Some(pose(angles_deg)),
             seen: Err(String::new()),
         }
     }
@@ -87,16 +95,16 @@ mod tests {
             })
             .collect();
         let found = steady(&frames, 0.000_1);
-        let mut loads: Vec<(f64, Option<[f64; 2]>)> =
+        let mut loads: Vec<(f64, Option<Pose>)> =
             found.iter().map(|f| (f.force_n, f.kept.pose)).collect();
         loads.dedup();
         assert_eq!(loads.len(), 3, "{loads:?}");
         assert!((loads[0].0 - 0.1).abs() < 0.001, "{loads:?}");
         assert!(
-            (loads[1].0 - 0.02).abs() < 0.001 && loads[1].1 == Some([0.0, 0.0]),
+            (loads[1].0 - 0.02).abs() < 0.001 && loads[1].1 == Some(pose([0.0, 0.0])),
             "{loads:?}"
         );
-        assert_eq!(loads[2].1, Some([8.0, 0.0]));
+        assert_eq!(loads[2].1, Some(pose([8.0, 0.0])));
         assert!(found.len() > 60, "{}", found.len());
         assert!(steady(&[], 0.0).is_empty());
     }

@@ -67,7 +67,7 @@ pub struct AlignArgs {
     /// a tip that sticks (`stick`) or slips from a friction ratio on (`slip:0.6`).
     #[arg(long, default_value = "force")]
     contact: Contact,
-    /// Take only stretches in which the force was held, each as one load: for `quick`.
+    /// Take only stretches in which the force was held, each as one load: for `unit`.
     #[arg(long)]
     holds: bool,
     /// The CSV file to write.

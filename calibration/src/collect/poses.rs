@@ -1,22 +1,45 @@
 //! Which poses to take: typed, or from a list.
 
+use std::fmt;
 use std::io::BufRead;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use hivtac_host::stop;
 
 /// Largest |α| and |β|, degrees: beyond, a press is no press.
 const LARGEST_DEG: f64 = 60.0;
 
-/// Reads a list of poses: two columns, α and β in degrees, separated by comma, semicolon, tab or space. Empty lines,
-/// lines that begin with `#`, and a first line of names are passed over.
+/// The farthest that a stage puts the tip from the film's middle along x and y, mm.
+const LARGEST_MM: f64 = hivtac_scene::film::MAX_PLACE_MM;
+
+/// How the tip is set against the film.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// α and β, degrees.
+    pub angles_deg: [f64; 2],
+    /// Where the stage has the tip, from the film's middle along x and y, mm.
+    pub place_mm: [f64; 2],
+}
+
+impl fmt::Display for Pose {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([alpha, beta], [x, y]) = (self.angles_deg, self.place_mm);
+        write!(
+            f,
+            "α = {alpha}°, β = {beta}°, the tip at x = {x} mm, y = {y} mm"
+        )
+    }
+}
+
+/// Reads a list of poses: α and β in degrees, then x and y of the tip in mm where it is not in the middle; separated by comma,
+/// semicolon, tab or space. Empty lines, lines that begin with `#`, and a first line of names are passed over.
 ///
 /// # Errors
 /// When it cannot be read, or a line is no pose; names the line.
-pub fn load(path: &Path) -> Result<Vec<[f64; 2]>> {
+pub fn load(path: &Path) -> Result<Vec<Pose>> {
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let mut poses = Vec::new();
@@ -32,29 +55,36 @@ pub fn load(path: &Path) -> Result<Vec<[f64; 2]>> {
     Ok(poses)
 }
 
-/// α and β, degrees.
+/// α and β, degrees, and where they are said x and y, mm.
 ///
 /// # Errors
-/// When the text is not two angles of a press.
-pub fn parse(text: &str) -> Result<[f64; 2]> {
-    let parts: Vec<f64> = text
+/// When the text is neither two nor four such numbers of a press.
+pub fn parse(text: &str) -> Result<Pose> {
+    const WRITE: &str = "write α and β in degrees, such as `4, -3`, and where the tip is not in the middle x and y in mm, such as \
+                         `4, -3, 2.5, 0`";
+    let parts: Option<Vec<f64>> = text
         .split([',', ';', '\t', ' '])
         .filter(|part| !part.is_empty())
         .map(|part| part.parse().ok())
-        .collect::<Option<_>>()
-        .with_context(|| {
-            format!("`{text}` is no pose: write α and β in degrees, such as `4, -3`")
-        })?;
-    match parts[..] {
-        [alpha, beta] if alpha.abs() <= LARGEST_DEG && beta.abs() <= LARGEST_DEG => {
-            Ok([alpha, beta])
-        }
-        _ => anyhow::bail!("`{text}` is no pose: write two angles, each within ±{LARGEST_DEG}°"),
-    }
+        .collect();
+    let (angles_deg, place_mm) = match parts.as_deref() {
+        Some(&[alpha, beta]) => ([alpha, beta], [0.0; 2]),
+        Some(&[alpha, beta, x, y]) => ([alpha, beta], [x, y]),
+        _ => bail!("`{text}` is no pose: {WRITE}"),
+    };
+    let within = |parts: [f64; 2], largest: f64| parts.iter().all(|part| part.abs() <= largest);
+    ensure!(
+        within(angles_deg, LARGEST_DEG) && within(place_mm, LARGEST_MM),
+        "`{text}` is no pose: angles are within ±{LARGEST_DEG}°, places within ±{LARGEST_MM} mm"
+    );
+    Ok(Pose {
+        angles_deg,
+        place_mm,
+    })
 }
 
 /// The poses of a list that are left after some were done; one that is listed twice is done twice.
-pub fn left(list: &[[f64; 2]], done: &[[f64; 2]]) -> Vec<[f64; 2]> {
+pub fn left(list: &[Pose], done: &[Pose]) -> Vec<Pose> {
     let mut done = done.to_vec();
     let mut left = Vec::new();
     for pose in list {
@@ -106,17 +136,38 @@ impl Person {
 mod tests {
     use super::*;
 
+    fn pose(parts: [f64; 4]) -> Pose {
+        let [alpha, beta, x, y] = parts;
+        Pose {
+            angles_deg: [alpha, beta],
+            place_mm: [x, y],
+        }
+    }
+
     #[test]
     fn poses_are_read_from_text_and_lists() {
-        assert_eq!(parse("4, -3.5").unwrap(), [4.0, -3.5]);
-        assert_eq!(parse("0 0").unwrap(), [0.0, 0.0]);
-        for text in ["4", "4,3,2", "four,3", "90,0", "NaN,0", ""] {
+        assert_eq!(parse("4, -3.5").unwrap(), pose([4.0, -3.5, 0.0, 0.0]));
+        assert_eq!(parse("0 0").unwrap(), Pose::default());
+        assert_eq!(parse("0 0 3 -0.5").unwrap(), pose([0.0, 0.0, 3.0, -0.5]));
+        for text in [
+            "4",
+            "4,3,2",
+            "four,3",
+            "90,0",
+            "NaN,0",
+            "",
+            "0,0,9,0",
+            "1,2,3,4,5",
+        ] {
             assert!(parse(text).is_err(), "{text}");
         }
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("poses.csv");
-        std::fs::write(&path, "alpha,beta\n# first\n0,0\n\n8;-4\n").unwrap();
-        assert_eq!(load(&path).unwrap(), [[0.0, 0.0], [8.0, -4.0]]);
+        std::fs::write(&path, "alpha,beta\n# first\n0,0\n\n8;-4;1;2\n").unwrap();
+        assert_eq!(
+            load(&path).unwrap(),
+            [Pose::default(), pose([8.0, -4.0, 1.0, 2.0])]
+        );
         std::fs::write(&path, "0,0\n8,x\n").unwrap();
         let error = format!("{:#}", load(&path).unwrap_err());
         assert!(
@@ -129,10 +180,11 @@ mod tests {
 
     #[test]
     fn what_was_done_is_left_out_once() {
-        let list = [[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]];
+        let [rest, other] = [Pose::default(), pose([1.0, 0.0, 0.0, 0.0])];
+        let list = [rest, other, rest];
         assert_eq!(left(&list, &[]), list);
-        assert_eq!(left(&list, &[[0.0, 0.0]]), [[1.0, 0.0], [0.0, 0.0]]);
-        assert_eq!(left(&list, &[[0.0, 0.0], [0.0, 0.0]]), [[1.0, 0.0]]);
-        assert_eq!(left(&list, &[[5.0, 0.0]]), list);
+        assert_eq!(left(&list, &[rest]), [other, rest]);
+        assert_eq!(left(&list, &[rest, rest]), [other]);
+        assert_eq!(left(&list, &[pose([0.0, 0.0, 1.0, 0.0])]), list);
     }
 }

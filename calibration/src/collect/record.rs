@@ -9,9 +9,9 @@ use hivtac_host::port::Address;
 use hivtac_host::stop;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 
-use super::folder::{Folder, Pose, conditions_of};
+use super::folder::{Folder, conditions_of};
 use super::gauge_port::{GaugeArgs, GaugePort};
-use super::poses::{self, Person};
+use super::poses::{self, Person, Pose};
 
 /// Options of `collect record`.
 #[derive(Debug, clap::Args)]
@@ -25,7 +25,8 @@ pub struct RecordArgs {
     /// Longest wait for the sensor's answers and for its next frame, s.
     #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = seconds)]
     pub timeout: f64,
-    /// A list of poses: α and β in degrees, one pose a line. Without one they are typed.
+    /// A list of poses, one a line: α and β in degrees, and x and y of the tip in mm where it is not in the middle. Without one they
+    /// are typed.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
     /// Length of a take, s of the sensor's clock.
@@ -101,7 +102,7 @@ struct Take {
 }
 
 impl Recorder {
-    fn run(&mut self, args: &RecordArgs, list: Option<&[[f64; 2]]>) -> Result<()> {
+    fn run(&mut self, args: &RecordArgs, list: Option<&[Pose]>) -> Result<()> {
         let question = "Nothing may touch the film, and the gauge shows zero: press Enter.";
         if self.person.ask(question)?.is_none() {
             bail!("standard input has ended: nothing was recorded");
@@ -124,7 +125,7 @@ impl Recorder {
     }
 
     /// The next pose, once it is set; nothing at the end.
-    fn next_pose(&self, list: Option<&mut Vec<[f64; 2]>>) -> Result<Option<[f64; 2]>> {
+    fn next_pose(&self, list: Option<&mut Vec<Pose>>) -> Result<Option<Pose>> {
         let Some(list) = list else {
             return self.typed_pose();
         };
@@ -132,18 +133,15 @@ impl Recorder {
             return Ok(None);
         }
         let pose = list.remove(0);
-        let question = format!(
-            "Set α = {}°, β = {}°, and press Enter (`done` to end).",
-            pose[0], pose[1]
-        );
+        let question = format!("Set {pose}, and press Enter (`done` to end).");
         let answer = self.person.ask(&question)?;
         Ok(answer.filter(|text| text != "done").map(|_| pose))
     }
 
-    fn typed_pose(&self) -> Result<Option<[f64; 2]>> {
+    fn typed_pose(&self) -> Result<Option<Pose>> {
         loop {
-            let question =
-                "Set a pose and type α and β in degrees, such as `4, -3` (`done` to end).";
+            let question = "Set a pose and type α and β in degrees, such as `4, -3`, and where the tip is not in the middle its x and y in mm, \
+                 such as `4, -3, 2.5, 0` (`done` to end).";
             match self.person.ask(question)?.as_deref() {
                 None | Some("done") => return Ok(None),
                 Some(text) => match poses::parse(text) {
@@ -155,7 +153,7 @@ impl Recorder {
     }
 
     /// Records for so long on the sensor's clock.
-    fn take(&mut self, pose: Pose, seconds: f64) -> Result<Take> {
+    fn take(&mut self, pose: Option<Pose>, seconds: f64) -> Result<Take> {
         match pose {
             Some(_) => {
                 eprintln!("Recording for {seconds} s: press and release, in no even rhythm.")
@@ -209,7 +207,7 @@ impl Recorder {
         self.gauge.as_mut().map(GaugePort::readings).transpose()
     }
 
-    fn keep(&mut self, message: DeviceMessage, pose: Pose, take: &mut Take) -> Result<()> {
+    fn keep(&mut self, message: DeviceMessage, pose: Option<Pose>, take: &mut Take) -> Result<()> {
         match message {
             DeviceMessage::Sample(sample) => {
                 let host_s = self.begun.elapsed().as_secs_f64();

@@ -186,7 +186,10 @@ impl Dataset {
     }
 
     /// The rest position of a session: the mean of its accepted rows without force, rounded half up.
-    fn session_rest(&self, session: usize) -> Result<Rest> {
+    ///
+    /// # Errors
+    /// When there is no such row.
+    pub fn session_rest(&self, session: usize) -> Result<Rest> {
         let untouched = |row: &&Row| row.place.session == session && row.force_n == [0.0; 3];
         let rows = self.rows.iter().filter(untouched);
         let seen: Vec<&Observation> = rows.filter_map(|row| row.seen.as_ref().ok()).collect();

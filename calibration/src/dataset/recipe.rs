@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::session::{Session, Spread};
 use super::{About, Place};
 use crate::conditions::{CentroidName, Conditions, ContactName, PixelName};
-use crate::loads::{KnownLoads, PaperPoses, RandomLoads};
+use crate::loads::{PaperPoses, RandomLoads};
 use crate::weights::Range;
 
 /// Which loads.
@@ -23,8 +23,6 @@ pub enum Loads {
     TrainingPoses(usize),
     /// As many for each of the 71 that they hold out.
     HeldOutPoses(usize),
-    /// As many frames of each of ten loads that are enough for a closed form.
-    Known(usize),
     /// What was measured with a unit, in so many poses; nothing to render.
     Measured(usize),
 }
@@ -92,7 +90,7 @@ impl Loads {
             Loads::PaperPoses(each) => Some((Poses::All, each)),
             Loads::TrainingPoses(each) => Some((Poses::Some(training), each)),
             Loads::HeldOutPoses(each) => Some((Poses::Some(held_out), each)),
-            Loads::Random(_) | Loads::Known(_) | Loads::Measured(_) => None,
+            Loads::Random(_) | Loads::Measured(_) => None,
         }
     }
 }
@@ -120,23 +118,10 @@ impl Poses {
 }
 
 impl Recipe {
-    /// Many sessions of a few random loads each, none of them this recipe's own: what a model made from this one does not know,
-    /// and its uncertainties must.
-    pub fn other_sessions(&self) -> Self {
-        Self {
-            loads: Loads::Random(100),
-            rest: Self::default().rest,
-            sessions: 150,
-            seed: self.seed.wrapping_add(1),
-            ..*self
-        }
-    }
-
     /// Frames of each session.
     pub fn session_rows(&self) -> usize {
         let loads = match self.loads {
             Loads::Random(count) => count,
-            Loads::Known(each) => each.saturating_mul(KnownLoads::COUNT),
             loads => loads
                 .poses()
                 .map_or(0, |(poses, each)| each.saturating_mul(poses.count())),
@@ -220,7 +205,6 @@ impl Recipe {
         let (range, seed) = (self.range, self.seed);
         let force_n = range.force_n;
         match (self.loads, self.place(row).pose) {
-            (Loads::Known(each), _) => KnownLoads { force_n }.load((within - self.rest) / each),
             (Loads::Measured(_), _) => Ok(Load::REST),
             (_, Some(pose)) => PaperPoses { force_n, seed }.load(pose, row),
             (_, None) => RandomLoads { range, seed }.load(row),

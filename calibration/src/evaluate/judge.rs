@@ -1,15 +1,16 @@
 //! The model's answers beside the truth.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use anyhow::{Result, anyhow, ensure};
 use hivtac_sensing::force::{Force, Place};
 use hivtac_sensing::model::Model;
-use hivtac_sensing::network::Network;
+use hivtac_sensing::status::Status;
 
+use crate::answer::Chip;
 use crate::conditions::{ContactName, OriginName};
-use crate::dataset::{Dataset, Row, Split};
-use crate::weights::features_from_q16;
+use crate::dataset::{Dataset, Row, Split, reasons};
 
 /// One answer with its truth. Angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,17 +72,15 @@ impl Evaluation {
             model.conditions,
             about.conditions
         );
-        let rejected = dataset
-            .rejected()
-            .into_iter()
+        let unseen = dataset.rejected().into_iter();
+        let mut rejected = unseen
             .map(|(status, count)| (status.to_owned(), count))
             .collect();
-        let dataset = dataset.clone().tared()?;
         let chosen: Vec<usize> = match held_out {
-            Some((split, seed)) => split.of(&dataset, seed)?[1].clone(),
+            Some((split, seed)) => split.of(dataset, seed)?[1].clone(),
             None => (0..dataset.rows.len()).collect(),
         };
-        let judged = judge(&model, &dataset, &chosen)?;
+        let judged = judge(&model, dataset, &chosen, &mut rejected)?;
         ensure!(
             !judged.is_empty(),
             "the data set has no accepted frame with a force"
@@ -104,19 +103,34 @@ impl Evaluation {
     }
 }
 
-fn judge(model: &Model<'_>, dataset: &Dataset, rows: &[usize]) -> Result<Vec<Judged>> {
-    // Data and model may rest at different places: the chip's tare is the data's.
-    let tare = features_from_q16(&dataset.rest()?.features_q16)?;
-    let mut network = Network::new();
+/// The answers to some rows, each session tared on its own frames without force; those that the chip sends without a force are
+/// counted by status.
+fn judge(
+    model: &Model<'_>,
+    dataset: &Dataset,
+    rows: &[usize],
+    rejected: &mut BTreeMap<String, usize>,
+) -> Result<Vec<Judged>> {
+    let mut chips = BTreeMap::new();
     let mut judged = Vec::new();
     for row in rows.iter().map(|&i| &dataset.rows[i]) {
         let Ok(seen) = &row.seen else { continue };
         if row.force_n == [0.0; 3] {
             continue;
         }
-        let output = network.run(model, &features_from_q16(&seen.features_q16)?, &tare);
-        let (force, _) = Force::of_outputs(model, &output);
-        judged.push(compare(row, &force));
+        let chip: &mut Chip<'_> = match chips.entry(row.place.session) {
+            Entry::Occupied(tared) => tared.into_mut(),
+            Entry::Vacant(other) => {
+                let rest = dataset.session_rest(row.place.session)?;
+                other.insert(Chip::new(*model, &rest)?)
+            }
+        };
+        let (force, status) = chip.force(seen)?;
+        if status.intersects(Status::NO_FORCE) {
+            *rejected.entry(reasons(status)).or_default() += 1;
+        } else {
+            judged.push(compare(row, &force));
+        }
     }
     Ok(judged)
 }

@@ -1,16 +1,13 @@
 //! From a data set to a weights file: split, fit, and measure what the chip makes of it on what was held out.
 
-pub mod quick;
-
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 
-use crate::closed_form::{self, ClosedForm, Effort};
 use crate::dataset::{About, Dataset, Observation, Sample, Split};
 use crate::errors::{Errors, norm};
-use crate::network::{Meaning, Network, Standardization};
+use crate::network::Network;
 use crate::quantize::export;
 use crate::train::{Options, Progress, Samples, train};
 use crate::uncertainty::Miss;
@@ -31,15 +28,6 @@ pub struct Fit {
     pub quantized: Errors,
 }
 
-/// What a data set is fitted with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A network.
-    Network,
-    /// A closed form, and a network for what it leaves.
-    Both,
-}
-
 type Rows<'a> = Vec<Sample<'a>>;
 
 /// Trains on nine tenths of the accepted rows of a data set, its sessions tared, and measures on the rest.
@@ -49,61 +37,24 @@ type Rows<'a> = Vec<Sample<'a>>;
 pub fn fit(
     dataset: &Dataset,
     split: Split,
-    kind: Kind,
     options: &Options,
     report: impl FnMut(Progress),
 ) -> Result<Fit> {
     let dataset = dataset.clone().tared()?;
     let (training, held_out) = parts(&dataset, split, options.seed)?;
-    let form = match kind {
-        Kind::Network => None,
-        Kind::Both => Some(form_of(&dataset, &training, Effort::Many)?),
-    };
-    ensure!(
-        form.is_none() || options.meaning == Meaning::ForceVector,
-        "beside a closed form a network answers with a force vector alone"
-    );
     ensure!(
         dataset.knows_places() || !options.meaning_in_use().tells_place(),
         "the data set does not know where the tip is: no network can learn it"
     );
-    let rest = dataset.rest()?.features_px();
-    let samples = |rows: &Rows<'_>| {
-        samples(rows, options, |seen| match &form {
-            Some(form) => form.force_n(&seen.features_px(), &rest),
-            None => [0.0; 3],
-        })
-    };
-    let judges = samples(&in_range(&held_out, &calibrated(&dataset.about)));
-    let network = train(&samples(&training), &judges, options, report)?;
+    let judges = samples(&in_range(&held_out, &calibrated(&dataset.about)), options);
+    let network = train(&samples(&training, options), &judges, options, report)?;
     let record = Training {
         seed: options.seed,
         epochs: options.epochs,
         rounded_epochs: options.rounded_epochs,
         ..record(&dataset, split, training.len())
     };
-    finished(&dataset, form, network, record, &held_out)
-}
-
-/// Fits a closed form to nine tenths of the accepted rows of a data set and measures on the rest.
-///
-/// # Errors
-/// When the data set has too few accepted rows or none at rest, or its forces are too alike.
-pub fn fit_closed_form(dataset: &Dataset, split: Split, seed: u64) -> Result<Fit> {
-    let dataset = dataset.clone().tared()?;
-    let (training, held_out) = parts(&dataset, split, seed)?;
-    let form = form_of(&dataset, &training, Effort::Many)?;
-    let record = Training {
-        seed,
-        ..record(&dataset, split, training.len())
-    };
-    finished(
-        &dataset,
-        Some(form),
-        no_network(&training)?,
-        record,
-        &held_out,
-    )
+    finished(&dataset, network, record, &held_out)
 }
 
 /// Takes a network that was trained elsewhere: what the chip's hidden layers must carry, the rest position and the
@@ -129,7 +80,7 @@ pub fn adopt(dataset: &Dataset, network: Network, source: &str) -> Result<Fit> {
         scene: format!("imported from {source}"),
         ..Training::default()
     };
-    finished(&dataset, None, network, record, &rows)
+    finished(&dataset, network, record, &rows)
 }
 
 /// Makes a model's uncertainties anew, from a data set that it was not made from, its sessions tared: what it is off by in
@@ -189,29 +140,9 @@ fn is_inside(row: &Sample<'_>, range: &Range) -> bool {
     norm(row.force_n) <= range.force_n && row.tip_mm.is_none_or(near)
 }
 
-fn form_of(dataset: &Dataset, rows: &Rows<'_>, effort: Effort) -> Result<ClosedForm> {
-    let rows: Vec<_> = rows
-        .iter()
-        .map(|row| (row.seen.features_px(), row.force_n))
-        .collect();
-    closed_form::fit(&dataset.rest()?.features_px(), &rows, effort)
-}
-
-/// No layers, but the scaling that every model file has.
-fn no_network(rows: &Rows<'_>) -> Result<Network> {
-    let features: Vec<_> = rows.iter().map(|row| row.seen.features_px()).collect();
-    let forces: Vec<_> = rows.iter().map(|row| row.force_n).collect();
-    Ok(Network {
-        input: Standardization::of(&features)?,
-        output: Standardization::of_answers(&forces)?,
-        ..Network::default()
-    })
-}
-
 /// Writes down what a model holds for, and measures it on `rows` that it was not made from.
 fn finished(
     dataset: &Dataset,
-    closed_form: Option<ClosedForm>,
     network: Network,
     training: Training,
     rows: &Rows<'_>,
@@ -227,7 +158,7 @@ fn finished(
         range,
         uncertainty: Uncertainty::default(),
         training,
-        closed_form,
+        film: None,
         network,
     };
     let tare = features_from_q16(&weights.rest.features_q16)?;
@@ -302,18 +233,10 @@ impl Answer {
     }
 }
 
-/// What the network shall answer: the force, less what is `known` of it without, and the place.
-fn samples(
-    rows: &Rows<'_>,
-    options: &Options,
-    known: impl Fn(&Observation) -> [f64; 3],
-) -> Samples {
+/// What the network shall answer: the force and the place.
+fn samples(rows: &Rows<'_>, options: &Options) -> Samples {
     let meaning = options.meaning_in_use();
-    let answer = |row: &Sample<'_>| {
-        let known = known(row.seen);
-        let left = std::array::from_fn(|i| row.force_n[i] - known[i]);
-        (row.seen.features_px(), meaning.of_force(left))
-    };
+    let answer = |row: &Sample<'_>| (row.seen.features_px(), meaning.of_force(row.force_n));
     let (features, answers) = rows.iter().map(answer).unzip();
     // A film that nothing touches is as if touched in its middle.
     let place = |row: &Sample<'_>| row.tip_mm.unwrap_or_default();

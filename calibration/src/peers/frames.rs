@@ -10,9 +10,10 @@ use super::PeersArgs;
 use super::models::How;
 use crate::conditions::CentroidName;
 use crate::dataset::{Dataset, Eye, Eyes, Loads, Recipe, Sensing, Split, generate_files};
-use crate::fit::fit_closed_form;
+use crate::fit::fit;
 use crate::quantize::export;
 use crate::scene::size::Size;
+use crate::train::Options;
 use crate::weights::Range;
 
 /// Opens a peer's eye for frames of so many columns and rows.
@@ -88,7 +89,13 @@ impl Frames {
         };
         let [ours, theirs] = see(&training, "training", None)?;
         // Any model of these frames: what is refused depends on its rest position and contact reading only.
-        let bytes = export(&fit_closed_form(&ours, Split::WithinPose, 1)?.weights)?;
+        let smallest = Options {
+            hidden: Vec::new(),
+            epochs: 1,
+            rounded_epochs: 0,
+            ..Options::default()
+        };
+        let bytes = export(&fit(&ours, Split::WithinPose, &smallest, |_| ())?.weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"));
         let model = model.context("the model that tells what the chip refuses")?;
         let [our_test, their_test] = see(&test, "test", Some(&model))?;

@@ -6,7 +6,7 @@
 
 mod errors;
 mod frames;
-mod limit;
+pub mod limit;
 mod models;
 mod opencv;
 mod table;

@@ -10,7 +10,7 @@ use super::frames::{Frames, Sets};
 use super::{PeersArgs, there};
 use crate::check::vector_n;
 use crate::dataset::{Dataset, Split};
-use crate::fit::{Kind, fit, fit_closed_form};
+use crate::fit::fit;
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
 use crate::scene::size::Size;
@@ -84,37 +84,25 @@ pub fn all(args: &PeersArgs, contact: Contact, size: Size, frames: &Frames) -> R
     let paper = kept.trained(
         &format!("paper-{}-passes", args.epochs),
         &frames.theirs.training,
-        Kind::Network,
         &paper(args),
     )?;
-    let form = kept.weights("closed-form", &|| {
-        Ok(fit_closed_form(ours, Split::WithinPose, SEED)?.weights)
-    })?;
-    let both = Options {
-        arithmetic: Arithmetic::Int8PerChannel,
-        rounded_epochs: args.our_rounded_epochs,
-        ..plain(args)
-    };
-    let both = kept.trained("both", ours, Kind::Both, &both)?;
     let model = |name, how, weights| Model { name, how, weights };
     let mut models = vec![model("the paper's", How::Paper, paper)];
     for tier in [plain_tier(args), fine_tier(args)] {
         let [float, int16, int8] = tier.files;
-        let alone = kept.trained(float, ours, Kind::Network, &tier.float)?;
+        let alone = kept.trained(float, ours, &tier.float)?;
         let rounded = |file, options: &Options| {
             let options = Options {
                 start: Some(alone.network.clone()),
                 ..options.clone()
             };
-            kept.trained(file, ours, Kind::Network, &options)
+            kept.trained(file, ours, &options)
         };
         let (int16, int8) = (rounded(int16, &tier.int16)?, rounded(int8, &tier.int8)?);
         let rows = [(How::Float, alone), (How::Chip, int16), (How::Chip, int8)];
         let named = tier.names.into_iter().zip(rows);
         models.extend(named.map(|(name, (how, weights))| model(name, how, weights)));
     }
-    models.push(model("closed form", How::Chip, form));
-    models.push(model("closed form + 64-64 int8", How::Chip, both));
     Ok(models)
 }
 
@@ -126,29 +114,18 @@ struct Kept<'a> {
 }
 
 impl Kept<'_> {
-    /// Those of this name, from the folder or made.
-    fn weights(&self, name: &str, make: &dyn Fn() -> Result<Weights>) -> Result<Weights> {
+    /// A network of this name, from the folder or trained.
+    fn trained(&self, name: &str, data: &Dataset, options: &Options) -> Result<Weights> {
         let file = format!("{name}.weights");
         let path = self.args.file(self.contact, self.size, &file);
         if there(&path) {
             return Weights::load(&path);
         }
         println!("training {}", path.display());
-        let weights = make().with_context(|| format!("training {}", path.display()))?;
-        weights.save(&path)?;
-        Ok(weights)
-    }
-
-    fn trained(
-        &self,
-        name: &str,
-        data: &Dataset,
-        kind: Kind,
-        options: &Options,
-    ) -> Result<Weights> {
-        self.weights(name, &|| {
-            Ok(fit(data, Split::WithinPose, kind, options, |_| ())?.weights)
-        })
+        let fitted = fit(data, Split::WithinPose, options, |_| ())
+            .with_context(|| format!("training {}", path.display()))?;
+        fitted.weights.save(&path)?;
+        Ok(fitted.weights)
     }
 }
 

@@ -13,8 +13,8 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
         test: 2,
         epochs: 12,
         hidden: vec![24, 24],
-        our_epochs: 12,
-        our_rounded_epochs: 4,
+        our_epochs: 300,
+        our_rounded_epochs: 30,
         folder: directory.path().into(),
         kept_frames: false,
         json: None,
@@ -34,16 +34,16 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
     let [comparison] = &comparisons[..] else {
         panic!("one reading")
     };
-    assert_eq!((comparison.test_frames, comparison.cells.len()), (142, 18));
+    assert_eq!((comparison.test_frames, comparison.cells.len()), (142, 14));
     assert!(comparison.common_frames > 100, "{comparison:?}");
-    let form = |size: &str| {
+    let ours = |size: &str| {
         let mut cells = comparison.cells.iter();
         cells
-            .find(|c| c.size == size && c.model == "closed form")
+            .find(|c| c.size == size && c.model == "64-64 int16")
             .unwrap()
     };
-    assert!(form("320x240").strong_direction_deg < 0.5, "{comparison:?}");
-    assert!(form("320x240").direction_deg < form("160x120").direction_deg);
+    assert!(ours("320x240").strong_direction_deg < 0.5, "{comparison:?}");
+    assert!(ours("320x240").direction_deg < ours("160x120").direction_deg);
     let limits = &comparison.limits[0].1;
     assert_eq!(
         (comparison.limits.len(), limits.len()),

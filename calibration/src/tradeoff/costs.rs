@@ -27,6 +27,7 @@ const DATA_MEMORIES: [&str; 3] = ["RAM", "SRAM", "AXISRAM"];
 pub struct Costs {
     frames: Vec<FramePart>,
     models: Vec<ModelPart>,
+    film: FilmPart,
     firmware: Vec<Memory>,
     default_model_bytes: i64,
 }
@@ -54,6 +55,45 @@ struct ModelPart {
     bytes: u64,
     whole: Counted,
     flash_cycles: i64,
+}
+
+/// The film run forwards behind a network.
+#[derive(Clone, Debug, Deserialize)]
+struct FilmPart {
+    /// Of the model file.
+    bytes: u64,
+    /// One step: the film is run forwards where the network's answer is, and where the step leads.
+    one_step: Counted,
+    /// Every other time that it is run forwards.
+    each_more: Counted,
+    flash_cycles: i64,
+}
+
+/// How often the film is run forwards in one step.
+const LOOKS_OF_ONE_STEP: f64 = 2.0;
+
+impl FilmPart {
+    /// Instructions and cycles of a force for which the film is run forwards so often on average.
+    fn cost(&self, looks: f64) -> [i64; 2] {
+        let more = (looks - LOOKS_OF_ONE_STEP).max(0.0);
+        let (one, each) = (self.one_step, self.each_more);
+        [
+            one.instructions + (more * each.instructions as f64).round() as i64,
+            one.cycles + (more * each.cycles as f64).round() as i64,
+        ]
+    }
+}
+
+/// What makes a force of features.
+#[derive(Clone, Copy)]
+pub struct Behind<'a> {
+    /// The network.
+    pub estimator: &'a Estimator,
+    /// How its numbers are held.
+    pub numbers: Numbers,
+    /// How often the film is run forwards from its answer, on average; 0 where the network stands
+    /// alone.
+    pub looks: f64,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -121,9 +161,9 @@ impl Costs {
         size: [u16; 2],
         centroid: CentroidName,
         scan: Scan,
-        (estimator, numbers): (&Estimator, Numbers),
+        behind: Behind<'_>,
     ) -> Result<Option<Cost>> {
-        let Some(name) = estimator.cost_name(numbers) else {
+        let Some(name) = behind.estimator.cost_name(behind.numbers) else {
             return Ok(None);
         };
         let is_here =
@@ -134,8 +174,19 @@ impl Costs {
         let model = self.models.iter().find(|part| part.model == name);
         let model = model.with_context(|| format!("the model `{name}` was not counted"))?;
         let near = |bytes: i64| if bytes as u64 <= NEAR_LIMIT { bytes } else { 0 };
-        let bytes = model.bytes as i64;
-        let extra = model.whole.cycles + model.flash_cycles;
+        let mut bytes = model.bytes as i64;
+        let (mut own, mut flash_cycles) = (model.whole, model.flash_cycles);
+        if behind.looks > 0.0 {
+            let [instructions, cycles] = self.film.cost(behind.looks);
+            own.instructions += instructions;
+            own.cycles += cycles;
+            bytes += self.film.bytes as i64;
+            flash_cycles += self.film.flash_cycles;
+        }
+        let extra = match near(bytes) {
+            0 => own.cycles + flash_cycles,
+            _ => own.cycles,
+        };
         let frame_bytes = 2 * i64::from(size[0]) * i64::from(size[1]);
         let in_memory = scan == Scan::Windows;
         let columns = i64::from(size[0]) - i64::from(super::plan::firmware_size()[0]);
@@ -148,7 +199,7 @@ impl Costs {
         let data: i64 = DATA_MEMORIES.map(used).into_iter().sum::<Result<i64>>()?;
         let ram = data + near(bytes) - near(self.default_model_bytes);
         Ok(Some(Cost {
-            instructions: frame.whole.instructions + model.whole.instructions,
+            instructions: frame.whole.instructions + own.instructions,
             cycles: frame.whole.cycles + extra,
             latency_cycles: frame.latency.cycles + if frame.answers_last { extra } else { 0 },
             flash: used("FLASH")? + bytes - self.default_model_bytes,
@@ -184,14 +235,16 @@ pub(super) mod tests {
             format!(r#"{{"name":"{name}","origin":0,"length":0,"used":{used}}}"#)
         };
         let text = format!(
-            r#"{{"compiler":"rustc","together":[],"frames":[{}],"models":[{}],"firmware":[{}],"default_model_bytes":8000}}"#,
+            r#"{{"compiler":"rustc","together":[],"frames":[{}],"models":[{}],
+                "film":{{"bytes":50000,"one_step":{{"instructions":300,"cycles":150}},"each_more":{{"instructions":200,"cycles":100}},"flash_cycles":40}},
+                "firmware":[{}],"default_model_bytes":8000}}"#,
             [
                 frame("[320,240]", "full", "binary-mask"),
                 frame("[640,480]", "windows", "binary-mask"),
             ]
             .join(","),
             [
-                model("closed form", 2_000, 0),
+                model("16-16 int8", 2_000, 30),
                 model("128-128 int8", 20_000, 700),
             ]
             .join(","),
@@ -210,10 +263,14 @@ pub(super) mod tests {
     fn a_configuration_costs_what_its_parts_do() {
         let (costs, all) = (example(), Estimator::all());
         let of = |size, scan, estimator: usize, numbers| {
-            let which = (&all[estimator], numbers);
-            costs.of(size, CentroidName::BinaryMask, scan, which)
+            let behind = Behind {
+                estimator: &all[estimator],
+                numbers,
+                looks: 0.0,
+            };
+            costs.of(size, CentroidName::BinaryMask, scan, behind)
         };
-        let cost = of([320, 240], Scan::Full, 5, Numbers::Int8PerTensor);
+        let cost = of([320, 240], Scan::Full, 3, Numbers::Int8PerChannel);
         let cost = cost.unwrap().unwrap();
         assert_eq!(
             (cost.instructions, cost.cycles, cost.latency_cycles),
@@ -222,14 +279,34 @@ pub(super) mod tests {
         // Weights that do not fit DTCM leave it.
         assert_eq!((cost.flash, cost.ram), (212_000, 302_000));
         assert!((cost.rate() - 480e6 / 1250.0).abs() < 1e-6);
-        let cost = of([640, 480], Scan::Windows, 0, Numbers::Integers);
+        let cost = of([640, 480], Scan::Windows, 0, Numbers::Int8PerChannel);
         let cost = cost.unwrap().unwrap();
         assert!(cost.too_large, "a frame of 614,400 bytes");
         assert_eq!(cost.latency_cycles, 100, "the answer comes last");
         assert_eq!(cost.ram, 150_000 - 6_000 + 614_400);
         assert_eq!(of([320, 240], Scan::Full, 0, Numbers::F32).unwrap(), None);
-        let error = of([160, 120], Scan::Full, 0, Numbers::Integers).unwrap_err();
+        let error = of([160, 120], Scan::Full, 0, Numbers::Int8PerChannel).unwrap_err();
         assert!(error.to_string().contains("[160, 120]"), "{error}");
+    }
+
+    #[test]
+    fn a_film_costs_as_often_as_it_is_run_forwards() {
+        let (costs, all) = (example(), Estimator::all());
+        let of = |looks| {
+            let behind = Behind {
+                estimator: &all[0],
+                numbers: Numbers::Int8PerChannel,
+                looks,
+            };
+            let cost = costs.of([320, 240], CentroidName::BinaryMask, Scan::Full, behind);
+            cost.unwrap().unwrap()
+        };
+        let (alone, one, more) = (of(0.0), of(2.0), of(2.5));
+        assert_eq!((alone.instructions, alone.cycles), (1100, 550));
+        // Weights that fit DTCM alone leave it with a film beside them.
+        assert_eq!((one.instructions, one.cycles), (1400, 550 + 30 + 150 + 40));
+        assert_eq!((one.flash, one.ram), (244_000, alone.ram - 2_000));
+        assert_eq!((more.instructions, more.cycles), (1500, one.cycles + 50));
     }
 
     #[test]

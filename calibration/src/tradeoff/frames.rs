@@ -7,17 +7,19 @@ use anyhow::{Result, anyhow, ensure};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::geometry::Geometry;
-use hivtac_sensing::model::Rest;
+use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::plan::{CENTROIDS, Plan, preset};
+use super::plan::{CENTROIDS, Plan, RENDERED, preset};
 use crate::conditions::CentroidName;
 use crate::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
-use crate::weights::features_from_q16;
+use crate::network::{INPUTS, Layer, Meaning, Network, Standardization};
+use crate::quantize::export;
+use crate::weights::{Training, Uncertainty, Weights};
 
 /// Frames of one size, as both estimators see them.
 pub struct Frames {
@@ -43,6 +45,13 @@ pub struct Seen {
 
 /// What an estimator makes of a frame, and whether windows make the same of it.
 type Look = (Result<Observation, String>, bool);
+
+/// A frame's force, N, where its tip touches the film, mm, and what both estimators make of it.
+struct Looked {
+    force_n: [f64; 3],
+    tip_mm: Option<[f64; 2]>,
+    looks: [Look; 2],
+}
 
 /// The frames of a size, from `folder` or rendered into it. `progress` is called for each, from any thread.
 ///
@@ -84,6 +93,7 @@ fn recipe(plan: &Plan, [width, height]: [u16; 2], centroid: CentroidName) -> Rec
         height,
         centroid,
         loads: Loads::Random(plan.rows),
+        range: RENDERED,
         ..Recipe::default()
     }
 }
@@ -98,19 +108,14 @@ fn file(folder: &Path, recipe: &Recipe) -> PathBuf {
 
 fn rendered(recipes: &[Recipe; 2], progress: impl Fn() + Sync) -> Result<Frames> {
     let [recipe, _] = recipes;
-    let looks = look(recipes, 0..recipe.rest, [None, None], &progress)?;
+    let looks = look(recipes, 0..recipe.rest, [None; 2], &progress)?;
     let mut datasets = [dataset(&recipes[0])?, dataset(&recipes[1])?];
     add(&mut datasets, recipe, looks, &mut [0; 2])?;
     // As the chip is tared, so that what is judged by the rest position is.
-    let mut rests = [None; 2];
-    for (rest, dataset) in rests.iter_mut().zip(&datasets) {
-        let mean = dataset.rest()?;
-        *rest = Some(Rest {
-            features: features_from_q16(&mean.features_q16)?,
-            areas: mean.areas_px,
-        });
-    }
-    let looks = look(recipes, recipe.rest..recipe.rows(), rests, &progress)?;
+    let files = [anything(&datasets[0])?, anything(&datasets[1])?];
+    let [a, b] = files.each_ref().map(|file| Model::parse(file));
+    let models = [a, b].map(|model| model.ok());
+    let looks = look(recipes, recipe.rest..recipe.rows(), models, &progress)?;
     let mut windows_differ = [0; 2];
     add(&mut datasets, recipe, looks, &mut windows_differ)?;
     let rejected = |dataset: &Dataset| dataset.rejected().values().sum();
@@ -134,24 +139,57 @@ fn dataset(recipe: &Recipe) -> Result<Dataset> {
 fn look(
     recipes: &[Recipe; 2],
     rows: std::ops::Range<usize>,
-    rests: [Option<Rest>; 2],
+    models: [Option<Model<'_>>; 2],
     progress: impl Fn() + Sync,
-) -> Result<Vec<([f64; 3], [Look; 2])>> {
+) -> Result<Vec<Looked>> {
     let scene = recipes[0].scene(0)?;
-    let eyes = || -> Result<[Box<Sensor<'static>>; 2]> {
-        Ok([eye(&recipes[0], rests[0])?, eye(&recipes[1], rests[1])?])
+    let eyes = || -> Result<[Box<Sensor<'_>>; 2]> {
+        Ok([eye(&recipes[0], models[0])?, eye(&recipes[1], models[1])?])
     };
     let looks = rows.into_par_iter().map_init(eyes, |eyes, row| {
         let eyes = eyes.as_mut().map_err(|error| anyhow!("{error}"))?;
         let frame = scene.render_load(&recipes[0].load(row)?, row as u64)?;
         progress();
         let looks = eyes.each_mut().map(|eye| look_once(eye, &frame));
-        Ok((frame.truth.force.vector_n(), looks))
+        Ok(Looked {
+            force_n: frame.truth.force.vector_n(),
+            tip_mm: frame.truth.touches_mm,
+            looks,
+        })
     });
     looks.collect()
 }
 
-fn eye(recipe: &Recipe, rest: Option<Rest>) -> Result<Box<Sensor<'static>>> {
+/// A model of a data set's conditions and rest position that tells a place. What is refused depends
+/// on nothing else: it answers nothing but zeros.
+fn anything(dataset: &Dataset) -> Result<Vec<u8>> {
+    let outputs = Meaning::ForceAndPlace.outputs();
+    let even = |numbers: usize| Standardization {
+        mean: vec![0.0; numbers],
+        sigma: vec![1.0; numbers],
+    };
+    export(&Weights {
+        format: Weights::format(),
+        conditions: dataset.about.conditions.clone(),
+        rest: dataset.rest()?,
+        range: RENDERED,
+        uncertainty: Uncertainty::default(),
+        training: Training::default(),
+        film: None,
+        network: Network {
+            meaning: Meaning::ForceAndPlace,
+            input: even(INPUTS),
+            output: even(outputs),
+            layers: vec![Layer {
+                weights: vec![vec![0.0; INPUTS]; outputs],
+                bias: vec![0.0; outputs],
+            }],
+            ..Network::default()
+        },
+    })
+}
+
+fn eye<'m>(recipe: &Recipe, model: Option<Model<'m>>) -> Result<Box<Sensor<'m>>> {
     let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
     let settings = Settings {
         centroid: recipe.centroid.to_model(),
@@ -159,9 +197,9 @@ fn eye(recipe: &Recipe, rest: Option<Rest>) -> Result<Box<Sensor<'static>>> {
     };
     let mut sensor = Box::new(Sensor::new());
     sensor
-        .configure(settings, None)
+        .configure(settings, model)
         .map_err(|error| anyhow!("{error}"))?;
-    sensor.set_tare(rest);
+    sensor.set_tare(model.map(|model| model.rest));
     Ok(sensor)
 }
 
@@ -187,17 +225,22 @@ fn observation(measurement: &Measurement) -> Result<Observation, String> {
 fn add(
     datasets: &mut [Dataset; 2],
     recipe: &Recipe,
-    looks: Vec<([f64; 3], [Look; 2])>,
+    looked: Vec<Looked>,
     windows_differ: &mut [usize; 2],
 ) -> Result<()> {
-    for (force_n, looks) in looks {
+    for Looked {
+        force_n,
+        tip_mm,
+        looks,
+    } in looked
+    {
         let place = recipe.place(datasets[0].rows.len());
         for (i, (seen, same)) in looks.into_iter().enumerate() {
             windows_differ[i] += usize::from(!same);
             datasets[i].rows.push(Row {
                 place,
                 force_n,
-                tip_mm: None,
+                tip_mm,
                 seen,
             });
         }

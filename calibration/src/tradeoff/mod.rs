@@ -139,7 +139,7 @@ impl TradeoffArgs {
         let picked = best(&all, &self.limits())?;
         println!("{}", told(picked));
         if let Some(folder) = &self.out {
-            let step = begins([40_000, 0]);
+            let step = begins([model::FRAMES, 0]);
             println!("{}", model::write(picked, folder, || step(Step::Frame))?);
         }
         Ok(())
@@ -166,12 +166,14 @@ fn told(picked: &Configuration) -> String {
     let half = |mean: &table::Mean| mean.half_width.unwrap_or(0.0);
     let (strong, force) = (&picked.strong_direction_deg, &picked.force_rmse_mn);
     let mut text = format!(
-        "picked: {picked}\n  simulated: direction {:.3}° ± {:.3}° from 50 mN up, {:.3}° over all; |F| {:.3} ± {:.3} mN RMSE",
+        "picked: {picked}\n  simulated: direction {:.3}° ± {:.3}° from 50 mN up, {:.3}° over all; |F| {:.3} ± {:.3} mN RMSE; \
+         place {:.1} µm along x and y each",
         strong.value,
         half(strong),
         picked.direction_deg.value,
         force.value,
-        half(force)
+        half(force),
+        picked.place_rmse_um.value
     );
     if let Some(cost) = &picked.cost {
         text += &format!(

@@ -6,17 +6,24 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde_json::json;
 
-use super::plan::{Scan, preset};
+use super::plan::{RENDERED, Scan, preset};
 use super::table::Configuration;
 use crate::check::check;
 use crate::conditions::Conditions;
-use crate::dataset::{Recipe, Split, generate};
-use crate::fit::{Kind, fit, fit_closed_form};
+use crate::dataset::{Loads, Recipe, Split, generate};
+use crate::fit::fit;
+use crate::network::Meaning;
 use crate::quantize::export;
 use crate::train::Options;
 
-/// Frames to train on; as many passes as for the default model.
-const ROWS: usize = 40_000;
+/// Frames that the network is trained on, in so many passes in floats and with rounding, and frames
+/// that tell the markers' noise and their seed: as for the default model.
+const ROWS: usize = 80_000;
+const EPOCHS: [usize; 2] = [400, 300];
+const DIRECTION_WEIGHT: f64 = 3.0;
+const NOISE: (usize, u64) = (6_000, 5);
+/// Frames that are rendered for a model.
+pub const FRAMES: usize = ROWS + NOISE.0;
 /// Frames to check on, and the seed of their loads and noise.
 const CHECKED: (usize, u64) = (4000, 1_000_001);
 
@@ -33,35 +40,42 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
         width: picked.size[0],
         height: picked.size[1],
         centroid: picked.centroid,
-        loads: crate::dataset::Loads::Random(ROWS),
+        loads: Loads::Random(ROWS),
+        range: RENDERED,
         ..Recipe::default()
     };
-    let dataset = generate(&recipe, progress)?;
-    let split = Split::WithinPose;
+    let dataset = generate(&recipe, &progress)?;
+    let [epochs, rounded_epochs] = EPOCHS;
     let options = Options {
+        meaning: Meaning::ForceAndPlace,
+        epochs,
+        rounded_epochs,
+        direction_weight: Some(DIRECTION_WEIGHT),
         hidden: picked.estimator.hidden.clone(),
         arithmetic: picked.numbers.arithmetic().unwrap_or_default(),
         ..Options::default()
     };
-    let fitted = match (
-        picked.estimator.hidden.is_empty(),
-        picked.estimator.closed_form,
-    ) {
-        (true, _) => fit_closed_form(&dataset, split, options.seed)?,
-        (_, true) => fit(&dataset, split, Kind::Both, &options, |_| ())?,
-        (_, false) => fit(&dataset, split, Kind::Network, &options, |_| ())?,
-    };
-    let bytes = export(&fitted.weights)?;
+    let mut weights = fit(&dataset, Split::WithinPose, &options, |_| ())?.weights;
+    if picked.steps > 0 {
+        let (rows, seed) = NOISE;
+        let recipe = Recipe {
+            loads: Loads::Random(rows),
+            seed,
+            ..recipe
+        };
+        weights = weights.with_film(picked.steps, &generate(&recipe, &progress)?)?;
+    }
+    let bytes = export(&weights)?;
     fs::create_dir_all(folder)?;
     let folder = folder.canonicalize()?;
     let file = |name: &str| folder.join(name);
-    fitted.weights.save(&file("model.weights"))?;
+    weights.save(&file("model.weights"))?;
     let save = |name: &str, bytes: &[u8]| {
         fs::write(file(name), bytes)
             .with_context(|| format!("cannot write {}", file(name).display()))
     };
     save("model.hvtm", &bytes)?;
-    let settings = settings(picked, &fitted.weights.conditions);
+    let settings = settings(picked, &weights.conditions);
     save(
         "settings.json",
         (serde_json::to_string_pretty(&settings)? + "\n").as_bytes(),

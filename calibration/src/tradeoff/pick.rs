@@ -39,9 +39,10 @@ pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configurati
 
 /// The best configuration within the limits that the firmware does as it is.
 ///
-/// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction error from 50 mN up and error
-/// of |F| are both within a twentieth of the least of each, one that scans whole frames rather than one that follows the
-/// markers, as that needs no second frame after a doubt; of these the fastest.
+/// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
+/// error from 50 mN up, error of
+/// |F| and error of the place are within a twentieth of the least of each, one that scans whole frames rather than one that
+/// follows the markers, as that needs no second frame after a doubt; of these the fastest.
 ///
 /// # Errors
 /// When there is none; says what comes nearest.
@@ -77,11 +78,12 @@ fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
         among.iter().filter(near).copied().collect::<Vec<_>>()
     };
     let by_direction = equals(fitting, |c| c.strong_direction_deg.value);
-    let by_both = equals(&by_direction, |c| c.force_rmse_mn.value);
+    let by_force = equals(&by_direction, |c| c.force_rmse_mn.value);
+    let by_all = equals(&by_force, |c| c.place_rmse_um.value);
     let whole = |c: &&&Configuration| c.scan == Scan::Full;
-    let of_whole: Vec<_> = by_both.iter().filter(whole).copied().collect();
+    let of_whole: Vec<_> = by_all.iter().filter(whole).copied().collect();
     if of_whole.is_empty() {
-        by_both
+        by_all
     } else {
         of_whole
     }
@@ -163,11 +165,15 @@ pub(super) mod tests {
             size,
             centroid: CentroidName::RednessWeighted,
             estimator: Estimator::all()[0].clone(),
-            numbers: Numbers::Integers,
+            numbers: Numbers::Int16,
+            steps: 1,
+            looks: 2.0,
             scan,
             direction_deg: mean(3.0 * direction),
             strong_direction_deg: mean(direction),
             force_rmse_mn: mean(force),
+            place_rmse_um: mean(10.0),
+            unexplained: 0.001,
             worst: [10.0 * direction, 5.0 * force],
             cost: Some(Cost {
                 instructions: 2 * cycles,

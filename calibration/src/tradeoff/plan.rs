@@ -1,4 +1,4 @@
-//! What is swept: frame sizes, centroid estimators, estimators of the force, arithmetics, scans.
+//! What is swept: frame sizes, centroid estimators, networks, arithmetics, steps, scans.
 
 use std::fmt;
 
@@ -8,14 +8,13 @@ use serde::{Deserialize, Serialize};
 use crate::conditions::CentroidName;
 use crate::dataset::Recipe;
 use crate::network::Arithmetic;
+use crate::weights::Range;
 
 /// What makes a force of features.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Estimator {
-    /// Whether a closed form does, alone or with the network.
-    pub closed_form: bool,
-    /// Widths of the network's hidden layers; none for no network.
+    /// Widths of the network's hidden layers.
     pub hidden: Vec<usize>,
 }
 
@@ -25,14 +24,10 @@ pub struct Estimator {
 pub enum Numbers {
     /// Floats: what the others are compared with. The chip runs no floats.
     F32,
-    /// Integers, of a closed form without a network.
-    Integers,
     /// int16 weights, activations of 12 bits.
     Int16,
     /// int8 weights with a scale for each output, activations of 7 bits.
     Int8PerChannel,
-    /// int8 weights with one scale for a layer.
-    Int8PerTensor,
 }
 
 /// How a frame is looked at. All give the same features.
@@ -49,6 +44,20 @@ pub enum Scan {
 
 /// All scans.
 pub const SCANS: [Scan; 3] = [Scan::Full, Scan::Windows, Scan::Tracked];
+/// Gauss–Newton steps from the network's answer; none: the network stands alone.
+pub const STEPS: [u8; 4] = [0, 1, 2, 3];
+/// The steps of the default model.
+pub const USUAL_STEPS: u8 = 1;
+/// Loads of the frames that are rendered, a little beyond those that are judged.
+pub const RENDERED: Range = Range {
+    force_n: 0.25,
+    alpha_deg: 10.0,
+    beta_deg: 10.0,
+    place_mm: 4.2,
+};
+/// The largest |F|, N, and the farthest place along x and y, mm, of those that are judged.
+pub const JUDGED_N: f64 = 0.2;
+pub const JUDGED_MM: f64 = 4.0;
 /// Both ways to take a marker's position.
 pub const CENTROIDS: [CentroidName; 2] = [CentroidName::BinaryMask, CentroidName::RednessWeighted];
 /// Hidden layers of the paper's network.
@@ -62,7 +71,7 @@ pub struct Plan {
     pub sizes: Vec<[u16; 2]>,
     /// Estimators of the force.
     pub estimators: Vec<Estimator>,
-    /// The paper's network is trained for these sizes, once; for no other.
+    /// A network of the paper's widths is trained for these sizes, once; for no other.
     pub paper_sizes: Vec<[u16; 2]>,
     /// Frames of each size, besides those of the untouched film.
     pub rows: usize,
@@ -81,12 +90,12 @@ impl Default for Plan {
         Self {
             sizes: vec![[160, 120], [320, 240], [640, 480], [800, 600]],
             estimators: Estimator::all(),
-            paper_sizes: vec![[320, 240], [800, 600]],
-            rows: 8_000,
+            paper_sizes: vec![[320, 240]],
+            rows: 10_000,
             parts: 5,
             seeds: 3,
-            epochs: [200, 60],
-            paper_epochs: [20, 6],
+            epochs: [150, 40],
+            paper_epochs: [12, 4],
         }
     }
 }
@@ -137,21 +146,11 @@ impl Plan {
 impl Estimator {
     /// All that are swept.
     pub fn all() -> Vec<Self> {
+        let widths: [&[usize]; 5] = [&[16; 2], &[32; 2], &[64; 2], &[128; 2], &PAPER];
         let network = |hidden: &[usize]| Self {
-            closed_form: false,
             hidden: hidden.to_vec(),
         };
-        let both = Self {
-            closed_form: true,
-            ..network(&[64, 64])
-        };
-        let closed_form = Self {
-            closed_form: true,
-            ..network(&[])
-        };
-        let widths: [&[usize]; 5] = [&[16; 2], &[32; 2], &[64; 2], &[128; 2], &PAPER];
-        let networks = widths.into_iter().map(network);
-        [closed_form, both].into_iter().chain(networks).collect()
+        widths.into_iter().map(network).collect()
     }
 
     /// Whether it is the paper's network.
@@ -159,38 +158,34 @@ impl Estimator {
         self.hidden == PAPER
     }
 
-    /// How its numbers may be held.
-    pub fn numbers(&self) -> &'static [Numbers] {
-        match self.hidden[..] {
-            [] => &[Numbers::F32, Numbers::Integers],
-            _ => &[
-                Numbers::F32,
-                Numbers::Int16,
-                Numbers::Int8PerChannel,
-                Numbers::Int8PerTensor,
-            ],
-        }
-    }
-
     /// Its model's name among the counted costs; `None` where the chip does not run it.
     pub fn cost_name(&self, numbers: Numbers) -> Option<String> {
         match numbers {
             Numbers::F32 => None,
-            Numbers::Integers => Some(self.to_string()),
             Numbers::Int16 => Some(format!("{self} int16")),
-            Numbers::Int8PerChannel | Numbers::Int8PerTensor => Some(format!("{self} int8")),
+            Numbers::Int8PerChannel => Some(format!("{self} int8")),
         }
     }
 }
 
 impl Numbers {
+    /// All of them.
+    pub const ALL: [Numbers; 3] = [Numbers::F32, Numbers::Int16, Numbers::Int8PerChannel];
+
+    /// Steps that its answer is followed by: the chip runs no floats, and so nothing behind them.
+    pub fn steps(self) -> &'static [u8] {
+        match self {
+            Numbers::F32 => &STEPS[..1],
+            Numbers::Int16 | Numbers::Int8PerChannel => &STEPS,
+        }
+    }
+
     /// The same as the trainer has it; `None` for what is no arithmetic of a network on the chip.
     pub fn arithmetic(self) -> Option<Arithmetic> {
         match self {
-            Numbers::F32 | Numbers::Integers => None,
+            Numbers::F32 => None,
             Numbers::Int16 => Some(Arithmetic::Int16),
             Numbers::Int8PerChannel => Some(Arithmetic::Int8PerChannel),
-            Numbers::Int8PerTensor => Some(Arithmetic::Int8PerTensor),
         }
     }
 }
@@ -218,11 +213,7 @@ pub fn firmware_size() -> [u16; 2] {
 impl fmt::Display for Estimator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widths: Vec<String> = self.hidden.iter().map(usize::to_string).collect();
-        match (self.closed_form, widths.is_empty()) {
-            (true, true) => f.write_str("closed form"),
-            (true, false) => write!(f, "closed form + {}", widths.join("-")),
-            (false, _) => f.write_str(&widths.join("-")),
-        }
+        f.write_str(&widths.join("-"))
     }
 }
 
@@ -230,10 +221,8 @@ impl fmt::Display for Numbers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Numbers::F32 => "f32",
-            Numbers::Integers => "integers",
             Numbers::Int16 => "int16",
             Numbers::Int8PerChannel => "int8 per channel",
-            Numbers::Int8PerTensor => "int8 per tensor",
         })
     }
 }
@@ -253,7 +242,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_network_is_trained_once_for_two_sizes() {
+    fn the_papers_network_is_trained_once_for_one_size() {
         let plan = Plan::default();
         let papers = |size| {
             let tasks = plan.tasks(size);
@@ -261,22 +250,20 @@ mod tests {
         };
         assert_eq!(
             [[160, 120], [320, 240], [640, 480], [800, 600]].map(papers),
-            [0, 2, 0, 2]
+            [0, 2, 0, 0]
         );
-        assert_eq!(plan.tasks([640, 480]).len(), 2 * 6 * 3);
+        assert_eq!(plan.tasks([640, 480]).len(), 2 * 4 * 3);
     }
 
     #[test]
     fn names_are_those_of_the_counted_models() {
         let names: Vec<_> = Estimator::all()
             .iter()
-            .map(|e| e.cost_name(e.numbers()[1]).unwrap())
+            .map(|e| e.cost_name(Numbers::Int16).unwrap())
             .collect();
         assert_eq!(
             names,
             [
-                "closed form",
-                "closed form + 64-64 int16",
                 "16-16 int16",
                 "32-32 int16",
                 "64-64 int16",

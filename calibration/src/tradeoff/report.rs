@@ -3,7 +3,10 @@
 use std::fmt::Write;
 
 use super::pick::{Limits, best, front};
-use super::plan::{Estimator, Numbers, SCANS, Scan, firmware_size, has_camera};
+use super::plan::{
+    Estimator, JUDGED_MM, JUDGED_N, Numbers, RENDERED, SCANS, Scan, USUAL_STEPS, firmware_size,
+    has_camera,
+};
 use super::results::Results;
 use super::table::{Configuration, Mean, Reach, words};
 use crate::plot::{Axis, COLOURS, Plot, Scale};
@@ -29,12 +32,12 @@ pub fn markdown(results: &Results, configurations: &[Configuration]) -> String {
     let [width, height] = firmware_size();
     let _ = write!(
         text,
-        "\n### Every estimator at {width}×{height}, full scan\n\n{}",
+        "\n### Every network at {width}×{height}, full scan\n\n{}",
         table(&here)
     );
     let _ = write!(
         text,
-        "\n### Every size and scan, behind them the same estimator\n\n{}",
+        "\n### Every size and scan, behind them the same network and steps\n\n{}",
         sizes(configurations)
     );
     let _ = write!(text, "\n### The default\n\n{}", default(configurations));
@@ -46,13 +49,14 @@ fn about(results: &Results) -> String {
     let [epochs, rounded] = plan.epochs;
     let [paper_epochs, paper_rounded] = plan.paper_epochs;
     let mut text = format!(
-        "**Simulated** frames, contact reading `force`: {} of each size, in {} parts. Each of {} seeds trains without one part \
-         and is judged on it, on the frames up to 0.2 N. Networks: {epochs} passes over the data in floats, then {rounded} with \
-         the chip's rounding for each arithmetic; 512-512-512: one seed, {paper_epochs} and {paper_rounded} passes. Intervals \
-         (±) hold the mean of all seeds with 95 %, by Student's t.\n\n\
+        "**Simulated** frames of a tip anywhere within ±{} mm, contact reading `force`, |F| to {} N, angles to ±{}°: {} of each \
+         size, in {} parts. Each of {} seeds trains without one part and is judged on it, on the frames up to {JUDGED_N} N and \
+         ±{JUDGED_MM} mm. Networks: {epochs} passes over the data in floats, then {rounded} with the chip's rounding for each \
+         arithmetic; 512-512-512: one seed, {paper_epochs} and {paper_rounded} passes. Intervals (±) hold the mean of all seeds \
+         with 95 %, by Student's t.\n\n\
          | frames | of | binary: rejected | others in windows | weighted: rejected | others in windows |\n\
          |---|---:|---:|---:|---:|---:|\n",
-        plan.rows, plan.parts, plan.seeds
+        RENDERED.place_mm, RENDERED.force_n, RENDERED.alpha_deg, plan.rows, plan.parts, plan.seeds
     );
     for (size, seen) in &results.seen {
         let ([a, b], [x, y]) = (seen.rejected, seen.windows_differ);
@@ -94,9 +98,9 @@ fn grouped(number: i64) -> String {
     groups.join(",")
 }
 
-const HEAD: &str = "| frame | centroids | estimator | numbers | scan | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | worst: °, mN | \
-                    instructions | modelled cycles | µs | per second | latency, µs | flash, KB | RAM, KB |\n\
-                    |---|---|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+const HEAD: &str = "| frame | centroids | network | numbers | steps | run forwards | scan | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | \
+                    place, µm | worst: °, mN | unexplained | instructions | modelled cycles | µs | per second | latency, µs | flash, KB | RAM, KB |\n\
+                    |---|---|---|---|---:|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
 
 fn table(configurations: &[&Configuration]) -> String {
     let rows = configurations.iter().map(|c| row(c));
@@ -118,17 +122,21 @@ fn row(c: &Configuration) -> String {
         ),
     };
     format!(
-        "| {} | {} | {} | {} | {} | {} | {} | {} | {:.2}, {:.2} {cost}\n",
+        "| {} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.2} % {cost}\n",
         frame(c.size),
         words(c.centroid),
         c.estimator,
         c.numbers,
+        c.steps,
+        c.looks,
         c.scan,
         interval(&c.strong_direction_deg, 3),
         interval(&c.direction_deg, 2),
         interval(&c.force_rmse_mn, 3),
+        interval(&c.place_rmse_um, 1),
         c.worst[0],
         c.worst[1],
+        1e2 * c.unexplained,
     )
 }
 
@@ -136,26 +144,28 @@ fn row(c: &Configuration) -> String {
 fn sizes(configurations: &[Configuration]) -> String {
     let estimator = default_estimator();
     let mut text = format!(
-        "{estimator}, {}. A frame in memory that does not fit the chip's is marked *.\n\n\
-         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | full: cycles | µs | windows: cycles | µs | \
-         tracked: cycles | µs |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+        "{estimator}, {}, {USUAL_STEPS} step. A frame in memory that does not fit the chip's is marked *.\n\n\
+         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | full: cycles | µs | \
+         windows: cycles | µs | tracked: cycles | µs |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
         Numbers::Int8PerChannel
     );
     let of_it = configurations
         .iter()
-        .filter(|c| c.estimator == estimator && c.numbers == Numbers::Int8PerChannel);
+        .filter(|c| c.estimator == estimator && c.numbers == Numbers::Int8PerChannel)
+        .filter(|c| c.steps == USUAL_STEPS);
     let of_it: Vec<&Configuration> = of_it.collect();
     // The scans of one configuration follow each other.
     for scans in of_it.chunks(SCANS.len()) {
         let c = scans[0];
         let _ = write!(
             text,
-            "| {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} |",
             frame(c.size),
             words(c.centroid),
             interval(&c.strong_direction_deg, 3),
             interval(&c.direction_deg, 2),
-            interval(&c.force_rmse_mn, 3)
+            interval(&c.force_rmse_mn, 3),
+            interval(&c.place_rmse_um, 1)
         );
         for cost in scans.iter().filter_map(|c| c.cost) {
             let mark = if cost.too_large { "*" } else { "" };
@@ -169,7 +179,6 @@ fn sizes(configurations: &[Configuration]) -> String {
 
 fn default_estimator() -> Estimator {
     Estimator {
-        closed_form: true,
         hidden: crate::train::Options::default().hidden,
     }
 }
@@ -183,9 +192,9 @@ fn default(configurations: &[Configuration]) -> String {
 
 /// Every configuration.
 pub fn csv(configurations: &[Configuration]) -> String {
-    let mut text = "width,height,centroid,estimator,numbers,scan,reach,direction_deg,direction_deg_95,strong_direction_deg,\
-                    strong_direction_deg_95,force_rmse_mn,force_rmse_mn_95,worst_strong_direction_deg,worst_force_mn,\
-                    instructions,modelled_cycles,microseconds,per_second,latency_microseconds,flash_bytes,ram_bytes\n"
+    let mut text = "width,height,centroid,network,numbers,steps,looks,scan,reach,direction_deg,direction_deg_95,strong_direction_deg,\
+                    strong_direction_deg_95,force_rmse_mn,force_rmse_mn_95,place_rmse_um,place_rmse_um_95,\
+                    worst_strong_direction_deg,worst_force_mn,unexplained,instructions,modelled_cycles,microseconds,per_second,latency_microseconds,flash_bytes,ram_bytes\n"
         .to_owned();
     for c in configurations {
         let reach = match c.reach() {
@@ -194,19 +203,29 @@ pub fn csv(configurations: &[Configuration]) -> String {
             Reach::Firmware => "firmware",
         };
         let [width, height] = c.size;
-        let (centroid, estimator, numbers, scan) =
-            (words(c.centroid), &c.estimator, c.numbers, c.scan);
+        let (centroid, network, numbers) = (words(c.centroid), &c.estimator, c.numbers);
+        let (steps, looks, scan) = (c.steps, c.looks, c.scan);
         let _ = write!(
             text,
-            "{width},{height},{centroid},{estimator},{numbers},{scan},{reach}"
+            "{width},{height},{centroid},{network},{numbers},{steps},{looks:.3},{scan},{reach}"
         );
-        for mean in [&c.direction_deg, &c.strong_direction_deg, &c.force_rmse_mn] {
+        let means = [
+            &c.direction_deg,
+            &c.strong_direction_deg,
+            &c.force_rmse_mn,
+            &c.place_rmse_um,
+        ];
+        for mean in means {
             let half = mean
                 .half_width
                 .map_or(String::new(), |half| format!("{half:.5}"));
             let _ = write!(text, ",{:.5},{half}", mean.value);
         }
-        let _ = write!(text, ",{:.5},{:.5}", c.worst[0], c.worst[1]);
+        let _ = write!(
+            text,
+            ",{:.5},{:.5},{:.5}",
+            c.worst[0], c.worst[1], c.unexplained
+        );
         let _ = match &c.cost {
             None => writeln!(text, ",,,,,,,"),
             Some(cost) => writeln!(
@@ -296,7 +315,7 @@ mod tests {
             .lines()
             .map(|line| line.split(',').count())
             .collect();
-        assert_eq!(columns, [22; 4]);
+        assert_eq!(columns, [27; 4]);
         let svg = plot(&all);
         assert!(svg.contains("800×600 (no camera)") && svg.ends_with("</svg>\n"));
     }

@@ -23,10 +23,17 @@ pub struct Figures {
     pub strong_direction_deg: f64,
     /// Root mean square error of |F|, mN.
     pub force_rmse_mn: f64,
+    /// Root mean square error of each coordinate of the place from 50 mN up, µm.
+    pub place_rmse_um: f64,
     /// Largest angle between found and true force from 50 mN up, degrees.
     pub worst_direction_deg: f64,
     /// Largest |error| of |F|, mN.
     pub worst_force_mn: f64,
+    /// Frames that no single contact explains: without a force, and not among the others.
+    pub unexplained: usize,
+    /// How often the film was run forwards for a force, on average; 0 where the network stands
+    /// alone.
+    pub looks: f64,
 }
 
 /// One finished training.
@@ -36,8 +43,8 @@ pub struct Finished {
     /// What was trained.
     #[serde(flatten)]
     pub task: Task,
-    /// What it was like in each arithmetic.
-    pub figures: Vec<(Numbers, Figures)>,
+    /// What it was like in each arithmetic, with so many steps.
+    pub figures: Vec<(Numbers, u8, Figures)>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -185,12 +192,15 @@ mod tests {
             direction_deg: 0.5,
             strong_direction_deg: 0.2,
             force_rmse_mn: 0.1,
+            place_rmse_um: 40.0,
+            unexplained: 0,
+            looks: 0.0,
             worst_direction_deg: 1.0,
             worst_force_mn: 0.3,
         };
         Finished {
             task: task.clone(),
-            figures: vec![(Numbers::F32, figures)],
+            figures: vec![(Numbers::F32, 0, figures)],
         }
     }
 

@@ -3,23 +3,31 @@
 use std::path::Path;
 use std::sync::Mutex;
 
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
+use hivtac_sensing::model::Model;
+use hivtac_sensing::model::encode::with_steps;
+use hivtac_sensing::status::Status;
 use rayon::prelude::*;
 
 use super::frames::{Frames, frames};
-use super::plan::{CENTROIDS, Numbers, Plan, Task};
+use super::plan::{CENTROIDS, JUDGED_MM, JUDGED_N, Numbers, Plan, STEPS, Task};
 use super::results::{Figures, Finished, Results};
+use crate::answer::Chip;
 use crate::dataset::{Dataset, Row, Split};
 use crate::errors::{WEAK_N, angle_deg, norm};
-use crate::evaluate::Evaluation;
-use crate::fit::{Kind, fit, fit_closed_form};
+use crate::fit::fit;
+use crate::network::Meaning;
 use crate::quantize::export;
 use crate::train::Options;
-use crate::weights::{Range, Weights};
+use crate::weights::Weights;
 
 /// Adam's first step and rows that share one, for the paper's network: the paper's.
 const PAPER_RATE: f64 = 1e-3;
 const PAPER_BATCH: usize = 64;
+/// Directions of weak forces count, as for the default model.
+const DIRECTION_WEIGHT: f64 = 3.0;
+/// One in so many of the rows to train on tells the noise that a film's file holds.
+const NOISE_ROWS: usize = 4;
 
 /// What a sweep tells of its progress.
 pub enum Step {
@@ -68,17 +76,29 @@ fn run(plan: &Plan, frames: &Frames, task: Task) -> Result<Finished> {
     );
     let [training, judged] = parted(dataset, plan.parts, task.seed);
     let models = models(plan, &training, &task)?;
-    let figures = models.iter().map(|(numbers, weights)| {
-        let figures = match numbers {
-            Numbers::F32 => floats(weights, &judged)?,
-            _ => integers(weights, &judged)?,
-        };
-        Ok((*numbers, figures))
-    });
-    Ok(Finished {
-        figures: figures.collect::<Result<_>>()?,
-        task,
-    })
+    let noise = thinned(&training, NOISE_ROWS);
+    let mut figures = Vec::new();
+    for (numbers, weights) in models {
+        match numbers {
+            Numbers::F32 => figures.push((numbers, 0, floats(&weights, &judged)?)),
+            _ => {
+                let of_steps = integers(weights, &noise, &judged)?;
+                figures.extend(of_steps.map(|(steps, figures)| (numbers, steps, figures)));
+            }
+        }
+    }
+    Ok(Finished { figures, task })
+}
+
+/// One of so many rows; the untouched film is in all of them.
+fn thinned(dataset: &Dataset, one_of: usize) -> Dataset {
+    let rest = dataset.about.rest;
+    let rows = dataset.rows.iter().enumerate();
+    let kept = rows.filter(|(number, _)| *number < rest || number % one_of == 0);
+    Dataset {
+        about: dataset.about.clone(),
+        rows: kept.map(|(_, row)| row.clone()).collect(),
+    }
 }
 
 /// The rows to train on, and those of a seed's own part; both begin with the untouched film.
@@ -99,29 +119,23 @@ fn parted(dataset: &Dataset, parts: usize, seed: usize) -> [Dataset; 2] {
 fn models(plan: &Plan, training: &Dataset, task: &Task) -> Result<Vec<(Numbers, Weights)>> {
     let estimator = &task.estimator;
     let (seed, split) = (task.seed as u64, Split::WithinPose);
-    if estimator.hidden.is_empty() {
-        let weights = fit_closed_form(training, split, seed)?.weights;
-        let both = estimator.numbers().iter();
-        return Ok(both.map(|&numbers| (numbers, weights.clone())).collect());
-    }
-    let kind = match estimator.closed_form {
-        true => Kind::Both,
-        false => Kind::Network,
-    };
     let [epochs, rounded_epochs] = plan.epochs_of(estimator);
     let mut options = Options {
+        meaning: Meaning::ForceAndPlace,
         hidden: estimator.hidden.clone(),
         epochs,
         rounded_epochs: 0,
+        direction_weight: Some(DIRECTION_WEIGHT),
         seed,
         ..Options::default()
     };
     if estimator.is_papers() {
         (options.learning_rate, options.batch) = (PAPER_RATE, PAPER_BATCH);
+        options.direction_weight = None;
     }
-    let float = fit(training, split, kind, &options, |_| ())?.weights;
+    let float = fit(training, split, &options, |_| ())?.weights;
     let mut models = vec![(Numbers::F32, float.clone())];
-    for &numbers in estimator.numbers() {
+    for numbers in Numbers::ALL {
         let Some(arithmetic) = numbers.arithmetic() else {
             continue;
         };
@@ -132,35 +146,66 @@ fn models(plan: &Plan, training: &Dataset, task: &Task) -> Result<Vec<(Numbers, 
             start: Some(float.network.clone()),
             ..options.clone()
         };
-        models.push((
-            numbers,
-            fit(training, split, kind, &options, |_| ())?.weights,
-        ));
+        models.push((numbers, fit(training, split, &options, |_| ())?.weights));
     }
     Ok(models)
 }
 
 /// Of a model in floats.
 fn floats(weights: &Weights, dataset: &Dataset) -> Result<Figures> {
-    let answers = dataset.accepted().map(|(seen, truth)| {
-        let found = weights.force_n(&seen.features_px());
+    let answers = dataset.samples().map(|row| {
+        let features = row.seen.features_px();
+        let found = weights.force_n(&features);
         Answer {
-            truth_n: norm(truth),
+            truth_n: norm(row.force_n),
             found_n: norm(found),
-            direction_deg: angle_deg(found, truth).unwrap_or(90.0),
+            direction_deg: angle_deg(found, row.force_n).unwrap_or(90.0),
+            tip_mm: row.tip_mm,
+            place_mm: weights.network.place_mm(&features),
+            looks: 0,
+            is_refused: false,
         }
     });
     figures(answers)
 }
 
-/// Of a model as the chip computes it, to the force that it sends.
-fn integers(weights: &Weights, dataset: &Dataset) -> Result<Figures> {
-    let evaluation = Evaluation::of(&export(weights)?, dataset, None)?;
-    figures(evaluation.judged.iter().map(|judged| Answer {
-        truth_n: judged.truth_polar[2],
-        found_n: judged.found_polar[2],
-        direction_deg: judged.direction_deg,
-    }))
+/// Of a model as the chip computes it, to the force that it sends: the network alone, and with
+/// steps on the film, of which the markers' noise is that of the rows `noise`.
+fn integers(
+    weights: Weights,
+    noise: &Dataset,
+    judged: &Dataset,
+) -> Result<[(u8, Figures); STEPS.len()]> {
+    let alone = export(&weights)?;
+    let film = export(&weights.with_film(1, noise)?)?;
+    let mut all = Vec::new();
+    for steps in STEPS {
+        let stepping = with_steps(&film, steps).context("the film takes no such steps")?;
+        let file = if steps == 0 { &alone } else { &stepping };
+        all.push((steps, on_the_chip(file, judged)?));
+    }
+    all.try_into().map_err(|_| anyhow!("as many as steps"))
+}
+
+fn on_the_chip(file: &[u8], judged: &Dataset) -> Result<Figures> {
+    let model = Model::parse(file).map_err(|error| anyhow!("{error}"))?;
+    let mut chip = Chip::new(model, &judged.rest()?)?;
+    let mut answers = Vec::new();
+    for row in judged.samples() {
+        let (force, status, looks) = chip.force_and_looks(row.seen)?;
+        let found = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+        let place = force.place.as_ref();
+        answers.push(Answer {
+            truth_n: norm(row.force_n),
+            found_n: norm(found),
+            direction_deg: angle_deg(found, row.force_n).unwrap_or(90.0),
+            tip_mm: row.tip_mm,
+            place_mm: place.map(|place| [place.x, place.y].map(|part| f64::from(part.0) * 1e-3)),
+            looks,
+            is_refused: status.intersects(Status::NO_FORCE),
+        });
+    }
+    figures(answers.into_iter())
 }
 
 /// One force.
@@ -168,38 +213,67 @@ struct Answer {
     truth_n: f64,
     found_n: f64,
     direction_deg: f64,
+    tip_mm: Option<[f64; 2]>,
+    place_mm: Option<[f64; 2]>,
+    looks: u8,
+    /// Whether no single contact explains the markers: the chip sends no force then.
+    is_refused: bool,
 }
 
-/// Of the forces within the calibrated range.
+impl Answer {
+    /// Whether the load is one of those that are judged.
+    fn counts(&self) -> bool {
+        let near = |tip_mm: [f64; 2]| tip_mm.iter().all(|part| part.abs() <= JUDGED_MM);
+        self.truth_n > 0.0 && self.truth_n <= JUDGED_N && self.tip_mm.is_none_or(near)
+    }
+
+    /// The mean square error of both coordinates of the place, mm².
+    fn place_square(&self) -> f64 {
+        let (Some(found), Some(truth)) = (self.place_mm, self.tip_mm) else {
+            return 0.0;
+        };
+        [0, 1]
+            .map(|axis| (found[axis] - truth[axis]).powi(2))
+            .iter()
+            .sum::<f64>()
+            / 2.0
+    }
+}
+
+/// Of the forces that are judged.
 fn figures(answers: impl Iterator<Item = Answer>) -> Result<Figures> {
-    let range = Range::default().force_n;
-    let answers: Vec<Answer> = answers
-        .filter(|answer| answer.truth_n > 0.0 && answer.truth_n <= range)
-        .collect();
-    let strong = || answers.iter().filter(|answer| answer.truth_n >= WEAK_N);
+    let judged: Vec<Answer> = answers.filter(Answer::counts).collect();
+    let (refused, all): (Vec<_>, Vec<_>) = judged.iter().partition(|answer| answer.is_refused);
+    let is_strong = |answer: &&Answer| answer.truth_n >= WEAK_N;
+    let strong: Vec<&Answer> = all.iter().copied().filter(is_strong).collect();
     ensure!(
-        strong().count() > 0,
+        !strong.is_empty(),
         "no frame to judge has a force of {WEAK_N} N or more"
     );
-    let mean = |sum: f64, count: usize| sum / count as f64;
-    let off_mn = |answer: &Answer| 1e3 * (answer.found_n - answer.truth_n);
-    let square = answers.iter().map(|answer| off_mn(answer).powi(2)).sum();
-    let worst = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+    let mean = |of: &dyn Fn(&Answer) -> f64, answers: &[&Answer]| {
+        answers.iter().map(|answer| of(answer)).sum::<f64>() / answers.len() as f64
+    };
+    let worst = |of: &dyn Fn(&Answer) -> f64, answers: &[&Answer]| {
+        rounded(answers.iter().map(|answer| of(answer)).fold(0.0, f64::max))
+    };
+    let off_mn = |answer: &Answer| 1e3 * (answer.found_n - answer.truth_n).abs();
+    let direction = |answer: &Answer| answer.direction_deg;
     Ok(Figures {
-        frames: answers.len(),
-        direction_deg: rounded(mean(
-            answers.iter().map(|answer| answer.direction_deg).sum(),
-            answers.len(),
-        )),
-        strong_direction_deg: rounded(mean(
-            strong().map(|answer| answer.direction_deg).sum(),
-            strong().count(),
-        )),
-        force_rmse_mn: rounded(mean(square, answers.len()).sqrt()),
-        worst_direction_deg: rounded(worst(&mut strong().map(|answer| answer.direction_deg))),
-        worst_force_mn: rounded(worst(
-            &mut answers.iter().map(|answer| off_mn(answer).abs()),
-        )),
+        frames: all.len(),
+        direction_deg: rounded(mean(&direction, &all)),
+        strong_direction_deg: rounded(mean(&direction, &strong)),
+        force_rmse_mn: rounded(mean(&|answer| off_mn(answer).powi(2), &all).sqrt()),
+        place_rmse_um: rounded(1e3 * mean(&Answer::place_square, &strong).sqrt()),
+        worst_direction_deg: worst(&direction, &strong),
+        worst_force_mn: worst(&off_mn, &all),
+        unexplained: refused.len(),
+        looks: rounded(
+            judged
+                .iter()
+                .map(|answer| f64::from(answer.looks))
+                .sum::<f64>()
+                / judged.len() as f64,
+        ),
     })
 }
 

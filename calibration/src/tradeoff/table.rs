@@ -4,7 +4,7 @@ use std::fmt;
 
 use anyhow::Result;
 
-use super::costs::{Cost, Costs};
+use super::costs::{Behind, Cost, Costs};
 use super::plan::{Estimator, Numbers, SCANS, Scan, firmware_size, has_camera};
 use super::results::{Figures, Finished, Results};
 use crate::conditions::CentroidName;
@@ -29,6 +29,10 @@ pub struct Configuration {
     pub estimator: Estimator,
     /// How its numbers are held.
     pub numbers: Numbers,
+    /// Gauss–Newton steps from its answer, at the least; 0: it stands alone.
+    pub steps: u8,
+    /// How often the film is run forwards for a force, on average.
+    pub looks: f64,
     /// How the frame is looked at.
     pub scan: Scan,
     /// Mean angle between found and true force, degrees.
@@ -37,6 +41,10 @@ pub struct Configuration {
     pub strong_direction_deg: Mean,
     /// Root mean square error of |F|, mN.
     pub force_rmse_mn: Mean,
+    /// Root mean square error of each coordinate of the place from 50 mN up, µm.
+    pub place_rmse_um: Mean,
+    /// Frames that no single contact explains, in parts of those that are judged.
+    pub unexplained: f64,
     /// The worst over all seeds: direction from 50 mN up (degrees), |F| (mN).
     pub worst: [f64; 2],
     /// Cost on the chip; none of floats.
@@ -49,13 +57,15 @@ impl fmt::Display for Configuration {
             size: [width, height],
             estimator,
             numbers,
+            steps,
             scan,
             ..
         } = self;
         let centroid = words(self.centroid);
         write!(
             f,
-            "{estimator} ({numbers}) on {centroid} centroids of {width}×{height}, {scan} scan"
+            "{estimator} ({numbers}) with {steps} step{} on {centroid} centroids of {width}×{height}, {scan} scan",
+            if *steps == 1 { "" } else { "s" }
         )
     }
 }
@@ -109,20 +119,29 @@ pub fn configurations(results: &Results, costs: &Costs) -> Result<Vec<Configurat
     };
     for seeds in results.finished.chunk_by(same) {
         let task = &seeds[0].task;
-        for (i, (numbers, _)) in seeds[0].figures.iter().enumerate() {
-            let figures: Vec<Figures> = seeds.iter().map(|seed| seed.figures[i].1).collect();
+        for (i, (numbers, steps, _)) in seeds[0].figures.iter().enumerate() {
+            let figures: Vec<Figures> = seeds.iter().map(|seed| seed.figures[i].2).collect();
+            let looks = mean(&figures, |f| f.looks).value;
+            let behind = Behind {
+                estimator: &task.estimator,
+                numbers: *numbers,
+                looks,
+            };
             for scan in SCANS {
-                let which = (&task.estimator, *numbers);
-                let cost = costs.of(task.size, task.centroid, scan, which)?;
+                let cost = costs.of(task.size, task.centroid, scan, behind)?;
                 configurations.push(Configuration {
                     size: task.size,
                     centroid: task.centroid,
                     estimator: task.estimator.clone(),
                     numbers: *numbers,
+                    steps: *steps,
+                    looks,
                     scan,
                     direction_deg: mean(&figures, |f| f.direction_deg),
                     strong_direction_deg: mean(&figures, |f| f.strong_direction_deg),
                     force_rmse_mn: mean(&figures, |f| f.force_rmse_mn),
+                    place_rmse_um: mean(&figures, |f| f.place_rmse_um),
+                    unexplained: unexplained(&figures),
                     worst: [
                         largest(&figures, |f| f.worst_direction_deg),
                         largest(&figures, |f| f.worst_force_mn),
@@ -133,6 +152,12 @@ pub fn configurations(results: &Results, costs: &Costs) -> Result<Vec<Configurat
         }
     }
     Ok(configurations)
+}
+
+fn unexplained(figures: &[Figures]) -> f64 {
+    let refused: usize = figures.iter().map(|f| f.unexplained).sum();
+    let judged: usize = figures.iter().map(|f| f.frames + f.unexplained).sum();
+    refused as f64 / judged as f64
 }
 
 fn largest(figures: &[Figures], of: impl Fn(&Figures) -> f64) -> f64 {
@@ -166,6 +191,9 @@ mod tests {
             direction_deg: direction,
             strong_direction_deg: direction,
             force_rmse_mn: direction,
+            place_rmse_um: 100.0 * direction,
+            unexplained: 25,
+            looks: 2.0,
             worst_direction_deg: direction,
             worst_force_mn: direction,
         }
@@ -179,6 +207,7 @@ mod tests {
         // s = 0.1, over the square root of three.
         assert!((half_width.unwrap() - 4.303 * 0.1 / 3_f64.sqrt()).abs() < 1e-9);
         assert_eq!(mean(&three[..1], |f| f.direction_deg).half_width, None);
+        assert!((unexplained(&three) - 0.2).abs() < 1e-12);
         assert!((largest(&three, |f| f.worst_force_mn) - 1.1).abs() < 1e-12);
     }
 }

@@ -100,8 +100,9 @@ fn from_a_recording_to_a_model_for_the_unit() {
     }
     assert!(pressed > 1500, "{pressed}");
 
-    let closed = ["closed-form", "--data", "data.csv", "--out", "unit.weights"];
-    stdout(run(here, &closed, ""));
+    let train = ["train", "--data", "data.csv", "--out", "unit.weights"];
+    let fast = ["--hidden", "16", "--epochs", "10", "--rounded-epochs", "2"];
+    stdout(run(here, &[&train[..], &fast].concat(), ""));
     stdout(run(
         here,
         &["export", "--weights", "unit.weights", "--out", "unit.hvtm"],

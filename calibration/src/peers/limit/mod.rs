@@ -5,7 +5,7 @@
 //! a covariance below (JᵀΣ⁻¹J)⁻¹ (Cramér–Rao, for normal noise).
 
 mod bound;
-mod matrix;
+pub mod matrix;
 
 use anyhow::{Context, Result};
 use hivtac_scene::{Contact, Load, Scene};
@@ -14,10 +14,10 @@ use serde::Serialize;
 
 use super::frames::Frames;
 use super::models::Answers;
-use crate::closed_form::least_squares::solve;
 use crate::dataset::{Eye, Sensing};
 use crate::errors::{angle_deg, norm};
 use bound::{Bound, COORDINATES, Noise, bound, centroids, jacobian};
+use matrix::{dot, least_squares};
 
 /// Parts of the frames, by |F|.
 const PARTS: usize = 10;
@@ -115,7 +115,7 @@ fn scatter(looks: &[Look]) -> Result<Noise> {
     let a = |look: &Look| {
         let size = norm(look.force_n);
         let [x, y, _] = look.force_n;
-        vec![
+        [
             1.0,
             10.0 * size,
             30.0 * x,
@@ -127,11 +127,11 @@ fn scatter(looks: &[Look]) -> Result<Noise> {
     let mut left = vec![[0.0; COORDINATES]; looks.len()];
     let mut known = 0;
     for i in 0..COORDINATES {
-        let rows: Vec<_> = looks.iter().map(|l| (a(l), l.off_px[i], 1.0)).collect();
-        let x = solve(&rows)?;
+        let rows: Vec<_> = looks.iter().map(|l| (a(l), l.off_px[i])).collect();
+        let x = least_squares(&rows)?;
         known = x.len();
-        for (left, (a, off, _)) in left.iter_mut().zip(&rows) {
-            left[i] = off - a.iter().zip(&x).map(|(a, x)| a * x).sum::<f64>();
+        for (left, (a, off)) in left.iter_mut().zip(&rows) {
+            left[i] = off - dot(a, &x);
         }
     }
     Ok(covariance(&left, looks.len() - known))

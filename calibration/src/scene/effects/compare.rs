@@ -8,10 +8,10 @@ use crate::scene::eye::{Eye, Sight};
 use crate::scene::size::Size;
 
 /// Frames per second.
-const RATE: f64 = 30.0;
-/// From here on the tip of `demo` moves without jumps, s.
+const RATE: f64 = 12.0;
+/// From here on the tip of `sweep` presses, s.
 const PRESSED_S: f64 = 0.2;
-/// Decides where `demo` starts, and the noise.
+/// Decides the noise.
 const SEED: u64 = 1;
 
 /// The default sensor, and what is found in its frames.
@@ -72,7 +72,7 @@ impl Spread {
 
 impl Nominal {
     pub fn new(preset: Preset, size: Size, frames: u32) -> Result<Nominal> {
-        let noisy = Scene::preset("demo", preset, size.width, size.height, SEED)?;
+        let noisy = Scene::preset("sweep", preset, size.width, size.height, SEED)?;
         let silent = quiet(&noisy)?;
         Ok(Nominal {
             quiet: Seen::of(&silent, Eye::tared(&silent)?, frames, 0),

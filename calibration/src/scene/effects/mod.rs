@@ -24,7 +24,7 @@ pub struct EffectsArgs {
     /// Frame size, such as 320x240. Forces are measured where the default model fits: ov7725 at 320x240.
     #[arg(long, default_value = "320x240")]
     size: Size,
-    /// Frames of the scene `demo` for each effect, at 30 per second.
+    /// Frames of the scene `sweep` for each effect, at 12 per second.
     #[arg(long, default_value_t = 240, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     frames: u32,
     /// Print JSON.

@@ -1,0 +1,72 @@
+//! What the chip says of a row of a data set.
+
+use anyhow::Result;
+use hivtac_sensing::features::Features;
+use hivtac_sensing::force::{Force, Resting};
+use hivtac_sensing::markers::Marker;
+use hivtac_sensing::model::{Model, Rest};
+use hivtac_sensing::network::Network;
+use hivtac_sensing::status::Status;
+
+use crate::dataset::Observation;
+use crate::weights::features_from_q16;
+
+/// A model on the chip, with a rest position.
+pub struct Chip<'m> {
+    model: Model<'m>,
+    tare: Features,
+    resting: Option<Resting>,
+    network: Network,
+}
+
+impl<'m> Chip<'m> {
+    /// With the rest position of a data set.
+    ///
+    /// # Errors
+    /// When its features do not fit the chip's numbers.
+    pub fn new(model: Model<'m>, rest: &crate::weights::Rest) -> Result<Self> {
+        let tare = features_from_q16(&rest.features_q16)?;
+        let rest = Rest {
+            features: tare,
+            areas: rest.areas_px,
+        };
+        Ok(Self {
+            resting: Resting::of_model(&model, &rest),
+            model,
+            tare,
+            network: Network::new(),
+        })
+    }
+
+    /// The force that it says of what was seen, and how far to trust it.
+    ///
+    /// # Errors
+    /// When the features do not fit the chip's numbers.
+    pub fn force(&mut self, seen: &Observation) -> Result<(Force, Status)> {
+        let (force, status, _) = self.force_and_looks(seen)?;
+        Ok((force, status))
+    }
+
+    /// The same, and how often the film was run forwards for it: 0 by a model that takes no steps.
+    ///
+    /// # Errors
+    /// When the features do not fit the chip's numbers.
+    pub fn force_and_looks(&mut self, seen: &Observation) -> Result<(Force, Status, u8)> {
+        let features = features_from_q16(&seen.features_q16)?;
+        let output = self.network.run(&self.model, &features, &self.tare);
+        let forward = self.model.forward.as_ref().zip(self.resting.as_ref());
+        let Some((forward, resting)) = forward else {
+            let (force, status) = Force::of_outputs(&self.model, &output);
+            return Ok((force, status, 0));
+        };
+        let marker = |k: usize| {
+            let (x, y) = features.centroids[k];
+            let area = seen.areas_px[k];
+            Marker { x, y, area }
+        };
+        let markers = std::array::from_fn(marker);
+        let estimate = resting.estimate(forward, &markers, &output);
+        let (force, status) = resting.told(forward, &self.model.range, &estimate);
+        Ok((force, status, estimate.looks))
+    }
+}

@@ -1,0 +1,591 @@
+//! A unit's film and camera from a handful of known loads: least squares over the few numbers in which units differ, each drawn to
+//! its nominal value as strongly as building tolerances say.
+
+use std::fmt;
+
+use anyhow::{Result, ensure};
+use hivtac_scene::film::Film;
+use hivtac_scene::film::reduced::{NOMINAL_RADIUS_MM, Pose};
+use hivtac_scene::{Camera, Load, Preset};
+use hivtac_sensing::forward::{Column, Stiffness, solve};
+
+use super::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
+use super::{OwnUnit, Seen, ToleranceOf};
+
+/// A load that was put on, and what was seen of it.
+#[derive(Clone, Copy, Debug)]
+pub struct KnownLoad {
+    /// The force as the gauge or the weight tells it, N.
+    pub force_n: [f64; 3],
+    /// Where the stage says the tip is, mm.
+    pub place_mm: [f64; 2],
+    /// Where markers 0–3 were seen, mean of some frames, px.
+    pub seen_px: [[f64; 2]; 4],
+}
+
+/// What is known before there is a load.
+#[derive(Clone, Copy, Debug)]
+pub struct Bench {
+    /// The camera's nominal focal length, px.
+    pub focal_px: f64,
+    /// Where its axis meets the picture, px.
+    pub middle_px: [f64; 2],
+    /// Standard uncertainty of a marker's mean coordinates, px.
+    pub noise_px: f64,
+    /// That of |F|, N.
+    pub gauge_n: f64,
+    /// That of the stage's zero, mm.
+    pub stage_mm: f64,
+}
+
+/// A number in which units differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Number {
+    /// ln of Young's modulus over the nominal one, and of the thickness.
+    Stiffness,
+    Thickness,
+    /// A post's place along x or y, mm.
+    Post(usize, usize),
+    /// A marker's, mm.
+    Marker(usize, usize),
+    /// How far the camera is rolled, degrees; ln of its focal length over the nominal one; where the axis is, px.
+    Roll,
+    Focal,
+    Middle(usize),
+    /// The tip's radius, mm, and the stage's zero, mm.
+    TipRadius,
+    Stage(usize),
+    /// What the pixel grid does to a marker at rest, px.
+    Rest(usize, usize),
+    /// How much larger a load is than its gauge says, N.
+    Gauge(usize),
+}
+
+/// Standard deviations of the tip's radius, mm, and of what the pixel grid does at rest, px.
+const TIP_RADIUS_MM: f64 = 0.25;
+const REST_PX: f64 = 0.006;
+/// Steps of numbers, in parts of their standard deviations, to see what they do.
+const STEP: f64 = 0.02;
+/// Gauss–Newton steps at most, and the change of χ² that ends them.
+const ROUNDS: usize = 25;
+const SETTLED: f64 = 1e-4;
+/// Nothing is taken farther than so many standard deviations.
+const AT_MOST: f64 = 3.0;
+/// χ² of what is seen, over its degrees of freedom, of a fit that can be trusted.
+const TRUSTED: f64 = 3.0;
+
+/// What a fit found.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The unit.
+    pub unit: OwnUnit,
+    /// The tip's radius, mm.
+    pub tip_radius_mm: f64,
+    /// The stage's zero on the film, mm.
+    pub stage_mm: [f64; 2],
+    /// What a tare takes for the rest position less where markers rest, px.
+    pub rest_px: [[f64; 2]; 4],
+    /// Each number's name, value and standard uncertainty.
+    pub numbers: Vec<(String, f64, f64)>,
+    /// χ² over the degrees of freedom.
+    pub chi_square: f64,
+    /// What is still not known of the unit.
+    pub tolerance: ToleranceOf,
+}
+
+impl fmt::Display for Fit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |part: f64| 100.0 * (part - 1.0);
+        let (stiffer, thicker) = (percent(self.unit.stiffness), percent(self.unit.thickness));
+        let words = |percent: f64, more: &str, less: &str| {
+            let word = if percent < 0.0 { less } else { more };
+            format!("{:.1} % {word}", percent.abs())
+        };
+        writeln!(
+            f,
+            "the film is {} and {} than the nominal one",
+            words(stiffer, "stiffer", "softer"),
+            words(thicker, "thicker", "thinner")
+        )?;
+        writeln!(f, "χ² over its degrees of freedom: {:.2}", self.chi_square)?;
+        for (name, value, sigma) in &self.numbers {
+            writeln!(f, "{name:<40} {value:>9.4} ± {sigma:.4}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A unit's numbers, their standard deviations before, and loads to hold them against.
+struct Problem<'a> {
+    bench: &'a Bench,
+    rest_px: &'a [[f64; 2]; 4],
+    loads: &'a [KnownLoad],
+    numbers: Vec<(Number, f64)>,
+    camera: Camera,
+}
+
+/// Fits a unit to its rest position and to loads, from several starts.
+///
+/// # Errors
+/// When there are too few loads, or no start ends where the markers are explained: then something is not as it was said to be.
+pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Result<Fit> {
+    ensure!(
+        loads.len() >= 4,
+        "{} loads: at least 4 are needed, best ten, some tilted and some 2 to 3 mm off the middle",
+        loads.len()
+    );
+    let problem = Problem {
+        bench,
+        rest_px,
+        loads,
+        numbers: numbers(bench, loads.len()),
+        camera: Camera::new(Preset::Ov7725, 320, 240)?,
+    };
+    let mut best: Option<(f64, Vec<f64>)> = None;
+    for start in problem.starts() {
+        let (square, found) = problem.descend(start)?;
+        if best.as_ref().is_none_or(|(least, _)| square < *least) {
+            best = Some((square, found));
+        }
+    }
+    let (square, found) = best.unwrap_or_default();
+    let chi_square = square / (8 * loads.len() + 8) as f64;
+    ensure!(
+        chi_square <= TRUSTED,
+        "no unit explains these loads (χ² {chi_square:.1} over its degrees of freedom): check the forces, their directions and the \
+         tip's places"
+    );
+    problem.fitted(&found, chi_square)
+}
+
+fn numbers(bench: &Bench, loads: usize) -> Vec<(Number, f64)> {
+    let mut numbers = vec![
+        (Number::Stiffness, STIFFNESS),
+        (Number::Thickness, THICKNESS),
+        (Number::Roll, ROLL_DEG),
+        (Number::Focal, FOCAL),
+        (Number::TipRadius, TIP_RADIUS_MM),
+    ];
+    for axis in [0, 1] {
+        numbers.push((Number::Middle(axis), MIDDLE_PX));
+        numbers.push((Number::Stage(axis), bench.stage_mm));
+        for k in 0..4 {
+            numbers.push((Number::Post(k, axis), POST_MM));
+            numbers.push((Number::Marker(k, axis), MARKER_MM));
+            numbers.push((Number::Rest(k, axis), REST_PX));
+        }
+    }
+    numbers.extend((0..loads).map(|k| (Number::Gauge(k), bench.gauge_n)));
+    numbers
+}
+
+/// A unit as its numbers, in parts of their standard deviations, make it.
+struct Made {
+    unit: OwnUnit,
+    tip_radius_mm: f64,
+    stage_mm: [f64; 2],
+    middle_px: [f64; 2],
+    rest_px: [[f64; 2]; 4],
+    gauge_n: Vec<f64>,
+}
+
+impl Problem<'_> {
+    fn made(&self, parts: &[f64]) -> Made {
+        let mut made = Made {
+            unit: OwnUnit {
+                stiffness: 1.0,
+                thickness: 1.0,
+                grip: 1.0,
+                posts_mm: [[0.0; 2]; 4],
+                markers_mm: [[0.0; 2]; 4],
+                focal_px: self.bench.focal_px,
+                roll_deg: 0.0,
+            },
+            tip_radius_mm: NOMINAL_RADIUS_MM,
+            stage_mm: [0.0; 2],
+            middle_px: self.bench.middle_px,
+            rest_px: [[0.0; 2]; 4],
+            gauge_n: vec![0.0; self.loads.len()],
+        };
+        for ((number, sigma), part) in self.numbers.iter().zip(parts) {
+            let value = part * sigma;
+            match *number {
+                Number::Stiffness => made.unit.stiffness = libm::exp(value),
+                Number::Thickness => made.unit.thickness = libm::exp(value),
+                Number::Post(k, axis) => made.unit.posts_mm[k][axis] = value,
+                Number::Marker(k, axis) => made.unit.markers_mm[k][axis] = value,
+                Number::Roll => made.unit.roll_deg = value,
+                Number::Focal => made.unit.focal_px *= libm::exp(value),
+                Number::Middle(axis) => made.middle_px[axis] += value,
+                Number::TipRadius => {
+                    made.tip_radius_mm = (NOMINAL_RADIUS_MM + value).clamp(0.25, 2.0);
+                }
+                Number::Stage(axis) => made.stage_mm[axis] = value,
+                Number::Rest(k, axis) => made.rest_px[k][axis] = value,
+                Number::Gauge(k) => made.gauge_n[k] = value,
+            }
+        }
+        made.unit.thickness = made.unit.thickness.clamp(0.7, 1.3);
+        made.unit.stiffness = made.unit.stiffness.clamp(0.5, 2.0);
+        made
+    }
+
+    fn seen(&self, made: &Made) -> Seen<'_> {
+        Seen {
+            unit: made.unit.film(),
+            tip_radius_mm: made.tip_radius_mm,
+            camera: &self.camera,
+        }
+    }
+
+    /// What is seen less what should be, in parts of the noise: the rest position, then the loads.
+    fn residuals(&self, parts: &[f64]) -> Result<Vec<f64>> {
+        let made = self.made(parts);
+        let seen = self.seen(&made);
+        let film = Film::of(seen.unit)?;
+        let to_px = made.unit.to_px();
+        let mut residuals = Vec::new();
+        let mut add = |seen: [f64; 2], should: [f64; 2]| {
+            residuals.extend([0, 1].map(|i| (seen[i] - should[i]) / self.bench.noise_px));
+        };
+        for k in 0..4 {
+            let at = to_px(self.at_rest(&film, k));
+            let off = made.rest_px[k];
+            let should = [0, 1].map(|i| made.middle_px[i] + at[i] + off[i]);
+            add(self.rest_px[k], should);
+        }
+        for (number, load) in self.loads.iter().enumerate() {
+            let pose = self.pose(load, &made, number)?;
+            for k in 0..4 {
+                let moved = to_px(seen.moved_by(&film, &pose, k)?);
+                let should = [0, 1].map(|i| self.rest_px[k][i] - made.rest_px[k][i] + moved[i]);
+                add(load.seen_px[k], should);
+            }
+        }
+        Ok(residuals)
+    }
+
+    /// Where a marker is seen at rest, focal lengths from the axis.
+    fn at_rest(&self, film: &Film, marker: usize) -> [f64; 2] {
+        let [x, y] = film.markers()[marker].centroid_px(|_| [0.0; 3], &self.camera);
+        let middle =
+            [self.camera.width(), self.camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
+        [x - middle[0], y - middle[1]].map(|part| part / self.camera.focal_px())
+    }
+
+    fn pose(&self, load: &KnownLoad, made: &Made, number: usize) -> Result<Load> {
+        let told_n = crate::errors::norm(load.force_n);
+        let larger = 1.0 + made.gauge_n[number] / told_n;
+        let place_mm = [0, 1].map(|i| load.place_mm[i] + made.stage_mm[i]);
+        Ok(Load::from_vector(load.force_n.map(|part| larger * part))?
+            .with_offset_mm(place_mm)?
+            .with_tip_radius_mm(made.tip_radius_mm)?)
+    }
+
+    /// As tolerances have it; with a thicker, softer film; with a thinner, stiffer one.
+    fn starts(&self) -> [Vec<f64>; 3] {
+        [0.0, 1.5, -1.5].map(|thicker| {
+            let part = |number: &Number| match number {
+                Number::Thickness => thicker,
+                Number::Stiffness => -1.5 * thicker,
+                _ => 0.0,
+            };
+            self.numbers
+                .iter()
+                .map(|(number, _)| part(number))
+                .collect()
+        })
+    }
+
+    /// Gauss–Newton steps, each shortened until χ² falls; ends where it falls no more.
+    fn descend(&self, mut parts: Vec<f64>) -> Result<(f64, Vec<f64>)> {
+        let mut residuals = self.residuals(&parts)?;
+        let mut square = self.square(&residuals, &parts);
+        for _ in 0..ROUNDS {
+            let (_, step) = self.solve(&parts, &residuals)?;
+            let mut fell = false;
+            for length in [1.0, 0.5, 0.2, 0.05] {
+                let there = parts.iter().zip(&step);
+                let there =
+                    there.map(|(part, step)| (part + length * step).clamp(-AT_MOST, AT_MOST));
+                let there: Vec<f64> = there.collect();
+                let other = self.residuals(&there)?;
+                let other_square = self.square(&other, &there);
+                if other_square < square {
+                    fell = square - other_square > SETTLED;
+                    (parts, residuals, square) = (there, other, other_square);
+                    break;
+                }
+            }
+            if !fell {
+                break;
+            }
+        }
+        Ok((square, parts))
+    }
+
+    /// χ²: what is seen, and how far the numbers are from their nominal values.
+    fn square(&self, residuals: &[f64], parts: &[f64]) -> f64 {
+        residuals.iter().chain(parts).map(|part| part * part).sum()
+    }
+
+    /// The covariance of the numbers, in parts of their standard deviations before, and the step to where they explain most.
+    fn solve(&self, parts: &[f64], residuals: &[f64]) -> Result<(Vec<Vec<f64>>, Vec<f64>)> {
+        let mut columns = Vec::new();
+        for k in 0..parts.len() {
+            let mut there = parts.to_vec();
+            there[k] += STEP;
+            let other = self.residuals(&there)?;
+            let slope = other.iter().zip(residuals).map(|(a, b)| (a - b) / STEP);
+            columns.push(slope.collect::<Vec<f64>>());
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let entry =
+            |i: usize, j: usize| dot(&columns[i], &columns[j]) + f64::from(u8::from(i == j));
+        let count = parts.len();
+        let matrix = (0..count).map(|i| (0..count).map(|j| entry(i, j)).collect());
+        let covariance = inverse(matrix.collect())?;
+        let side: Vec<f64> = (0..count)
+            .map(|i| -dot(&columns[i], residuals) - parts[i])
+            .collect();
+        let step = covariance.iter().map(|row| dot(row, &side)).collect();
+        Ok((covariance, step))
+    }
+
+    fn fitted(&self, parts: &[f64], chi_square: f64) -> Result<Fit> {
+        let residuals = self.residuals(parts)?;
+        let (covariance, _) = self.solve(parts, &residuals)?;
+        let made = self.made(parts);
+        let told = self.numbers.iter().zip(parts).enumerate();
+        let numbers = told.map(|(k, ((number, sigma), part))| {
+            (
+                number.name(),
+                sigma * part,
+                sigma * covariance[k][k].max(0.0).sqrt(),
+            )
+        });
+        Ok(Fit {
+            unit: made.unit,
+            tip_radius_mm: made.tip_radius_mm,
+            stage_mm: made.stage_mm,
+            rest_px: made.rest_px,
+            numbers: numbers.collect(),
+            chi_square,
+            tolerance: self.tolerance(parts, &covariance)?,
+        })
+    }
+}
+
+/// Loads at which it is seen what is not known of a unit: their |F|, N, and places, mm.
+const TRIED_N: [f64; 3] = [0.05, 0.1, 0.2];
+const TRIED_MM: [[f64; 2]; 5] = [
+    [0.0, 0.0],
+    [3.0, 1.0],
+    [-1.0, 3.0],
+    [-3.0, -2.0],
+    [2.0, -3.0],
+];
+
+/// Sums of squares of what loads would be off by: their direction, rad, |F|, in parts of it, and place, mm.
+#[derive(Default)]
+struct Off {
+    direction: f64,
+    force: f64,
+    place: f64,
+}
+
+impl Off {
+    /// Of unknowns of a solved load: size, tilt, place.
+    fn add(&mut self, off: impl Fn(usize) -> f64, at: &Tried) {
+        self.direction += off(1).powi(2) + off(2).powi(2);
+        self.force += (at.per_size * off(0)).powi(2);
+        self.place += off(3).powi(2) + off(4).powi(2);
+    }
+}
+
+impl Problem<'_> {
+    /// How far loads would be off by what the fit leaves open, beside how far they would be by a displacement of the markers that is
+    /// wrong by a part of itself.
+    fn tolerance(&self, parts: &[f64], covariance: &[Vec<f64>]) -> Result<ToleranceOf> {
+        let spread = cholesky(covariance.to_vec())?;
+        let tried = self.tried(parts)?;
+        let (mut left_open, mut by_shape) = (Off::default(), Off::default());
+        for k in 0..parts.len() {
+            let there = parts.iter().zip(&spread);
+            let there: Vec<f64> = there.map(|(part, row)| part + row[k]).collect();
+            let film = Moving::new(self, &there)?;
+            for at in &tried {
+                let moved = film.moved(&film.pose(at.force_n, at.place_mm))?;
+                let off: Column = std::array::from_fn(|i| (moved[i] - at.moved[i]) as f32);
+                if let Some(solved) = solve(at.slopes, off) {
+                    left_open.add(|k| solved.unknowns[k].into(), at);
+                }
+            }
+        }
+        for at in &tried {
+            let sigma: Column = std::array::from_fn(|i| {
+                let [x, y] = [at.moved[i & !1], at.moved[i | 1]];
+                x.hypot(y) as f32
+            });
+            let weigh = |column: Column| std::array::from_fn(|i| column[i] / sigma[i]);
+            if let Some(solved) = solve(at.slopes.map(weigh), [0.0; 8]) {
+                by_shape.add(|k| f64::from(solved.covariance(k, k)).sqrt(), at);
+            }
+        }
+        let shape =
+            (left_open.direction / by_shape.direction).max(left_open.place / by_shape.place);
+        Ok(ToleranceOf {
+            shape: shape.sqrt(),
+            stiffness: (left_open.force / tried.len() as f64).sqrt(),
+        })
+    }
+
+    /// The loads that are tried on a unit.
+    fn tried(&self, parts: &[f64]) -> Result<Vec<Tried>> {
+        let film = Moving::new(self, parts)?;
+        let mut all = Vec::new();
+        for force_n in TRIED_N {
+            for place_mm in TRIED_MM {
+                all.push(film.tried(force_n, place_mm)?);
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// A load that is tried: how the unit's markers move under it, px, and what that changes by.
+struct Tried {
+    force_n: f64,
+    place_mm: [f64; 2],
+    moved: [f64; 8],
+    /// By the unknowns of a solved load: size, tilt, place.
+    slopes: [Column; 5],
+    /// How much of |F| a change of the size by one is.
+    per_size: f64,
+}
+
+/// How the markers of a unit move.
+struct Moving<'a> {
+    unit: OwnUnit,
+    seen: Seen<'a>,
+    film: Film,
+}
+
+impl<'a> Moving<'a> {
+    fn new(problem: &'a Problem, parts: &[f64]) -> Result<Self> {
+        let made = problem.made(parts);
+        let seen = problem.seen(&made);
+        Ok(Self {
+            film: Film::of(seen.unit)?,
+            seen,
+            unit: made.unit,
+        })
+    }
+
+    /// The pose of a force straight into the film.
+    fn pose(&self, force_n: f64, place_mm: [f64; 2]) -> Pose {
+        Pose::of_force([0.0, 0.0, -force_n], place_mm, self.seen.stiffness_n())
+    }
+
+    /// x and y of markers 0–3, px.
+    fn moved(&self, pose: &Pose) -> Result<[f64; 8]> {
+        let to_px = self.unit.to_px();
+        let mut moved = [0.0; 8];
+        for (marker, place) in moved.chunks_exact_mut(2).enumerate() {
+            place.copy_from_slice(&to_px(self.seen.moved(&self.film, pose, marker)?));
+        }
+        Ok(moved)
+    }
+
+    fn tried(&self, force_n: f64, place_mm: [f64; 2]) -> Result<Tried> {
+        let pose = self.pose(force_n, place_mm);
+        let [linear_n, cubic_n] = self.seen.stiffness_n().map(|part| part as f32);
+        let stiffness = Stiffness { linear_n, cubic_n };
+        let size = pose.size as f32;
+        Ok(Tried {
+            force_n,
+            place_mm,
+            moved: self.moved(&pose)?,
+            slopes: slopes(&pose, |pose| self.moved(pose))?,
+            per_size: (stiffness.per_size_n(size) / stiffness.magnitude_n(size)).into(),
+        })
+    }
+}
+
+/// By central differences.
+fn slopes(pose: &Pose, moved: impl Fn(&Pose) -> Result<[f64; 8]>) -> Result<[Column; 5]> {
+    const STEP: f64 = 1e-3;
+    let mut slopes = [[0.0; 8]; 5];
+    for (k, column) in slopes.iter_mut().enumerate() {
+        let beside = |step: f64| {
+            let mut pose = *pose;
+            match k {
+                0 => pose.size += step,
+                1 | 2 => pose.tilt[k - 1] += step,
+                _ => pose.place_mm[k - 3] += step,
+            }
+            moved(&pose)
+        };
+        let (less, more) = (beside(-STEP)?, beside(STEP)?);
+        *column = std::array::from_fn(|i| ((more[i] - less[i]) / (2.0 * STEP)) as f32);
+    }
+    Ok(slopes)
+}
+
+impl Number {
+    fn name(self) -> String {
+        let along = |axis: usize| ["x", "y"][axis];
+        match self {
+            Number::Stiffness => "film's stiffness, ln".into(),
+            Number::Thickness => "film's thickness, ln".into(),
+            Number::Post(k, axis) => format!("post {k}, {}, mm", along(axis)),
+            Number::Marker(k, axis) => format!("marker {k}, {}, mm", along(axis)),
+            Number::Roll => "camera's roll, °".into(),
+            Number::Focal => "focal length, ln".into(),
+            Number::Middle(axis) => format!("optical axis, {}, px", along(axis)),
+            Number::TipRadius => "tip's radius less 0.5 mm".into(),
+            Number::Stage(axis) => format!("stage's zero, {}, mm", along(axis)),
+            Number::Rest(k, axis) => format!("pixel grid at rest, marker {k}, {}, px", along(axis)),
+            Number::Gauge(k) => format!("load {k} beyond its gauge, N"),
+        }
+    }
+}
+
+/// The factor L of a symmetric matrix L·Lᵀ that is positive definite; what is above its diagonal means nothing.
+fn cholesky(mut matrix: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
+    let count = matrix.len();
+    for i in 0..count {
+        for j in 0..=i {
+            let known: f64 = (0..j).map(|k| matrix[i][k] * matrix[j][k]).sum();
+            let left = matrix[i][j] - known;
+            matrix[i][j] = if i == j {
+                left.sqrt()
+            } else {
+                left / matrix[j][j]
+            };
+        }
+        ensure!(
+            matrix[i][i] > 0.0,
+            "the loads do not tell the unit's numbers"
+        );
+        matrix[i][i + 1..].fill(0.0);
+    }
+    Ok(matrix)
+}
+
+/// Of a symmetric matrix that is positive definite.
+fn inverse(matrix: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
+    let (count, matrix) = (matrix.len(), cholesky(matrix)?);
+    // Columns of the factor's inverse, then their products.
+    let mut columns = vec![vec![0.0; count]; count];
+    for (k, column) in columns.iter_mut().enumerate() {
+        for i in k..count {
+            let known: f64 = (k..i).map(|j| matrix[i][j] * column[j]).sum();
+            column[i] = (f64::from(u8::from(i == k)) - known) / matrix[i][i];
+        }
+    }
+    let product = |i: usize, j: usize| columns[i].iter().zip(&columns[j]).map(|(a, b)| a * b).sum();
+    Ok((0..count)
+        .map(|i| (0..count).map(|j| product(i, j)).collect())
+        .collect())
+}

@@ -1,0 +1,126 @@
+//! A unit's own model from a data set of a handful of loads.
+
+use anyhow::{Context, Result, ensure};
+
+use super::{Bench, FilmModel, Fit, KnownLoad, fit};
+use crate::dataset::{Dataset, Observation};
+use crate::weights::{Rest, Weights};
+
+/// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is left of noise.
+const MEAN_PX: f64 = 0.009;
+/// More loads than this tell nothing that fewer do not, and take long.
+const MOST_LOADS: usize = 40;
+
+impl Weights {
+    /// These weights for the unit that a data set shows: its rest position, and its film and camera as its loads tell them.
+    ///
+    /// `gauge_n` and `stage_mm` are the standard uncertainties of the loads' |F|, N, and of the stage's zero, mm.
+    ///
+    /// # Errors
+    /// When the data set has other conditions, or as with [`Self::fitted`].
+    pub fn for_unit(
+        self,
+        dataset: &Dataset,
+        gauge_n: f64,
+        stage_mm: f64,
+    ) -> Result<(Weights, Fit)> {
+        let [own, other] = [&self.conditions, &dataset.about.conditions];
+        ensure!(
+            own.to_model()?.geometry == other.to_model()?.geometry
+                && own.centroid == other.centroid,
+            "the weights are for other frames than the data set's"
+        );
+        let origin = other.origin.clone();
+        let (mut weights, found) =
+            self.fitted(dataset.rest()?, &loads(dataset)?, gauge_n, stage_mm)?;
+        weights.conditions.origin = origin;
+        weights.check()?;
+        Ok((weights, found))
+    }
+
+    /// These weights for the unit that rests so and answers loads so.
+    ///
+    /// # Errors
+    /// When the weights have no film, there are fewer than 4 loads, or no unit explains them.
+    pub fn fitted(
+        mut self,
+        rest: Rest,
+        loads: &[KnownLoad],
+        gauge_n: f64,
+        stage_mm: f64,
+    ) -> Result<(Weights, Fit)> {
+        let film = self.film.take();
+        let film =
+            film.context("the weights have no film: make them with `hivtac-calibrate film`")?;
+        let camera = self.conditions.camera()?;
+        let bench = Bench {
+            focal_px: camera.focal_px(),
+            middle_px: [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0),
+            noise_px: MEAN_PX,
+            gauge_n,
+            stage_mm,
+        };
+        let found = fit(&bench, &places(&rest.features_px()), loads)?;
+        self.film = Some(FilmModel {
+            tip_radius_mm: found.tip_radius_mm,
+            rest_px: found.rest_px,
+            own: found.tolerance,
+            unit: Some(found.unit.clone()),
+            ..film
+        });
+        self.rest = rest;
+        Ok((self, found))
+    }
+}
+
+/// The loads of a data set: rows of the same force at the same place are frames of one. Where
+/// nobody noted places, the tip was set on the film's middle.
+fn loads(dataset: &Dataset) -> Result<Vec<KnownLoad>> {
+    let mut loads: Vec<(KnownLoad, f64)> = Vec::new();
+    for sample in dataset.samples() {
+        if sample.force_n == [0.0; 3] {
+            continue;
+        }
+        let place_mm = sample.tip_mm.unwrap_or_default();
+        let same = |(load, _): &&mut (KnownLoad, f64)| {
+            load.force_n == sample.force_n && load.place_mm == place_mm
+        };
+        let seen_px = seen(sample.seen);
+        match loads.iter_mut().find(same) {
+            Some((load, frames)) => {
+                *frames += 1.0;
+                for (mean, now) in load
+                    .seen_px
+                    .as_flattened_mut()
+                    .iter_mut()
+                    .zip(seen_px.as_flattened())
+                {
+                    *mean += (now - *mean) / *frames;
+                }
+            }
+            None => loads.push((
+                KnownLoad {
+                    force_n: sample.force_n,
+                    place_mm,
+                    seen_px,
+                },
+                1.0,
+            )),
+        }
+    }
+    ensure!(
+        loads.len() <= MOST_LOADS,
+        "{} different loads: use at most {MOST_LOADS}, several frames of each",
+        loads.len()
+    );
+    Ok(loads.into_iter().map(|(load, _)| load).collect())
+}
+
+fn seen(observation: &Observation) -> [[f64; 2]; 4] {
+    places(&observation.features_px())
+}
+
+/// Markers 0–3 of a frame's features.
+fn places(features_px: &[f64]) -> [[f64; 2]; 4] {
+    std::array::from_fn(|k| [features_px[2 * k], features_px[2 * k + 1]])
+}
