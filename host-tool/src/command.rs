@@ -1,4 +1,4 @@
-//! `hivtac tare` and `hivtac threshold`: one command each.
+//! `hivtac tare`, `hivtac threshold` and `hivtac expose`: one command each.
 
 use crate::output::{note, print};
 use hivtac_host::failure::{Failure, Kind};
@@ -20,6 +20,13 @@ pub fn tare(address: &Address, patience: Duration, frames: u16) -> Result<(), Fa
     let (mut link, _) = Link::connect(address, patience)?;
     send(&mut link, Request::Tare { frames }, wait)?;
     print(&format!("tare taken over {frames} frames")).map(|_| ())
+}
+
+/// Has exposure and gain found anew for the light that there is.
+pub fn expose(address: &Address, patience: Duration) -> Result<(), Failure> {
+    let (mut link, _) = Link::connect(address, patience)?;
+    send(&mut link, Request::Expose, patience)?;
+    print("exposure and gain found; take a new tare").map(|_| ())
 }
 
 /// Sets the threshold until the device restarts: this one, or when none is given that of its model.

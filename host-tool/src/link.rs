@@ -230,6 +230,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::SetThreshold(_) => "set threshold",
         Request::Tare { .. } => "tare",
         Request::StartWithMarkers => "start with markers",
+        Request::Expose => "expose",
     }
 }
 

@@ -74,6 +74,13 @@ enum Command {
         #[command(flatten)]
         wanted: WantedThreshold,
     },
+    /// Let the camera find exposure and gain for the light that there is, and keep them
+    ///
+    /// It does so by itself when it starts.
+    Expose {
+        #[command(flatten)]
+        device: Device,
+    },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
     /// PNG, JPEG or PPM, up to 800 × 800 px. Eight bits a channel are rounded to RGB565, which is what the sensor's
@@ -232,6 +239,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Tare { device, frames } => {
             command::tare(&device.address(), device.timeout, frames)
         }
+        Command::Expose { device } => command::expose(&device.address(), device.timeout),
         Command::Threshold { device, wanted } => {
             command::threshold(&device.address(), device.timeout, wanted.threshold())
         }

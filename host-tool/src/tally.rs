@@ -248,8 +248,9 @@ impl fmt::Display for DeviceCounts {
             f,
             "device: {exposed} frames exposed, {processed} processed; dropped: busy {busy}, overrun {overrun}, \
              size {size}, USB {usb}; tracked {tracked}, lost {lost} times; camera timeouts {timeouts}, restarts {restarts}, \
-             overruns {overruns}; commands rejected {rejected}; last frame took {} µs",
-            last.processing_us
+             overruns {overruns}; commands rejected {rejected}; last frame took {} µs, its sample was ready {} µs after the middle of \
+             its exposure",
+            last.processing_us, last.latency_us
         )
     }
 }

@@ -15,6 +15,7 @@ fn info_for_a_person() {
             dropped_busy: 7,
             usb_dropped: 3,
             processing_us: 5300,
+            latency_us: 4800,
             uptime_us: 34_000_000,
             ..Stats::default()
         };
@@ -38,7 +39,7 @@ fn info_for_a_person() {
              camera     0 timeouts, 0 restarts, 0 overruns\n\
              tracking   0 frames by the markers' surroundings alone, lost 0 times\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\
-             time       up 34.000 s; last frame took 5300 µs\n",
+             time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n",
             device.port
         )
     );
@@ -164,6 +165,19 @@ fn ports_that_cannot_be_opened_are_named() {
         "{}",
         nobody.stderr
     );
+}
+
+#[test]
+fn an_exposure_is_asked_for() {
+    let script: Script = Box::new(|device| device.serve());
+    let device = FakeDevice::on_tcp([script]);
+    let done = run(&["expose", "--port", &device.port]);
+    assert_eq!(
+        (done.code, done.stdout.as_str()),
+        (Some(0), "exposure and gain found; take a new tare\n")
+    );
+    let commands: Vec<_> = device.commands.iter().collect();
+    assert_eq!(commands, [Request::Expose]);
 }
 
 #[test]

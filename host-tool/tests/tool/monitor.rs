@@ -31,7 +31,7 @@ fn json_lines_and_a_summary_on_standard_error() {
          lost: 0 samples on the way (gaps in the sequence), 0 frames not processed (gaps in the frame number); \
          rejected here: 0 messages, 0 bytes\n\
          device: 0 frames exposed, 0 processed; dropped: busy 0, overrun 0, size 0, USB 0; \
-         tracked 0, lost 0 times; camera timeouts 0, restarts 0, overruns 0; commands rejected 0; last frame took 0 µs\n\
+         tracked 0, lost 0 times; camera timeouts 0, restarts 0, overruns 0; commands rejected 0; last frame took 0 µs, its sample was ready 0 µs after the middle of its exposure\n\
          without a force: 1 (markers_missing 1)\n"
     );
     assert_eq!(run.code, Some(0));
@@ -111,6 +111,7 @@ fn losses_are_counted_by_cause() {
             frames_tracked: 4,
             tracking_lost: 1,
             processing_us: 5300,
+            latency_us: 4800,
             uptime_us: 20,
             ..Stats::default()
         };
@@ -124,7 +125,7 @@ fn losses_are_counted_by_cause() {
          lost: 2 samples on the way (gaps in the sequence), 2 frames not processed (gaps in the frame number); \
          rejected here: 2 messages, 26 bytes (overlong 0, cobs 1, crc 1, body 0, trailing 0)\n\
          device: 7 frames exposed, 5 processed; dropped: busy 2, overrun 0, size 0, USB 2; \
-         tracked 4, lost 1 times; camera timeouts 1, restarts 0, overruns 0; commands rejected 0; last frame took 5300 µs\n"
+         tracked 4, lost 1 times; camera timeouts 1, restarts 0, overruns 0; commands rejected 0; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n"
     );
     assert_eq!(run.code, Some(0));
 }
