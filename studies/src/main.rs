@@ -1,11 +1,25 @@
-//! `hivtac-studies`: the project's own numbers beside those of programs that nobody here wrote.
+//! `hivtac-studies`: what only proves or compares: the project's numbers beside what is possible, on units drawn at random, and
+//! beside programs that nobody here wrote.
 
+mod anywhere;
 mod calculix;
+mod convergence;
+mod coverage;
+mod large;
+mod maps;
+mod page;
+mod paper;
+mod press;
+mod tangential;
+mod tips;
+mod touches;
+mod units;
+mod unseen;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
-/// The project's own numbers beside those of programs that nobody here wrote.
+/// What only proves or compares: each study writes its page under docs/results.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -15,14 +29,45 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Press anywhere within ±4 mm and hold the errors against the Cramér–Rao bound.
+    Anywhere(anywhere::Anywhere),
     /// Press the film in CalculiX, too, and compare markers and tip. Needs the program `ccx`.
     Calculix(calculix::Calculix),
+    /// Follow Gauss–Newton steps from many starts to contacts all over the film.
+    Convergence(convergence::Convergence),
+    /// Ask in every tenth of |F| and of the distance from the middle whether stated uncertainties
+    /// hold.
+    Coverage(coverage::Coverage),
+    /// Make a model for frames of 800×600, and hold its errors against the Cramér–Rao bound.
+    Large(large::Large),
+    /// Train the paper's network with the place as two more outputs, and judge it beside ours.
+    Paper(paper::Paper),
+    /// Press with a tangential force to 0.8 of the normal one.
+    Tangential(tangential::Tangential),
+    /// Press with tips of other sizes than the model believes in.
+    Tips(tips::Tips),
+    /// Press with two tips at once, and with flat faces, by the film's full solver.
+    Touches(touches::Touches),
+    /// Displace one marker and see what the residual does not tell.
+    Unseen(unseen::Unseen),
+    /// Draw units as people build them; measure them with a tare alone, and after ten loads.
+    Units(units::Units),
 }
 
 fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
     match Cli::parse().command {
+        Command::Anywhere(study) => study.run(),
         Command::Calculix(study) => study.run(),
+        Command::Convergence(study) => study.run(),
+        Command::Coverage(study) => study.run(),
+        Command::Large(study) => study.run(),
+        Command::Paper(study) => study.run(),
+        Command::Tangential(study) => study.run(),
+        Command::Tips(study) => study.run(),
+        Command::Touches(study) => study.run(),
+        Command::Unseen(study) => study.run(),
+        Command::Units(study) => study.run(),
     }
 }

@@ -1,0 +1,213 @@
+//! The paper's pipeline with the place as two more outputs, beside ours, on the same frames of
+//! 800×600.
+
+use anyhow::{Result, anyhow};
+use clap::Args;
+use hivtac_calibration::answer::Chip;
+use hivtac_calibration::conditions::CentroidName;
+use hivtac_calibration::dataset::{Dataset, Observation, Split};
+use hivtac_calibration::errors::{angle_deg, norm};
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::{Arithmetic, Meaning};
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options as Training;
+use hivtac_sensing::model::Model;
+use hivtac_sensing::status::Status;
+use serde::Serialize;
+
+use crate::large::{Large, dataset};
+use crate::page;
+use crate::press::{FORCES_MN, REACH_MM};
+
+/// The seed of the frames that are judged.
+const TEST_SEED: u64 = 77;
+/// Frames within this of a force, in parts of it, count for it.
+const NEAR: f64 = 0.2;
+
+/// Train the paper's network on the paper's centroids, force and place, and judge it beside ours on
+/// the same frames.
+#[derive(Args)]
+pub struct Paper {
+    /// Frames that networks are trained on.
+    #[arg(long, default_value_t = 8000)]
+    frames: usize,
+    /// Passes of the paper's network over them; the paper's has 100.
+    #[arg(long, default_value_t = 40)]
+    epochs: usize,
+    /// Frames that are judged.
+    #[arg(long, default_value_t = 2000)]
+    judged: usize,
+    /// Print one JSON object and write no page.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A force and the place of its tip, N and mm.
+type Answer = ([f64; 3], [f64; 2]);
+
+/// A frame's truth and what a pipeline says; `None` when it refuses.
+struct Judged {
+    truth: Answer,
+    found: Option<Answer>,
+}
+
+/// Root mean squares near a force.
+#[derive(Serialize)]
+struct Row {
+    pipeline: &'static str,
+    force_mn: u32,
+    direction_deg: f64,
+    magnitude_mn: f64,
+    /// Of each coordinate.
+    place_um: f64,
+    frames: u32,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    rows: Vec<Row>,
+}
+
+impl Paper {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// When frames cannot be rendered, training fails, or the page cannot be written.
+    pub fn run(&self) -> Result<()> {
+        let theirs = self.theirs()?;
+        let ours = self.ours()?;
+        // Frames that either refuses count for neither.
+        let both: Vec<(&Judged, &Judged)> = (theirs.iter().zip(&ours))
+            .filter(|(theirs, ours)| theirs.found.is_some() && ours.found.is_some())
+            .collect();
+        let of_theirs: Vec<&Judged> = both.iter().map(|(theirs, _)| *theirs).collect();
+        let of_ours: Vec<&Judged> = both.iter().map(|(_, ours)| *ours).collect();
+        let mut rows = Vec::new();
+        for (pipeline, judged) in [("the paper's", of_theirs), ("ours", of_ours)] {
+            rows.extend(FORCES_MN.map(|force_mn| Row::of(pipeline, force_mn, &judged)));
+        }
+        if self.json {
+            println!("{}", serde_json::to_string(&Report { rows })?);
+            return Ok(());
+        }
+        let mut text = String::from(
+            "| pipeline | force | direction, rms | \\|F\\|, rms | place, rms | frames |\n|---|--:|--:|--:|--:|--:|\n",
+        );
+        text.extend(rows.iter().map(Row::line));
+        let refused = |all: &[Judged]| all.iter().filter(|one| one.found.is_none()).count();
+        text += &format!(
+            "\nOf {} frames, the paper's pipeline refused {}, ours {}.\n",
+            theirs.len(),
+            refused(&theirs),
+            refused(&ours)
+        );
+        print!("{text}");
+        page::write("paper.md", include_str!("paper.md"), &text)
+    }
+
+    /// Plain means of masks, and a network of three layers of 512 in floats.
+    fn theirs(&self) -> Result<Vec<Judged>> {
+        let training = dataset(CentroidName::BinaryMask, self.frames, 1)?;
+        let options = Training {
+            hidden: vec![512; 3],
+            meaning: Meaning::ForceAndPlace,
+            arithmetic: Arithmetic::Int16,
+            epochs: self.epochs,
+            rounded_epochs: 0,
+            learning_rate: 1e-3,
+            batch: 64,
+            whitened: false,
+            ..Training::default()
+        };
+        let weights = fit(&training, Split::default(), &options, |_| ())?.weights;
+        let test = dataset(CentroidName::BinaryMask, self.judged, TEST_SEED)?;
+        Ok(judged(&test, |row| {
+            let features = row.features_px();
+            let place_mm = weights.network.place_mm(&features)?;
+            Some((weights.network.force_n(&features), place_mm))
+        }))
+    }
+
+    /// Weighted centroids, a small network and steps, as the chip computes them.
+    fn ours(&self) -> Result<Vec<Judged>> {
+        let large = Large {
+            frames: self.frames,
+            presses: 0,
+            json: false,
+        };
+        let bytes = export(&large.weights()?)?;
+        let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+        let test = dataset(CentroidName::RednessWeighted, self.judged, TEST_SEED)?;
+        let mut chip = Chip::new(model, &test.rest()?)?;
+        Ok(judged(&test, |row| {
+            let (force, status) = chip.force(row).ok()?;
+            let place = force.place?;
+            let force_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+            let place_mm = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
+            (!status.contains(Status::UNEXPLAINED)).then_some((force_n, place_mm))
+        }))
+    }
+}
+
+/// What is said of the frames with a press.
+fn judged(dataset: &Dataset, mut says: impl FnMut(&Observation) -> Option<Answer>) -> Vec<Judged> {
+    let pressed = dataset
+        .rows
+        .iter()
+        .filter_map(|row| Some((row, row.tip_mm?)));
+    let judge = pressed.map(|(row, tip_mm)| Judged {
+        truth: (row.force_n, tip_mm),
+        found: row.seen.as_ref().ok().and_then(&mut says),
+    });
+    judge.collect()
+}
+
+impl Row {
+    fn of(pipeline: &'static str, force_mn: u32, judged: &[&Judged]) -> Row {
+        let around_n = f64::from(force_mn) * 1e-3;
+        let (mut squares, mut frames) = ([0.0; 3], 0);
+        for one in judged {
+            let (force_n, place_mm) = one.truth;
+            let Some((found_n, found_mm)) = one.found else {
+                continue;
+            };
+            let size_n = norm(force_n);
+            let is_inside = place_mm.iter().all(|part| part.abs() <= REACH_MM);
+            if !is_inside || (size_n - around_n).abs() > NEAR * around_n {
+                continue;
+            }
+            let errors = [
+                angle_deg(found_n, force_n).unwrap_or(180.0),
+                1e3 * (norm(found_n) - size_n),
+                1e3 * (found_mm[0] - place_mm[0]).hypot(found_mm[1] - place_mm[1]),
+            ];
+            for (square, error) in squares.iter_mut().zip(errors) {
+                *square += error * error;
+            }
+            frames += 1;
+        }
+        let [direction_deg, magnitude_mn, far_um] =
+            squares.map(|square| (square / f64::from(frames)).sqrt());
+        Row {
+            pipeline,
+            force_mn,
+            direction_deg,
+            magnitude_mn,
+            place_um: far_um / std::f64::consts::SQRT_2,
+            frames,
+        }
+    }
+
+    fn line(&self) -> String {
+        format!(
+            "| {} | {} mN | {:.3}° | {:.3} mN | {:.1} µm | {} |\n",
+            self.pipeline,
+            self.force_mn,
+            self.direction_deg,
+            self.magnitude_mn,
+            self.place_um,
+            self.frames
+        )
+    }
+}

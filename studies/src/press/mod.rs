@@ -1,0 +1,70 @@
+//! Known presses on simulated sensors, and what the sensor says of them.
+
+mod bound;
+mod drawn;
+mod held;
+mod rows;
+mod unit;
+
+pub use bound::{Bound, Noise};
+use drawn::Drawn;
+pub use drawn::{normal, seeded};
+pub use held::{Held, noise_of};
+pub use rows::{Errors, Off, Row};
+pub use unit::{Answer, Tared, TestedUnit};
+
+use hivtac_film::halton;
+use hivtac_scene::{Load, SceneError};
+
+/// Forces, mN.
+pub const FORCES_MN: [u32; 3] = [50, 100, 200];
+/// How far from the middle, along x and along y, tips press, mm.
+pub const REACH_MM: f64 = 4.0;
+/// The largest α and β, degrees.
+pub const ANGLE_DEG: f64 = 8.0;
+
+/// The press with this number of a force: places and angles evenly within their limits.
+///
+/// # Errors
+/// When the force is none.
+pub fn press(number: u32, force_n: f64, reach_mm: f64) -> Result<Load, SceneError> {
+    let part = |base| 2.0 * part(number, base) - 1.0;
+    Load::from_angles(force_n, ANGLE_DEG * part(2), ANGLE_DEG * part(3))?
+        .with_offset_mm([5, 7].map(|base| reach_mm * part(base)))
+}
+
+/// A press with this number of any force within limits, N.
+///
+/// # Errors
+/// When the force is none.
+pub fn press_of_any(
+    number: u32,
+    [least_n, most_n]: [f64; 2],
+    reach_mm: f64,
+) -> Result<Load, SceneError> {
+    let force_n = least_n + (most_n - least_n) * part(number, 11);
+    press(number, force_n, reach_mm)
+}
+
+/// The press with this number whose tangential force is so many times its normal one, and turned
+/// anywhere.
+///
+/// # Errors
+/// When the force is none.
+pub fn tilted_press(
+    number: u32,
+    force_n: f64,
+    ratio: f64,
+    reach_mm: f64,
+) -> Result<Load, SceneError> {
+    let (sin, cos) = (std::f64::consts::TAU * part(number, 2)).sin_cos();
+    let normal_n = force_n / ratio.hypot(1.0);
+    let vector_n = [normal_n * ratio * cos, normal_n * ratio * sin, -normal_n];
+    Load::from_vector(vector_n)?
+        .with_offset_mm([5, 7].map(|base| reach_mm * (2.0 * part(number, base) - 1.0)))
+}
+
+/// A part of one for a press with this number, evenly spread; another base is another coordinate.
+fn part(number: u32, base: usize) -> f64 {
+    halton(number as usize + 20, base)
+}

@@ -1,0 +1,224 @@
+//! One simulated unit: its scene, its tare, its answers.
+
+use anyhow::{Result, anyhow};
+use hivtac_scene::film::reduced::{LARGEST_SIZE, Pose, Unit};
+use hivtac_scene::{Frame, Load, Options, Scene};
+use hivtac_sensing::force::Force;
+use hivtac_sensing::model::{Conditions, Model, Rest};
+use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::status::Status;
+use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::threshold::ByteOrder;
+
+use super::Drawn;
+
+/// Frames of a tare.
+const TARE_FRAMES: u16 = 64;
+
+/// A simulated sensor as somebody built it.
+pub struct TestedUnit {
+    scene: Scene,
+    tip_radius_mm: f64,
+}
+
+/// A sensor with a model, tared on a unit.
+pub struct Tared<'m> {
+    sensor: Box<Sensor<'m>>,
+}
+
+/// What a sensor said of a press.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer {
+    /// The press.
+    pub load: Load,
+    /// The force; `None` when it was refused.
+    pub force: Option<Force>,
+    /// Why it was refused, or how far to trust it.
+    pub status: Status,
+    /// How far each marker's centroid is from where it truly was, px; `None` where it was not found.
+    pub off_px: Option<[[f64; 2]; 4]>,
+}
+
+impl TestedUnit {
+    /// Of these options, as a camera of these conditions sees it, pressed by a tip of a radius in mm.
+    ///
+    /// # Errors
+    /// When an option is out of range.
+    pub fn new(
+        conditions: &Conditions,
+        options: Options,
+        tip_radius_mm: f64,
+        seed: u64,
+    ) -> Result<Self> {
+        let geometry = &conditions.geometry;
+        let (width, height) = (geometry.width.into(), geometry.height.into());
+        let preset = conditions.preset.name().parse()?;
+        let scene = Scene::preset("demo", preset, width, height, seed)?;
+        Ok(Self {
+            scene: scene.with_options(options)?,
+            tip_radius_mm,
+        })
+    }
+
+    /// The unit with this number of those that people build.
+    ///
+    /// # Errors
+    /// When there is no such camera.
+    pub fn drawn(conditions: &Conditions, number: u64) -> Result<Self> {
+        let focal_px = conditions.geometry.focal.to_f64();
+        let Drawn {
+            options,
+            tip_radius_mm,
+        } = Drawn::new(number, focal_px);
+        Self::new(conditions, options, tip_radius_mm, number)
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// A press with this unit's tip.
+    ///
+    /// # Errors
+    /// When there is no such tip.
+    pub fn with_tip(&self, load: Load) -> Result<Load> {
+        Ok(load.with_tip_radius_mm(self.tip_radius_mm)?)
+    }
+
+    /// Whether the simulated film holds a press, and all markers are wholly in the picture under
+    /// it. A soft film's tables end before the largest force: there the simulation would stay where
+    /// it is.
+    ///
+    /// # Errors
+    /// When the film cannot take the press.
+    pub fn shows_all(&self, load: &Load) -> Result<bool> {
+        let Unit {
+            stiffness,
+            thickness,
+            ..
+        } = self.scene.options().film.unit;
+        let stretching = stiffness * thickness;
+        let times = [stretching * thickness * thickness, stretching];
+        let pose = Pose::of_force(load.vector_n(), load.offset_mm(), times);
+        if pose.size > LARGEST_SIZE {
+            return Ok(false);
+        }
+        let truth = self.scene.truth_under(&self.with_tip(*load)?)?;
+        let camera = self.scene.camera();
+        let sides = [camera.width(), camera.height()].map(f64::from);
+        let inside = truth.markers.iter().flatten().filter(|marker| {
+            // An image is at most so much longer than round.
+            let far = 1.2 * (marker.area_px2 / std::f64::consts::PI).sqrt() + 2.0;
+            let within = |at: f64, side: f64| (far..side - 1.0 - far).contains(&at);
+            let [x, y] = marker.centroid_px;
+            within(x, sides[0]) && within(y, sides[1])
+        });
+        let inside = inside.count() == 4;
+        Ok(inside)
+    }
+
+    /// A sensor with this model, tared on the unit at rest.
+    ///
+    /// # Errors
+    /// When the model's frames cannot be read, or no markers are found at rest.
+    pub fn tare<'m>(&self, model: &Model<'m>) -> Result<Tared<'m>> {
+        let mut sensor = Box::new(Sensor::new());
+        let settings = Settings::of_model(model, ByteOrder::Native);
+        let configured = sensor.configure(settings, Some(*model));
+        configured.map_err(|error| anyhow!("{error}"))?;
+        let rest = self.rest(&mut sensor)?;
+        sensor.set_tare(Some(rest));
+        Ok(Tared { sensor })
+    }
+
+    fn rest(&self, sensor: &mut Sensor<'_>) -> Result<Rest> {
+        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
+        let mut rest = None;
+        for number in 0..TARE_FRAMES {
+            let frame = self
+                .scene
+                .render_load(&Load::REST, 1_000_000 + u64::from(number))?;
+            let seen = look(sensor, &frame);
+            let found = seen.markers.zip(seen.features);
+            let (markers, features) = found.ok_or_else(|| {
+                let names: Vec<_> = seen.status.names().collect();
+                anyhow!("no markers at rest: {}", names.join(" "))
+            })?;
+            rest = tare.add(&markers, &features);
+        }
+        rest.ok_or_else(|| anyhow!("no rest position"))
+    }
+}
+
+impl Answer {
+    /// Why there is no force.
+    pub fn refusals(&self) -> impl Iterator<Item = &'static str> {
+        let status = self.status;
+        Status::NAMES
+            .iter()
+            .filter(move |(bit, _)| Status::NO_FORCE.contains(*bit) && status.contains(*bit))
+            .map(|(_, name)| *name)
+    }
+}
+
+impl Tared<'_> {
+    /// Where it rests.
+    pub fn rest(&self) -> Option<&Rest> {
+        self.sensor.tare()
+    }
+
+    /// Where markers are seen under a press, the mean of some frames; the number selects their noise.
+    ///
+    /// # Errors
+    /// When the film cannot take the press, or markers are not found.
+    pub fn seen_px(
+        &mut self,
+        unit: &TestedUnit,
+        load: Load,
+        frames: u64,
+        number: u64,
+    ) -> Result<[[f64; 2]; 4]> {
+        let mut mean = [[0.0; 2]; 4];
+        for frame in 0..frames {
+            let picture = unit
+                .scene
+                .render_load(&unit.with_tip(load)?, number + frame)?;
+            let markers = look(&mut self.sensor, &picture).markers;
+            let markers = markers.ok_or_else(|| anyhow!("no markers under a load"))?;
+            for (mean, marker) in mean.iter_mut().zip(markers) {
+                mean[0] += marker.x.to_f64() / frames as f64;
+                mean[1] += marker.y.to_f64() / frames as f64;
+            }
+        }
+        Ok(mean)
+    }
+
+    /// What the sensor says of a press on its unit; the number selects the noise.
+    ///
+    /// # Errors
+    /// When the film cannot take the press.
+    pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
+        let frame = unit.scene.render_load(&unit.with_tip(load)?, number)?;
+        let seen = look(&mut self.sensor, &frame);
+        let off = |k: usize| {
+            let [x, y] = frame.truth.markers[k]?.centroid_px;
+            let marker = seen.markers?[k];
+            Some([marker.x.to_f64() - x, marker.y.to_f64() - y])
+        };
+        let off_px: Vec<_> = (0..4).filter_map(off).collect();
+        Ok(Answer {
+            load,
+            force: seen.force,
+            status: seen.status,
+            off_px: off_px.try_into().ok(),
+        })
+    }
+}
+
+fn look(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
+    sensor.begin_frame();
+    sensor.push_rows(&frame.words());
+    sensor.finish_frame()
+}

@@ -1,0 +1,256 @@
+//! What the residual cannot see: one marker that is found beside its place.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
+use hivtac_sensing::forward::{Estimate, Forward, Pose};
+use hivtac_sensing::model::Model;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::anywhere::WEIGHTS;
+use crate::convergence::ways::{Contact, Film};
+use crate::maps::{self, CALIBRATED_MM, Map, PLACES, place_mm};
+use crate::page;
+
+/// Forces, mN.
+const FORCES_MN: [u32; 2] = [50, 200];
+/// How far a marker is found beside its place, px, and how many ways.
+const OFF_PX: [f64; 10] = [0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0];
+const WAYS: u32 = 8;
+/// Errors that the sensor's statements still hold, in parts of its stated standard uncertainties.
+const SIGMAS: f64 = 3.0;
+
+/// Find each marker in turn a little beside its place, and see how wrong a force gets before it is
+/// refused.
+#[derive(Args)]
+pub struct Unseen {
+    /// A weights file of a network that tells places, with its film.
+    #[arg(long, default_value = WEIGHTS)]
+    weights: PathBuf,
+    /// The picture to write.
+    #[arg(long, default_value = "docs/pictures/unseen.svg")]
+    picture: PathBuf,
+    /// Print one JSON object and write neither page nor picture.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The worst that is not refused at a place of the tip.
+#[derive(Clone, Copy, Default)]
+struct Worst {
+    /// The largest displacement of a marker that is not refused, px.
+    off_px: f64,
+    /// The largest error of the direction, degrees, of |F|, mN, and of the place, mm.
+    errors: [f64; 3],
+}
+
+/// Places at one force.
+#[derive(Serialize)]
+struct Row {
+    force_mn: u32,
+    /// Displacements that change the force by more than three stated standard uncertainties, and
+    /// how many of these are refused, per cent.
+    refused: f64,
+    /// Of all places: the median and the largest displacement that is not refused, px.
+    off_px: [f64; 2],
+    /// The median and the largest error that is not refused: degrees, mN, mm.
+    direction_deg: [f64; 2],
+    magnitude_mn: [f64; 2],
+    place_mm: [f64; 2],
+    /// Where the largest error of the direction is, mm.
+    at_mm: [f64; 2],
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report {
+    rows: Vec<Row>,
+}
+
+/// A place, with how many displacements matter and how many of those are refused.
+struct Cell {
+    place_mm: [f64; 2],
+    worst: Worst,
+    matter: u32,
+    refused: u32,
+}
+
+impl Unseen {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// When a file cannot be read or written.
+    pub fn run(&self) -> Result<()> {
+        let bytes = export(&Weights::load(&self.weights)?)?;
+        let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+        let film = Film::new(&model, model).context("the model has no film")?;
+        let maps: Vec<(u32, Vec<Cell>)> = FORCES_MN
+            .into_iter()
+            .map(|force_mn| {
+                let cells = (0..PLACES * PLACES).into_par_iter();
+                (
+                    force_mn,
+                    cells.map(|number| cell(&film, force_mn, number)).collect(),
+                )
+            })
+            .collect();
+        let rows: Vec<Row> = maps
+            .iter()
+            .map(|(force_mn, cells)| Row::of(*force_mn, cells))
+            .collect();
+        if self.json {
+            println!("{}", serde_json::to_string(&Report { rows })?);
+            return Ok(());
+        }
+        maps::write(&self.picture, 2, &panels(&maps))?;
+        let mut text = String::from(
+            "| force | refused, of displacements that matter | displaced unseen: median, most | direction then: median, most | \
+             \\|F\\|: median, most | place: median, most | the most at |\n|--:|--:|--:|--:|--:|--:|---|\n",
+        );
+        text.extend(rows.iter().map(Row::line));
+        print!("{text}");
+        page::write("unseen.md", include_str!("unseen.md"), &text)
+    }
+}
+
+fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
+    let place_mm = place_mm(number);
+    let contact = film.contact(f64::from(force_mn) * 1e-3, place_mm, None);
+    let mut cell = Cell {
+        place_mm,
+        worst: Worst::default(),
+        matter: 0,
+        refused: 0,
+    };
+    for marker in 0..4 {
+        for way in 0..WAYS {
+            let turn = std::f32::consts::TAU * way as f32 / WAYS as f32;
+            for off_px in OFF_PX {
+                let focal = off_px as f32 * film.per_px();
+                let off = [turn.cos(), turn.sin()].map(|part| focal * part);
+                cell.take(
+                    film.forward(),
+                    &contact,
+                    off_px,
+                    &contact.with_marker_off(marker, off),
+                );
+            }
+        }
+    }
+    cell
+}
+
+impl Cell {
+    fn take(&mut self, forward: &Forward<'_>, truth: &Contact<'_>, off_px: f64, found: &Estimate) {
+        let errors = errors(forward, &found.pose, truth.pose());
+        let refused = !found.is_explained() || found.pose.size >= forward.limits.size;
+        let matters = found
+            .sigma(&forward.stiffness, forward.own.stiffness)
+            .is_none_or(|sigma| {
+                let stated = [
+                    f64::from(sigma.direction).to_degrees(),
+                    1e3 * f64::from(sigma.magnitude_n),
+                    f64::from(sigma.place_mm),
+                ];
+                errors
+                    .iter()
+                    .zip(stated)
+                    .any(|(error, sigma)| *error > SIGMAS * sigma)
+            });
+        self.matter += u32::from(matters);
+        self.refused += u32::from(matters && refused);
+        if !refused {
+            let worst = &mut self.worst;
+            worst.off_px = worst.off_px.max(off_px);
+            for (worst, error) in worst.errors.iter_mut().zip(errors) {
+                *worst = worst.max(error);
+            }
+        }
+    }
+
+    fn is_calibrated(&self) -> bool {
+        self.place_mm.iter().all(|part| part.abs() <= CALIBRATED_MM)
+    }
+}
+
+/// Of the direction, degrees, of |F|, mN, and of the place, mm.
+fn errors(forward: &Forward<'_>, found: &Pose, truth: &Pose) -> [f64; 3] {
+    let [a, b] = [found, truth].map(|pose| pose.direction().map(f64::from));
+    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    let off_n =
+        forward.stiffness.magnitude_n(found.size) - forward.stiffness.magnitude_n(truth.size);
+    let [x, y] = [0, 1].map(|i| f64::from(found.place_mm[i] - truth.place_mm[i]));
+    [
+        dot.clamp(-1.0, 1.0).acos().to_degrees(),
+        1e3 * f64::from(off_n).abs(),
+        x.hypot(y),
+    ]
+}
+
+impl Row {
+    fn of(force_mn: u32, cells: &[Cell]) -> Row {
+        let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.is_calibrated()).collect();
+        let both = |of: &dyn Fn(&Cell) -> f64| {
+            let mut all: Vec<f64> = cells.iter().map(|cell| of(cell)).collect();
+            all.sort_by(f64::total_cmp);
+            [all[all.len() / 2], all[all.len() - 1]]
+        };
+        let direction_deg = both(&|cell| cell.worst.errors[0]);
+        let worst = cells
+            .iter()
+            .find(|cell| cell.worst.errors[0] >= direction_deg[1]);
+        let sum = |of: fn(&Cell) -> u32| f64::from(cells.iter().map(|cell| of(cell)).sum::<u32>());
+        Row {
+            force_mn,
+            refused: 100.0 * sum(|cell| cell.refused) / sum(|cell| cell.matter),
+            off_px: both(&|cell| cell.worst.off_px),
+            direction_deg,
+            magnitude_mn: both(&|cell| cell.worst.errors[1]),
+            place_mm: both(&|cell| cell.worst.errors[2]),
+            at_mm: worst.map_or([0.0; 2], |cell| cell.place_mm),
+        }
+    }
+
+    fn line(&self) -> String {
+        let Row {
+            force_mn,
+            refused,
+            off_px: [off, most_off],
+            direction_deg: [angle, most_angle],
+            magnitude_mn: [size, most_size],
+            place_mm: [far, farthest],
+            at_mm: [x, y],
+        } = self;
+        format!(
+            "| {force_mn} mN | {refused:.1} % | {off} px, {most_off} px | {angle:.2}°, {most_angle:.1}° | \
+             {size:.2} mN, {most_size:.1} mN | {far:.3} mm, {farthest:.2} mm | ({x}, {y}) mm |\n"
+        )
+    }
+}
+
+/// The largest displacement that is not refused, and the direction's error with it.
+fn panels(maps: &[(u32, Vec<Cell>)]) -> Vec<Map> {
+    let mut panels = Vec::new();
+    for (force_mn, cells) in maps {
+        panels.push(Map {
+            title: format!("displaced unseen, px, {force_mn} mN"),
+            levels: &[0.04, 0.06, 0.08, 0.12, 0.25, 0.4, 0.8],
+            values: cells.iter().map(|cell| Some(cell.worst.off_px)).collect(),
+        });
+    }
+    for (force_mn, cells) in maps {
+        panels.push(Map {
+            title: format!("direction then off, degrees, {force_mn} mN"),
+            levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
+            values: cells
+                .iter()
+                .map(|cell| Some(cell.worst.errors[0]))
+                .collect(),
+        });
+    }
+    panels
+}
