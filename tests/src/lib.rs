@@ -14,6 +14,8 @@ pub mod artifact;
 #[cfg(feature = "host")]
 pub mod hard;
 #[cfg(feature = "host")]
+pub mod judged;
+#[cfg(feature = "host")]
 pub mod looking;
 #[cfg(feature = "host")]
 pub mod models;

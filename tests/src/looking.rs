@@ -7,7 +7,7 @@ use std::vec::Vec;
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensing::geometry::{self, Geometry};
-use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, OutputKind};
+use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, OutputKind, Rest};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
@@ -183,16 +183,7 @@ impl View {
         let configured = sensor.configure(settings, None);
         configured.map_err(|error| anyhow!("{error}"))?;
         let mut looker = Looker { sensor };
-        let scene = self.nominal()?;
-        let mut builder = TareBuilder::new(TARE_FRAMES).context("a number of frames")?;
-        let mut rest = None;
-        for number in 0..u64::from(TARE_FRAMES) {
-            let seen = looker.sense(&scene.render_load(&Load::REST, number)?);
-            let markers = seen.markers.context("no markers at rest")?;
-            let features = seen.features.context("no features at rest")?;
-            rest = builder.add(&markers, &features);
-        }
-        let rest = rest.context("too few frames at rest")?;
+        let rest = looker.rest(&self.nominal()?)?;
         let file = models::file_read_so(&settings, rest, self.reading(), output);
         // A few hundred bytes that a test keeps to its end.
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
@@ -204,6 +195,39 @@ impl View {
 }
 
 impl Looker {
+    /// A sensor with a committed model, tared on the nominal scene of its camera.
+    ///
+    /// # Errors
+    /// When the file is no model's, or the nominal scene is not found.
+    pub fn of_model(file: Vec<u8>) -> Result<Looker> {
+        // Some tens of kilobytes that a test keeps to its end.
+        let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
+        let geometry = &model.conditions.geometry;
+        let (width, height) = (geometry.width.into(), geometry.height.into());
+        let preset = model.conditions.preset.name().parse()?;
+        let mut sensor = Box::new(Sensor::new());
+        let settings = Settings::of_model(&model, ByteOrder::Native);
+        let configured = sensor.configure(settings, Some(model));
+        configured.map_err(|error| anyhow!("{error}"))?;
+        let mut looker = Looker { sensor };
+        let rest = looker.rest(&Scene::preset("rest", preset, width, height, 7)?)?;
+        looker.sensor.set_tare(Some(rest));
+        Ok(looker)
+    }
+
+    /// Where the markers of a scene rest.
+    fn rest(&mut self, scene: &Scene) -> Result<Rest> {
+        let mut builder = TareBuilder::new(TARE_FRAMES).context("a number of frames")?;
+        let mut rest = None;
+        for number in 0..u64::from(TARE_FRAMES) {
+            let seen = self.sense(&scene.render_load(&Load::REST, number)?);
+            let markers = seen.markers.context("no markers at rest")?;
+            let features = seen.features.context("no features at rest")?;
+            rest = builder.add(&markers, &features);
+        }
+        rest.context("too few frames at rest")
+    }
+
     /// The whole pipeline on a frame.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
         self.sensor.begin_frame();

@@ -4,10 +4,10 @@ use std::vec::Vec;
 
 use hivtac_sensing::features::{FEATURES, Features};
 use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
+use hivtac_sensing::model::encode::{LayerSpec, ModelSpec, with_steps};
 use hivtac_sensing::model::{
-    CalibratedRange, CentroidEstimator, ClosedFormSpec, Conditions, ContactReading, InputScaling,
-    Origin, OutputKind, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
+    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, Origin,
+    OutputKind, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
 };
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{PixelFormat, Threshold};
@@ -108,37 +108,33 @@ pub fn file_read_so(
     encoded(&spec)
 }
 
-/// The file of a model of the trade between speed and accuracy: a closed form, layers of these widths (none for no
-/// layers), or both; for frames of a geometry, with the rest position that they show.
+/// The committed model that tells forces and places anywhere, with so many steps from its network's answer.
+pub fn anywhere(steps: u8) -> Vec<u8> {
+    let file = include_bytes!("../../calibration/models/default.hvtm");
+    with_steps(file, steps).expect("the committed model takes steps")
+}
+
+/// The file of a model of the trade between speed and accuracy, with layers of these widths, the
+/// last of five outputs: for frames of a geometry, with the rest position that they show.
 pub fn trade_file(
     (geometry, rest, centroid): (Geometry, Rest, CentroidEstimator),
-    closed_form: bool,
     widths: &[u16],
     weights: Weights,
 ) -> Vec<u8> {
-    let mut spec = spec(geometry, rest, widths, weights, OutputKind::ForceVector, 1);
+    let mut spec = spec(
+        geometry,
+        rest,
+        widths,
+        weights,
+        OutputKind::ForceAndPlace,
+        1,
+    );
     spec.conditions.centroid = centroid;
     // The paper's camera is the only one of its size.
     if geometry == Geometry::preset(Preset::Paper, geometry.width, geometry.height) {
         spec.conditions.preset = Preset::Paper;
     }
-    spec.closed_form = closed_form.then(|| straight_curves(geometry.width));
     encoded(&spec)
-}
-
-/// Curves that give about the forces of the simulated sensor at frames so wide.
-fn straight_curves(width: u16) -> ClosedFormSpec {
-    /// Half the square root of two.
-    const DIAGONAL: i32 = 23_170;
-    let across = [-DIAGONAL, DIAGONAL, DIAGONAL, -DIAGONAL];
-    let down = [-DIAGONAL, -DIAGONAL, DIAGONAL, DIAGONAL];
-    // 0.2 N at 3 px and 10 mN/px at 320 columns, in 96 steps of 1/32 px and their like.
-    let knot = |i: i32| [i * 2_083, 256 * 10_000 * 320 / i32::from(width), 0];
-    ClosedFormSpec {
-        directions: core::array::from_fn(|marker| [across[marker], down[marker]]),
-        step_bits: 11 + (width / 320).checked_ilog2().unwrap_or(0) as u8,
-        knots: (0..=96).map(knot).collect(),
-    }
 }
 
 fn qvga() -> Geometry {
@@ -175,7 +171,7 @@ fn spec(
         input: input_scaling(rest.features),
         rest,
         layers: layers.collect(),
-        closed_form: None,
+        forward: None,
         output,
         range: CalibratedRange {
             magnitude: MicroNewtons(200_000),

@@ -3,6 +3,8 @@
 use std::vec::Vec;
 
 use hivtac_sensing::features::{FEATURES, Features};
+use hivtac_sensing::markers::Marker;
+use hivtac_sensing::model::Rest;
 use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 
 use crate::golden::Kind;
@@ -130,6 +132,22 @@ impl Script {
         for number in features.to_array().into_iter().chain(tare.to_array()) {
             self.bytes.extend(number.to_le_bytes());
         }
+        self
+    }
+
+    /// Runs the network on markers, and the steps from its answer.
+    pub fn press(&mut self, markers: &[Marker; 4], rest: &Rest) -> &mut Script {
+        self.bytes.push(Kind::Press as u8);
+        for Marker { x, y, area } in markers {
+            self.bytes
+                .extend([x.0, y.0].iter().flat_map(|part| part.to_le_bytes()));
+            self.bytes.extend(area.to_le_bytes());
+        }
+        for number in rest.features.to_array() {
+            self.bytes.extend(number.to_le_bytes());
+        }
+        self.bytes
+            .extend(rest.areas.iter().flat_map(|area| area.to_le_bytes()));
         self
     }
 

@@ -2,8 +2,11 @@
 
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
 use hivtac_sensing::formats::{Mono, Yuv422};
-use hivtac_sensing::model::OutputKind;
+use hivtac_sensing::forward::MOST_STEPS;
+use hivtac_sensing::markers::Marker;
+use hivtac_sensing::model::{Model, OutputKind, Rest};
 use hivtac_sensing::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};
+use hivtac_sensing::units::Px;
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu;
@@ -289,6 +292,44 @@ fn networks_of_files_at_any_place_give_the_same_outputs() {
         }
     }
     same_on_both(&script);
+}
+
+/// Single precision gives the same bits: markers as presses move them, and anywhere in a picture.
+#[test]
+fn steps_lead_to_the_same_forces() {
+    let mut script = Script::new();
+    let mut random = Random::new(41);
+    let rest = Model::parse(&models::anywhere(1)).unwrap().rest;
+    for steps in 1..=MOST_STEPS {
+        script.model(&models::anywhere(steps));
+        for farthest in [1 << 10, 1 << 16, 6 << 16, 40 << 16, 400 << 16] {
+            for _ in 0..6 {
+                script.press(&pressed(&mut random, &rest, farthest), &rest);
+            }
+        }
+    }
+    let text = same_on_both(&script);
+    let count = |what: &str| text.lines().filter(|line| line.contains(what)).count();
+    assert_eq!(count("Force {"), 3 * 5 * 6, "{text}");
+}
+
+/// Markers of any size that moved away from the middle, or anywhere.
+fn pressed(random: &mut Random, rest: &Rest, farthest: i64) -> [Marker; 4] {
+    let outward = random.between(0, farthest);
+    core::array::from_fn(|k| {
+        let (x, y) = rest.features.centroids[k];
+        let mut moved = |at: Px, sign: i64| {
+            let by = sign * outward + random.between(-farthest / 8, farthest / 8);
+            let there = i64::from(at.0) + by;
+            Px(there.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32)
+        };
+        let (x, y) = (
+            moved(x, if k == 1 || k == 2 { 1 } else { -1 }),
+            moved(y, if k >= 2 { 1 } else { -1 }),
+        );
+        let area = random.between(1, 800) as u32;
+        Marker { x, y, area }
+    })
 }
 
 #[test]

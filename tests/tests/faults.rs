@@ -43,7 +43,7 @@ fn check_recovery(output: &ToolOutput, lines: &[Value]) {
 
 #[test]
 fn a_silent_camera_is_started_again() {
-    let (output, lines, _) = watch(&["camera-silent@500-1000"], &["--frames", "30"]);
+    let (output, lines, _) = watch(&["camera-silent@300-400"], &["--frames", "60"]);
     check_recovery(&output, &lines);
     assert!(
         lines
@@ -57,7 +57,7 @@ fn a_silent_camera_is_started_again() {
 
 #[test]
 fn an_overrun_costs_its_frame_and_no_more() {
-    let (output, lines, _) = watch(&["dcmi-overrun@500-505"], &["--frames", "30"]);
+    let (output, lines, _) = watch(&["dcmi-overrun@300-302"], &["--frames", "60"]);
     check_recovery(&output, &lines);
     assert!(
         lines.iter().any(|line| has_status(line, "capture_overrun")),
@@ -69,7 +69,7 @@ fn an_overrun_costs_its_frame_and_no_more() {
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
     // Longer than the device's own buffers, shorter than the silence after which the monitor asks.
-    let (output, lines, _) = watch(&["host-not-reading@500-900"], &["--frames", "30"]);
+    let (output, lines, _) = watch(&["host-not-reading@300-700"], &["--frames", "90"]);
     check_recovery(&output, &lines);
     assert!(counter(&output, "USB") > 0, "{}", output.err);
     let no_gap = "0 frames not processed";
@@ -87,8 +87,8 @@ fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
 
 #[test]
 fn a_pulled_cable_is_reported_and_survived() {
-    let options = ["--frames", "20", "--reconnect"];
-    let (output, lines, counters) = watch(&["cable-pulled@500-900"], &options);
+    let options = ["--frames", "60", "--reconnect"];
+    let (output, lines, counters) = watch(&["cable-pulled@300-700"], &options);
     check_recovery(&output, &lines);
     assert_eq!(counters["usb"]["enumerations"], 2, "{counters}");
     assert!(output.err.contains("connected again"), "{}", output.err);
@@ -96,6 +96,6 @@ fn a_pulled_cable_is_reported_and_survived() {
 
 #[test]
 fn a_pulled_cable_ends_a_monitor_that_does_not_reconnect() {
-    let (output, ..) = watch(&["cable-pulled@500-900"], &["--frames", "20"]);
+    let (output, ..) = watch(&["cable-pulled@300-700"], &["--frames", "60"]);
     assert_eq!(output.code, Some(5), "{output:?}");
 }

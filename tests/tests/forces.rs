@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use hivtac_scene::{Format, Options, Preset, Scene};
+use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
 use hivtac_sensing::model::Model;
+use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
@@ -17,15 +18,24 @@ use serde_json::{Value, json};
 
 const SEED: u64 = 5;
 
-/// The sensing on this computer, with the model that the firmware carries.
-fn on_this_computer(model: &[u8], pixels: &[u16]) -> Measurement {
+/// The sensing on this computer, with the model that the firmware carries: of a frame after the one
+/// before it.
+fn on_this_computer(model: &[u8], before: Option<&[u16]>, pixels: &[u16]) -> Measurement {
     let model = Model::parse(model).unwrap();
     let mut sensor = Box::new(Sensor::<64>::new());
     let settings = Settings::of_model(&model, ByteOrder::Native);
     sensor.configure(settings, Some(model)).unwrap();
-    sensor.begin_frame();
-    pixels.chunks(320).for_each(|row| sensor.push_row(row));
-    sensor.finish_frame()
+    // An OV7725 has 278 lines.
+    sensor.set_motion(Motion::rolling(278));
+    let mut measure = |pixels: &[u16]| {
+        sensor.begin_frame();
+        pixels.chunks(320).for_each(|row| sensor.push_row(row));
+        sensor.finish_frame()
+    };
+    if let Some(before) = before {
+        measure(before);
+    }
+    measure(pixels)
 }
 
 fn model_file(name: &str) -> Vec<u8> {
@@ -91,6 +101,17 @@ fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
     lines
 }
 
+/// The pixels of an exposure, by its line in the truth log.
+fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
+    let number = |key: &str| line[key].as_f64().unwrap();
+    let shutter = Shutter {
+        exposure_s: number("exposure_s"),
+        readout_s: number("readout_s"),
+    };
+    let exposure = line["exposure"].as_u64().unwrap();
+    scene.frame_by(&shutter, exposure, number("time_s")).pixels
+}
+
 /// Holds every line of the host tool against the sensing here.
 fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
     let truth = rig.truth().unwrap();
@@ -98,12 +119,15 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
         .iter()
         .map(|line| (line["frame"].as_u64().unwrap(), line))
         .collect();
-    for line in lines {
-        let exposure = shown[&line["frame"].as_u64().unwrap()];
-        let number = exposure["exposure"].as_u64().unwrap();
-        let frame = scene.frame(number, exposure["time_s"].as_f64().unwrap());
-        let measurement = on_this_computer(model, &frame.pixels);
-        assert_eq!(said(line), expected(&measurement), "{line}");
+    for (nth, line) in lines.iter().enumerate() {
+        let frame = line["frame"].as_u64().unwrap();
+        let [before, now] = [frame - 1, frame].map(|frame| exposed(scene, shown[&frame]));
+        let measured = |before| expected(&on_this_computer(model, before, &now));
+        // Before the first one there may have been none in this pixel format.
+        if nth == 0 && said(line) == measured(None) {
+            continue;
+        }
+        assert_eq!(said(line), measured(Some(&before)), "{line}");
     }
 }
 
@@ -126,8 +150,8 @@ fn check_counting(lines: &[Value]) {
     for pair in lines.windows(2) {
         let step = |key| number(&pair[1], key) - number(&pair[0], key);
         assert_eq!((step("seq"), step("frame")), (1, 1), "{pair:?}");
-        // 39.03 frames a second; an edge is stamped within 50 µs.
-        assert!(step("time_us").abs_diff(25_620) < 50, "{pair:?}");
+        // 156.12 frames a second; an edge is stamped within 50 µs.
+        assert!(step("time_us").abs_diff(6_405) < 50, "{pair:?}");
     }
 }
 
@@ -172,6 +196,13 @@ fn forces_and_mismatches(lines: &[Value]) -> (usize, usize) {
     )
 }
 
+/// Whether all lines have forces by their own model but the first, of which nobody knows how fast the
+/// markers moved while it was exposed.
+fn forces_but_one(lines: &[Value]) -> bool {
+    let (forces, mismatches) = forces_and_mismatches(lines);
+    mismatches == 0 && lines[1..].iter().all(|line| line["force"].is_object()) && forces > 0
+}
+
 /// Firmware with a model for YUV422 begins in that format, leaves it for RGB565 on command, and comes back to it.
 #[test]
 fn the_pixel_format_is_chosen_while_frames_are_measured() {
@@ -189,7 +220,7 @@ fn the_pixel_format_is_chosen_while_frames_are_measured() {
 
     let first = monitor(&rig, FRAMES);
     check_forces(&rig, &first, &scene, &model);
-    assert_eq!(forces_and_mismatches(&first), (FRAMES, 0));
+    assert!(forces_but_one(&first), "{first:?}");
 
     let output = set_threshold(&rig, &["--hsv", "170,10,100,255,45,255"]);
     assert!(output.err.contains("made for yuv422"), "{output:?}");
@@ -204,7 +235,7 @@ fn the_pixel_format_is_chosen_while_frames_are_measured() {
         status.retain(|name| name != "frame_dropped");
     }
     check_forces(&rig, &last, &scene, &model);
-    assert_eq!(forces_and_mismatches(&last), (FRAMES, 0));
+    assert!(forces_but_one(&last), "{last:?}");
 
     let output = tool(&rig, "threshold", &["--luma", "0,88"]).unwrap();
     assert_eq!(output.code, Some(6), "{output:?}");

@@ -1,19 +1,21 @@
 //! Honest contacts anywhere get a force from a model that tells places, and few of them from one that does not.
 
-use hivtac_scene::{Contact, Load, Preset, Scene};
+use hivtac_scene::{Contact, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::threshold::PixelFormat;
+use hivtac_tests::judged::Contacts;
 use hivtac_tests::looking::{ESTIMATORS, Looker, Seen, View};
 use hivtac_tests::pictures::Random;
 
 /// Frames of each view.
 const FRAMES: u64 = 2_400;
-/// The least and the largest |F|, N; the largest tangential force in parts of the normal one; the
-/// largest distance from the middle along x and y, mm.
-const FORCE_N: [f64; 2] = [0.005, 0.25];
-const RATIO: f64 = 0.8;
-const PLACE_MM: f64 = 4.0;
+/// What presses.
+const CONTACTS: Contacts = Contacts {
+    force_n: [0.005, 0.25],
+    ratio: 0.8,
+    place_mm: 4.0,
+};
 
 const fn view(preset: Preset, size: [u32; 2], estimator: CentroidEstimator) -> View {
     View {
@@ -23,24 +25,6 @@ const fn view(preset: Preset, size: [u32; 2], estimator: CentroidEstimator) -> V
         estimator,
         contact: Contact::Force,
     }
-}
-
-/// A number from `from` to `to`.
-fn within(random: &mut Random, from: f64, to: f64) -> f64 {
-    let part = random.between(0, 1 << 30) as f64 / f64::from(1 << 30);
-    from + (to - from) * part
-}
-
-/// A contact whose size, tilt, turn and place are uniform.
-fn contact(random: &mut Random) -> Load {
-    let size = within(random, FORCE_N[0], FORCE_N[1]);
-    let ratio = within(random, 0.0, RATIO);
-    let (sin, cos) = within(random, 0.0, std::f64::consts::TAU).sin_cos();
-    let normal = size / ratio.hypot(1.0);
-    let vector = [normal * ratio * cos, normal * ratio * sin, -normal];
-    let place = [0; 2].map(|_: u8| within(random, -PLACE_MM, PLACE_MM));
-    let load = Load::from_vector(vector).unwrap();
-    load.with_offset_mm(place).unwrap()
 }
 
 /// What became of the frames.
@@ -58,7 +42,9 @@ fn look(looker: &mut Looker, scene: &Scene) -> Counts {
     let mut random = Random::new(5);
     let mut counts = Counts::default();
     for number in 0..FRAMES {
-        let frame = scene.render_load(&contact(&mut random), number).unwrap();
+        let frame = scene
+            .render_load(&CONTACTS.draw(&mut random).unwrap(), number)
+            .unwrap();
         let inside = |marker: &Option<_>| {
             marker.is_some_and(|marker: hivtac_scene::MarkerTruth| marker.visible == 1.0)
         };

@@ -142,6 +142,7 @@ fn stats() -> DeviceMessage {
         frames_tracked: 940,
         tracking_lost: 25,
         processing_us: 5300,
+        latency_us: 4800,
         uptime_us: 34_000_000,
     })
 }
@@ -218,6 +219,7 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ),
         ("tare", command(7, Request::Tare { frames: 128 })),
         ("start-with-markers", command(2, Request::StartWithMarkers)),
+        ("expose", command(9, Request::Expose)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -278,7 +280,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 6);
+    assert_eq!(requests.len(), 7);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

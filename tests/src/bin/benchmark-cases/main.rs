@@ -1,6 +1,6 @@
 //! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
 //! one JSON object a line: `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
-//! what is special about the frame, `{"Windows":{"tracked":…}}`, `{"Network":[widths]}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
+//! what is special about the frame, `{"Windows":{"tracked":…}}`, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
 //! for `tests/board`. `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is made of
 //! (`trade`), and each line says the `"part"`, too. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
 
@@ -9,11 +9,14 @@ mod trade;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use anyhow::{Context, Result, bail};
-use hivtac_scene::{Format, Options, Preset, Scene};
+use anyhow::{Context, Result, anyhow, bail};
+use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_sensing::features::Features;
+use hivtac_sensing::forward::MOST_STEPS;
 use hivtac_sensing::geometry::{self, Geometry};
+use hivtac_sensing::markers::Marker;
 use hivtac_sensing::model::CentroidEstimator::{self, BinaryMask, RednessWeighted};
-use hivtac_sensing::model::{OutputKind, Rest};
+use hivtac_sensing::model::{Model, OutputKind, Rest};
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
@@ -86,6 +89,8 @@ enum Work {
     },
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
+    /// The network of a model that tells places, and so many steps from its answer.
+    Steps(u8, [Marker; 4], Rest),
     /// The threshold's table of 64 KiB.
     Table,
 }
@@ -117,6 +122,7 @@ impl Case {
             Work::Table => {
                 script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped)
             }
+            Work::Steps(_, markers, rest) => script.press(markers, rest),
             Work::Network(_) => script.network(&models::rest(), &models::rest()),
         };
         script
@@ -129,6 +135,7 @@ impl Work {
             Work::Frame { special, .. } => json!({ "Frame": special }),
             Work::Windows { tracked, .. } => json!({ "Windows": { "tracked": tracked } }),
             Work::Network(widths) => json!({ "Network": widths }),
+            Work::Steps(steps, ..) => json!({ "Steps": steps }),
             Work::Table => json!("Table"),
         }
     }
@@ -179,6 +186,9 @@ fn cases() -> Result<Vec<Case>> {
         size: [320, 240],
         format: PixelFormat::Rgb565,
     }));
+    for steps in 1..=MOST_STEPS {
+        cases.push(stepping(steps)?);
+    }
     cases.push(Case {
         work: Work::Table,
         model: Vec::new(),
@@ -187,6 +197,25 @@ fn cases() -> Result<Vec<Case>> {
         format: PixelFormat::Rgb565,
     });
     Ok(cases)
+}
+
+/// Steps at a press of 0.1 N off the middle.
+fn stepping(steps: u8) -> Result<Case> {
+    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
+    let model = models::anywhere(steps);
+    let rest = Model::parse(&model)
+        .map_err(|error| anyhow!("{error}"))?
+        .rest;
+    let load = Load::from_angles(0.1, 4.0, -3.0)?.with_offset_mm([1.5, -2.25])?;
+    let pressed = scene("rest", format, size)?.render_load(&load, 1)?;
+    let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
+    let markers = seen(geometry, format, RednessWeighted, &pressed.words())?.1;
+    Ok(Case {
+        work: Work::Steps(steps, markers, rest),
+        model,
+        size,
+        format,
+    })
 }
 
 /// Frames of the demo's scene, of the firmware's size.
@@ -218,7 +247,7 @@ impl Board {
         let file = |name: &str| folder.join(format!("{number}.{name}"));
         let (model, pixels) = (file("model"), file("rgb565"));
         match &case.work {
-            Work::Windows { .. } | Work::Table => return Ok(()),
+            Work::Windows { .. } | Work::Steps(..) | Work::Table => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
             // The board's program reads RGB565.
             Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),
@@ -318,6 +347,20 @@ fn position(
     centroid: CentroidEstimator,
     pixels: &[u16],
 ) -> Result<Rest> {
+    let (features, markers) = seen(geometry, format, centroid, pixels)?;
+    Ok(Rest {
+        features,
+        areas: markers.map(|marker| marker.area),
+    })
+}
+
+/// What a frame shows.
+fn seen(
+    geometry: Geometry,
+    format: PixelFormat,
+    centroid: CentroidEstimator,
+    pixels: &[u16],
+) -> Result<(Features, [Marker; 4])> {
     let mut sensor = Box::new(Sensor::<64>::new());
     let settings = Settings {
         threshold: Threshold::red(format),
@@ -329,11 +372,7 @@ fn position(
     sensor.push_rows(pixels);
     let measurement = sensor.finish_frame();
     let found = measurement.features.zip(measurement.markers);
-    let (features, markers) = found.context("a frame that shows where the markers are has none")?;
-    Ok(Rest {
-        features,
-        areas: markers.map(|marker| marker.area),
-    })
+    found.context("a frame that shows where the markers are has none")
 }
 
 fn write(file: &Path, bytes: &[u8]) -> Result<()> {

@@ -1,13 +1,15 @@
 //! What the configurations of the trade between speed and accuracy cost (`docs/tradeoff.md`).
 //!
-//! A frame costs the same whatever model is behind it, and a model the same whatever frame is before it: so the frames are
-//! written with the cheapest model, a closed form, the models by themselves, and some of both together, to check that.
+//! A frame costs the same whatever model is behind it, and a model the same whatever frame is
+//! before it: so the frames are written with the cheapest model, the models by themselves, the film
+//! run forwards behind one of them, and some of all together, to check that.
 
 use std::path::Path;
 
 use anyhow::Result;
 use hivtac_scene::Scene;
 use hivtac_sensing::features::Features;
+use hivtac_sensing::forward::MOST_STEPS;
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{CentroidEstimator, Rest};
 use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
@@ -15,7 +17,7 @@ use hivtac_tests::models::{self, Weights};
 use hivtac_tests::script::Script;
 use serde_json::{Value, json};
 
-use super::{ATTEMPTS, SIZES, position, usual_frame, write};
+use super::{ATTEMPTS, SIZES, position, stepping, usual_frame, write};
 
 const ESTIMATORS: [(&str, CentroidEstimator); 2] = [
     ("binary-mask", CentroidEstimator::BinaryMask),
@@ -29,10 +31,15 @@ const FORMAT: PixelFormat = PixelFormat::Rgb565;
 /// The size whose models are measured.
 const SIZE: [u16; 2] = [320, 240];
 
+/// Hidden layers of the cheapest model, and its name: it is behind every frame.
+const SMALLEST: [u16; 2] = [16; 2];
+const BEHIND: &str = "16-16 int8";
+/// The network of the committed model, whose answer steps begin from.
+const BEFORE_STEPS: &str = "64-64 int8";
+
 /// A model by its name.
 struct Made {
     name: String,
-    closed_form: bool,
     widths: Vec<u16>,
     weights: Weights,
 }
@@ -65,7 +72,7 @@ pub fn write_cases(folder: &Path) -> Result<()> {
             let frames = Frames::of(size, centroid)?;
             for scan in SCANS {
                 let together = together(size, centroid.0, scan);
-                let with = |model: &&Made| model.is_closed_form() || together == Some(&model.name);
+                let with = |model: &&Made| [Some(BEHIND), together].contains(&Some(&model.name));
                 for model in models.iter().filter(with) {
                     let file = frames.model(model);
                     write_one(&frames.script(scan, &file), frames.part(scan, model, &file))?;
@@ -76,6 +83,18 @@ pub fn write_cases(folder: &Path) -> Result<()> {
                     let file = frames.model(model);
                     write_one(&frames.inference(&file)?, inference_part(model, &file))?;
                 }
+                for steps in [1, MOST_STEPS] {
+                    let case = stepping(steps)?;
+                    let part = json!({ "model": BEFORE_STEPS, "bytes": case.model.len() });
+                    let what = case.work.description();
+                    write_one(
+                        &case.script(),
+                        json!({ "work": what, "size": size, "part": part }),
+                    )?;
+                }
+                let file = models::anywhere(1);
+                let stepping = frames.part_of("full", &format!("{BEFORE_STEPS}, 1 step"), &file);
+                write_one(&frames.script("full", &file), stepping)?;
             }
         }
     }
@@ -93,7 +112,7 @@ fn preset(size: [u16; 2]) -> (Preset, hivtac_scene::Preset) {
 /// The model that is also measured behind such frames.
 fn together(size: [u16; 2], centroid: &str, scan: &str) -> Option<&'static str> {
     match (size, centroid, scan) {
-        (SIZE, "redness-weighted", "full") => Some("closed form + 64-64 int8"),
+        (SIZE, "redness-weighted", "full") => Some("64-64 int8"),
         (SIZE, "binary-mask", "windows") => Some("64-64 int16"),
         ([800, 600], "redness-weighted", "tracked") => Some("512-512-512 int8"),
         _ => None,
@@ -101,39 +120,25 @@ fn together(size: [u16; 2], centroid: &str, scan: &str) -> Option<&'static str> 
 }
 
 fn made() -> Vec<Made> {
-    let mut models = vec![Made {
-        name: "closed form".to_owned(),
-        closed_form: true,
-        widths: Vec::new(),
-        weights: Weights::Random,
-    }];
-    let hidden: [(bool, &[u16]); 6] = [
-        (true, &[64, 64]),
-        (false, &[16, 16]),
-        (false, &[32, 32]),
-        (false, &[64, 64]),
-        (false, &[128, 128]),
-        (false, &[512, 512, 512]),
+    let mut models = Vec::new();
+    let hidden: [&[u16]; 5] = [
+        &SMALLEST,
+        &[32, 32],
+        &[64, 64],
+        &[128, 128],
+        &[512, 512, 512],
     ];
-    for (closed_form, hidden) in hidden {
+    for hidden in hidden {
         for (width, weights) in [("int8", Weights::Random), ("int16", Weights::Wide)] {
             let names: Vec<String> = hidden.iter().map(u16::to_string).collect();
-            let beside = if closed_form { "closed form + " } else { "" };
             models.push(Made {
-                name: format!("{beside}{} {width}", names.join("-")),
-                closed_form,
-                widths: [&[11], hidden, &[3]].concat(),
+                name: format!("{} {width}", names.join("-")),
+                widths: [&[11], hidden, &[5]].concat(),
                 weights,
             });
         }
     }
     models
-}
-
-impl Made {
-    fn is_closed_form(&self) -> bool {
-        self.widths.is_empty()
-    }
 }
 
 impl Frames {
@@ -149,7 +154,8 @@ impl Frames {
             &scene("rest")?.frame(0, 0.0).pixels,
         )?;
         let conditions = (geometry, rest, centroid.1);
-        let model = models::trade_file(conditions, true, &[], Weights::Random);
+        let widths = [&[11][..], &SMALLEST, &[5]].concat();
+        let model = models::trade_file(conditions, &widths, Weights::Random);
         Ok(Frames {
             geometry,
             centroid,
@@ -161,7 +167,7 @@ impl Frames {
 
     fn model(&self, made: &Made) -> Vec<u8> {
         let conditions = (self.geometry, self.rest, self.centroid.1);
-        models::trade_file(conditions, made.closed_form, &made.widths, made.weights)
+        models::trade_file(conditions, &made.widths, made.weights)
     }
 
     fn script(&self, scan: &str, model: &[u8]) -> Script {
@@ -188,12 +194,16 @@ impl Frames {
     }
 
     fn part(&self, scan: &str, made: &Made, file: &[u8]) -> Value {
+        self.part_of(scan, &made.name, file)
+    }
+
+    fn part_of(&self, scan: &str, model: &str, file: &[u8]) -> Value {
         let work = match scan {
             "full" => json!({ "Frame": "" }),
             _ => json!({ "Windows": { "tracked": scan == "tracked" } }),
         };
         let size = [self.geometry.width, self.geometry.height];
-        let (centroid, model) = (self.centroid.0, &made.name);
+        let centroid = self.centroid.0;
         let part =
             json!({ "centroid": centroid, "scan": scan, "model": model, "bytes": file.len() });
         json!({ "work": work, "size": size, "part": part })

@@ -1,0 +1,113 @@
+//! Whether a force is right: within three of its stated standard uncertainties, or near enough for
+//! a hand.
+
+use std::format;
+use std::string::String;
+
+use hivtac_scene::{Load, SceneError, Truth};
+use hivtac_sensing::force::Force;
+use hivtac_sensing::pipeline::Measurement;
+use hivtac_sensing::status::Status;
+
+use crate::pictures::Random;
+
+/// Standard uncertainties that an error may have.
+const SIGMAS: f64 = 3.0;
+/// Errors that are no fault, however certain a force is: of the direction, degrees, of |F|, mN, and
+/// of the place, mm.
+const NO_FAULT: [f64; 3] = [5.0, 5.0, 0.25];
+/// Below this a contact is none, mN: its direction and its place mean nothing.
+const LEAST_MN: f64 = 2.0;
+
+/// Which contacts are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Contacts {
+    /// The least and the largest |F|, N.
+    pub force_n: [f64; 2],
+    /// The largest tangential force, in parts of the normal one.
+    pub ratio: f64,
+    /// The largest distance from the middle along x and y, mm.
+    pub place_mm: f64,
+}
+
+impl Contacts {
+    /// A contact whose size, tilt, turn and place are uniform.
+    ///
+    /// # Errors
+    /// When these are no contacts.
+    pub fn draw(&self, random: &mut Random) -> Result<Load, SceneError> {
+        let mut within = |from: f64, to: f64| {
+            let part = random.between(0, 1 << 30) as f64 / f64::from(1 << 30);
+            from + (to - from) * part
+        };
+        let size = within(self.force_n[0], self.force_n[1]);
+        let ratio = within(0.0, self.ratio);
+        let (sin, cos) = within(0.0, std::f64::consts::TAU).sin_cos();
+        let normal = size / ratio.hypot(1.0);
+        let vector = [normal * ratio * cos, normal * ratio * sin, -normal];
+        let place = [0; 2].map(|_: u8| within(-self.place_mm, self.place_mm));
+        Load::from_vector(vector)?.with_offset_mm(place)
+    }
+}
+
+/// What was made of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Judged {
+    /// The force is right.
+    Right,
+    /// There is no force, for these reasons.
+    Refused(Status),
+    /// The force is wrong, and how.
+    Wrong(String),
+}
+
+impl Judged {
+    /// Of a measurement, by what the frame truly shows.
+    pub fn of(seen: &Measurement, truth: &Truth) -> Judged {
+        let Some(force) = &seen.force else {
+            return Judged::Refused(seen.status);
+        };
+        let errors = errors(force, truth);
+        let allowed = [
+            f64::from(force.direction_sigma.0) * 1e-3,
+            f64::from(force.magnitude_sigma.0) * 1e-3,
+            force
+                .place
+                .map_or(0.0, |place| f64::from(place.sigma.0) * 1e-3),
+        ];
+        let limits: [f64; 3] = std::array::from_fn(|k| NO_FAULT[k].max(SIGMAS * allowed[k]));
+        match errors
+            .iter()
+            .zip(&limits)
+            .all(|(error, limit)| error <= limit)
+        {
+            true => Judged::Right,
+            false => Judged::Wrong(format!(
+                "{:?} N at {:?} mm: off by {errors:.3?} (°, mN, mm), may be {limits:.3?}",
+                truth.on_film_n, truth.touches_mm
+            )),
+        }
+    }
+}
+
+/// How far a force is off: of the direction, degrees, of |F|, mN, and of the place, mm.
+fn errors(force: &Force, truth: &Truth) -> [f64; 3] {
+    let found = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    let [size, true_size] = [found, truth.on_film_n].map(length);
+    let off_mn = 1e3 * (size - true_size).abs();
+    let touches = 1e3 * size.min(true_size) >= LEAST_MN;
+    let (true, Some([x, y]), Some(place)) = (touches, truth.touches_mm, force.place) else {
+        return [0.0, off_mn, 0.0];
+    };
+    let dot: f64 = found.iter().zip(truth.on_film_n).map(|(a, b)| a * b).sum();
+    let angle = (dot / (size * true_size)).clamp(-1.0, 1.0).acos();
+    let far = [
+        f64::from(place.x.0) * 1e-3 - x,
+        f64::from(place.y.0) * 1e-3 - y,
+    ];
+    [angle.to_degrees(), off_mn, far[0].hypot(far[1])]
+}
+
+fn length(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
+}

@@ -1,0 +1,155 @@
+//! Forces that change under a rolling shutter: what moving the markers to one common time is worth.
+//!
+//! `cargo test --release -p hivtac-tests --test moving -- --nocapture` prints the table of
+//! `docs/firmware.md`.
+
+use std::fs;
+use std::path::Path;
+
+use hivtac_scene::{Motion, Preset, Scene, Shutter, Vibration};
+use hivtac_sensing::model::Model;
+use hivtac_sensing::motion;
+use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensing::settings::Settings;
+use hivtac_sensing::threshold::ByteOrder;
+
+/// Lines of an OV7725's frame, of which 240 are rows.
+const LINES: u16 = 278;
+/// The camera's rates, frames a second.
+const RATES: [f64; 3] = [156.12, 78.06, 39.03];
+/// How long each row is exposed, s.
+const EXPOSURE_S: f64 = 0.004;
+/// Frames of each run.
+const FRAMES: u64 = 60;
+/// |F| from which a direction counts, N.
+const FLOOR_N: f64 = 0.05;
+/// 0.13 ± 0.08 N at 10 Hz: up to 5 N/s.
+fn fast() -> Motion {
+    Motion::Vibration(Vibration {
+        force_n: 0.13,
+        alpha_deg: 4.0,
+        beta_deg: -3.0,
+        amplitude_n: 0.08,
+        frequency_hz: 10.0,
+        ..Vibration::default()
+    })
+}
+
+/// Errors of one run.
+#[derive(Clone, Copy, Debug)]
+struct Errors {
+    /// Mean angle to the true force, degrees.
+    mean_deg: f64,
+    /// Largest, degrees.
+    most_deg: f64,
+    /// Root mean square of |F|'s, mN.
+    magnitude_mn: f64,
+    /// Frames without a force.
+    refused: usize,
+}
+
+fn sensor(model: &[u8], motion: motion::Motion) -> Box<Sensor<'_>> {
+    let model = Model::parse(model).unwrap();
+    let mut sensor = Box::new(Sensor::<64>::new());
+    let settings = Settings::of_model(&model, ByteOrder::Native);
+    sensor.configure(settings, Some(model)).unwrap();
+    sensor.set_motion(motion);
+    sensor
+}
+
+/// Of a scene at a rate, with markers as they are seen and at one time.
+fn errors(model: &[u8], scene: &Scene, rate_hz: f64) -> [Errors; 2] {
+    let shutter = Shutter {
+        exposure_s: EXPOSURE_S,
+        readout_s: 240.0 / f64::from(LINES) / rate_hz,
+    };
+    let motions = [motion::Motion::GLOBAL, motion::Motion::rolling(LINES)];
+    let mut sensors = motions.map(|motion| sensor(model, motion));
+    let mut found = [const { Vec::new() }; 2];
+    let mut refused = [0; 2];
+    for number in 0..FRAMES {
+        let frame = scene.frame_by(&shutter, number, 0.6 + number as f64 / rate_hz);
+        for (nth, sensor) in sensors.iter_mut().enumerate() {
+            sensor.begin_frame();
+            sensor.push_rows(&frame.pixels);
+            let force = sensor.finish_frame().force;
+            let truth = frame.truth.force;
+            // The first frame has none before it.
+            if number == 0 || truth.magnitude_n() < FLOOR_N {
+                continue;
+            }
+            let Some(force) = force else {
+                refused[nth] += 1;
+                continue;
+            };
+            let found_n = force
+                .cartesian
+                .map(|component| f64::from(component.0) * 1e-6);
+            found[nth].push((
+                angle_deg(found_n, truth.vector_n()),
+                f64::from(force.magnitude.0) * 1e-3 - truth.magnitude_n() * 1e3,
+            ));
+        }
+    }
+    [0, 1].map(|nth| summed_up(&found[nth], refused[nth]))
+}
+
+fn summed_up(found: &[(f64, f64)], refused: usize) -> Errors {
+    let count = found.len() as f64;
+    Errors {
+        mean_deg: found.iter().map(|(deg, _)| deg).sum::<f64>() / count,
+        most_deg: found.iter().map(|(deg, _)| *deg).fold(0.0, f64::max),
+        magnitude_mn: (found.iter().map(|(_, mn)| mn * mn).sum::<f64>() / count).sqrt(),
+        refused,
+    }
+}
+
+fn angle_deg(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+    let cross = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| a[i] * b[j] - a[j] * b[i]);
+    let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+    sine.atan2(dot).to_degrees()
+}
+
+#[test]
+fn a_force_that_changes_is_measured_as_one_that_stays() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let model = fs::read(root.join("calibration/models/default.hvtm")).unwrap();
+    let preset = |name| Scene::preset(name, Preset::Ov7725, 320, 240, 5).unwrap();
+    let scenes = [
+        ("0", preset("static")),
+        ("0.6", preset("demo")),
+        ("to 5", preset("static").with_motion(fast()).unwrap()),
+    ];
+    println!("| N/s | frames/s | as seen | at one time |\n|---|---:|---|---|");
+    for (name, scene) in &scenes {
+        for rate_hz in RATES {
+            let [seen, moved] = errors(&model, scene, rate_hz);
+            let text = |e: Errors| {
+                let Errors {
+                    mean_deg,
+                    most_deg,
+                    magnitude_mn,
+                    refused,
+                } = e;
+                format!(
+                    "{mean_deg:.2}°, {most_deg:.1}° at most; {magnitude_mn:.2} mN; {refused} refused"
+                )
+            };
+            println!(
+                "| {name} | {rate_hz:.0} | {} | {} |",
+                text(seen),
+                text(moved)
+            );
+            let worth = match *name {
+                // Two frames' noise instead of one's.
+                "0" => moved.mean_deg < 1.25 * seen.mean_deg,
+                // As seen, no one contact explains markers that moved one after the other.
+                "0.6" => moved.mean_deg < 0.4 && 10 * moved.refused.max(1) <= seen.refused,
+                // Four frames a period do not tell a velocity.
+                _ => rate_hz < 40.0 || moved.refused < seen.refused,
+            };
+            assert!(worth, "{name} N/s at {rate_hz} Hz: {seen:?} {moved:?}");
+        }
+    }
+}
