@@ -14,7 +14,7 @@ pub const SEEDED_BUGS: [&str; 5] = [
     "bug-polarity",
     "bug-camera-register",
     "bug-half-buffer",
-    "bug-no-hsi48",
+    "bug-usb-clock",
 ];
 
 /// The feature that lets the firmware follow the markers, which the rig tries, too.

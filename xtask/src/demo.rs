@@ -9,6 +9,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 
 use crate::rig::Rig;
+use crate::summary::{self, Summary};
 use crate::toolchain::Toolchain;
 use crate::{artifacts, process, workspace};
 
@@ -16,8 +17,12 @@ use crate::{artifacts, process, workspace};
 #[derive(Args)]
 pub struct Demo {
     /// End after this many frames.
-    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 150, value_parser = clap::value_parser!(u64).range(1..))]
     frames: u64,
+    /// Print one JSON object instead: frames, rate_hz, latency_ms, direction_deg, magnitude_mn,
+    /// place_um.
+    #[arg(long)]
+    json: bool,
 }
 
 /// What the demo runs, and where it writes.
@@ -26,6 +31,7 @@ struct Stage {
     rig: PathBuf,
     tool: PathBuf,
     truth: PathBuf,
+    arrivals: PathBuf,
     log: PathBuf,
 }
 
@@ -38,7 +44,10 @@ impl Demo {
         let start = Instant::now();
         let stage = Stage::build(toolchain)?;
         let built = start.elapsed();
-        let outcome = self.show(&stage);
+        let outcome = match self.json {
+            true => self.summarize(&stage),
+            false => self.show(&stage),
+        };
         if outcome.is_err() {
             stage.show_log();
         }
@@ -54,7 +63,24 @@ impl Demo {
     fn show(&self, stage: &Stage) -> Result<()> {
         let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
         process::run(&mut self.monitor(stage, rig.port()))?;
-        rig.finish()
+        rig.finish()?;
+        let latency_ms = stage.latency_ms()?;
+        println!(
+            "latency: {latency_ms:.2} ms from the middle of the exposure to the last byte on USB"
+        );
+        Ok(())
+    }
+
+    fn summarize(&self, stage: &Stage) -> Result<()> {
+        let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
+        let mut monitor = self.monitor(stage, rig.port());
+        process::show(monitor.arg("--json"));
+        let lines = process::output(&mut monitor)?;
+        rig.finish()?;
+        let [truth, arrivals] = stage.logs()?;
+        let summary = Summary::of(&lines, &truth, &arrivals)?;
+        println!("{}", serde_json::to_string(&summary)?);
+        Ok(())
     }
 
     fn monitor(&self, stage: &Stage, port: &str) -> Command {
@@ -87,6 +113,7 @@ impl Stage {
             rig: artifacts::rig()?,
             tool: artifacts::host_tool()?,
             truth: folder.join("truth.jsonl"),
+            arrivals: folder.join("arrivals.jsonl"),
             log: folder.join("rig.log"),
         })
     }
@@ -96,6 +123,8 @@ impl Stage {
         command
             .args(["--scene", "demo", "--pty", "--exit-on-hangup", "--truth"])
             .arg(&self.truth)
+            .arg("--arrivals")
+            .arg(&self.arrivals)
             .arg(&self.firmware);
         command
     }
@@ -107,6 +136,20 @@ impl Stage {
             // The emulated board boots slower than a real one.
             .args(["--timeout", "120"]);
         command
+    }
+
+    /// What the rig wrote of truth and arrivals.
+    fn logs(&self) -> Result<[String; 2]> {
+        let read = |path: &Path| {
+            fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))
+        };
+        Ok([read(&self.truth)?, read(&self.arrivals)?])
+    }
+
+    /// Mean latency of all samples, ms.
+    fn latency_ms(&self) -> Result<f64> {
+        let [truth, arrivals] = self.logs()?;
+        summary::latency_ms(&summary::parsed(&arrivals)?, &truth, &arrivals)
     }
 
     fn show_log(&self) {

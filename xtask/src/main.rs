@@ -9,6 +9,7 @@ mod process;
 mod report;
 mod rig;
 mod size;
+mod summary;
 mod test;
 mod toolchain;
 mod workspace;

@@ -49,6 +49,8 @@ pub enum Work {
     },
     /// One inference of a model with these layer widths.
     Network(Vec<u64>),
+    /// The network of a model that tells places, and so many steps from its answer.
+    Steps(u64),
     /// The threshold's table of 64 KiB, made once for each threshold.
     Table,
 }

@@ -95,6 +95,7 @@ fn of_one(measured: &Measured) -> Vec<Item> {
             vec![make("frame windows, tracked", measured.total())]
         }
         Work::Table => vec![make("table", measured.total())],
+        Work::Steps(steps) => vec![make(&steps_of(*steps), measured.total())],
         Work::Network(widths) => {
             let names: Vec<String> = widths.iter().map(u64::to_string).collect();
             let mut items = vec![make(
@@ -109,6 +110,12 @@ fn of_one(measured: &Measured) -> Vec<Item> {
             items
         }
     }
+}
+
+/// `network and 1 step`, `network and 2 steps`
+pub fn steps_of(steps: u64) -> String {
+    let plural = if steps == 1 { "" } else { "s" };
+    format!("network and {steps} step{plural}")
 }
 
 fn item(measured: &Measured, name: &str, cost: Cost, count: f64) -> Item {

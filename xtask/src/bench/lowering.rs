@@ -4,12 +4,16 @@
 //! - Branches, calls and returns go nowhere and take one slot of the branch unit: the core's branch target cache turns
 //!   a correctly predicted one around in a cycle. Wrong predictions are counted apart (`tables`).
 //! - `it` takes one slot; what it makes conditional takes its own whether it is executed or not.
+//! - A comparison of floating-point numbers is a subtraction, and reading its flags a move to the core's registers.
 //! - Loads and stores of several registers (`ldm`, `push` …), one cycle to the analyzer, are one load or store each.
 
 use super::disassembly::{Instruction, is_it};
 
 /// Takes one slot and waits for nothing.
 pub const FILLER: &str = "mov.w r8, #0";
+
+/// Takes the difference that a comparison is.
+const SCRATCH: &str = "s31";
 
 /// Conditional branches.
 const CONDITIONS: [&str; 16] = [
@@ -37,6 +41,8 @@ pub fn lower(instruction: &Instruction) -> Vec<String> {
             one(format!("{name} {register}, #4"))
         }
         "tbb" | "tbh" => table_branch(operands),
+        "vcmp" | "vcmpe" => one(comparison(operands)),
+        "vmrs" => one(format!("vmov r12, {SCRATCH}")),
         "push" | "vpush" => several("str", "sp", operands),
         "pop" | "vpop" => several("ldr", "sp", operands),
         "ldm" | "ldmdb" | "ldmia" | "vldmia" | "vldmdb" => list("ldr", operands),
@@ -46,6 +52,15 @@ pub fn lower(instruction: &Instruction) -> Vec<String> {
         }
         _ if CONDITIONS.contains(&name) => one("bne #-8".to_owned()),
         _ => one(format!("{} {operands}", instruction.mnemonic)),
+    }
+}
+
+/// `s0, s1` or `s0, #0`
+fn comparison(operands: &str) -> String {
+    match operands.split_once(", ") {
+        Some((a, b)) if !b.starts_with('#') => format!("vsub.f32 {SCRATCH}, {a}, {b}"),
+        Some((a, _)) => format!("vneg.f32 {SCRATCH}, {a}"),
+        None => FILLER.to_owned(),
     }
 }
 
@@ -106,6 +121,13 @@ mod tests {
         assert_eq!(lowered("tbb", "[pc, r1]"), ["ldrb r12, [sp, r1]", "bx r12"]);
         // Not a branch.
         assert_eq!(lowered("bic", "r0, r0, #1"), ["bic r0, r0, #1"]);
+    }
+
+    #[test]
+    fn comparisons_are_subtractions() {
+        assert_eq!(lowered("vcmp.f32", "s0, #0"), ["vneg.f32 s31, s0"]);
+        assert_eq!(lowered("vcmpe.f32", "s0, s2"), ["vsub.f32 s31, s0, s2"]);
+        assert_eq!(lowered("vmrs", "APSR_nzcv, fpscr"), ["vmov r12, s31"]);
     }
 
     #[test]

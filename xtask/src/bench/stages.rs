@@ -7,13 +7,14 @@ use addr2line::Loader;
 use anyhow::{Context, Result, anyhow};
 
 /// The stages, in the order in which a frame goes through them.
-pub const ORDER: [&str; 9] = [
+pub const ORDER: [&str; 10] = [
     "threshold",
     "dilation",
     "runs, labels, moments",
     "markers",
     "features",
     "network",
+    "steps",
     "angles, force",
     "pipeline",
     "library",
@@ -102,6 +103,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         "markers" | "geometry" => Some("markers"),
         "features" => Some("features"),
         "network" | "model" => Some("network"),
+        "forward" => Some("steps"),
         "force" | "angle" | "cordic" => Some("angles, force"),
         // Small things that belong to whoever uses them.
         "units" | "status" | "kernels" | "mask" | "division" | "root" => None,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::cases::Work;
-use super::items::Item;
+use super::items::{Item, steps_of};
 use super::measure::{Cost, Measured};
 use super::memory::{AXI_LOAD, FLASH_LINE};
 use super::stages;
@@ -149,6 +149,7 @@ fn name(measured: &Measured) -> String {
             format!("{} {}, windows, tracked", case.frame(), case.format)
         }
         Work::Table => "the threshold's table".to_owned(),
+        Work::Steps(steps) => steps_of(*steps),
         Work::Network(widths) => {
             let widths: Vec<String> = widths.iter().map(u64::to_string).collect();
             format!("network {}", widths.join("-"))

@@ -1,33 +1,35 @@
 //! What the configurations of the trade between speed and accuracy cost (`docs/tradeoff.md`): frames without a model, models
-//! without a frame, and some of both together, which must be their sum.
+//! without a frame, the film run forwards, and some of all together, which must be their sum.
 
 use std::fs;
 
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 
-use super::cases::Part;
+use super::cases::{Part, Work};
 use super::measure::{Cost, Measured};
 use crate::size::{self, Region};
 use crate::toolchain::{Toolchain, cargo};
 use crate::{process, workspace};
 
 /// The model behind every frame; its own cost is taken off.
-const BEHIND: &str = "closed form";
+const BEHIND: &str = "16-16 int8";
+/// What the name of a model ends with behind whose network there is a step.
+const ONE_STEP: &str = ", 1 step";
+/// The most steps that are counted.
+const MOST_STEPS: u64 = 3;
 /// How far from the sum of its parts a whole may be, of itself: what a force takes to become angles depends a little on it,
 /// and blocks of instructions follow others.
 const TOLERANCE: f64 = 0.01;
 /// Where the result goes.
 const FILE: &str = "calibration/tradeoff/costs.json";
-/// A model of at most so many bytes is copied to DTCM by the firmware (`NEAR_LIMIT` of its `model.rs`).
-const NEAR_LIMIT: u64 = 12 * 1024;
-
 /// Everything, as the file has it.
 #[derive(Serialize)]
 struct Costs {
     compiler: String,
     frames: Vec<Frame>,
     models: Vec<Model>,
+    film: Film,
     together: Vec<Together>,
     /// The firmware's memories, and the size of the model file that it holds.
     firmware: Vec<Region>,
@@ -64,6 +66,19 @@ struct Model {
     flash_cycles: u64,
 }
 
+/// The film run forwards behind a network.
+#[derive(Serialize)]
+struct Film {
+    /// Of the model file.
+    bytes: u64,
+    /// One step: the film is run forwards where the network's answer is, and where the step leads.
+    one_step: Numbers,
+    /// Every other time that it is run forwards.
+    each_more: Numbers,
+    /// Cycles that come on top when its tables are read from flash.
+    flash_cycles: u64,
+}
+
 /// A frame with its model, counted, and as the sum of its parts.
 #[derive(Debug, Serialize)]
 struct Together {
@@ -82,13 +97,15 @@ struct Together {
 pub fn write(toolchain: &Toolchain, measured: &[Measured]) -> Result<()> {
     let models = models(measured)?;
     let frames = frames(measured, &models)?;
-    let together = together(measured, &frames, &models)?;
+    let film = film(measured, &models)?;
+    let together = together(measured, &frames, &models, &film)?;
     let model = workspace::folder("calibration/models/default.hvtm");
     let model = fs::metadata(&model).with_context(|| format!("reading {}", model.display()))?;
     let costs = Costs {
         compiler: toolchain.compiler()?,
         frames,
         models,
+        film,
         together,
         firmware: size::of_firmware(toolchain)?.0,
         default_model_bytes: model.len(),
@@ -130,20 +147,40 @@ fn models(measured: &[Measured]) -> Result<Vec<Model>> {
     let mut models = Vec::new();
     for measured in measured {
         let part = part(measured)?;
-        if part.scan.is_none() {
+        if let Work::Network(_) = measured.case.work {
             models.push(Model {
                 model: part.model.clone(),
                 bytes: part.bytes,
                 whole: numbers(measured.total())?,
-                flash_cycles: if part.bytes > NEAR_LIMIT {
-                    measured.loads.weights_in_flash()
-                } else {
-                    0
-                },
+                flash_cycles: measured.loads.weights_in_flash(),
             });
         }
     }
     Ok(models)
+}
+
+/// Steps less the network before them.
+fn film(measured: &[Measured], models: &[Model]) -> Result<Film> {
+    let stepping = |steps: u64| {
+        let is_it =
+            |measured: &&Measured| matches!(measured.case.work, Work::Steps(n) if n == steps);
+        let found = measured.iter().find(is_it);
+        found.with_context(|| format!("{steps} steps were not counted"))
+    };
+    let (one, three) = (stepping(1)?, stepping(MOST_STEPS)?);
+    let network = find_model(models, &part(one)?.model)?;
+    let (whole, all) = (numbers(one.total())?, numbers(three.total())?);
+    let more = minus(all, whole);
+    let others = MOST_STEPS as i64 - 1;
+    Ok(Film {
+        bytes: part(one)?.bytes - network.bytes,
+        one_step: minus(whole, network.whole),
+        each_more: Numbers {
+            instructions: more.instructions / others,
+            cycles: more.cycles / others,
+        },
+        flash_cycles: one.loads.weights_in_flash() - network.flash_cycles,
+    })
 }
 
 fn frames(measured: &[Measured], models: &[Model]) -> Result<Vec<Frame>> {
@@ -175,7 +212,12 @@ fn frames(measured: &[Measured], models: &[Model]) -> Result<Vec<Frame>> {
     Ok(frames)
 }
 
-fn together(measured: &[Measured], frames: &[Frame], models: &[Model]) -> Result<Vec<Together>> {
+fn together(
+    measured: &[Measured],
+    frames: &[Frame],
+    models: &[Model],
+    film: &Film,
+) -> Result<Vec<Together>> {
     let mut together = Vec::new();
     for measured in measured {
         let part = part(measured)?;
@@ -190,7 +232,7 @@ fn together(measured: &[Measured], frames: &[Frame], models: &[Model]) -> Result
         };
         let frame = frames.iter().find(is_same);
         let frame = frame.with_context(|| format!("no frame without {}", part.model))?;
-        let (a, b) = (frame.whole, find_model(models, &part.model)?.whole);
+        let (a, b) = (frame.whole, behind(models, film, &part.model)?);
         let whole = Together {
             size: measured.case.size,
             centroid: centroid.clone(),
@@ -233,6 +275,18 @@ impl Together {
     }
 }
 
+/// What a model costs, with a step behind its network where its name says so.
+fn behind(models: &[Model], film: &Film, name: &str) -> Result<Numbers> {
+    let Some(network) = name.strip_suffix(ONE_STEP) else {
+        return Ok(find_model(models, name)?.whole);
+    };
+    let whole = find_model(models, network)?.whole;
+    Ok(Numbers {
+        instructions: whole.instructions + film.one_step.instructions,
+        cycles: whole.cycles + film.one_step.cycles,
+    })
+}
+
 fn find_model<'m>(models: &'m [Model], name: &str) -> Result<&'m Model> {
     let found = models.iter().find(|model| model.model == name);
     found.with_context(|| format!("the model `{name}` was not counted"))
@@ -248,13 +302,6 @@ fn minus(a: Numbers, b: Numbers) -> Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn models_are_copied_as_in_the_firmware() {
-        let source = fs::read_to_string(workspace::folder("firmware/src/model.rs")).unwrap();
-        let line = format!("const NEAR_LIMIT: usize = {} * 1024;", NEAR_LIMIT / 1024);
-        assert!(source.contains(&line), "no `{line}`");
-    }
 
     #[test]
     fn a_whole_that_is_not_the_sum_is_refused() {
