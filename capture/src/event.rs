@@ -1,7 +1,5 @@
 //! What the tracker tells the follower.
 
-use crate::window::Window;
-
 /// One VSYNC edge: the one that begins a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Edge {
@@ -18,8 +16,6 @@ pub struct Band {
     pub sequence: u32,
     /// Bands of the same frame above it.
     pub index: u16,
-    /// The part of the frame that is captured.
-    pub window: Window,
     /// The edge that began its frame.
     pub edge: Edge,
 }

@@ -40,6 +40,8 @@ pub struct Tally {
     pub overrun: u32,
     /// Too short or too long.
     pub size: u32,
+    /// [Passed over](Follower::pass_over).
+    pub passed: u32,
 }
 
 /// Where the frame under way stands.
@@ -48,7 +50,7 @@ enum Under {
     /// None is, or it is lost already.
     Nothing,
     /// The bands before `next` were scanned.
-    Scanning { edge: Edge, next: u16, bands: u16 },
+    Scanning { edge: Edge, next: u16 },
     /// It was delivered before its end was known.
     Delivered { edge: Edge },
 }
@@ -78,6 +80,7 @@ impl Follower {
                 busy: 0,
                 overrun: 0,
                 size: 0,
+                passed: 0,
             },
             after_loss: false,
             after_overrun: false,
@@ -98,7 +101,7 @@ impl Follower {
     /// Whether every band of a frame was scanned and its end is not yet known. When no event waits and nothing more has
     /// come since its last band, it may be [delivered](Self::deliver) already.
     pub fn is_complete(&self) -> bool {
-        matches!(self.under, Under::Scanning { next, bands, .. } if next == bands)
+        matches!(self.under, Under::Scanning { next, .. } if next == self.shape.bands())
     }
 
     /// Takes the next event.
@@ -129,7 +132,7 @@ impl Follower {
     /// counts as such, and the next delivery says so.
     pub fn deliver(&mut self) -> Action {
         match self.under {
-            Under::Scanning { edge, next, bands } if next == bands => {
+            Under::Scanning { edge, next } if next == self.shape.bands() => {
                 self.gap_before(edge.number);
                 self.under = Under::Delivered { edge };
                 Action::Deliver(Delivery {
@@ -143,6 +146,16 @@ impl Follower {
         }
     }
 
+    /// Goes on after frame `newest`: whatever has come of frames up to it was not, and will not be,
+    /// looked at.
+    pub fn pass_over(&mut self, newest: u32) {
+        self.close();
+        let passed = newest.saturating_sub(self.accounted);
+        self.tally.passed += passed;
+        self.accounted += passed;
+        self.after_loss |= passed > 0;
+    }
+
     fn band(&mut self, band: Band) -> Action {
         if band.index == 0 {
             self.close();
@@ -150,7 +163,6 @@ impl Follower {
                 self.under = Under::Scanning {
                     edge: band.edge,
                     next: 0,
-                    bands: band.window.bands(self.shape),
                 };
             }
         }

@@ -20,7 +20,6 @@ mod event;
 mod follower;
 mod shape;
 mod tracker;
-mod window;
 
 #[cfg(test)]
 extern crate std;
@@ -31,4 +30,3 @@ pub use event::{Band, Edge, Ending, Event};
 pub use follower::{Action, Delivery, Follower, Tally};
 pub use shape::Shape;
 pub use tracker::{Interface, Tracker};
-pub use window::Window;

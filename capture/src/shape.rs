@@ -1,28 +1,28 @@
-//! How rows, bands and slots relate.
+//! How frames, bands and slots relate.
 
-/// The number of rows of a band, and of slots.
+/// The number of bands of a frame, and of slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shape {
-    rows: u16,
+    bands: u16,
     slots: u16,
 }
 
 impl Shape {
-    /// Bands of `rows` rows, in a ring of `slots` slots.
+    /// Frames of `bands` bands, in a ring of `slots` slots.
     ///
     /// # Panics
-    /// Without a row, or when `slots` is no power of two of at least 4. Meant for constants, where a panic is a
+    /// Without a band, or when `slots` is no power of two of at least 4. Meant for constants, where a panic is a
     /// build error.
-    pub const fn new(rows: u16, slots: u16) -> Self {
-        assert!(rows > 0, "a band has at least one row");
+    pub const fn new(bands: u16, slots: u16) -> Self {
+        assert!(bands > 0, "a frame has at least one band");
         // Sequence numbers wrap at 2³², so that the ring must divide it. The DMA holds two slots.
         assert!(slots >= 4 && slots.is_power_of_two());
-        Shape { rows, slots }
+        Shape { bands, slots }
     }
 
-    /// Rows of a band.
-    pub const fn rows(&self) -> u16 {
-        self.rows
+    /// Bands of a frame.
+    pub const fn bands(&self) -> u16 {
+        self.bands
     }
 
     /// Where a band lies.

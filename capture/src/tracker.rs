@@ -2,13 +2,12 @@
 
 use crate::event::{Band, Edge, Ending, Event};
 use crate::shape::Shape;
-use crate::window::Window;
 
 /// The camera interface and its double-buffered DMA, as the tracker needs them.
 pub trait Interface {
-    /// Stops everything, throws away what is under way, and begins again: `window` of the next frame that begins goes
-    /// to slot `first`, then to slot `second`.
-    fn restart(&mut self, window: Window, first: u16, second: u16);
+    /// Stops everything, throws away what is under way, and begins again: the next frame that begins
+    /// goes to slot `first`, then to slot `second`.
+    fn restart(&mut self, first: u16, second: u16);
 
     /// Stops everything.
     fn stop(&mut self);
@@ -33,13 +32,7 @@ pub trait Interface {
 #[derive(Debug)]
 pub struct Tracker {
     shape: Shape,
-    /// What is captured now.
-    window: Window,
-    /// What is to be captured.
-    wanted: Window,
     running: bool,
-    /// No band has come since a frame ended or everything began again.
-    idle: bool,
     finished: u32,
     /// The DMA's target as far as it is known.
     second: bool,
@@ -50,14 +43,11 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// A tracker at rest, of whole frames `frame`.
-    pub const fn new(shape: Shape, frame: Window) -> Self {
+    /// A tracker at rest.
+    pub const fn new(shape: Shape) -> Self {
         Tracker {
             shape,
-            window: frame,
-            wanted: frame,
             running: false,
-            idle: false,
             finished: 0,
             second: false,
             index: 0,
@@ -71,17 +61,6 @@ impl Tracker {
     /// Bands finished since boot, modulo 2³².
     pub fn finished(&self) -> u32 {
         self.finished
-    }
-
-    /// Captures only `window`, which is [capturable](Window::capturable), from the next frame on; while one is under way,
-    /// from the next frame on after its end.
-    pub fn set_window(&mut self, window: Window, interface: &mut impl Interface) {
-        self.wanted = window;
-        let between_frames =
-            self.idle && interface.newest_edge() == self.frame && !interface.has_begun_a_band();
-        if self.running && between_frames && window != self.window {
-            self.restart(interface);
-        }
     }
 
     /// Begins with the next frame.
@@ -114,15 +93,13 @@ impl Tracker {
             (_, true) => {}
             (_, false) => return self.broken(Ending::Late, interface, tell),
         }
-        self.idle = false;
         tell(Event::Band(Band {
             sequence: self.finished,
             index: self.index,
-            window: self.window,
             edge,
         }));
         self.finished = self.finished.wrapping_add(1);
-        self.index = (self.index + 1) % self.window.bands(self.shape);
+        self.index = (self.index + 1) % self.shape.bands();
         interface.aim(self.shape.slot(self.finished.wrapping_add(1)));
     }
 
@@ -135,16 +112,10 @@ impl Tracker {
         let edge = interface.newest_edge();
         let complete = self.index == 0 && edge == self.frame;
         match (complete, interface.has_begun_a_band()) {
-            (true, false) => {
-                self.idle = true;
-                if self.wanted != self.window {
-                    self.restart(interface);
-                }
-                tell(Event::Ended {
-                    edge,
-                    how: Ending::Whole,
-                });
-            }
+            (true, false) => tell(Event::Ended {
+                edge,
+                how: Ending::Whole,
+            }),
             (true, true) => self.broken(Ending::Long, interface, tell),
             (false, _) => self.broken(Ending::Short, interface, tell),
         }
@@ -192,10 +163,8 @@ impl Tracker {
 
     fn restart(&mut self, interface: &mut impl Interface) {
         self.index = 0;
-        self.idle = true;
         self.second = false;
-        self.window = self.wanted;
         let next = self.shape.slot(self.finished.wrapping_add(1));
-        interface.restart(self.window, self.shape.slot(self.finished), next);
+        interface.restart(self.shape.slot(self.finished), next);
     }
 }

@@ -10,11 +10,11 @@
 //! Coherence: the MDMA reads AXI SRAM past the caches, where the camera's DMA has written past them; it writes DTCM,
 //! which is never cached. A barrier keeps the core from reading ahead of the end of a copy.
 
-use crate::bands::{self, BAND_PIXELS, ROWS, SHAPE};
+use crate::bands::{self, BAND_PIXELS, SHAPE};
 use embassy_stm32::pac::mdma::{Ch, regs, vals};
 use embassy_stm32::pac::{MDMA, RCC};
 use embassy_stm32::{Peri, peripherals};
-use hivtac_capture::{Band, Window};
+use hivtac_capture::Band;
 use static_cell::ConstStaticCell;
 
 const CHANNEL: usize = 0;
@@ -40,9 +40,9 @@ pub struct BandCopy {
     /// The buffer of the copy under way, or the next one.
     next: usize,
     /// The band that is being copied, or was copied ahead.
-    ahead: Option<(u32, Window)>,
+    ahead: Option<u32>,
     /// The band that was fetched last, when it was intact.
-    before: Option<(u32, Window)>,
+    before: Option<u32>,
 }
 
 /// A band in memory, row by row.
@@ -69,9 +69,8 @@ impl BandCopy {
     /// A finished band. `finished` tells how many bands are finished by now; when there is one more already, its copy
     /// begins. `None` when the band was overwritten meanwhile, or could not be copied.
     pub fn fetch(&mut self, band: &Band, finished: impl Fn() -> u32) -> Option<Fetched<'_>> {
-        let wanted = (band.sequence, band.window);
-        if self.ahead.take() != Some(wanted) {
-            self.start(band.sequence, band.window);
+        if self.ahead.take() != Some(band.sequence) {
+            self.start(band.sequence);
         }
         let copied = wait();
         let finished = finished();
@@ -79,39 +78,37 @@ impl BandCopy {
         self.next = (self.next + 1) % COUNT;
         let following = band.sequence.wrapping_add(1);
         if following != finished {
-            self.start(following, band.window);
-            self.ahead = Some((following, band.window));
+            self.start(following);
+            self.ahead = Some(following);
         }
         let intact = copied && SHAPE.intact(band.sequence, finished);
         let before = self.before.take();
         if !intact {
             return None;
         }
-        self.before = Some(wanted);
-        let pixels = usize::from(band.window.width) * usize::from(ROWS);
+        self.before = Some(band.sequence);
         let above = match before {
-            Some((sequence, window))
-                if sequence.wrapping_add(1) == band.sequence && window == band.window =>
-            {
-                self.buffers[buffer_before].0.get(..pixels)
+            Some(sequence) if sequence.wrapping_add(1) == band.sequence => {
+                &self.buffers[buffer_before].0[..]
             }
-            _ => None,
+            _ => &[],
         };
         Some(Fetched {
-            rows: self.buffers[buffer].0.get(..pixels)?,
-            above: above.unwrap_or_default(),
+            rows: &self.buffers[buffer].0,
+            above,
         })
     }
 
     /// Begins to copy a band into the next buffer. What was under way is given up.
-    fn start(&mut self, sequence: u32, window: Window) {
-        let bytes = u32::from(window.width) * u32::from(ROWS) * size_of::<u16>() as u32;
+    fn start(&mut self, sequence: u32) {
         let channel = registers();
         channel.cr().write_value(regs::Cr(0));
         while channel.cr().read().en() {}
         channel.ifcr().write_value(regs::Ifcr(ALL_FLAGS));
         channel.tcr().write(set_up_transfer);
-        channel.bndtr().write(|w| w.set_bndt(bytes));
+        channel
+            .bndtr()
+            .write(|w| w.set_bndt(size_of::<Rows>() as u32));
         let source = bands::address(SHAPE.slot(sequence));
         channel.sar().write_value(regs::Sar(source));
         let buffer = &raw mut self.buffers[self.next];

@@ -8,37 +8,32 @@
 //! # Note
 //! The ring lies in AXI SRAM: this DMA reaches neither DTCM nor ITCM.
 
-use crate::{bands, seeded_bugs};
+use crate::bands::{self, BAND_PIXELS};
+use crate::seeded_bugs;
 use embassy_stm32::pac::dma::{St, regs, vals};
 use embassy_stm32::pac::{DMA1, DMAMUX1};
 use embassy_stm32::{Peri, peripherals};
-use hivtac_capture::Window;
 
 const STREAM: usize = 0;
+/// Words of a band: DCMI packs two pixels into one.
+const WORDS: u16 = (BAND_PIXELS / 2) as u16 / seeded_bugs::BAND_DIVISOR;
 
 /// The stream.
 pub struct BandDma {
     /// Holding it says that nobody else uses the stream.
     _stream: Peri<'static, peripherals::DMA1_CH0>,
-    /// Words of a band, now.
-    words: u16,
 }
 
 impl BandDma {
     /// Takes the stream.
     pub fn new(stream: Peri<'static, peripherals::DMA1_CH0>) -> Self {
-        Self {
-            _stream: stream,
-            words: 0,
-        }
+        Self { _stream: stream }
     }
 
-    /// Starts anew: bands of `window`'s rows, from the data register at `source` into slots `first`, `second`, and then
+    /// Starts anew: bands from the data register at `source` into slots `first`, `second`, and then
     /// where [`aim`](Self::aim) says.
-    pub fn start(&mut self, source: *mut u32, window: Window, first: u16, second: u16) {
+    pub fn start(&mut self, source: *mut u32, first: u16, second: u16) {
         self.halt();
-        // DCMI packs two pixels into a word. A band has at most 800 × 4 pixels.
-        self.words = window.width / 2 * bands::ROWS / seeded_bugs::BAND_DIVISOR;
         DMAMUX1
             .ccr(STREAM)
             .write(|w| w.set_dmareq_id(seeded_bugs::DCMI_DMA_REQUEST));
@@ -46,7 +41,7 @@ impl BandDma {
         stream.par().write_value(source as u32);
         stream.m0ar().write_value(bands::address(first));
         stream.m1ar().write_value(bands::address(second));
-        stream.ndtr().write(|w| w.set_ndt(self.words));
+        stream.ndtr().write(|w| w.set_ndt(WORDS));
         stream.fcr().write_value(regs::Fcr(0));
         // What the core wrote to the ring at boot must not arrive after the DMA's words.
         cortex_m::asm::dmb();
@@ -111,13 +106,13 @@ impl BandDma {
     /// Whether a band was just finished, or none has begun.
     pub fn is_between_bands(&self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
-        finished || registers().ndtr().read().ndt() == self.words
+        finished || registers().ndtr().read().ndt() == WORDS
     }
 
     /// Whether words have come since the newest band that was [taken](Self::take_finished).
     pub fn has_begun_a_band(&self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
-        finished || registers().ndtr().read().ndt() != self.words
+        finished || registers().ndtr().read().ndt() != WORDS
     }
 }
 

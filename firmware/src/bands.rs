@@ -4,23 +4,21 @@
 
 use crate::camera::{HEIGHT, WIDTH};
 use core::mem::MaybeUninit;
-use hivtac_capture::{Shape, Window};
+use hivtac_capture::Shape;
 
 /// Rows of a band: as many as the sensing takes at a time, for each time costs it some hundred cycles.
 pub const ROWS: u16 = 8;
 /// Bands in the ring: at 320 × 240 a little more than a frame.
 pub const SLOTS: u16 = 32;
-/// Both.
-pub const SHAPE: Shape = Shape::new(ROWS, SLOTS);
-/// A whole frame.
-pub const FRAME: Window = Window::whole(WIDTH, HEIGHT);
-/// Pixels of a band of a whole frame: the size of a slot.
+/// How frames, bands and slots relate.
+pub const SHAPE: Shape = Shape::new(HEIGHT / ROWS, SLOTS);
+/// Pixels of a band: the size of a slot.
 pub const BAND_PIXELS: usize = WIDTH as usize * ROWS as usize;
 
 const _: () = {
-    assert!(
-        matches!(FRAME.capturable(FRAME, SHAPE), Some(window) if window.height == HEIGHT && window.width == WIDTH)
-    );
+    assert!(HEIGHT.is_multiple_of(ROWS));
+    // What the DMA moves at once (`band_copy`).
+    assert!((BAND_PIXELS * size_of::<u16>()).is_multiple_of(128));
     // The widest rows that the pipeline takes fit, too.
     assert!(ring_bytes(800) <= 512 * 1024);
 };

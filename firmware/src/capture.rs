@@ -3,7 +3,7 @@
 //! # Design
 //! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots in AXI SRAM
 //! (`bands`), at 320 × 240 a little more than a frame, at 800 × 600 four tenths of one. Each finished band is one
-//! interrupt; so are the end of a frame (the VSYNC pulse, or the last row of a crop window) and an overrun. The handlers
+//! interrupt; so are the end of a frame (the VSYNC pulse) and an overrun. The handlers
 //! do what `hivtac_capture::Tracker` says, and pass its events to the pipeline, which has finished bands copied to DTCM
 //! (`band_copy`) and scans one while the next ones arrive. A frame is measured as soon as its last band is scanned. When
 //! more comes after that, it counts as too long, and the next sample says that a frame was lost.
@@ -30,11 +30,10 @@
 //!
 //! # Limitations
 //! A frame in which the camera lost bytes and gained as many is not noticed. Nor is it noticed that the handler of a
-//! band was late by exactly two bands in a frame that was too long by two bands. With a crop window, what the camera
-//! sends after the window is not seen.
+//! band was late by exactly two bands in a frame that was too long by two bands.
 
 use crate::band_dma::BandDma;
-use crate::bands::{FRAME, SHAPE};
+use crate::bands::SHAPE;
 use crate::camera::{self, Format};
 use crate::seeded_bugs::INVERTED_POLARITIES;
 use crate::{stats, vsync};
@@ -46,7 +45,7 @@ use embassy_stm32::{Peri, peripherals, rcc};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use hivtac_capture::{Edge, Event, Interface, Tracker, Window};
+use hivtac_capture::{Edge, Event, Interface, Tracker};
 
 /// Events that wait for the pipeline: more than bands that are still whole.
 const EVENTS_WAITING: usize = 72;
@@ -93,7 +92,7 @@ impl Capture {
     pub fn new(dcmi: Peri<'static, peripherals::DCMI>, dma: BandDma, priority: Priority) -> Self {
         rcc::enable_and_reset::<peripherals::DCMI>();
         let running = Running {
-            tracker: Tracker::new(SHAPE, FRAME),
+            tracker: Tracker::new(SHAPE),
             hardware: Hardware { dma, _dcmi: dcmi },
         };
         CAPTURE.lock(|capture| capture.replace(Some(running)));
@@ -106,15 +105,25 @@ impl Capture {
         Self(())
     }
 
-    /// Captures from the next frame on, after the time that `passed` tells of; whole frames of such pixels.
-    pub async fn start(&mut self, passed: Event, format: Format) {
+    /// What pixels the camera sends.
+    pub fn format(&self) -> Format {
+        FORMAT.lock(Cell::get)
+    }
+
+    /// The camera sends such pixels from now on. Only while nothing is captured.
+    pub fn set_format(&mut self, format: Format) {
         FORMAT.lock(|cell| cell.set(format));
-        set_window(FRAME);
-        let told = Told {
-            event: passed,
-            format,
-        };
-        EVENTS.send(told).await;
+    }
+
+    /// Captures from the next frame on, after the time that `passed` tells of.
+    pub async fn start(&mut self, passed: Event) {
+        let format = self.format();
+        EVENTS
+            .send(Told {
+                event: passed,
+                format,
+            })
+            .await;
         act(|running, _| running.tracker.start(&mut running.hardware));
     }
 
@@ -137,11 +146,6 @@ impl Capture {
 /// Bands finished since boot, modulo 2³².
 pub fn finished() -> u32 {
     FINISHED.load(Ordering::Acquire)
-}
-
-/// Captures only `window` from the next frame on, or the one after that. It must be capturable out of [`FRAME`].
-pub fn set_window(window: Window) {
-    act(|running, _| running.tracker.set_window(window, &mut running.hardware));
 }
 
 /// Whether anything has come since the newest band that an event told of.
@@ -172,14 +176,11 @@ fn tell(event: Event) {
 }
 
 impl Interface for Hardware {
-    fn restart(&mut self, window: Window, first: u16, second: u16) {
+    fn restart(&mut self, first: u16, second: u16) {
         reset();
-        self.dma
-            .start(DCMI.dr().as_ptr().cast(), window, first, second);
+        let source = DCMI.dr().as_ptr().cast();
+        self.dma.start(source, first, second);
         configure();
-        if window != FRAME {
-            crop(window);
-        }
         DCMI.ier().write(|w| {
             w.set_frame_ie(true);
             w.set_ovr_ie(true);
@@ -227,19 +228,6 @@ fn configure() {
         w.set_vspol(camera::VSYNC_BLANKING_IS_HIGH != INVERTED_POLARITIES);
         w.set_hspol(camera::HREF_BLANKING_IS_HIGH != INVERTED_POLARITIES);
     });
-}
-
-/// Lets DCMI pass only `window`: two bytes a pixel, and sizes less one (RM0433, DCMI_CWSTRT and DCMI_CWSIZE).
-fn crop(window: Window) {
-    DCMI.cwstrt().write(|w| {
-        w.set_hoffcnt(window.left * 2);
-        w.set_vst(window.top);
-    });
-    DCMI.cwsize().write(|w| {
-        w.set_capcnt(window.width * 2 - 1);
-        w.set_vline(window.height - 1);
-    });
-    DCMI.cr().modify(|w| w.set_crop(true));
 }
 
 /// Waits until the DMA has written a frame's last words, some bus cycles; no longer, as they may never come.

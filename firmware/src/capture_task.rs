@@ -14,8 +14,8 @@ use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
 use hivtac_wire::message::{DeviceMessage, LogLevel, Outcome, Reply};
 
-/// So many frame times without a band or the end of a frame are a silence. Bands come all the time but for the vertical
-/// blanking, a seventh of a frame, or what a crop window leaves out.
+/// So many frame times without a band or the end of a frame are a silence. Bands come all the
+/// time but for the vertical blanking, a seventh of a frame.
 const SILENCE: u32 = 2;
 /// So many silences in a row, and the camera is set up again.
 const SILENCES: u32 = 3;
@@ -41,11 +41,11 @@ static EXPOSING: AtomicBool = AtomicBool::new(false);
 
 /// Runs for ever at the capture executor's priority. The camera begins with `format`.
 #[embassy_executor::task]
-pub async fn run(camera: Camera, capture: Capture, format: Format) {
+pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
+    capture.set_format(format);
     let mut task = CaptureTask {
         camera,
         capture,
-        format,
         numbering: false,
         activity: 0,
         quiet: 0,
@@ -65,8 +65,6 @@ pub async fn run(camera: Camera, capture: Capture, format: Format) {
 struct CaptureTask {
     camera: Camera,
     capture: Capture,
-    /// What pixels the camera sends.
-    format: Format,
     /// VSYNC edges count since the first register reset.
     numbering: bool,
     /// [`Capture::activity`] when it was looked at last.
@@ -123,7 +121,7 @@ impl CaptureTask {
     /// Has the camera send other pixels.
     async fn change_format(&mut self, format: Format) {
         let from = self.stop();
-        self.format = format;
+        self.capture.set_format(format);
         let answered = self.camera.set_format(format).await;
         self.go_on_when_set_up(from, answered).await;
     }
@@ -166,7 +164,7 @@ impl CaptureTask {
         let to = vsync::newest().number;
         stats::end_passing_over(to);
         let passed = Event::Passed { from, to, restart };
-        self.capture.start(passed, self.format).await;
+        self.capture.start(passed).await;
     }
 
     async fn try_until_it_answers(&mut self) {
@@ -183,6 +181,6 @@ impl CaptureTask {
             self.numbering = true;
             vsync::restart_count();
         }
-        self.camera.configure(self.format).await
+        self.camera.configure(self.capture.format()).await
     }
 }

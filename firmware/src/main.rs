@@ -22,7 +22,6 @@ mod capture_task;
 mod commands;
 mod convert;
 mod faults;
-mod follow;
 mod health;
 mod info;
 mod log;

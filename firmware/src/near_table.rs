@@ -11,13 +11,6 @@ static TABLE: ConstStaticCell<ByteTable> = ConstStaticCell::new(ByteTable::CLOSE
 pub struct NearTable(Option<&'static mut ByteTable>);
 
 impl NearTable {
-    /// Takes over all of another table.
-    pub fn copy_from(&mut self, other: &ByteTable) {
-        if let Some(table) = self.table() {
-            table.copy_from(other);
-        }
-    }
-
     /// The table, taken when it is needed first: not while pixels are not RGB565.
     fn table(&mut self) -> Option<&mut ByteTable> {
         if self.0.is_none() {

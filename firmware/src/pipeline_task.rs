@@ -2,15 +2,15 @@
 
 use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
-use crate::camera::{self, Format};
+use crate::camera;
 use crate::capture::{self, EVENTS, Told};
 use crate::convert;
-use crate::follow::Follow;
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
 use crate::next_threshold::NextThreshold;
+use crate::session::Asked;
 use crate::tare::Taring;
-use crate::{info, outbox, session, stats};
+use crate::{info, outbox, session, stats, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
@@ -47,15 +47,11 @@ pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
 pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
-    let next = NextThreshold::take(sensor.settings().byte_order);
-    let sent = Format::of(sensor.threshold().format()).unwrap_or(Format::Rgb565);
     let mut task = PipelineTask {
         sensor,
-        sent,
-        next,
+        next_threshold: NextThreshold::NONE,
         bands,
         follower: Follower::new(SHAPE),
-        follow: Follow::new(),
         busy_us: 0,
         newest: 0,
         sequence: 0,
@@ -69,12 +65,9 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
-    /// The pixels of the frames that come.
-    sent: Format,
-    next: NextThreshold,
+    next_threshold: NextThreshold,
     bands: BandCopy,
     follower: Follower,
-    follow: Follow,
     /// Spent on the frame under way, µs.
     busy_us: u32,
     /// The frame that was measured last.
@@ -93,11 +86,6 @@ impl PipelineTask {
         if self.follower.is_scanning() {
             return self.go_on().await;
         }
-        self.use_next_threshold();
-        if self.next.is_unfinished() && EVENTS.is_empty() {
-            self.next.go_on();
-            return;
-        }
         self.taring.take_if(|taring| !taring.is_wanted());
         let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
         match select3(ORDERS.receive(), EVENTS.receive(), Timer::at(deadline)).await {
@@ -113,8 +101,6 @@ impl PipelineTask {
         if complete && EVENTS.is_empty() && !capture::has_begun_a_band() {
             let action = self.follower.deliver();
             self.act(action);
-        } else if !complete && self.next.is_unfinished() && EVENTS.is_empty() {
-            self.next.go_on();
         } else {
             let told = EVENTS.receive().await;
             self.follow(told);
@@ -122,15 +108,16 @@ impl PipelineTask {
     }
 
     fn follow(&mut self, Told { event, format }: Told) {
-        if format != self.sent {
-            self.change_format(format);
-        }
         if let Event::Ended { edge, how } = event
             && how != Ending::Whole
         {
             defmt::warn!("frame {=u32}: {}", edge.number, defmt::Debug2Format(&how));
         }
         let action = self.follower.event(event);
+        // The first event of other pixels is that the camera was set to them.
+        if format.pixels() != self.sensor.threshold().format() {
+            self.change_format();
+        }
         self.act(action);
     }
 
@@ -145,6 +132,7 @@ impl PipelineTask {
         stats::DROPPED_BUSY.add(tally.busy);
         stats::DROPPED_OVERRUN.add(tally.overrun);
         stats::DROPPED_SIZE.add(tally.size);
+        stats::DROPPED_SETUP.add(tally.passed);
         if tally.overrun + tally.size > 0 {
             health::set(Condition::NoForce);
         }
@@ -158,7 +146,7 @@ impl PipelineTask {
             if band.edge.number != self.newest.wrapping_add(1) {
                 self.sensor.forget_motion();
             }
-            self.follow.begin(self.sensor, band.window);
+            self.sensor.begin_frame();
         }
         let fetched = self.bands.fetch(band, capture::finished);
         if let Some(band) = &fetched {
@@ -171,9 +159,14 @@ impl PipelineTask {
     fn obey(&mut self, order: Order) {
         match order {
             Order::SetThreshold { id, threshold } => {
-                let wanted = convert::threshold_from_wire(threshold);
-                if let Err(outcome) = self.next.begin(id, wanted) {
-                    reply(id, outcome);
+                let threshold = convert::threshold_from_wire(threshold);
+                match self.next_threshold.take(id, threshold, self.sensor) {
+                    Ok(true) => {
+                        self.threshold_changed();
+                        reply(id, Outcome::Done);
+                    }
+                    Ok(false) => {}
+                    Err(outcome) => reply(id, outcome),
                 }
             }
             Order::Tare { id, .. } if self.taring.is_some() => reply(id, Outcome::Busy),
@@ -184,30 +177,41 @@ impl PipelineTask {
         }
     }
 
-    /// Between two frames: from the next one on, the threshold that was asked for holds, if it can.
-    fn use_next_threshold(&mut self) {
-        if let Some(asked) = self.next.come_into_use(self.sensor, self.sent) {
-            info::set_looking(self.sensor.settings());
-            if let Some(id) = asked.id() {
-                reply(id, Outcome::Done);
-            }
+    /// Frames of other pixels come from now on: those of the threshold that waits. Markers have
+    /// other areas in them, so that no rest position holds.
+    fn change_format(&mut self) {
+        let asked = self.next_threshold.come_into_use(self.sensor);
+        self.sensor.set_tare(None);
+        self.give_up_tare();
+        self.threshold_changed();
+        if let Some(id) = asked.and_then(Asked::id) {
+            reply(id, Outcome::Done);
         }
     }
 
-    /// Frames of other pixels come from now on. Markers have other areas in them: no rest position and no window holds.
-    fn change_format(&mut self, format: Format) {
-        self.sent = format;
-        self.use_next_threshold();
-        self.sensor.set_tare(None);
+    /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
+    /// which frames pass.
+    fn threshold_changed(&mut self) {
+        info::set_looking(self.sensor.settings());
         self.sensor.forget_motion();
-        self.give_up_tare();
-        self.follow = Follow::new();
+        let mut missed = false;
+        while let Ok(Told { event, .. }) = EVENTS.try_receive() {
+            missed = true;
+            if let Event::Passed { from, .. } = event {
+                self.follower.pass_over(from);
+                self.follower.event(event);
+            }
+        }
+        if missed {
+            self.follower.pass_over(vsync::newest().number);
+        }
+        self.act(Action::None);
     }
 
     /// Measures the frame whose rows were scanned.
     fn deliver(&mut self, delivery: &Delivery) {
         let begun = Instant::now();
-        let measurement = self.follow.finish(self.sensor);
+        let measurement = self.sensor.finish_frame();
         self.newest = delivery.edge.number;
         let sample = self.sample(delivery, &measurement);
         self.busy_us += begun.elapsed().as_micros() as u32;

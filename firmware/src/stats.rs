@@ -48,7 +48,7 @@ pub fn pass_over_frames_after(last: u32) {
 
 /// Ends that; `newest` is the last such frame.
 pub fn end_passing_over(newest: u32) {
-    DROPPED_BUSY.add(passed_over(newest));
+    DROPPED_SETUP.add(passed_over(newest));
     PASSING_OVER.store(NOT_PASSING, Ordering::Relaxed);
 }
 
@@ -74,7 +74,8 @@ macro_rules! counters {
                 uptime_us: Instant::now().as_micros(),
                 $($field: $name.get(),)*
             };
-            stats.dropped_busy = stats.dropped_busy.saturating_add(passed_over(frames_exposed));
+            let passed = passed_over(frames_exposed);
+            stats.dropped_setup = stats.dropped_setup.saturating_add(passed);
             stats
         }
     };
@@ -85,13 +86,12 @@ counters! {
     DROPPED_BUSY => dropped_busy;
     DROPPED_OVERRUN => dropped_overrun;
     DROPPED_SIZE => dropped_size;
+    DROPPED_SETUP => dropped_setup;
     CAMERA_TIMEOUTS => camera_timeouts;
     CAMERA_RESTARTS => camera_restarts;
     CAPTURE_OVERRUNS => capture_overruns;
     USB_DROPPED => usb_dropped;
     HOST_FRAMES_REJECTED => host_frames_rejected;
-    FRAMES_TRACKED => frames_tracked;
-    TRACKING_LOST => tracking_lost;
     PROCESSING_US => processing_us;
     LATENCY_US => latency_us;
 }

@@ -145,23 +145,21 @@ impl<'a> Info<'a> {
 }
 
 /// The counters since boot.
-fn stats_lines(stats: &Stats) -> [String; 5] {
+fn stats_lines(stats: &Stats) -> [String; 4] {
     [
         format!(
-            "frames     {} exposed, {} processed; dropped: busy {}, overrun {}, size {}",
+            "frames     {} exposed, {} processed; dropped: busy {}, overrun {}, size {}, \
+             set-up {}",
             stats.frames_exposed,
             stats.frames_processed,
             stats.dropped_busy,
             stats.dropped_overrun,
-            stats.dropped_size
+            stats.dropped_size,
+            stats.dropped_setup
         ),
         format!(
             "camera     {} timeouts, {} restarts, {} overruns",
             stats.camera_timeouts, stats.camera_restarts, stats.capture_overruns
-        ),
-        format!(
-            "tracking   {} frames by the markers' surroundings alone, lost {} times",
-            stats.frames_tracked, stats.tracking_lost
         ),
         format!(
             "USB        {} samples dropped, {} frames from the host rejected",

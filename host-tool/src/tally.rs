@@ -190,7 +190,7 @@ struct DeviceCounts {
     last: Option<Stats>,
     /// How often they were received after the first time.
     updates: u64,
-    grown: [u64; 12],
+    grown: [u64; 11],
 }
 
 impl DeviceCounts {
@@ -208,20 +208,19 @@ impl DeviceCounts {
     }
 }
 
-fn counters(stats: &Stats) -> [u32; 12] {
+fn counters(stats: &Stats) -> [u32; 11] {
     [
         stats.frames_exposed,
         stats.frames_processed,
         stats.dropped_busy,
         stats.dropped_overrun,
         stats.dropped_size,
+        stats.dropped_setup,
         stats.usb_dropped,
         stats.camera_timeouts,
         stats.camera_restarts,
         stats.capture_overruns,
         stats.host_frames_rejected,
-        stats.frames_tracked,
-        stats.tracking_lost,
     ]
 }
 
@@ -236,19 +235,18 @@ impl fmt::Display for DeviceCounts {
             busy,
             overrun,
             size,
+            setup,
             usb,
             timeouts,
             restarts,
             overruns,
             rejected,
-            tracked,
-            lost,
         ] = self.grown;
         write!(
             f,
             "device: {exposed} frames exposed, {processed} processed; dropped: busy {busy}, overrun {overrun}, \
-             size {size}, USB {usb}; tracked {tracked}, lost {lost} times; camera timeouts {timeouts}, restarts {restarts}, \
-             overruns {overruns}; commands rejected {rejected}; last frame took {} µs, its sample was ready {} µs after the middle of \
+             size {size}, set-up {setup}, USB {usb}; camera timeouts {timeouts}, \
+             restarts {restarts}, overruns {overruns}; commands rejected {rejected}; last frame took {} µs, its sample was ready {} µs after the middle of \
              its exposure",
             last.processing_us, last.latency_us
         )

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Run, Setup, bug, command, firmware, set_threshold};
+use common::{Run, Setup, command, firmware, set_threshold};
 use hivtac_rig::script::Action;
 use hivtac_wire::message::{HsvBox, Outcome, Request, Sample, Threshold};
 use hivtac_wire::status::Status;
@@ -68,32 +68,30 @@ fn no_frame_is_read_in_the_wrong_format() {
 
 #[test]
 fn the_way_back_leads_to_the_same_forces() {
-    for elf in [firmware(), bug("tracking")] {
-        // The same program, so that the camera starts at the same instant.
-        let undisturbed = Setup::new(elf.clone(), 520).run();
-        let run = Setup::new(elf, 520)
-            .at(220, set_threshold(80, RED_CR))
-            .at(221, set_threshold(81, RED))
-            .at(222, set_threshold(82, DARK))
-            .at(320, set_threshold(83, DARK))
-            .at(325, set_threshold(84, RED))
-            .run();
-        let outcomes = [80, 81, 82, 83, 84].map(|id| outcome(&run, id).unwrap());
-        use Outcome::{Busy, Done, Unsupported};
-        assert_eq!(outcomes, [Done, Busy, Busy, Unsupported, Done]);
-        let samples = run.samples();
-        let gap = samples
-            .windows(2)
-            .rposition(|pair| pair[1].frame != pair[0].frame + 1);
-        // How the markers move is not known before the second frame.
-        let back = &samples[gap.unwrap() + 2..];
-        let with_force = back.iter().filter(|sample| sample.force.is_some());
-        assert!(with_force.count() >= 4, "{back:?}");
-        for sample in back.iter().filter(|sample| sample.force.is_some()) {
-            let others = undisturbed.samples();
-            let same = others.iter().find(|it| it.frame == sample.frame);
-            assert_eq!(same.unwrap().force, sample.force, "{sample:?}");
-        }
+    // The same program, so that the camera starts at the same instant.
+    let undisturbed = Setup::new(firmware(), 520).run();
+    let run = Setup::new(firmware(), 520)
+        .at(220, set_threshold(80, RED_CR))
+        .at(221, set_threshold(81, RED))
+        .at(222, set_threshold(82, DARK))
+        .at(320, set_threshold(83, DARK))
+        .at(325, set_threshold(84, RED))
+        .run();
+    let outcomes = [80, 81, 82, 83, 84].map(|id| outcome(&run, id).unwrap());
+    use Outcome::{Busy, Done, Unsupported};
+    assert_eq!(outcomes, [Done, Busy, Busy, Unsupported, Done]);
+    let samples = run.samples();
+    let gap = samples
+        .windows(2)
+        .rposition(|pair| pair[1].frame != pair[0].frame + 1);
+    // How the markers move is not known before the second frame.
+    let back = &samples[gap.unwrap() + 2..];
+    let with_force = back.iter().filter(|sample| sample.force.is_some());
+    assert!(with_force.count() >= 4, "{back:?}");
+    for sample in back.iter().filter(|sample| sample.force.is_some()) {
+        let others = undisturbed.samples();
+        let same = others.iter().find(|it| it.frame == sample.frame);
+        assert_eq!(same.unwrap().force, sample.force, "{sample:?}");
     }
 }
 

@@ -103,13 +103,12 @@ fn longest_stats() -> Stats {
         dropped_busy: u32::MAX,
         dropped_overrun: u32::MAX,
         dropped_size: u32::MAX,
+        dropped_setup: u32::MAX,
         camera_timeouts: u32::MAX,
         camera_restarts: u32::MAX,
         capture_overruns: u32::MAX,
         usb_dropped: u32::MAX,
         host_frames_rejected: u32::MAX,
-        frames_tracked: u32::MAX,
-        tracking_lost: u32::MAX,
         processing_us: u32::MAX,
         latency_us: u32::MAX,
         uptime_us: u64::MAX,
@@ -246,21 +245,20 @@ fn any_place() -> impl Strategy<Value = Place> {
 }
 
 fn any_stats() -> impl Strategy<Value = Stats> {
-    (any::<[u32; 14]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
+    (any::<[u32; 13]>(), any::<u64>()).prop_map(|(counts, uptime_us)| Stats {
         frames_exposed: counts[0],
         frames_processed: counts[1],
         dropped_busy: counts[2],
         dropped_overrun: counts[3],
         dropped_size: counts[4],
-        camera_timeouts: counts[5],
-        camera_restarts: counts[6],
-        capture_overruns: counts[7],
-        usb_dropped: counts[8],
-        host_frames_rejected: counts[9],
-        frames_tracked: counts[10],
-        tracking_lost: counts[11],
-        processing_us: counts[12],
-        latency_us: counts[13],
+        dropped_setup: counts[5],
+        camera_timeouts: counts[6],
+        camera_restarts: counts[7],
+        capture_overruns: counts[8],
+        usb_dropped: counts[9],
+        host_frames_rejected: counts[10],
+        processing_us: counts[11],
+        latency_us: counts[12],
         uptime_us,
     })
 }

@@ -230,12 +230,14 @@ pub struct Stats {
     pub frames_exposed: u32,
     /// Frames that became a sample.
     pub frames_processed: u32,
-    /// Frames not captured because both buffers were busy or the next capture was armed too late.
+    /// Frames overwritten before they were processed, or whose interrupt came too late.
     pub dropped_busy: u32,
     /// Frames thrown away after a capture overrun.
     pub dropped_overrun: u32,
     /// Frames with too few or too many bytes.
     pub dropped_size: u32,
+    /// Frames that passed while the camera was set up, or a threshold was set.
+    pub dropped_setup: u32,
     /// Times the camera fell silent and the capture timed out.
     pub camera_timeouts: u32,
     /// Times the camera was set up again.
@@ -246,10 +248,6 @@ pub struct Stats {
     pub usb_dropped: u32,
     /// Frames from the host that were thrown away: bad CRC, COBS or content.
     pub host_frames_rejected: u32,
-    /// Frames that became a sample from the markers' surroundings alone; whole frames count as processed only.
-    pub frames_tracked: u32,
-    /// Times a marker was not where it was looked for, so that the whole of the next frame was looked at.
-    pub tracking_lost: u32,
     /// Duration of the last frame's processing, µs.
     pub processing_us: u32,
     /// From the middle of the last frame's exposure until its sample was ready, µs.

@@ -17,9 +17,6 @@ pub const SEEDED_BUGS: [&str; 5] = [
     "bug-usb-clock",
 ];
 
-/// The feature that lets the firmware follow the markers, which the rig tries, too.
-pub const TRACKING: &str = "tracking";
-
 /// The firmware, as it is flashed.
 pub fn firmware(toolchain: &Toolchain) -> Result<PathBuf> {
     build(&mut firmware_command(toolchain), "hivtac-firmware")
@@ -31,13 +28,10 @@ pub fn firmware_with(toolchain: &Toolchain, feature: &str) -> Result<PathBuf> {
     build(command.args(["--features", feature]), "hivtac-firmware")
 }
 
-/// The firmware with features and the model for YUV422.
-pub fn firmware_for_yuv422(toolchain: &Toolchain, features: &[&str]) -> Result<PathBuf> {
+/// The firmware with the model for YUV422.
+pub fn firmware_for_yuv422(toolchain: &Toolchain) -> Result<PathBuf> {
     let mut command = firmware_command(toolchain);
     command.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
-    for feature in features {
-        command.args(["--features", feature]);
-    }
     build(&mut command, "hivtac-firmware")
 }
 

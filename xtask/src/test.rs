@@ -162,18 +162,12 @@ impl Test {
 impl Programs {
     fn build(toolchain: &Toolchain) -> Result<Programs> {
         let bugs = workspace::work_folder("bugs")?;
-        for feature in artifacts::SEEDED_BUGS
-            .into_iter()
-            .chain([artifacts::TRACKING])
-        {
+        for feature in artifacts::SEEDED_BUGS {
             let elf = artifacts::firmware_with(toolchain, feature)?;
             artifacts::copy(&elf, &bugs.join(format!("{feature}.elf")))?;
         }
-        let tracking: &[&str] = &[artifacts::TRACKING];
-        for (features, name) in [(&[][..], "yuv422"), (tracking, "yuv422-tracking")] {
-            let elf = artifacts::firmware_for_yuv422(toolchain, features)?;
-            artifacts::copy(&elf, &bugs.join(format!("{name}.elf")))?;
-        }
+        let elf = artifacts::firmware_for_yuv422(toolchain)?;
+        artifacts::copy(&elf, &bugs.join("yuv422.elf"))?;
         // Last, so that what cargo leaves behind is the firmware without a bug.
         Ok(Programs {
             firmware: artifacts::firmware(toolchain)?,

@@ -2,10 +2,10 @@
 
 mod world;
 
-use crate::{Ending, Event, Tally, Tracker, Window};
+use crate::{Ending, Event, Tally, Tracker};
 use proptest::prelude::*;
 use std::vec::Vec;
-use world::{BAND, Chip, FRAME, GOOD, Pace, SHAPE, Sent, WHOLE, World, value};
+use world::{BAND, Chip, FRAME, GOOD, Pace, SHAPE, Sent, World, value};
 
 /// Sends frames to prompt handlers, then a good one. Gives the world afterwards.
 fn promptly(frames: &[Sent]) -> World {
@@ -68,53 +68,12 @@ fn an_overrun_costs_its_frame_and_no_more() {
 }
 
 #[test]
-fn a_change_of_window_costs_no_frame() {
-    let mut world = World::new(Pace::prompt());
-    let rows = |top, height| Window {
-        top,
-        height,
-        ..WHOLE
-    };
-    for window in [rows(0, 4), rows(4, 8), rows(8, 4), WHOLE, rows(4, 4), WHOLE] {
-        world.tracker.set_window(window, &mut world.chip);
-        world.send(GOOD);
-    }
-    world.settle();
-    world.check_contents();
-    assert_eq!(world.numbers(), [1, 2, 3, 4, 5, 6, 7]);
-    let heights: Vec<u16> = world.delivered.iter().map(|d| d.1.height).collect();
-    assert_eq!(heights, [4, 8, 4, 12, 4, 12, 12]);
-}
-
-#[test]
-fn a_window_set_within_a_frame_waits_for_its_end() {
-    let mut world = World::new(Pace::prompt());
-    world.send(GOOD);
-    world.chip.edge.number = 2;
-    let window = Window { height: 4, ..WHOLE };
-    world.tracker.set_window(window, &mut world.chip);
-    assert_eq!(
-        world.chip.restarts, 1,
-        "the frame has begun, if no band has"
-    );
-    world.chip.edge.number = 1;
-    world.send(GOOD);
-    world.send(GOOD);
-    world.settle();
-    let heights: Vec<u16> = world.delivered.iter().map(|d| d.1.height).collect();
-    assert_eq!(
-        (world.numbers(), heights),
-        (std::vec![1, 2, 3, 4], std::vec![12, 12, 4, 4])
-    );
-}
-
-#[test]
 fn a_frame_is_delivered_before_its_end_is_known() {
     let mut world = World::new(Pace::prompt());
     world.chip.edge.number = 1;
     world.chip.capturing = true;
     for word in 0..FRAME {
-        world.chip.word(word, value(1, word));
+        world.chip.word(value(1, word));
         world.pass(1);
     }
     world.pass(2);
@@ -162,7 +121,7 @@ fn silence_gives_the_begun_frame_up() {
     world.chip.edge.number = 1;
     world.chip.capturing = true;
     for word in 0..BAND + 1 {
-        world.chip.word(word, value(1, word));
+        world.chip.word(value(1, word));
         world.pass(1);
     }
     let events = &mut world.events;
@@ -199,7 +158,7 @@ fn a_frame_under_way_at_a_stop_is_not_captured_and_the_next_one_says_so() {
     world.chip.capturing = true;
     let cut = world.chip.edge.number;
     for word in 0..BAND + 1 {
-        world.chip.word(word, value(cut, word));
+        world.chip.word(value(cut, word));
         world.pass(1);
     }
     world.tracker.stop(&mut world.chip);
@@ -220,10 +179,30 @@ fn a_frame_under_way_at_a_stop_is_not_captured_and_the_next_one_says_so() {
     assert_eq!(world.after, [(false, false), (false, false), (true, false)]);
 }
 
+/// While the pipeline is set anew it looks at nothing, and no frame is of the time before and after.
+#[test]
+fn frames_that_are_passed_over_are_counted_and_never_mixed() {
+    for words in 1..3 * FRAME {
+        let mut world = promptly(&[GOOD]);
+        world.busy_for(words);
+        for _ in 0..6 {
+            world.send(GOOD);
+        }
+        let first = world.numbers()[2];
+        world.settle();
+        world.check_contents();
+        let passed = world.tally.passed;
+        assert!((1..=3).contains(&passed), "{words} words: {passed}");
+        assert_eq!(first, 3 + passed, "{words} words");
+        assert_eq!((world.tally.processed, world.counted()), (9 - passed, 9));
+        assert_eq!(world.after[2], (true, false), "{words} words");
+    }
+}
+
 #[test]
 fn a_stopped_tracker_tells_nothing() {
     let mut chip = Chip::new();
-    let mut tracker = Tracker::new(SHAPE, WHOLE);
+    let mut tracker = Tracker::new(SHAPE);
     let mut told = 0;
     let mut tell = |_| told += 1;
     chip.band_flag = true;
@@ -237,7 +216,7 @@ fn a_stopped_tracker_tells_nothing() {
 #[test]
 fn the_reason_of_a_late_interrupt_is_told() {
     let mut chip = Chip::new();
-    let mut tracker = Tracker::new(SHAPE, WHOLE);
+    let mut tracker = Tracker::new(SHAPE);
     tracker.start(&mut chip);
     chip.edge.number = 1;
     // Two bands were finished, and one interrupt came.
@@ -259,28 +238,13 @@ fn sent() -> impl Strategy<Value = Sent> {
     (words, overrun_at).prop_map(|(words, overrun_at)| Sent { words, overrun_at })
 }
 
-fn window() -> impl Strategy<Value = Window> {
-    (0..FRAME as u16, 1..=FRAME as u16).prop_map(|(top, height)| {
-        let window = Window {
-            top,
-            height,
-            ..WHOLE
-        };
-        window.capturable(WHOLE, SHAPE).unwrap()
-    })
-}
-
 fn delays(most: usize) -> impl Strategy<Value = Vec<usize>> {
     prop::collection::vec(prop_oneof![3 => Just(0), 1 => 0..most], 1..40)
 }
 
-/// Sends frames, and before each the next of the windows.
-fn check_everything(frames: &[Sent], windows: &[Window], pace: Pace) -> Result<(), TestCaseError> {
+fn check_everything(frames: &[Sent], pace: Pace) -> Result<(), TestCaseError> {
     let mut world = World::new(pace);
-    for (n, frame) in frames.iter().enumerate() {
-        if let Some(window) = windows.get(n) {
-            world.tracker.set_window(*window, &mut world.chip);
-        }
+    for frame in frames {
         world.send(*frame);
     }
     world.settle();
@@ -300,9 +264,8 @@ proptest! {
         frames in prop::collection::vec(sent(), 1..40),
         interrupts in delays(2 * BAND - 1),
         follower in delays(3 * FRAME),
-        windows in prop::collection::vec(window(), 0..40),
     ) {
-        check_everything(&frames, &windows, Pace { interrupts, follower })?;
+        check_everything(&frames, Pace { interrupts, follower })?;
     }
 
     /// The same with interrupts that come later than that, as long as no frame is too long by just what was missed.
@@ -314,7 +277,7 @@ proptest! {
     ) {
         let not_long = |sent: &Sent| Sent { words: sent.words.min(FRAME), ..*sent };
         let frames: Vec<Sent> = frames.iter().map(not_long).collect();
-        check_everything(&frames, &[], Pace { interrupts, follower })?;
+        check_everything(&frames, Pace { interrupts, follower })?;
     }
 
     /// With prompt handlers, exactly the good frames are delivered and counted as processed: a broken one costs no

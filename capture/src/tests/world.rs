@@ -1,6 +1,6 @@
 //! The world that a tracker and a follower live in: camera, DMA, memory and processor, in steps of one word.
 
-use crate::{Action, Edge, Event, Follower, Interface, Shape, Tally, Tracker, Window};
+use crate::{Action, Edge, Event, Follower, Interface, Shape, Tally, Tracker};
 use std::collections::VecDeque;
 use std::vec::Vec;
 
@@ -13,9 +13,7 @@ const FRONT: usize = 4;
 const PULSE: usize = 6;
 /// Words of time from the end of the VSYNC pulse to the first word.
 const BACK: usize = 3;
-/// A row is one word.
-pub const SHAPE: Shape = Shape::new(BAND as u16, SLOTS as u16);
-pub const WHOLE: Window = Window::whole(16, FRAME as u16);
+pub const SHAPE: Shape = Shape::new(BANDS, SLOTS as u16);
 /// More frames are never under way.
 const EVENTS: usize = SLOTS + 4;
 
@@ -35,7 +33,6 @@ pub const GOOD: Sent = Sent {
 /// Camera interface, DMA and memory.
 #[derive(Debug)]
 pub struct Chip {
-    window: Window,
     memory: [u32; SLOTS * BAND],
     targets: [u16; 2],
     pub second: bool,
@@ -52,7 +49,6 @@ pub struct Chip {
 impl Chip {
     pub fn new() -> Self {
         Chip {
-            window: WHOLE,
             memory: [0; SLOTS * BAND],
             targets: [0; 2],
             second: false,
@@ -67,12 +63,9 @@ impl Chip {
         }
     }
 
-    /// The camera sends a word, the one of this row.
-    pub fn word(&mut self, row: usize, value: u32) {
-        let Window { top, height, .. } = self.window;
-        let (top, bottom) = (usize::from(top), usize::from(top + height));
-        let cropped = self.window != WHOLE;
-        if !self.capturing || cropped && !(top..bottom).contains(&row) {
+    /// The camera sends a word.
+    pub fn word(&mut self, value: u32) {
+        if !self.capturing {
             return;
         }
         let slot = usize::from(self.targets[usize::from(self.second)]);
@@ -83,10 +76,6 @@ impl Chip {
             self.second = !self.second;
             self.band_flag = true;
         }
-        if cropped && row + 1 == bottom {
-            self.capturing = false;
-            self.frame_flag = true;
-        }
     }
 
     fn slot(&self, slot: u16) -> [u32; BAND] {
@@ -96,9 +85,8 @@ impl Chip {
 }
 
 impl Interface for Chip {
-    fn restart(&mut self, window: Window, first: u16, second: u16) {
+    fn restart(&mut self, first: u16, second: u16) {
         self.stop();
-        self.window = window;
         (self.targets, self.second, self.position) = ([first, second], false, 0);
         self.running = true;
         self.restarts += 1;
@@ -158,10 +146,11 @@ pub struct World {
     now: usize,
     interrupts_at: usize,
     follower_at: usize,
+    /// When the follower passes over all that came.
+    pass_over_at: usize,
     turns: usize,
-    window: Window,
     scanned: Vec<u32>,
-    pub delivered: Vec<(u32, Window, Vec<u32>)>,
+    pub delivered: Vec<(u32, Vec<u32>)>,
     pub after: Vec<(bool, bool)>,
     pub tally: Tally,
 }
@@ -170,15 +159,15 @@ impl World {
     pub fn new(pace: Pace) -> Self {
         let mut world = World {
             chip: Chip::new(),
-            tracker: Tracker::new(SHAPE, WHOLE),
+            tracker: Tracker::new(SHAPE),
             follower: Follower::new(SHAPE),
             events: VecDeque::new(),
             pace,
             now: 0,
             interrupts_at: 0,
             follower_at: 0,
+            pass_over_at: 0,
             turns: 0,
-            window: WHOLE,
             scanned: Vec::new(),
             delivered: Vec::new(),
             after: Vec::new(),
@@ -202,7 +191,7 @@ impl World {
                 self.chip.capturing = false;
                 self.chip.overrun_flag = true;
             }
-            self.chip.word(word, value(number, word));
+            self.chip.word(value(number, word));
             self.pass(1);
         }
         self.pass(FRONT);
@@ -212,6 +201,12 @@ impl World {
         self.pass(PULSE);
     }
 
+    /// For the next `words` of time the follower does something else, and then passes over what came.
+    pub fn busy_for(&mut self, words: usize) {
+        self.follower_at = usize::MAX;
+        self.pass_over_at = self.now + words;
+    }
+
     /// Time passes.
     pub fn pass(&mut self, words: usize) {
         for _ in 0..words {
@@ -219,6 +214,11 @@ impl World {
             if self.now >= self.interrupts_at && self.serve() {
                 let delays = &self.pace.interrupts;
                 self.interrupts_at = self.now + 1 + delays[self.now % delays.len()];
+            }
+            if self.now == self.pass_over_at {
+                self.events.clear();
+                self.follower.pass_over(self.chip.edge.number);
+                self.follower_at = self.now;
             }
             if self.now >= self.follower_at {
                 let delays = &self.pace.follower;
@@ -268,7 +268,6 @@ impl World {
             Action::Scan(band) => {
                 if band.index == 0 {
                     self.scanned.clear();
-                    self.window = band.window;
                 }
                 self.scanned
                     .extend(self.chip.slot(SHAPE.slot(band.sequence)));
@@ -277,7 +276,7 @@ impl World {
             }
             Action::Deliver(delivery) => {
                 self.delivered
-                    .push((delivery.edge.number, self.window, self.scanned.clone()));
+                    .push((delivery.edge.number, self.scanned.clone()));
                 self.after
                     .push((delivery.after_loss, delivery.after_overrun));
             }
@@ -287,11 +286,13 @@ impl World {
             busy,
             overrun,
             size,
+            passed,
         } = self.follower.take_tally();
         self.tally.processed += processed;
         self.tally.busy += busy;
         self.tally.overrun += overrun;
         self.tally.size += size;
+        self.tally.passed += passed;
     }
 
     pub fn numbers(&self) -> Vec<u32> {
@@ -300,9 +301,8 @@ impl World {
 
     /// Every delivered frame is the camera's, word by word, and none comes twice or late.
     pub fn check_contents(&self) {
-        for (number, window, words) in &self.delivered {
-            let rows = usize::from(window.top)..usize::from(window.top + window.height);
-            let sent: Vec<u32> = rows.map(|row| value(*number, row)).collect();
+        for (number, words) in &self.delivered {
+            let sent: Vec<u32> = (0..FRAME).map(|word| value(*number, word)).collect();
             assert_eq!(words, &sent, "frame {number}");
         }
         assert!(
@@ -322,7 +322,14 @@ impl World {
     }
 
     pub fn counted(&self) -> u32 {
-        self.tally.processed + self.tally.busy + self.tally.overrun + self.tally.size
+        let Tally {
+            processed,
+            busy,
+            overrun,
+            size,
+            passed,
+        } = self.tally;
+        processed + busy + overrun + size + passed
     }
 }
 

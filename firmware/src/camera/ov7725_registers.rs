@@ -45,6 +45,14 @@ impl Format {
         }
     }
 
+    /// Its pixels.
+    pub const fn pixels(self) -> PixelFormat {
+        match self {
+            Format::Rgb565 => PixelFormat::Rgb565,
+            Format::Yuv422 => PixelFormat::Yuv422,
+        }
+    }
+
     /// Register, value: what makes the camera send it. Everything else is the same for all formats.
     pub const fn registers(self) -> &'static [(u8, u8)] {
         match self {

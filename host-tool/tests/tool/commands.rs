@@ -35,9 +35,8 @@ fn info_for_a_person() {
              frame      320 × 240 px\n\
              threshold  rgb565, H 170–10, S 100–255, V 45–255\n\
              markers    preset ov7725, dilations 1, centroids redness-weighted\n\
-             frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0\n\
+             frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0, set-up 0\n\
              camera     0 timeouts, 0 restarts, 0 overruns\n\
-             tracking   0 frames by the markers' surroundings alone, lost 0 times\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\
              time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n",
             device.port

@@ -108,8 +108,7 @@ fn losses_are_counted_by_cause() {
             dropped_busy: 2,
             usb_dropped: 2,
             camera_timeouts: 1,
-            frames_tracked: 4,
-            tracking_lost: 1,
+            dropped_setup: 3,
             processing_us: 5300,
             latency_us: 4800,
             uptime_us: 20,
@@ -124,8 +123,8 @@ fn losses_are_counted_by_cause() {
         "3 frames shown, 3 received, 4 lost\n\
          lost: 2 samples on the way (gaps in the sequence), 2 frames not processed (gaps in the frame number); \
          rejected here: 2 messages, 26 bytes (overlong 0, cobs 1, crc 1, body 0, trailing 0)\n\
-         device: 7 frames exposed, 5 processed; dropped: busy 2, overrun 0, size 0, USB 2; \
-         tracked 4, lost 1 times; camera timeouts 1, restarts 0, overruns 0; commands rejected 0; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n"
+         device: 7 frames exposed, 5 processed; dropped: busy 2, overrun 0, size 0, set-up 3, USB 2; \
+         camera timeouts 1, restarts 0, overruns 0; commands rejected 0; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n"
     );
     assert_eq!(run.code, Some(0));
 }

@@ -241,8 +241,8 @@ impl Dcmi {
             self.receiver
                 .byte(sampled & self.pins.data, &self.settings)?;
         }
-        if ends && self.receiver.end_line(&self.settings)? {
-            self.end_frame(registers);
+        if ends {
+            self.receiver.end_line()?;
         }
         Ok(())
     }
@@ -269,15 +269,14 @@ impl Dcmi {
             return;
         }
         let unsupported = [
+            (control::CROP, "the crop window (CR bit 2)"),
             (control::JPEG, "JPEG mode (CR bit 3)"),
             (control::EMBEDDED, "embedded synchronization (CR bit 4)"),
             (control::WIDTH, "more than 8 data bits (CR bits 11:10)"),
         ];
         for (bits, name) in unsupported {
             if value & bits != 0 {
-                self.rules.broken(|| {
-                    format!("DCMI: {name} is not simulated, and the camera has 8 data lines")
-                });
+                self.rules.broken(|| format!("DCMI: {name}: not simulated"));
             }
         }
     }
@@ -336,8 +335,6 @@ impl Device for Dcmi {
             Register::Cr => self.write_control(landed),
             Register::Ier => self.enabled = landed,
             Register::Icr => self.raised &= !landed,
-            Register::Cwstrt => self.settings.crop_start = landed,
-            Register::Cwsize => self.settings.crop_size = landed,
             _ => {}
         }
         self.drive(context);

@@ -1,22 +1,19 @@
 //! The data path of the camera interface: frame, line and byte selection, packing, and the four-word FIFO.
 //!
 //! RM0433 rev 7 chapter 33. Simulated: hardware synchronization, 8 data bits, snapshot and continuous mode, frame
-//! rate selection, crop, byte and line selection, overrun. Not simulated: embedded codes, JPEG, more data bits.
+//! rate selection, byte and line selection, overrun. Not simulated: crop, embedded codes, JPEG, more
+//! data bits.
 
 use std::collections::VecDeque;
 
 /// Words in the FIFO.
 pub const FIFO_WORDS: usize = 4;
 
-/// The fields of CR, CWSTRT and CWSIZE.
+/// The fields of CR.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Settings {
     /// DCMI_CR.
     pub control: u32,
-    /// DCMI_CWSTRT.
-    pub crop_start: u32,
-    /// DCMI_CWSIZE.
-    pub crop_size: u32,
 }
 
 /// CR bits.
@@ -56,18 +53,6 @@ impl Settings {
     /// One frame in so many is captured.
     fn frame_interval(&self) -> u32 {
         [1, 2, 4, 4][self.field(8, 2) as usize]
-    }
-
-    /// First and last line of the crop window.
-    fn crop_lines(&self) -> (u32, u32) {
-        let first = self.crop_start >> 16 & 0x1FFF;
-        (first, first + (self.crop_size >> 16 & 0x3FFF))
-    }
-
-    /// First and last pixel clock of the crop window.
-    fn crop_clocks(&self) -> (u32, u32) {
-        let first = self.crop_start & 0x3FFF;
-        (first, first + (self.crop_size & 0x3FFF))
     }
 }
 
@@ -131,22 +116,20 @@ impl Receiver {
         }
     }
 
-    /// HSYNC went to its blanking level. A last word that is not full is filled with zeros. Answers whether that was
-    /// the last line of the crop window.
+    /// HSYNC went to its blanking level. A last word that is not full is filled with zeros.
     ///
     /// # Errors
     /// As [`Receiver::byte`].
-    pub fn end_line(&mut self, settings: &Settings) -> Result<bool, Overrun> {
+    pub fn end_line(&mut self) -> Result<(), Overrun> {
         if self.capturing && self.packed > 0 {
             self.push()?;
         }
-        let last = settings.has(control::CROP) && self.line == settings.crop_lines().1;
         self.line += 1;
         self.clock = 0;
-        Ok(self.capturing && last)
+        Ok(())
     }
 
-    /// The frame, or its crop window, is over. Answers how many words it had.
+    /// The frame is over. Answers how many words it had.
     pub fn end_frame(&mut self) -> u32 {
         self.capturing = false;
         self.words
@@ -158,17 +141,9 @@ impl Receiver {
     }
 
     fn selects(&self, clock: u32, settings: &Settings) -> bool {
-        let (mut line, mut column) = (self.line, clock);
-        if settings.has(control::CROP) {
-            let ((top, bottom), (left, right)) = (settings.crop_lines(), settings.crop_clocks());
-            if !(top..=bottom).contains(&line) || !(left..=right).contains(&clock) {
-                return false;
-            }
-            (line, column) = (line - top, column - left);
-        }
         let second_line = settings.field(20, 1);
-        let line_wanted = settings.field(19, 1) == 0 || line % 2 == second_line;
-        line_wanted && selects_byte(column, settings.field(16, 2), settings.field(18, 1))
+        let line_wanted = settings.field(19, 1) == 0 || self.line % 2 == second_line;
+        line_wanted && selects_byte(clock, settings.field(16, 2), settings.field(18, 1))
     }
 
     fn push(&mut self) -> Result<(), Overrun> {
@@ -203,7 +178,6 @@ mod tests {
     fn settings(control: u32) -> Settings {
         Settings {
             control: control | ENABLE | CAPTURE,
-            ..Settings::default()
         }
     }
 
@@ -219,13 +193,10 @@ mod tests {
                     (receiver.waiting() > 0).then(|| receiver.take())
                 }));
             }
-            let last = receiver.end_line(settings).unwrap();
+            receiver.end_line().unwrap();
             words.extend(std::iter::from_fn(|| {
                 (receiver.waiting() > 0).then(|| receiver.take())
             }));
-            if last {
-                receiver.end_frame();
-            }
         }
         words
     }
@@ -251,19 +222,6 @@ mod tests {
         assert_eq!((receiver.waiting(), receiver.capturing()), (0, false));
         receiver.byte(20, &settings).unwrap();
         assert_eq!(receiver.waiting(), 0);
-    }
-
-    #[test]
-    fn crop_keeps_its_lines_and_clocks() {
-        let settings = Settings {
-            crop_start: 1 << 16 | 2,
-            crop_size: 1 << 16 | 3,
-            ..settings(CROP)
-        };
-        let line = |n: u8| [n, n + 1, n + 2, n + 3, n + 4, n + 5, n + 6];
-        let lines = [line(0), line(10), line(20), line(30)];
-        let lines: Vec<&[u8]> = lines.iter().map(|line| &line[..]).collect();
-        assert_eq!(captured(&settings, &lines), [0x0F0E_0D0C, 0x1918_1716]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Runs the firmware under a scripted host, and decodes what it sends.
 //!
-//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug, `tracking.elf`, and
-//! `yuv422.elf` and `yuv422-tracking.elf` with the model for YUV422.
+//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug, and
+//! `yuv422.elf` with the model for YUV422.
 //! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
@@ -321,6 +321,19 @@ impl Run {
         let frames: Vec<u32> = self.samples().iter().map(|sample| sample.frame).collect();
         let between = |pair: &[u32]| pair[0] + 1..pair[1];
         frames.windows(2).flat_map(between).collect()
+    }
+
+    /// Asserts that every frame was measured, or passed while something was set; one may be under way.
+    pub fn assert_only_setup_drops(&self) {
+        let stats = self.stats();
+        let losses = [
+            stats.dropped_busy,
+            stats.dropped_overrun,
+            stats.dropped_size,
+        ];
+        assert_eq!(losses, [0; 3], "{stats:?}");
+        let counted = stats.frames_processed + stats.dropped_setup;
+        assert!(stats.frames_exposed - counted <= 1, "{stats:?}");
     }
 
     /// The frames whose samples say that a frame before them was lost.
