@@ -37,30 +37,9 @@ impl<T: Table> Formats<T> {
         Ok(())
     }
 
-    /// Sets RGB565 and a box whose table was made elsewhere: `install` puts it in place.
-    ///
-    /// # Errors
-    /// Those of [`HsvBox::check`]; nothing is then changed, and `install` not called.
-    pub fn set_made(
-        &mut self,
-        hsv_box: HsvBox,
-        install: impl FnOnce(&mut T),
-    ) -> Result<(), ThresholdError> {
-        hsv_box.check()?;
-        install(&mut self.table);
-        self.threshold = Threshold::Rgb565(hsv_box);
-        Ok(())
-    }
-
     /// The threshold in use.
     pub fn threshold(&self) -> &Threshold {
         &self.threshold
-    }
-
-    /// The table, for what tests count in it.
-    #[cfg(test)]
-    pub(crate) fn table(&self) -> &T {
-        &self.table
     }
 }
 
@@ -77,11 +56,11 @@ impl<T: Table> Pixels for Formats<T> {
         }
     }
 
-    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
         match &self.threshold {
-            Threshold::Rgb565(_) => self.table.mask_rows(pixels, stride, width, mask),
-            Threshold::Yuv422(yuv422) => yuv422.mask_rows(pixels, stride, width, mask),
-            Threshold::Mono(mono) => mono.mask_rows(pixels, stride, width, mask),
+            Threshold::Rgb565(_) => self.table.mask_rows(rows, width, mask),
+            Threshold::Yuv422(yuv422) => yuv422.mask_rows(rows, width, mask),
+            Threshold::Mono(mono) => mono.mask_rows(rows, width, mask),
         }
     }
 

@@ -59,9 +59,7 @@ pub struct Band<'p> {
     pub first: u16,
     /// `u16`s of a row.
     pub row_length: usize,
-    /// From where one row begins to where the next does.
-    pub stride: usize,
-    /// The rows.
+    /// The rows, one after the other.
     pub pixels: &'p [u16],
     /// The rows above, which lie one after the other, to the one before the first.
     pub above: &'p [u16],
@@ -72,7 +70,6 @@ impl<'p> Band<'p> {
     pub const WITHOUT_PIXELS: Band<'static> = Band {
         first: 0,
         row_length: 0,
-        stride: 0,
         pixels: &[],
         above: &[],
     };
@@ -81,15 +78,14 @@ impl<'p> Band<'p> {
     pub const EMPTY: Band<'static> = Band {
         first: u16::MAX,
         row_length: 1,
-        stride: 1,
         pixels: &[],
         above: &[],
     };
 
-    /// So many rows ≥ 1 from row `y` of the frame on, all of which are in the band.
+    /// So many rows from row `y` of the frame on, all of which are in the band.
     pub fn part(&self, y: u16, rows: usize) -> &'p [u16] {
-        let start = usize::from(y - self.first) * self.stride;
-        let end = start + (rows - 1) * self.stride + self.row_length;
+        let start = usize::from(y - self.first) * self.row_length;
+        let end = start + rows * self.row_length;
         self.pixels.get(start..end).unwrap_or_default()
     }
 
@@ -97,7 +93,7 @@ impl<'p> Band<'p> {
     pub fn row(&self, y: u16) -> Option<&'p [u16]> {
         match y.checked_sub(self.first) {
             Some(below) => {
-                let start = usize::from(below) * self.stride;
+                let start = usize::from(below) * self.row_length;
                 self.pixels.get(start..start + self.row_length)
             }
             None => {

@@ -51,8 +51,6 @@ pub struct Labeller<const BLOBS: usize> {
     last: usize,
     forest: Forest,
     kept: Vec<Blob, BLOBS>,
-    /// Column and row in which the frame's first pixel lies.
-    origin: (u16, u16),
     min_area: u32,
     /// Runs that the frame may still have.
     runs_left: u32,
@@ -71,7 +69,6 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             last: 0,
             forest: Forest::new(),
             kept: Vec::new(),
-            origin: (0, 0),
             min_area: 0,
             runs_left: 0,
             exhausted: false,
@@ -80,13 +77,11 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         }
     }
 
-    /// Starts a frame whose first pixel lies in column and row `origin`, and in which blobs of fewer than `min_area` pixels are
-    /// dropped. After a row with which it has more than `max_runs` runs, nothing more of it is taken.
-    pub fn begin(&mut self, origin: (u16, u16), min_area: u32, max_runs: u32) {
+    /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped. After a row with which it has more than `max_runs` runs, nothing more of it is taken.
+    pub fn begin(&mut self, min_area: u32, max_runs: u32) {
         self.rows[self.last].edges.clear();
         self.forest.clear();
         self.kept.clear();
-        self.origin = origin;
         self.min_area = min_area;
         self.runs_left = max_runs;
         self.exhausted = false;
@@ -108,15 +103,13 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.exhausted |= exhausted;
         self.overflowed |= exhausted;
         self.idle = count == 0;
-        let (left, top) = self.origin;
         let mut all = 0;
         let mut passed = |run: [u16; 2]| {
             let passed = dilation.passed(i, run);
             all += passed;
             passed
         };
-        let place = (left, y + top);
-        if !continue_blobs([above, runs], labels, &mut self.forest, place, &mut passed) {
+        if !continue_blobs([above, runs], labels, &mut self.forest, y, &mut passed) {
             self.label_row(y, passed);
         }
         all
@@ -125,10 +118,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Weighs the runs of row `y`, which was pushed last.
     #[inline(always)]
     pub fn weigh(&mut self, y: u16, weigh: impl Fn(Run) -> Weights) {
-        let (left, y) = (self.origin.0, y + self.origin.1);
         let Row { edges, labels } = &self.rows[self.last];
         for (&[x0, end], label) in edges.runs().iter().zip(labels) {
-            let weights = weigh(Run { x0, x1: end - 1 }).moved(left);
+            let weights = weigh(Run { x0, x1: end - 1 });
             self.forest.slots[usize::from(*label)]
                 .moments
                 .weigh(weights, y);
@@ -166,7 +158,6 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it. `passed` says how many pixels of a run
     /// were set before dilation.
     fn label_row(&mut self, y: u16, mut passed: impl FnMut([u16; 2]) -> u32) {
-        let (left, y) = (self.origin.0, y + self.origin.1);
         let (before, current) = last_two(&mut self.rows, self.last);
         let (above, above_labels) = (before.edges.runs(), &before.labels);
         // The first run above that can touch this one or a later one.
@@ -177,7 +168,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             while above.get(first).is_some_and(|above| above[1] < x0) {
                 first += 1;
             }
-            let run = Run { x0, x1: end - 1 }.moved(left);
+            let run = Run { x0, x1: end - 1 };
             let touched = above[first..].iter().zip(&above_labels[first..]);
             let mut touched = touched.take_while(|(above, _)| above[0] <= end);
             let Some((_, touched_label)) = touched.next() else {
@@ -234,14 +225,14 @@ fn last_two(rows: &mut [Row; 2], last: usize) -> (&mut Row, &mut Row) {
 }
 
 /// Labels the runs of the row `y` of the frame when each touches just one of those above, and each of these just one of them: the
-/// usual case. Otherwise does nothing and gives false. `left` is where columns begin, and `passed` says how many pixels of a run were set
+/// usual case. Otherwise does nothing and gives false. `passed` says how many pixels of a run were set
 /// before dilation.
 #[inline(always)]
 fn continue_blobs(
     [above, runs]: [&[[u16; 2]]; 2],
     (above_labels, labels): (&[Label; MAX_RUNS], &mut [Label; MAX_RUNS]),
     forest: &mut Forest,
-    (left, y): (u16, u16),
+    y: u16,
     mut passed: impl FnMut([u16; 2]) -> u32,
 ) -> bool {
     if above.len() != runs.len() {
@@ -260,7 +251,7 @@ fn continue_blobs(
     let labels = labels.iter_mut().zip(above_labels);
     for (&[x0, end], (label, above)) in runs.iter().zip(labels) {
         *label = *above;
-        let run = Run { x0, x1: end - 1 }.moved(left);
+        let run = Run { x0, x1: end - 1 };
         let moments = &mut forest.slots[usize::from(*above)].moments;
         moments.add_run(run, y);
         moments.passed += passed([x0, end]);

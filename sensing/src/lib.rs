@@ -38,7 +38,6 @@ pub mod settings;
 pub mod tables;
 pub mod tare;
 pub mod threshold;
-pub mod windows;
 
 mod angle;
 mod cordic;

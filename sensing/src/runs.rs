@@ -11,17 +11,6 @@ pub struct Run {
     pub x1: u16,
 }
 
-impl Run {
-    /// The run so many columns to the right.
-    #[inline(always)]
-    pub(crate) fn moved(self, columns: u16) -> Run {
-        Run {
-            x0: self.x0 + columns,
-            x1: self.x1 + columns,
-        }
-    }
-}
-
 /// Calls `visit` with each edge of a word whose first column is `column`: where a bit differs from the one before it. `open` says
 /// whether the bit before the word is set.
 ///
@@ -36,6 +25,7 @@ pub fn for_each_edge(column: u16, word: u32, open: bool, mut visit: impl FnMut(u
     }
 }
 
+#[cfg(test)]
 /// Calls `visit` with each run of a row of mask words, from left to right. A row of w pixels has at most ⌈w / 2⌉.
 pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
     let mut open = None;

@@ -148,36 +148,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// # Errors
     /// Those of [`ScanSettings::check`]; there is then no frame to push rows to.
     pub fn begin(&mut self, settings: ScanSettings) -> Result<(), ScanError> {
-        self.begin_at((0, 0), settings)
-    }
-
-    /// The same, for a part of a frame: its first pixel lies in column and row `origin`, and blobs say where they lie in
-    /// that frame.
-    ///
-    /// # Errors
-    /// As [`begin`](Self::begin); and when the part goes beyond the largest frame.
-    pub(crate) fn begin_at(
-        &mut self,
-        origin: (u16, u16),
-        settings: ScanSettings,
-    ) -> Result<(), ScanError> {
         self.active = false;
         self.status = Status::FRAME_INCOMPLETE;
         self.rows_in = 0;
         self.set_pixels = 0;
-        self.labels
-            .begin(origin, settings.min_area, settings.max_runs);
+        self.labels.begin(settings.min_area, settings.max_runs);
         settings.check()?;
-        let (right, bottom) = (
-            origin.0.saturating_add(settings.width),
-            origin.1.saturating_add(settings.height),
-        );
-        if right > MAX_WIDTH {
-            return Err(ScanError::Width(right));
-        }
-        if bottom > MAX_HEIGHT {
-            return Err(ScanError::Height(bottom));
-        }
         self.settings = settings;
         self.dilation.begin(settings.width, settings.dilations);
         self.history.clear();
@@ -191,7 +167,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
         let length = pixels.row_length(self.settings.width);
         if row.len() == length {
-            let band = self.band(pixels, row, length);
+            let band = self.band(pixels, row);
             self.push_band(pixels, &band, 1, Stay::Gone);
         } else {
             self.status |= Status::FRAME_INCOMPLETE;
@@ -221,29 +197,16 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
         let band = Band {
             above,
-            ..self.band(pixels, rows, length)
+            ..self.band(pixels, rows)
         };
         self.push_band(pixels, &band, count, stay);
     }
 
-    /// Takes the next `count` rows, which begin every `stride` `u16`s, and behind which there is no other of the frame.
-    pub(crate) fn push_apart(
-        &mut self,
-        pixels: &impl Pixels,
-        rows: &[u16],
-        stride: usize,
-        count: usize,
-    ) {
-        let band = self.band(pixels, rows, stride);
-        self.push_band(pixels, &band, count, Stay::Here);
-    }
-
-    /// The next rows, which begin every `stride` `u16`s.
-    fn band<'p>(&self, pixels: &impl Pixels, rows: &'p [u16], stride: usize) -> Band<'p> {
+    /// The next rows.
+    fn band<'p>(&self, pixels: &impl Pixels, rows: &'p [u16]) -> Band<'p> {
         Band {
             first: self.rows_in,
             row_length: pixels.row_length(self.settings.width),
-            stride,
             pixels: rows,
             above: &[],
         }
@@ -260,7 +223,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             let rows = left.min(MAX_ROWS);
             if !self.labels.is_exhausted() {
                 let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
-                pixels.mask_rows(part, band.stride, width, self.dilation.incoming(rows));
+                pixels.mask_rows(part, width, self.dilation.incoming(rows));
             }
             self.take(pixels, band, rows);
             left -= rows;

@@ -1,15 +1,11 @@
-//! How a row of RGB565 pixels is read: look-up tables over all 65,536 values.
-//!
-//! [`ByteTable`] answers with one load, [`BitTable`] takes an eighth of the memory and a little more time. Both
-//! say the same of every pixel.
+//! How a row of RGB565 pixels is read: through a table over all 65,536 values.
 
 use crate::{
     hsv::{Hsv, rgb888},
-    kernels::{threshold_bits, threshold_bytes, threshold_bytes_down, weigh_bytes},
+    kernels::{threshold_bytes, weigh_bytes},
     mask::words_of,
     threshold::{ByteOrder, HsvBox, ThresholdError},
 };
-use core::ops::Range;
 
 pub use crate::runs::Run;
 
@@ -24,10 +20,17 @@ pub trait Pixels {
     /// become unset.
     fn mask_row(&self, row: &[u16], mask: &mut [u32]);
 
-    /// Thresholds several rows of `width` pixels, which begin every `stride` ≥ `row_length(width)` `u16`s. `mask` has ⌈width / 32⌉
-    /// words for each.
-    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
-        mask_row_by_row(self, pixels, stride, width, mask);
+    /// Thresholds several rows of `width` pixels, which lie one after the other. `mask` has
+    /// ⌈width / 32⌉ words for each.
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        if width.is_multiple_of(32) {
+            // One long row.
+            return self.mask_row(rows, mask);
+        }
+        let rows = rows.chunks(self.row_length(width).max(1));
+        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
+            self.mask_row(row, mask);
+        }
     }
 
     /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the row.
@@ -38,25 +41,6 @@ pub trait Pixels {
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let columns = (run.x0..=run.x1).map(|x| (u32::from(x), self.weight(row, x)));
         columns.fold(Weights::NONE, |sums, (x, weight)| sums.with(x, weight))
-    }
-}
-
-/// [`Pixels::mask_rows`] by [`Pixels::mask_row`].
-fn mask_row_by_row(
-    pixels: &(impl Pixels + ?Sized),
-    rows: &[u16],
-    stride: usize,
-    width: u16,
-    mask: &mut [u32],
-) {
-    let length = pixels.row_length(width);
-    if stride == length && width.is_multiple_of(32) {
-        // One long row.
-        return pixels.mask_row(rows, mask);
-    }
-    let rows = rows.chunks(stride.max(1));
-    for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
-        pixels.mask_row(row.get(..length).unwrap_or(row), mask);
     }
 }
 
@@ -109,14 +93,6 @@ impl Weights {
     /// Of no pixel.
     pub const NONE: Weights = Weights { sum: 0, sum_x: 0 };
 
-    /// The same pixels so many columns to the right.
-    pub(crate) const fn moved(self, columns: u16) -> Weights {
-        Weights {
-            sum: self.sum,
-            sum_x: self.sum_x + self.sum * columns as u32,
-        }
-    }
-
     /// With one more pixel, in column `x` < 800.
     pub const fn with(self, x: u32, weight: u8) -> Weights {
         Weights {
@@ -152,71 +128,6 @@ pub const fn redness(pixel: u16) -> u8 {
     }
 }
 
-/// One bit per `u16` as it lies in memory: set where its colour lies in the box. 8 KiB; weights are computed.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BitTable {
-    /// Bit r % 32 of word r / 32 belongs to the raw value r.
-    words: [u32; 2048],
-    order: ByteOrder,
-}
-
-impl BitTable {
-    /// The table of a box.
-    ///
-    /// # Errors
-    /// Those of [`HsvBox::check`].
-    pub fn new(hsv_box: &HsvBox, order: ByteOrder) -> Result<BitTable, ThresholdError> {
-        let mut table = BitTable::CLOSED;
-        table.set(hsv_box, order)?;
-        Ok(table)
-    }
-
-    /// The bit of `raw` in bit 0, others above it. An index of 11 bits needs no bounds check, and the rotation takes
-    /// its count modulo 32 as the processor does.
-    #[inline(always)]
-    fn rotated(&self, raw: u16) -> u32 {
-        self.words[usize::from(raw >> 5)].rotate_right(u32::from(raw))
-    }
-}
-
-impl Table for BitTable {
-    const CLOSED: BitTable = BitTable {
-        words: [0; 2048],
-        order: ByteOrder::Native,
-    };
-
-    fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
-        hsv_box.check()?;
-        self.order = order;
-        for (high, word) in (0_u16..).zip(&mut self.words) {
-            *word = (0..32).fold(0, |bits, low| {
-                let color = Hsv::from_rgb565(order.pixel(high << 5 | low));
-                bits | u32::from(hsv_box.contains(color)) << low
-            });
-        }
-        Ok(())
-    }
-
-    fn accepts(&self, raw: u16) -> bool {
-        self.rotated(raw) & 1 == 1
-    }
-}
-
-impl Pixels for BitTable {
-    fn row_length(&self, width: u16) -> usize {
-        usize::from(width)
-    }
-
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        threshold_bits(&self.words, row, mask);
-    }
-
-    fn weight(&self, row: &[u16], column: u16) -> u8 {
-        let raw = row.get(usize::from(column));
-        raw.map_or(0, |raw| redness(self.order.pixel(*raw)))
-    }
-}
-
 /// One byte per `u16` as it lies in memory: bit 0 is set where its colour lies in the box, bits 1–7 are its
 /// [`redness`]. 64 KiB.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -225,9 +136,6 @@ pub struct ByteTable {
 }
 
 impl ByteTable {
-    /// Values of a pixel.
-    pub const VALUES: usize = 65_536;
-
     /// The table of a box. Large: on a microcontroller, [`set`](Table::set) one in place.
     ///
     /// # Errors
@@ -236,22 +144,6 @@ impl ByteTable {
         let mut table = ByteTable::CLOSED;
         table.set(hsv_box, order)?;
         Ok(table)
-    }
-
-    /// Sets the bytes of some values of a pixel to a box that [`HsvBox::check`] accepts: all of them, one part after the
-    /// other, are what [`set`](Table::set) does at once.
-    pub fn set_part(&mut self, hsv_box: &HsvBox, order: ByteOrder, part: Range<usize>) {
-        let bytes = self.bytes.iter_mut().enumerate();
-        for (raw, byte) in bytes.take(part.end).skip(part.start) {
-            let pixel = order.pixel(raw as u16);
-            let inside = hsv_box.contains(Hsv::from_rgb565(pixel));
-            *byte = redness(pixel) << 1 | u8::from(inside);
-        }
-    }
-
-    /// Takes over all of another one.
-    pub fn copy_from(&mut self, other: &ByteTable) {
-        self.bytes.copy_from_slice(&other.bytes);
     }
 
     /// The byte of the pixel that lies in memory as `raw`.
@@ -266,7 +158,11 @@ impl Table for ByteTable {
 
     fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
         hsv_box.check()?;
-        self.set_part(hsv_box, order, 0..Self::VALUES);
+        for (raw, byte) in (0..=u16::MAX).zip(&mut self.bytes) {
+            let pixel = order.pixel(raw);
+            let inside = hsv_box.contains(Hsv::from_rgb565(pixel));
+            *byte = redness(pixel) << 1 | u8::from(inside);
+        }
         Ok(())
     }
 
@@ -282,20 +178,6 @@ impl Pixels for ByteTable {
 
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
         threshold_bytes(&self.bytes, row, mask);
-    }
-
-    /// Rows that lie apart go word by word, downwards, when they are more than the words of each.
-    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
-        let words = words_of(width);
-        let apart = stride != usize::from(width) && width.is_multiple_of(32);
-        if !apart || words * words > mask.len() {
-            return mask_row_by_row(self, pixels, stride, width, mask);
-        }
-        for word in 0..words {
-            if let (Some(pixels), Some(mask)) = (pixels.get(32 * word..), mask.get_mut(word..)) {
-                threshold_bytes_down(&self.bytes, pixels, stride, mask, words);
-            }
-        }
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {
@@ -332,20 +214,18 @@ mod tests {
     };
 
     #[test]
-    fn both_tables_say_what_the_box_and_the_colour_say() {
+    fn the_table_says_what_the_box_and_the_colour_say() {
         for (hsv_box, order) in [
             (HsvBox::RED, ByteOrder::Native),
             (HsvBox::RED, ByteOrder::Swapped),
             (GREEN, ByteOrder::Swapped),
         ] {
-            let bits = Box::new(BitTable::new(&hsv_box, order).unwrap());
-            let bytes = Box::new(ByteTable::new(&hsv_box, order).unwrap());
+            let table = Box::new(ByteTable::new(&hsv_box, order).unwrap());
             for raw in 0..=u16::MAX {
                 let pixel = order.pixel(raw);
                 let inside = hsv_box.contains(Hsv::from_rgb565(pixel));
-                assert_eq!([bits.accepts(raw), bytes.accepts(raw)], [inside; 2]);
-                let weights = [bits.weight(&[raw], 0), bytes.weight(&[raw], 0)];
-                assert_eq!(weights, [redness(pixel); 2], "{raw:04x}");
+                assert_eq!(table.accepts(raw), inside, "{raw:04x}");
+                assert_eq!(table.weight(&[raw], 0), redness(pixel), "{raw:04x}");
             }
         }
     }
@@ -360,24 +240,8 @@ mod tests {
     }
 
     #[test]
-    fn a_table_that_is_made_in_parts_is_the_same() {
-        let whole = Box::new(ByteTable::new(&GREEN, ByteOrder::Swapped).unwrap());
-        let mut parts = Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap());
-        for ends in [0, 1, 256, 257, 40_000, ByteTable::VALUES].windows(2) {
-            assert!(parts != whole);
-            parts.set_part(&GREEN, ByteOrder::Swapped, ends[0]..ends[1]);
-        }
-        assert!(parts == whole);
-        let mut copy = Box::new(ByteTable::CLOSED);
-        copy.copy_from(&parts);
-        assert!(copy == whole);
-    }
-
-    #[test]
     fn a_closed_table_accepts_nothing() {
         let mut mask = [u32::MAX; 2];
-        BitTable::CLOSED.mask_row(&[0xf800; 40], &mut mask);
-        assert_eq!(mask, [0; 2]);
         ByteTable::CLOSED.mask_row(&[0xf800; 40], &mut mask);
         assert_eq!(mask, [0; 2]);
     }
@@ -401,22 +265,18 @@ mod tests {
             a in 0..800_u16,
             b in 0..800_u16,
         ) {
-            std::thread_local!(static TABLES: (BitTable, Box<ByteTable>) = (
-                BitTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap(),
-                Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap()),
-            ));
-            TABLES.with(|(bits, bytes)| {
-                let mut masks = [vec![u32::MAX; row.len().div_ceil(32)], vec![u32::MAX; row.len().div_ceil(32)]];
-                bits.mask_row(&row, &mut masks[0]);
-                bytes.mask_row(&row, &mut masks[1]);
-                for (i, &raw) in row.iter().enumerate() {
-                    prop_assert_eq!(masks[0][i / 32] >> (i % 32) & 1 == 1, bits.accepts(raw));
+            std::thread_local!(static TABLE: Box<ByteTable> =
+                Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap()));
+            TABLE.with(|table| {
+                let mut mask = vec![u32::MAX; row.len().div_ceil(32)];
+                table.mask_row(&row, &mut mask);
+                let bit = |x: usize| mask[x / 32] >> (x % 32) & 1 == 1;
+                for (x, &raw) in row.iter().enumerate() {
+                    prop_assert_eq!(bit(x), table.accepts(raw));
                 }
-                prop_assert_eq!(masks[0].last().unwrap().checked_shr(row.len() as u32 % 32).filter(|_| row.len() % 32 != 0).unwrap_or(0), 0);
-                prop_assert_eq!(&masks[0], &masks[1]);
+                prop_assert!((row.len()..32 * mask.len()).all(|x| !bit(x)), "beyond the row");
                 let run = Run { x0: a.min(b), x1: a.max(b) };
-                let sums = bytes.weigh(&row, run);
-                prop_assert_eq!(sums, bits.weigh(&row, run));
+                let sums = table.weigh(&row, run);
                 let columns = usize::from(run.x0)..(usize::from(run.x1) + 1).min(row.len());
                 let weights = columns.map(|x| (x as u32, u32::from(redness(row[x].swap_bytes()))));
                 let (sum, sum_x) = weights.fold((0, 0), |(s, sx), (x, w)| (s + w, sx + w * x));

@@ -8,7 +8,7 @@ use std::{fs, vec::Vec};
 use anyhow::{Context, Result, ensure};
 
 use crate::artifact;
-use crate::golden::{Buffers, MAX_FRAME_PIXELS, MAX_ROW_PIXELS, NO_USUAL_MODEL, Runner};
+use crate::golden::{Buffers, MAX_ROW_PIXELS, NO_USUAL_MODEL, Runner, TWO_BANDS_PIXELS};
 use crate::script::Script;
 
 /// Runs a script on the emulated Cortex-M7 (`HIVTAC_QEMU_IMAGE`) and gives the text it printed.
@@ -36,11 +36,11 @@ pub fn run(script: &Script) -> Result<String> {
 /// # Errors
 /// When the script is not sound.
 pub fn run_on_host(script: &Script) -> Result<String> {
-    let mut frame = std::vec![0; MAX_FRAME_PIXELS];
+    let mut bands = std::vec![0; TWO_BANDS_PIXELS];
     let buffers = Buffers {
         model: &mut *std::boxed::Box::new(NO_USUAL_MODEL),
         row: &mut [0; MAX_ROW_PIXELS],
-        frame: frame
+        bands: bands
             .as_mut_slice()
             .try_into()
             .context("room for a frame")?,

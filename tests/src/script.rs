@@ -101,31 +101,6 @@ impl Script {
         self
     }
 
-    /// Runs frames of one size through the pipeline as they lie in memory, in windows; `tracked`: those that follow the
-    /// markers. Pixels as in [`scan`](Self::scan).
-    pub fn windows(&mut self, width: u16, frames: &[&[u16]], tracked: bool) -> &mut Script {
-        self.push_windows(width, frames, u8::from(tracked))
-    }
-
-    /// Runs frames of one size through the pipeline, each but the first cropped to the rectangle around the windows that
-    /// follow the markers. Pixels as in [`scan`](Self::scan).
-    pub fn cropped(&mut self, width: u16, frames: &[&[u16]]) -> &mut Script {
-        self.push_windows(width, frames, 2)
-    }
-
-    fn push_windows(&mut self, width: u16, frames: &[&[u16]], how: u8) -> &mut Script {
-        let height = frames.first().map_or(0, |pixels| self.rows(width, pixels));
-        let count = u16::try_from(frames.len()).expect("at most 65,535 frames");
-        self.bytes.push(Kind::Windows as u8);
-        self.put(&[width, height, count]);
-        self.bytes.push(how);
-        for pixels in frames {
-            assert_eq!(self.rows(width, pixels), height, "frames of one size");
-            self.frame(pixels);
-        }
-        self
-    }
-
     /// Runs the network on features, measured from a rest position.
     pub fn network(&mut self, features: &Features, tare: &Features) -> &mut Script {
         self.bytes.push(Kind::Network as u8);

@@ -226,15 +226,13 @@ fn frames_in_other_formats_give_the_same_forces() {
         script.model(&models::weighted_file(format, widths, weights, output, 3));
         script.threshold(Threshold::red(format), ByteOrder::Swapped);
         script.sense(320, &frames);
-        script.windows(320, &frames, false);
-        script.windows(320, &frames, true);
         // A model of one format does not measure frames of another.
         script.model(&models::file(widths, weights, output, 3));
         script.sense(320, &frames);
     }
     let text = same_on_both(&script);
     let count = |what: &str| text.lines().filter(|line| line.contains(what)).count();
-    assert_eq!(count("force: Some"), 2 * 3 * loads().len(), "{text}");
+    assert_eq!(count("force: Some"), 2 * loads().len(), "{text}");
     assert_eq!(count("force: None"), 2 * loads().len(), "{text}");
 }
 
@@ -355,32 +353,4 @@ fn moved(random: &mut Random, distance: i64) -> hivtac_sensing::features::Featur
     let rest = models::rest().to_array();
     let limit = |number: i64| number.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
     features(rest.map(|number| limit(number + random.between(-distance, distance))))
-}
-
-#[test]
-fn windows_give_the_measurements_of_the_full_scan() {
-    let scene = Scene::preset("static", Preset::Ov7725, 320, 240, 5).unwrap();
-    let frames: Vec<_> = (0..3)
-        .map(|number| scene.frame(number, 1.0).pixels)
-        .collect();
-    let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
-    let mut script = Script::new();
-    red(&mut script, ByteOrder::Swapped);
-    script.sense(320, &frames);
-    script.windows(320, &frames, false);
-    script.windows(320, &frames, true);
-    script.cropped(320, &frames);
-    let text = same_on_both(&script);
-    let measurements = |case: &str| -> Vec<String> {
-        let lines = text.lines().filter_map(|line| line.strip_prefix(case));
-        let lines = lines.filter(|line| line.starts_with(": Measurement"));
-        lines.map(str::to_owned).collect()
-    };
-    let full = measurements("1");
-    assert_eq!(full.len(), frames.len(), "{text}");
-    for case in ["2", "3", "4"] {
-        assert_eq!(measurements(case), full, "case {case}");
-    }
-    let followed = "tracked: 2, fallen_back: 0, searched: 1";
-    assert_eq!(text.matches(followed).count(), 2, "{text}");
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
-use super::plan::{Estimator, Numbers, Scan};
+use super::plan::{Estimator, Numbers};
 use crate::conditions::CentroidName;
 
 /// The command that counts them.
@@ -17,8 +17,6 @@ pub const CLOCK_MHZ: f64 = 480.0;
 const NEAR_LIMIT: u64 = 12 * 1024;
 /// For each column of a frame: a ring of 32 bands and three bands more, of 8 rows and 2 bytes a pixel (`firmware/src/bands.rs`).
 const BAND_BYTES_OF_A_COLUMN: i64 = (32 + 3) * 8 * 2;
-/// AXI SRAM, where a whole frame would lie, bytes.
-const FRAME_MEMORY: i64 = 512 * 1024;
 /// Memories that hold data; the code's copy in ITCM is none.
 const DATA_MEMORIES: [&str; 3] = ["RAM", "SRAM", "AXISRAM"];
 
@@ -42,7 +40,6 @@ struct Counted {
 struct FramePart {
     size: [u16; 2],
     centroid: CentroidName,
-    scan: Scan,
     whole: Counted,
     latency: Counted,
     /// Whether the model is run after the last pixel, too.
@@ -115,8 +112,6 @@ pub struct Cost {
     pub flash: i64,
     /// Its data: DTCM, SRAM and AXI SRAM, without the stack, bytes.
     pub ram: i64,
-    /// Whether a whole frame has to lie in memory and does not fit.
-    pub too_large: bool,
 }
 
 impl Cost {
@@ -160,17 +155,14 @@ impl Costs {
         &self,
         size: [u16; 2],
         centroid: CentroidName,
-        scan: Scan,
         behind: Behind<'_>,
     ) -> Result<Option<Cost>> {
         let Some(name) = behind.estimator.cost_name(behind.numbers) else {
             return Ok(None);
         };
-        let is_here =
-            |part: &&FramePart| (part.size, part.centroid, part.scan) == (size, centroid, scan);
+        let is_here = |part: &&FramePart| (part.size, part.centroid) == (size, centroid);
         let frame = self.frames.iter().find(is_here);
-        let frame =
-            frame.with_context(|| format!("frames of {size:?}, {scan}, were not counted"))?;
+        let frame = frame.with_context(|| format!("frames of {size:?} were not counted"))?;
         let model = self.models.iter().find(|part| part.model == name);
         let model = model.with_context(|| format!("the model `{name}` was not counted"))?;
         let near = |bytes: i64| if bytes as u64 <= NEAR_LIMIT { bytes } else { 0 };
@@ -187,8 +179,6 @@ impl Costs {
             0 => own.cycles + flash_cycles,
             _ => own.cycles,
         };
-        let frame_bytes = 2 * i64::from(size[0]) * i64::from(size[1]);
-        let in_memory = scan == Scan::Windows;
         let columns = i64::from(size[0]) - i64::from(super::plan::firmware_size()[0]);
         let used = |name: &str| {
             let memory = self.firmware.iter().find(|memory| memory.name == name);
@@ -203,12 +193,7 @@ impl Costs {
             cycles: frame.whole.cycles + extra,
             latency_cycles: frame.latency.cycles + if frame.answers_last { extra } else { 0 },
             flash: used("FLASH")? + bytes - self.default_model_bytes,
-            ram: match in_memory {
-                // A frame instead of the ring.
-                true => ram - used("AXISRAM")? + frame_bytes,
-                false => ram + columns * BAND_BYTES_OF_A_COLUMN,
-            },
-            too_large: in_memory && frame_bytes > FRAME_MEMORY,
+            ram: ram + columns * BAND_BYTES_OF_A_COLUMN,
         }))
     }
 }
@@ -217,13 +202,12 @@ impl Costs {
 pub(super) mod tests {
     use super::*;
 
-    /// 1000 instructions and 500 cycles for a full scan of 320×240, and a tenth of each for a model.
+    /// 1000 instructions and 500 cycles for a frame, and a tenth of each for a model.
     pub fn example() -> Costs {
-        let frame = |size: &str, scan: &str, centroid: &str| {
+        let frame = |size: &str, answers_last: bool| {
             format!(
-                r#"{{"size":{size},"centroid":"{centroid}","scan":"{scan}",
-                    "whole":{{"instructions":1000,"cycles":500}},"latency":{{"instructions":100,"cycles":50}},"answers_last":{}}}"#,
-                scan != "full"
+                r#"{{"size":{size},"centroid":"binary-mask",
+                    "whole":{{"instructions":1000,"cycles":500}},"latency":{{"instructions":100,"cycles":50}},"answers_last":{answers_last}}}"#
             )
         };
         let model = |name: &str, bytes: u64, flash: u64| {
@@ -238,11 +222,7 @@ pub(super) mod tests {
             r#"{{"compiler":"rustc","together":[],"frames":[{}],"models":[{}],
                 "film":{{"bytes":50000,"one_step":{{"instructions":300,"cycles":150}},"each_more":{{"instructions":200,"cycles":100}},"flash_cycles":40}},
                 "firmware":[{}],"default_model_bytes":8000}}"#,
-            [
-                frame("[320,240]", "full", "binary-mask"),
-                frame("[640,480]", "windows", "binary-mask"),
-            ]
-            .join(","),
+            [frame("[320,240]", false), frame("[640,480]", true),].join(","),
             [
                 model("16-16 int8", 2_000, 30),
                 model("128-128 int8", 20_000, 700),
@@ -262,15 +242,15 @@ pub(super) mod tests {
     #[test]
     fn a_configuration_costs_what_its_parts_do() {
         let (costs, all) = (example(), Estimator::all());
-        let of = |size, scan, estimator: usize, numbers| {
+        let of = |size, estimator: usize, numbers| {
             let behind = Behind {
                 estimator: &all[estimator],
                 numbers,
                 looks: 0.0,
             };
-            costs.of(size, CentroidName::BinaryMask, scan, behind)
+            costs.of(size, CentroidName::BinaryMask, behind)
         };
-        let cost = of([320, 240], Scan::Full, 3, Numbers::Int8PerChannel);
+        let cost = of([320, 240], 3, Numbers::Int8PerChannel);
         let cost = cost.unwrap().unwrap();
         assert_eq!(
             (cost.instructions, cost.cycles, cost.latency_cycles),
@@ -279,13 +259,12 @@ pub(super) mod tests {
         // Weights that do not fit DTCM leave it.
         assert_eq!((cost.flash, cost.ram), (212_000, 302_000));
         assert!((cost.rate() - 480e6 / 1250.0).abs() < 1e-6);
-        let cost = of([640, 480], Scan::Windows, 0, Numbers::Int8PerChannel);
+        let cost = of([640, 480], 0, Numbers::Int8PerChannel);
         let cost = cost.unwrap().unwrap();
-        assert!(cost.too_large, "a frame of 614,400 bytes");
         assert_eq!(cost.latency_cycles, 100, "the answer comes last");
-        assert_eq!(cost.ram, 150_000 - 6_000 + 614_400);
-        assert_eq!(of([320, 240], Scan::Full, 0, Numbers::F32).unwrap(), None);
-        let error = of([160, 120], Scan::Full, 0, Numbers::Int8PerChannel).unwrap_err();
+        assert_eq!(cost.ram, 310_000 - 6_000 + 320 * BAND_BYTES_OF_A_COLUMN);
+        assert_eq!(of([320, 240], 0, Numbers::F32).unwrap(), None);
+        let error = of([160, 120], 0, Numbers::Int8PerChannel).unwrap_err();
         assert!(error.to_string().contains("[160, 120]"), "{error}");
     }
 
@@ -298,7 +277,7 @@ pub(super) mod tests {
                 numbers: Numbers::Int8PerChannel,
                 looks,
             };
-            let cost = costs.of([320, 240], CentroidName::BinaryMask, Scan::Full, behind);
+            let cost = costs.of([320, 240], CentroidName::BinaryMask, behind);
             cost.unwrap().unwrap()
         };
         let (alone, one, more) = (of(0.0), of(2.0), of(2.5));

@@ -37,14 +37,12 @@ pub struct Seen {
     pub frames: usize,
     /// Those without a force, by the estimator.
     pub rejected: [usize; 2],
-    /// Those whose features are others when they lie in memory and are looked at in windows.
-    pub windows_differ: [usize; 2],
     /// Over all features: the same frames have the same.
     pub fingerprint: u64,
 }
 
 /// What an estimator makes of a frame, and whether windows make the same of it.
-type Look = (Result<Observation, String>, bool);
+type Look = Result<Observation, String>;
 
 /// A frame's force, N, where its tip touches the film, mm, and what both estimators make of it.
 struct Looked {
@@ -110,19 +108,17 @@ fn rendered(recipes: &[Recipe; 2], progress: impl Fn() + Sync) -> Result<Frames>
     let [recipe, _] = recipes;
     let looks = look(recipes, 0..recipe.rest, [None; 2], &progress)?;
     let mut datasets = [dataset(&recipes[0])?, dataset(&recipes[1])?];
-    add(&mut datasets, recipe, looks, &mut [0; 2])?;
+    add(&mut datasets, recipe, looks)?;
     // As the chip is tared, so that what is judged by the rest position is.
     let files = [anything(&datasets[0])?, anything(&datasets[1])?];
     let [a, b] = files.each_ref().map(|file| Model::parse(file));
     let models = [a, b].map(|model| model.ok());
     let looks = look(recipes, recipe.rest..recipe.rows(), models, &progress)?;
-    let mut windows_differ = [0; 2];
-    add(&mut datasets, recipe, looks, &mut windows_differ)?;
+    add(&mut datasets, recipe, looks)?;
     let rejected = |dataset: &Dataset| dataset.rejected().values().sum();
     let seen = Seen {
         frames: recipe.rows() - recipe.rest,
         rejected: [rejected(&datasets[0]), rejected(&datasets[1])],
-        windows_differ,
         fingerprint: fingerprint(&datasets),
     };
     Ok(Frames { datasets, seen })
@@ -204,10 +200,7 @@ fn eye<'m>(recipe: &Recipe, model: Option<Model<'m>>) -> Result<Box<Sensor<'m>>>
 }
 
 fn look_once(sensor: &mut Sensor<'_>, frame: &Frame) -> Look {
-    let whole = measure(sensor, frame);
-    let windows = sensor.measure_frame(&frame.pixels);
-    let same = (whole.features, whole.status) == (windows.features, windows.status);
-    (observation(&whole), same)
+    observation(&measure(sensor, frame))
 }
 
 /// What the chip would take a force from.
@@ -222,12 +215,7 @@ fn observation(measurement: &Measurement) -> Result<Observation, String> {
     }
 }
 
-fn add(
-    datasets: &mut [Dataset; 2],
-    recipe: &Recipe,
-    looked: Vec<Looked>,
-    windows_differ: &mut [usize; 2],
-) -> Result<()> {
+fn add(datasets: &mut [Dataset; 2], recipe: &Recipe, looked: Vec<Looked>) -> Result<()> {
     for Looked {
         force_n,
         tip_mm,
@@ -235,8 +223,7 @@ fn add(
     } in looked
     {
         let place = recipe.place(datasets[0].rows.len());
-        for (i, (seen, same)) in looks.into_iter().enumerate() {
-            windows_differ[i] += usize::from(!same);
+        for (i, seen) in looks.into_iter().enumerate() {
             datasets[i].rows.push(Row {
                 place,
                 force_n,

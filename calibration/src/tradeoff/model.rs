@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde_json::json;
 
-use super::plan::{RENDERED, Scan, preset};
+use super::plan::{RENDERED, preset};
 use super::table::Configuration;
 use crate::check::check;
 use crate::conditions::Conditions;
@@ -75,7 +75,7 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
             .with_context(|| format!("cannot write {}", file(name).display()))
     };
     save("model.hvtm", &bytes)?;
-    let settings = settings(picked, &weights.conditions);
+    let settings = settings(&weights.conditions);
     save(
         "settings.json",
         (serde_json::to_string_pretty(&settings)? + "\n").as_bytes(),
@@ -86,52 +86,22 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
     Ok(format!(
         "{report}\n\nwrote model.hvtm, model.weights and settings.json into {}\n\n{}",
         folder.display(),
-        orders(picked, &file("model.hvtm"))
+        orders(&file("model.hvtm"))
     ))
 }
 
-fn features(picked: &Configuration) -> &'static [&'static str] {
-    match picked.scan {
-        Scan::Tracked => &["tracking"],
-        _ => &[],
-    }
-}
-
-fn settings(picked: &Configuration, conditions: &Conditions) -> serde_json::Value {
+fn settings(conditions: &Conditions) -> serde_json::Value {
     json!({
         "conditions": conditions,
-        "scan": picked.scan,
-        "firmware_features": features(picked),
         "commands": ["hivtac tare"],
     })
 }
 
 /// What to type. The model file carries all settings of the sensing; the firmware takes them from it at the start.
-fn orders(picked: &Configuration, model: &Path) -> String {
-    let features: String = features(picked)
-        .iter()
-        .map(|feature| format!(" --features {feature}"))
-        .collect();
+fn orders(model: &Path) -> String {
     format!(
         "flash it, from the root of the repository:\n\n  HIVTAC_MODEL={} \\\n    cargo run --release -p hivtac-firmware --target \
-         thumbv7em-none-eabihf{features}\n\nthen, while nothing touches the film:\n\n  hivtac tare",
+         thumbv7em-none-eabihf\n\nthen, while nothing touches the film:\n\n  hivtac tare",
         model.display()
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::pick::tests::made;
-    use super::*;
-
-    #[test]
-    fn what_follows_the_markers_needs_the_firmwares_feature() {
-        let orders = |scan| {
-            let picked = made([320, 240], scan, 1, [0.1; 2]);
-            super::orders(&picked, Path::new("/a/model.hvtm"))
-        };
-        assert!(orders(Scan::Tracked).contains("--features tracking"));
-        assert!(!orders(Scan::Full).contains("features"));
-        assert!(orders(Scan::Full).contains("HIVTAC_MODEL=/a/model.hvtm"));
-    }
 }

@@ -2,7 +2,6 @@
 
 use anyhow::{Context, Result, bail};
 
-use super::plan::Scan;
 use super::table::{Configuration, Reach};
 
 /// Errors count as equal within this part of themselves: training again changes them as much.
@@ -41,8 +40,7 @@ pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configurati
 ///
 /// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
 /// error from 50 mN up, error of
-/// |F| and error of the place are within a twentieth of the least of each, one that scans whole frames rather than one that
-/// follows the markers, as that needs no second frame after a doubt; of these the fastest.
+/// |F| and error of the place are within a twentieth of the least of each, the fastest.
 ///
 /// # Errors
 /// When there is none; says what comes nearest.
@@ -70,7 +68,7 @@ pub fn best<'c>(configurations: &'c [Configuration], limits: &Limits) -> Result<
     best.context("no configuration has a cost")
 }
 
-/// The most accurate and their equals; those that scan whole frames, if there are any.
+/// The most accurate and their equals.
 fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
     let equals = |among: &[&'c Configuration], of: fn(&Configuration) -> f64| {
         let least = among.iter().map(|c| of(c)).fold(f64::INFINITY, f64::min);
@@ -79,14 +77,7 @@ fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
     };
     let by_direction = equals(fitting, |c| c.strong_direction_deg.value);
     let by_force = equals(&by_direction, |c| c.force_rmse_mn.value);
-    let by_all = equals(&by_force, |c| c.place_rmse_um.value);
-    let whole = |c: &&&Configuration| c.scan == Scan::Full;
-    let of_whole: Vec<_> = by_all.iter().filter(whole).copied().collect();
-    if of_whole.is_empty() {
-        by_all
-    } else {
-        of_whole
-    }
+    equals(&by_force, |c| c.place_rmse_um.value)
 }
 
 fn cycles(configuration: &Configuration) -> i64 {
@@ -151,12 +142,7 @@ pub(super) mod tests {
     use crate::tradeoff::table::Mean;
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F| (mN).
-    pub fn made(
-        size: [u16; 2],
-        scan: Scan,
-        cycles: i64,
-        [direction, force]: [f64; 2],
-    ) -> Configuration {
+    pub fn made(size: [u16; 2], cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         let mean = |value: f64| Mean {
             value,
             half_width: Some(0.1 * value),
@@ -168,7 +154,6 @@ pub(super) mod tests {
             numbers: Numbers::Int16,
             steps: 1,
             looks: 2.0,
-            scan,
             direction_deg: mean(3.0 * direction),
             strong_direction_deg: mean(direction),
             force_rmse_mn: mean(force),
@@ -181,24 +166,22 @@ pub(super) mod tests {
                 latency_cycles: cycles / 5,
                 flash: 200_000,
                 ram: 300_000,
-                too_large: false,
             }),
         }
     }
 
     const QVGA: [u16; 2] = [320, 240];
 
-    /// By cycles: tracked and rough; tracked and good; whole and good; whole and a little better; whole and much better in
-    /// |F|; then one without a firmware, and one without a camera.
+    /// By cycles: rough; good; as good; a little better; much better in |F|; then one without a firmware, and one without a camera.
     fn several() -> Vec<Configuration> {
         vec![
-            made(QVGA, Scan::Tracked, 96_000, [0.5, 0.3]),
-            made(QVGA, Scan::Tracked, 144_000, [0.20, 0.1]),
-            made(QVGA, Scan::Full, 240_000, [0.20, 0.1]),
-            made(QVGA, Scan::Full, 288_000, [0.195, 0.1]),
-            made(QVGA, Scan::Full, 480_000, [0.198, 0.01]),
-            made([640, 480], Scan::Full, 960_000, [0.1, 0.01]),
-            made([800, 600], Scan::Full, 1_440_000, [0.05, 0.01]),
+            made(QVGA, 96_000, [0.5, 0.3]),
+            made(QVGA, 144_000, [0.20, 0.1]),
+            made(QVGA, 240_000, [0.20, 0.1]),
+            made(QVGA, 288_000, [0.195, 0.1]),
+            made(QVGA, 480_000, [0.198, 0.01]),
+            made([640, 480], 960_000, [0.1, 0.01]),
+            made([800, 600], 1_440_000, [0.05, 0.01]),
         ]
     }
 
@@ -213,19 +196,19 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn among_equals_whole_frames_come_before_speed() {
+    fn among_equals_the_fastest_is_best() {
         let budget = |us| Limits {
             budget_us: Some(us),
             ..Limits::default()
         };
-        assert_eq!(picked(budget(600.0)), 240_000);
-        assert_eq!(picked(budget(499.0)), 144_000, "no whole frame fits");
+        assert_eq!(picked(budget(600.0)), 144_000);
+        assert_eq!(picked(budget(299.0)), 96_000);
         assert_eq!(picked(budget(200.0)), 96_000);
         let rate = Limits {
             min_rate: Some(2000.0),
             ..Limits::default()
         };
-        assert_eq!(picked(rate), 240_000);
+        assert_eq!(picked(rate), 144_000);
     }
 
     #[test]
@@ -266,19 +249,11 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn floats_and_frames_without_room_are_out_of_reach() {
-        let mut float = made(QVGA, Scan::Full, 1, [0.0; 2]);
+    fn floats_are_out_of_reach_and_other_frames_need_a_firmware() {
+        let mut float = made(QVGA, 1, [0.0; 2]);
         float.cost = None;
         assert_eq!(float.reach(), Reach::None);
-        let mut large = made([640, 480], Scan::Windows, 1, [0.0; 2]);
+        let large = made([640, 480], 1, [0.0; 2]);
         assert_eq!(large.reach(), Reach::Camera);
-        large.cost.as_mut().unwrap().too_large = true;
-        assert_eq!(large.reach(), Reach::None);
-        let windows = made(QVGA, Scan::Windows, 1, [0.0; 2]);
-        assert_eq!(
-            windows.reach(),
-            Reach::Camera,
-            "the firmware keeps no frame"
-        );
     }
 }

@@ -1,4 +1,4 @@
-//! What is swept: frame sizes, centroid estimators, networks, arithmetics, steps, scans.
+//! What is swept: frame sizes, centroid estimators, networks, arithmetics, steps.
 
 use std::fmt;
 
@@ -30,20 +30,6 @@ pub enum Numbers {
     Int8PerChannel,
 }
 
-/// How a frame is looked at. All give the same features.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Scan {
-    /// Every pixel, as the rows arrive.
-    Full,
-    /// A frame that lies in memory: every n-th row, then windows around what it hits.
-    Windows,
-    /// The rectangle around the windows that follow the markers, as its rows arrive; everything after a doubt.
-    Tracked,
-}
-
-/// All scans.
-pub const SCANS: [Scan; 3] = [Scan::Full, Scan::Windows, Scan::Tracked];
 /// Gauss–Newton steps from the network's answer; none: the network stands alone.
 pub const STEPS: [u8; 4] = [0, 1, 2, 3];
 /// The steps of the default model.
@@ -223,16 +209,6 @@ impl fmt::Display for Numbers {
             Numbers::F32 => "f32",
             Numbers::Int16 => "int16",
             Numbers::Int8PerChannel => "int8 per channel",
-        })
-    }
-}
-
-impl fmt::Display for Scan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Scan::Full => "full",
-            Scan::Windows => "windows",
-            Scan::Tracked => "tracked",
         })
     }
 }

@@ -4,8 +4,7 @@ use std::fmt::Write;
 
 use super::pick::{Limits, best, front};
 use super::plan::{
-    Estimator, JUDGED_MM, JUDGED_N, Numbers, RENDERED, SCANS, Scan, USUAL_STEPS, firmware_size,
-    has_camera,
+    Estimator, JUDGED_MM, JUDGED_N, Numbers, RENDERED, USUAL_STEPS, firmware_size, has_camera,
 };
 use super::results::Results;
 use super::table::{Configuration, Mean, Reach, words};
@@ -16,7 +15,7 @@ pub fn markdown(results: &Results, configurations: &[Configuration]) -> String {
     let mut text = about(results);
     let _ = write!(
         text,
-        "\n### The Pareto front\n\nWhat a supported camera delivers and the chip has room for, and nothing else beats in both time \
+        "\n### The Pareto front\n\nWhat a supported camera delivers, and nothing else beats in both time \
          and direction error from 50 mN up:\n\n{}",
         table(&front(configurations, Reach::Camera))
     );
@@ -27,17 +26,17 @@ pub fn markdown(results: &Results, configurations: &[Configuration]) -> String {
     );
     let here: Vec<&Configuration> = configurations
         .iter()
-        .filter(|c| c.size == firmware_size() && c.scan == Scan::Full)
+        .filter(|c| c.size == firmware_size())
         .collect();
     let [width, height] = firmware_size();
     let _ = write!(
         text,
-        "\n### Every network at {width}×{height}, full scan\n\n{}",
+        "\n### Every network at {width}×{height}\n\n{}",
         table(&here)
     );
     let _ = write!(
         text,
-        "\n### Every size and scan, behind them the same network and steps\n\n{}",
+        "\n### Every size, behind it the same network and steps\n\n{}",
         sizes(configurations)
     );
     let _ = write!(text, "\n### The default\n\n{}", default(configurations));
@@ -54,18 +53,13 @@ fn about(results: &Results) -> String {
          ±{JUDGED_MM} mm. Networks: {epochs} passes over the data in floats, then {rounded} with the chip's rounding for each \
          arithmetic; 512-512-512: one seed, {paper_epochs} and {paper_rounded} passes. Intervals (±) hold the mean of all seeds \
          with 95 %, by Student's t.\n\n\
-         | frames | of | binary: rejected | others in windows | weighted: rejected | others in windows |\n\
-         |---|---:|---:|---:|---:|---:|\n",
+         | frames | of | binary: rejected | weighted: rejected |\n\
+         |---|---:|---:|---:|\n",
         RENDERED.place_mm, RENDERED.force_n, RENDERED.alpha_deg, plan.rows, plan.parts, plan.seeds
     );
     for (size, seen) in &results.seen {
-        let ([a, b], [x, y]) = (seen.rejected, seen.windows_differ);
-        let _ = writeln!(
-            text,
-            "| {} | {} | {a} | {x} | {b} | {y} |",
-            frame(*size),
-            seen.frames
-        );
+        let [a, b] = seen.rejected;
+        let _ = writeln!(text, "| {} | {} | {a} | {b} |", frame(*size), seen.frames);
     }
     text
 }
@@ -98,9 +92,9 @@ fn grouped(number: i64) -> String {
     groups.join(",")
 }
 
-const HEAD: &str = "| frame | centroids | network | numbers | steps | run forwards | scan | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | \
+const HEAD: &str = "| frame | centroids | network | numbers | steps | run forwards | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | \
                     place, µm | worst: °, mN | unexplained | instructions | modelled cycles | µs | per second | latency, µs | flash, KB | RAM, KB |\n\
-                    |---|---|---|---|---:|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+                    |---|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
 
 fn table(configurations: &[&Configuration]) -> String {
     let rows = configurations.iter().map(|c| row(c));
@@ -122,14 +116,13 @@ fn row(c: &Configuration) -> String {
         ),
     };
     format!(
-        "| {} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.2} % {cost}\n",
+        "| {} | {} | {} | {} | {} | {:.2} | {} | {} | {} | {} | {:.2}, {:.2} | {:.2} % {cost}\n",
         frame(c.size),
         words(c.centroid),
         c.estimator,
         c.numbers,
         c.steps,
         c.looks,
-        c.scan,
         interval(&c.strong_direction_deg, 3),
         interval(&c.direction_deg, 2),
         interval(&c.force_rmse_mn, 3),
@@ -140,23 +133,20 @@ fn row(c: &Configuration) -> String {
     )
 }
 
-/// One estimator at every size, with what each scan costs.
+/// One estimator at every size.
 fn sizes(configurations: &[Configuration]) -> String {
     let estimator = default_estimator();
     let mut text = format!(
-        "{estimator}, {}, {USUAL_STEPS} step. A frame in memory that does not fit the chip's is marked *.\n\n\
-         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | full: cycles | µs | \
-         windows: cycles | µs | tracked: cycles | µs |\n|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+        "{estimator}, {}, {USUAL_STEPS} step.\n\n\
+         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | cycles | µs |\n\
+         |---|---|---:|---:|---:|---:|---:|---:|\n",
         Numbers::Int8PerChannel
     );
     let of_it = configurations
         .iter()
         .filter(|c| c.estimator == estimator && c.numbers == Numbers::Int8PerChannel)
         .filter(|c| c.steps == USUAL_STEPS);
-    let of_it: Vec<&Configuration> = of_it.collect();
-    // The scans of one configuration follow each other.
-    for scans in of_it.chunks(SCANS.len()) {
-        let c = scans[0];
+    for c in of_it {
         let _ = write!(
             text,
             "| {} | {} | {} | {} | {} | {} |",
@@ -167,10 +157,9 @@ fn sizes(configurations: &[Configuration]) -> String {
             interval(&c.force_rmse_mn, 3),
             interval(&c.place_rmse_um, 1)
         );
-        for cost in scans.iter().filter_map(|c| c.cost) {
-            let mark = if cost.too_large { "*" } else { "" };
+        if let Some(cost) = c.cost {
             let (cycles, time) = (grouped(cost.cycles), cost.microseconds());
-            let _ = write!(text, " {cycles}{mark} | {time:.0} |");
+            let _ = write!(text, " {cycles} | {time:.0} |");
         }
         text.push('\n');
     }
@@ -192,7 +181,7 @@ fn default(configurations: &[Configuration]) -> String {
 
 /// Every configuration.
 pub fn csv(configurations: &[Configuration]) -> String {
-    let mut text = "width,height,centroid,network,numbers,steps,looks,scan,reach,direction_deg,direction_deg_95,strong_direction_deg,\
+    let mut text = "width,height,centroid,network,numbers,steps,looks,reach,direction_deg,direction_deg_95,strong_direction_deg,\
                     strong_direction_deg_95,force_rmse_mn,force_rmse_mn_95,place_rmse_um,place_rmse_um_95,\
                     worst_strong_direction_deg,worst_force_mn,unexplained,instructions,modelled_cycles,microseconds,per_second,latency_microseconds,flash_bytes,ram_bytes\n"
         .to_owned();
@@ -204,10 +193,10 @@ pub fn csv(configurations: &[Configuration]) -> String {
         };
         let [width, height] = c.size;
         let (centroid, network, numbers) = (words(c.centroid), &c.estimator, c.numbers);
-        let (steps, looks, scan) = (c.steps, c.looks, c.scan);
+        let (steps, looks) = (c.steps, c.looks);
         let _ = write!(
             text,
-            "{width},{height},{centroid},{network},{numbers},{steps},{looks:.3},{scan},{reach}"
+            "{width},{height},{centroid},{network},{numbers},{steps},{looks:.3},{reach}"
         );
         let means = [
             &c.direction_deg,
@@ -292,9 +281,9 @@ mod tests {
     #[test]
     fn tables_say_what_is_there_and_mark_what_cannot_be() {
         let mut all = vec![
-            made([320, 240], Scan::Full, 480_000, [0.25, 0.1]),
-            made([800, 600], Scan::Full, 1_200_000, [0.125, 0.1]),
-            made([320, 240], Scan::Full, 1, [0.0625, 0.1]),
+            made([320, 240], 480_000, [0.25, 0.1]),
+            made([800, 600], 1_200_000, [0.125, 0.1]),
+            made([320, 240], 1, [0.0625, 0.1]),
         ];
         all[2].cost = None;
         all[2].numbers = Numbers::F32;
@@ -309,13 +298,13 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("0.250 ± 0.025"), "{text}");
-        assert!(default(&all).contains("320×240, full scan"));
+        assert!(default(&all).contains("320×240**"));
         assert_eq!(csv(&all).lines().count(), 4);
         let columns: Vec<usize> = csv(&all)
             .lines()
             .map(|line| line.split(',').count())
             .collect();
-        assert_eq!(columns, [27; 4]);
+        assert_eq!(columns, [26; 4]);
         let svg = plot(&all);
         assert!(svg.contains("800×600 (no camera)") && svg.ends_with("</svg>\n"));
     }

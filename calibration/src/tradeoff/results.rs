@@ -247,7 +247,6 @@ mod tests {
         let seen = Seen {
             frames: 10,
             rejected: [0; 2],
-            windows_differ: [0; 2],
             fingerprint: 1,
         };
         results.saw([160, 120], seen).unwrap();

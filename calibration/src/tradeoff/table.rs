@@ -5,7 +5,7 @@ use std::fmt;
 use anyhow::Result;
 
 use super::costs::{Behind, Cost, Costs};
-use super::plan::{Estimator, Numbers, SCANS, Scan, firmware_size, has_camera};
+use super::plan::{Estimator, Numbers, firmware_size, has_camera};
 use super::results::{Figures, Finished, Results};
 use crate::conditions::CentroidName;
 
@@ -33,8 +33,6 @@ pub struct Configuration {
     pub steps: u8,
     /// How often the film is run forwards for a force, on average.
     pub looks: f64,
-    /// How the frame is looked at.
-    pub scan: Scan,
     /// Mean angle between found and true force, degrees.
     pub direction_deg: Mean,
     /// The same from 50 mN up.
@@ -58,13 +56,12 @@ impl fmt::Display for Configuration {
             estimator,
             numbers,
             steps,
-            scan,
             ..
         } = self;
         let centroid = words(self.centroid);
         write!(
             f,
-            "{estimator} ({numbers}) with {steps} step{} on {centroid} centroids of {width}×{height}, {scan} scan",
+            "{estimator} ({numbers}) with {steps} step{} on {centroid} centroids of {width}×{height}",
             if *steps == 1 { "" } else { "s" }
         )
     }
@@ -81,9 +78,9 @@ pub fn words(centroid: CentroidName) -> &'static str {
 /// How far a configuration is from use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reach {
-    /// Not at all: the chip runs no floats, has no room for the frame, or no supported camera has the size.
+    /// Not at all: the chip runs no floats, or no supported camera has the size.
     None,
-    /// A supported camera delivers it and the chip has room, but the firmware captures frames otherwise.
+    /// A supported camera delivers it, but the firmware captures frames of another size.
     Camera,
     /// The firmware does it.
     Firmware,
@@ -93,14 +90,8 @@ impl Configuration {
     /// How far it is from use.
     pub fn reach(&self) -> Reach {
         match &self.cost {
-            Some(cost) if !cost.too_large && has_camera(self.size) => {
-                let streamed = self.scan != Scan::Windows;
-                if streamed && self.size == firmware_size() {
-                    Reach::Firmware
-                } else {
-                    Reach::Camera
-                }
-            }
+            Some(_) if self.size == firmware_size() => Reach::Firmware,
+            Some(_) if has_camera(self.size) => Reach::Camera,
             _ => Reach::None,
         }
     }
@@ -127,28 +118,25 @@ pub fn configurations(results: &Results, costs: &Costs) -> Result<Vec<Configurat
                 numbers: *numbers,
                 looks,
             };
-            for scan in SCANS {
-                let cost = costs.of(task.size, task.centroid, scan, behind)?;
-                configurations.push(Configuration {
-                    size: task.size,
-                    centroid: task.centroid,
-                    estimator: task.estimator.clone(),
-                    numbers: *numbers,
-                    steps: *steps,
-                    looks,
-                    scan,
-                    direction_deg: mean(&figures, |f| f.direction_deg),
-                    strong_direction_deg: mean(&figures, |f| f.strong_direction_deg),
-                    force_rmse_mn: mean(&figures, |f| f.force_rmse_mn),
-                    place_rmse_um: mean(&figures, |f| f.place_rmse_um),
-                    unexplained: unexplained(&figures),
-                    worst: [
-                        largest(&figures, |f| f.worst_direction_deg),
-                        largest(&figures, |f| f.worst_force_mn),
-                    ],
-                    cost,
-                });
-            }
+            let cost = costs.of(task.size, task.centroid, behind)?;
+            configurations.push(Configuration {
+                size: task.size,
+                centroid: task.centroid,
+                estimator: task.estimator.clone(),
+                numbers: *numbers,
+                steps: *steps,
+                looks,
+                direction_deg: mean(&figures, |f| f.direction_deg),
+                strong_direction_deg: mean(&figures, |f| f.strong_direction_deg),
+                force_rmse_mn: mean(&figures, |f| f.force_rmse_mn),
+                place_rmse_um: mean(&figures, |f| f.place_rmse_um),
+                unexplained: unexplained(&figures),
+                worst: [
+                    largest(&figures, |f| f.worst_direction_deg),
+                    largest(&figures, |f| f.worst_force_mn),
+                ],
+                cost,
+            });
         }
     }
     Ok(configurations)

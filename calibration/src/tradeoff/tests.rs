@@ -56,7 +56,7 @@ fn a_sweep_finds_what_is_known_of_centroids_and_goes_on_where_it_was() {
         "{weighted:?}"
     );
     let (_, seen) = results.seen[0];
-    assert_eq!((seen.frames, seen.windows_differ), (1_200, [0; 2]));
+    assert_eq!(seen.frames, 1_200);
     // Some tips far from the middle push a marker out of the picture.
     let few = |rejected: usize| rejected > 0 && rejected * 100 < 8 * seen.frames;
     assert!(seen.rejected.into_iter().all(few), "{seen:?}");

@@ -21,7 +21,6 @@ global_asm!(include_str!("dot8.s"), options(raw));
 global_asm!(include_str!("dot16.s"), options(raw));
 #[cfg(target_abi = "eabihf")]
 global_asm!(include_str!("spline.s"), options(raw));
-global_asm!(include_str!("threshold_bits.s"), options(raw));
 global_asm!(include_str!("threshold_bytes.s"), options(raw));
 global_asm!(include_str!("threshold_cr.s"), options(raw));
 global_asm!(include_str!("threshold_luma.s"), options(raw));
@@ -158,27 +157,11 @@ unsafe extern "C" {
     ///
     /// BFI puts bit 0 of a pixel's byte into its place in the word, whatever the other bits are.
     ///
-    /// *Contract.* `pixels`: 32 of them `pixel_step` bytes after each other, for each of `words` ≥ 1 words of the mask.
-    /// `table`: 65,536 bytes. Writes the words `mask_step` bytes after each other, from `mask` on.
+    /// *Contract.* `pixels`: 32 for each of `words` ≥ 1 words of the mask. `table`: 65,536 bytes.
+    /// Writes the words from `mask` on.
     ///
     /// *Schedule.* 32 pixels: 103 instructions in 53 cycles, 1.66 a pixel; 1.5 is the floor of two loads and one operation.
-    fn hivtac_threshold_bytes(
-        pixels: *const u16,
-        table: *const u8,
-        mask: *mut u32,
-        words: usize,
-        pixel_step: usize,
-        mask_step: usize,
-    );
-
-    /// Equals `portable::threshold_bits` for whole words of the mask.
-    ///
-    /// *Contract.* `row`: 32 pixels for each word of the mask. `table`: 2,048 words. Writes `mask` up to `end`, which lies a
-    /// positive number of words after it.
-    ///
-    /// *Schedule.* 32 pixels: 167 instructions in 103 cycles, 3.2 a pixel. Three of a pixel's five instructions shift, and the
-    /// core shifts once a cycle.
-    fn hivtac_threshold_bits(row: *const u16, table: *const u32, mask: *mut u32, end: *const u32);
+    fn hivtac_threshold_bytes(pixels: *const u16, table: *const u8, mask: *mut u32, words: usize);
 
     /// Equals `portable::threshold_cr` for whole words of the mask. USUB8 compares the Cr of four pairs with the lowest, and
     /// SEL chooses the bits of those that are not below it.
@@ -290,42 +273,9 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> u
     let (row, table, words) = (row.as_ptr(), table.as_ptr(), whole.len());
     if words > 0 {
         // SAFETY: the row has 32 pixels for each of the words, of which there is one at least.
-        unsafe { hivtac_threshold_bytes(row, table, whole.as_mut_ptr(), words, 64, 4) };
+        unsafe { hivtac_threshold_bytes(row, table, whole.as_mut_ptr(), words) };
     }
     words
-}
-
-/// As `portable::threshold_bytes_down`.
-pub fn threshold_bytes_down(
-    table: &[u8; 65_536],
-    pixels: &[u16],
-    pixel_step: usize,
-    mask: &mut [u32],
-    mask_step: usize,
-) {
-    let Some(last) = pixels.len().checked_sub(32) else {
-        return;
-    };
-    let words = (last / pixel_step + 1).min(mask.len().div_ceil(mask_step));
-    if words > 0 {
-        let (pixels, table, mask) = (pixels.as_ptr(), table.as_ptr(), mask.as_mut_ptr());
-        // SAFETY: the last of the words begins words − 1 steps after the first, which leaves 32 pixels for it, and itself.
-        unsafe {
-            hivtac_threshold_bytes(pixels, table, mask, words, 2 * pixel_step, 4 * mask_step)
-        };
-    }
-}
-
-/// As [`portable::threshold_bits`](super::portable::threshold_bits) for the first words of the mask, and says for how many: all
-/// whole ones.
-pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32]) -> usize {
-    let whole = whole_words(row, mask, 32);
-    let range = whole.as_mut_ptr_range();
-    if !whole.is_empty() {
-        // SAFETY: the row has 32 pixels for each of the words, of which there is one at least.
-        unsafe { hivtac_threshold_bits(row.as_ptr(), table.as_ptr(), range.start, range.end) };
-    }
-    whole.len()
 }
 
 /// As [`portable::threshold_cr`](super::portable::threshold_cr) for the first words of the mask, and says for how many: all

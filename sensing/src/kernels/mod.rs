@@ -88,20 +88,6 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {
     }
 }
 
-/// The masks of 32 pixels in each of several rows through a table of bytes: see `portable::threshold_bytes_down`.
-pub fn threshold_bytes_down(
-    table: &[u8; 65_536],
-    pixels: &[u16],
-    pixel_step: usize,
-    mask: &mut [u32],
-    mask_step: usize,
-) {
-    #[cfg(armv7em)]
-    cortex_m7::threshold_bytes_down(table, pixels, pixel_step, mask, mask_step);
-    #[cfg(not(armv7em))]
-    portable::threshold_bytes_down(table, pixels, pixel_step, mask, mask_step);
-}
-
 /// The mask of a row of YUV422 by its Cr: see `portable::threshold_cr`.
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) {
     #[cfg(armv7em)]
@@ -121,16 +107,5 @@ pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) {
     let done = 0;
     if done < mask.len() {
         portable::threshold_luma(low, span, row, mask, done);
-    }
-}
-
-/// The mask of a row of pixels through a table of bits: see `portable::threshold_bits`.
-pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32]) {
-    #[cfg(armv7em)]
-    let done = cortex_m7::threshold_bits(table, row, mask);
-    #[cfg(not(armv7em))]
-    let done = 0;
-    if done < mask.len() {
-        portable::threshold_bits(table, row, mask, done);
     }
 }

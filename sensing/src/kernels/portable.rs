@@ -79,26 +79,14 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, activations: &mut [i16; MAX_WIDT
 /// The mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w + i. `mask` has
 /// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], first: usize) {
-    pack(row, mask, first, |bits, raw| {
-        bits >> 1 | u32::from(table[usize::from(raw)]) << 31
-    });
-}
-
-/// The masks of 32 pixels in each of several rows, which begin at multiples of `pixel_step` ≥ 1; they go to the words of `mask`
-/// at multiples of `mask_step` ≥ 1, as many as both have.
-#[cfg(not(armv7em))]
-pub fn threshold_bytes_down(
-    table: &[u8; 65_536],
-    pixels: &[u16],
-    pixel_step: usize,
-    mask: &mut [u32],
-    mask_step: usize,
-) {
-    let words = mask.chunks_mut(mask_step);
-    for (word, row) in words.zip(pixels.chunks(pixel_step)) {
-        if let Some(row) = row.get(..32) {
-            threshold_bytes(table, row, &mut word[..1], 0);
-        }
+    // Each bit is shifted in from the top; a shorter last word is moved down.
+    let shift_in = |bits: u32, raw: &u16| bits >> 1 | u32::from(table[usize::from(*raw)]) << 31;
+    let (full, rest) = row.as_chunks::<32>();
+    for (word, pixels) in mask.iter_mut().zip(full).skip(first) {
+        *word = pixels.iter().fold(0, shift_in);
+    }
+    if let Some(last) = mask.get_mut(full.len()).filter(|_| !rest.is_empty()) {
+        *last = rest.iter().fold(0, shift_in) >> (32 - rest.len());
     }
 }
 
@@ -111,14 +99,6 @@ pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
         let sum = sum + u32::from(weight);
         [sum, sums + sum]
     })
-}
-
-/// The mask of a row: bit i of word w is bit p % 32 of word p / 32 of `table`, with p = pixel 32·w + i. `mask` has
-/// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
-pub fn threshold_bits(table: &[u32; 2048], row: &[u16], mask: &mut [u32], first: usize) {
-    // An index of 11 bits needs no bounds check, and the rotation takes its count modulo 32 as the processor does.
-    let rotated = |raw: u16| table[usize::from(raw >> 5)].rotate_right(u32::from(raw));
-    pack(row, mask, first, |bits, raw| bits >> 1 | rotated(raw) << 31);
 }
 
 /// The mask of a row of YUV422 (Y0 Cb Y1 Cr): bits 2·i and 2·i + 1 of a word are set where Cr of its pair i is at least
@@ -145,19 +125,5 @@ pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32], first: u
             let [left, right] = inside.map(u32::from);
             bits | (left | right << 1) << (2 * i)
         });
-    }
-}
-
-/// Makes each word of `mask`, from word `first` on, of 32 pixels by shifting them in from the top; a shorter last word is
-/// moved down.
-#[inline(always)]
-fn pack(row: &[u16], mask: &mut [u32], first: usize, shift_in: impl Fn(u32, u16) -> u32) {
-    let (full, rest) = row.as_chunks::<32>();
-    let word = |pixels: &[u16]| pixels.iter().fold(0, |bits, &raw| shift_in(bits, raw));
-    for (word_of_mask, pixels) in mask.iter_mut().zip(full).skip(first) {
-        *word_of_mask = word(pixels);
-    }
-    if let Some(last) = mask.get_mut(full.len()).filter(|_| !rest.is_empty()) {
-        *last = word(rest) >> (32 - rest.len());
     }
 }

@@ -1,7 +1,7 @@
 @ The mask of RGB565 pixels through a table of bytes: see `threshold_bytes` in cortex_m7.rs.
 @
-@ r0 pixels   r1 table   r2 where the mask goes   r3 words left   r4-r10 pixels, then their bytes   r11 from one word of the
-@ mask to the next   r12 the word of the mask   lr from one word's pixels to the next   stack: the first pixel … both steps
+@ r0 pixels   r1 table   r2 where the mask goes   r3 words left   r4-r10 pixels, then their bytes   r12 the word
+@ of the mask   stack: the first pixel
 @
 @ Each byte's bit 0 goes to its place in the word. A pixel is loaded four before it, and its byte two before; behind the
 @ last word these are the first pixels again, so that nothing beyond them is read. The order is a search's, judged by
@@ -15,15 +15,14 @@
     .thumb_func
 
 hivtac_threshold_bytes:
-    push   {r0, r4-r11, lr}
+    push   {r0, r4-r10, lr}
     ldrh   r4, [r0]
     ldrh   r5, [r0, #2]
-    ldrd   lr, r11, [sp, #40]
     ldrb   r4, [r1, r4]
     ldrb   r5, [r1, r5]
     ldrh   r6, [r0, #4]
     ldrh   r7, [r0, #6]
-    sub    r2, r2, r11
+    sub    r2, r2, #4
 .Lhivtac_threshold_bytes_word:
     bfi    r12, r4, #0, #1
     ldrb.w r6, [r1, r6]
@@ -32,7 +31,7 @@ hivtac_threshold_bytes:
     bfi    r12, r5, #1, #1
     ldrb.w r7, [r1, r7]
     bfi    r12, r6, #2, #1
-    add.w  r2, r2, r11
+    add.w  r2, r2, #4
     ldrb.w r9, [r1, r9]
     ldrh.w r10, [r0, #12]
     bfi    r12, r7, #3, #1
@@ -111,7 +110,7 @@ hivtac_threshold_bytes:
     bfi    r12, r5, #27, #1
     ldrb.w r7, [r1, r7]
     bfi    r12, r6, #28, #1
-    add.w  r0, r0, lr
+    add.w  r0, r0, #64
     subs   r3, r3, #1
     ldrb.w r8, [r1, r8]
     it     eq
@@ -128,5 +127,5 @@ hivtac_threshold_bytes:
     str    r12, [r2]
     ldrb.w r5, [r1, r5]
     bne.w  .Lhivtac_threshold_bytes_word
-    pop    {r0, r4-r11, pc}
+    pop    {r0, r4-r10, pc}
     .size hivtac_threshold_bytes, . - hivtac_threshold_bytes

@@ -1,10 +1,8 @@
 //! Rows in, measurement out.
 
 mod ahead;
-mod cropped;
 #[cfg(test)]
 mod tests;
-mod whole_frame;
 
 use crate::{
     blob::Blob,
@@ -20,8 +18,7 @@ use crate::{
     settings::{Settings, SettingsError},
     status::Status,
     tables::{ByteTable, Table},
-    threshold::{ByteOrder, HsvBox, PixelFormat, Threshold, ThresholdError},
-    windows::coarse_step,
+    threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError},
 };
 use ahead::Ahead;
 
@@ -43,8 +40,8 @@ const SATURATED_PART: u32 = 2;
 
 /// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565 up in a `T`.
 ///
-/// It holds all its storage, about 74 KiB and the table (64 KiB, or 8 as a [`BitTable`](crate::tables::BitTable)), so build it where it shall stay: in a `static` as [`Sensor::new`], which is
-/// `const`, and then [`configure`](Self::configure) it in place; nothing large crosses the stack.
+/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it
+/// shall stay: in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it in place; nothing large crosses the stack.
 /// For each frame: [`begin_frame`](Self::begin_frame), [`push_rows`](Self::push_rows) with all rows from the top, one
 /// or more at a time as they arrive, and [`finish_frame`](Self::finish_frame).
 #[derive(Clone, Debug)]
@@ -71,8 +68,6 @@ struct Prepared {
     resting: Option<Resting>,
     /// The bits that every frame has, whatever it shows.
     standing: Status,
-    /// Rows from one to the next of those that are looked at first in a frame that lies in memory.
-    coarse_step: u16,
 }
 
 impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
@@ -145,22 +140,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// Sets a threshold of RGB565 whose table was made elsewhere while frames went on: `install` puts that table in place.
-    /// Do it between frames; all else is as with [`set_threshold`](Self::set_threshold).
-    ///
-    /// # Errors
-    /// A box that means nothing; the threshold is then unchanged, and `install` not called.
-    pub fn set_made_threshold(
-        &mut self,
-        hsv_box: HsvBox,
-        install: impl FnOnce(&mut T),
-    ) -> Result<(), ThresholdError> {
-        self.pixels.set_made(hsv_box, install)?;
-        self.settings.threshold = Threshold::Rgb565(hsv_box);
-        self.prepare();
-        Ok(())
-    }
-
     /// Sets the rest position of this unit, or goes back to the model's. One that is not [sound](Rest::is_sound) is
     /// as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {
@@ -209,6 +188,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
         self.scanner.push_rows_below(&self.pixels, above, rows);
         self.look_ahead();
+    }
+
+    /// Measures a frame that lies in memory: all rows from the top, one after the other.
+    pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
+        self.begin_frame();
+        self.push_rows(frame);
+        self.finish_frame()
     }
 
     /// Ends the frame.
@@ -263,7 +249,12 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// The blobs of the frame that was finished last, when it was pushed row by row, at least [`Settings::min_area`] each.
+    /// How it reads pixels.
+    pub fn pixels(&self) -> &Formats<T> {
+        &self.pixels
+    }
+
+    /// The blobs of the frame that was finished last, at least [`Settings::min_area`] each.
     pub fn blobs(&self) -> &[Blob] {
         self.scanner.blobs()
     }
@@ -289,7 +280,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 .and_then(|(model, rest)| Resting::of_model(model, &rest)),
             trust: rest.map(|rest| Trust::new(settings, &rest, own_rest, reading)),
             standing: self.standing_status(),
-            coarse_step: coarse_step(&settings.geometry),
         });
     }
 

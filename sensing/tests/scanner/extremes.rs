@@ -5,7 +5,7 @@ use hivtac_sensing::{
     blob::Blob,
     scanner::{MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, ScanSettings, Scanner},
     status::Status,
-    tables::BitTable,
+    tables::ByteTable,
     threshold::{ByteOrder, HsvBox},
     units::Px,
 };
@@ -59,7 +59,7 @@ fn heaviest(width: u64, height: u64) -> Blob {
 
 #[test]
 fn an_all_red_frame_is_one_exact_blob() {
-    let table = BitTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap();
+    let table = ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap();
     let largest = (u64::from(MAX_WIDTH), u64::from(MAX_HEIGHT));
     for (width, height) in [(1, 1), (320, 240), (800, 600), largest] {
         for dilations in 0..=MAX_DILATIONS {

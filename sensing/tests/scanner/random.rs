@@ -4,7 +4,7 @@ use crate::reference::{Mask, scan, settings};
 use hivtac_sensing::{
     scanner::{ScanSettings, Scanner},
     status::Status,
-    tables::{BitTable, ByteTable, Pixels, Table},
+    tables::{ByteTable, Pixels, Table},
     threshold::{ByteOrder, HsvBox},
 };
 use proptest::{collection::vec, prelude::*};
@@ -12,10 +12,8 @@ use proptest::{collection::vec, prelude::*};
 /// Enough for every blob of the masks here: a blob needs a 2×2 cell of its own.
 const ALL: usize = 100 * 30 / 4 + 200;
 
-thread_local!(static TABLES: (BitTable, Box<ByteTable>) = (
-    BitTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap(),
-    Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap()),
-));
+thread_local!(static TABLE: Box<ByteTable> =
+    Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap()));
 
 /// Masks of any width around the borders of words, from sparse to dense. Near a density of 0.4, where blobs percolate,
 /// labels join in the most tangled ways.
@@ -103,7 +101,7 @@ proptest! {
         swapped in any::<bool>(),
     ) {
         let order = if swapped { ByteOrder::Swapped } else { ByteOrder::Native };
-        let table = BitTable::new(&HsvBox::RED, order).unwrap();
+        let table = ByteTable::new(&HsvBox::RED, order).unwrap();
         let rows: Vec<&[u16]> = pixels.chunks_exact(width).take(800).collect();
         let mask = Mask::from_fn(width, rows.len(), |x, y| table.accepts(rows[y][x]));
         let mut scanner = Scanner::<ALL>::new();
@@ -124,23 +122,23 @@ proptest! {
     ) {
         let pixels: Vec<u16> = seeds.iter().map(|(value, red)| if *red { 0x00d8 | value & 0x20e7 } else { *value }).collect();
         let pixels = &pixels[..width * height];
-        let (bits, bytes) = TABLES.with(Clone::clone);
-        let mask = Mask::from_fn(width, height, |x, y| bits.accepts(pixels[y * width + x]));
-        let weight = |x, y| bits.weight(&pixels[y * width..], x as u16);
+        let table = TABLE.with(Clone::clone);
+        let mask = Mask::from_fn(width, height, |x, y| table.accepts(pixels[y * width + x]));
+        let weight = |x, y| table.weight(&pixels[y * width..], x as u16);
         let expected = mask.dilated(dilations).weighted_blobs(1, weight);
         let settings = ScanSettings { weighted: true, ..settings(&mask, dilations, 1) };
         let mut scanner = Scanner::<ALL>::new();
         scanner.begin(settings).unwrap();
-        pixels.chunks(width).for_each(|row| scanner.push_row(&bits, row));
-        prop_assert_eq!(scanner.finish(&bits).blobs, expected.as_slice());
+        pixels.chunks(width).for_each(|row| scanner.push_row(&*table, row));
+        prop_assert_eq!(scanner.finish(&*table).blobs, expected.as_slice());
         scanner.begin(settings).unwrap();
         let mut rest = pixels;
         for band in bands.iter().map(|rows| rows * width) {
             let (rows, below) = rest.split_at(band.min(rest.len()));
-            scanner.push_rows(&*bytes, rows);
+            scanner.push_rows(&*table, rows);
             rest = below;
         }
-        let scan = scanner.finish(&*bytes);
+        let scan = scanner.finish(&*table);
         prop_assert_eq!(scan.status, Status::OK);
         prop_assert_eq!(scan.blobs, expected.as_slice());
         // Rows that stay in memory, all of them or just enough.
@@ -150,10 +148,10 @@ proptest! {
             for rows in &bands {
                 let next = height.min(y + rows);
                 let above = &pixels[y.saturating_sub(enough) * width..y * width];
-                scanner.push_rows_below(&*bytes, above, &pixels[y * width..next * width]);
+                scanner.push_rows_below(&*table, above, &pixels[y * width..next * width]);
                 y = next;
             }
-            let scan = scanner.finish(&*bytes);
+            let scan = scanner.finish(&*table);
             prop_assert_eq!(scan.status, Status::OK);
             prop_assert_eq!(scan.blobs, expected.as_slice());
         }

@@ -3,7 +3,7 @@
 use hivtac_sensing::{
     scanner::{ScanError, ScanSettings, Scanner},
     status::Status,
-    tables::{BitTable, Table},
+    tables::{ByteTable, Table},
     threshold::{ByteOrder, HsvBox, ThresholdError},
 };
 
@@ -41,7 +41,7 @@ fn missing_extra_and_wrong_rows_make_a_frame_incomplete() {
 
 #[test]
 fn pixel_rows_of_another_width_make_a_frame_incomplete() {
-    let table = BitTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
+    let table = ByteTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
     for width in [0, 39, 41, 801, 70_000] {
         let mut scanner = Scanner::<4>::new();
         let mask = Mask::from_fn(40, 1, |_, _| false);
@@ -58,7 +58,7 @@ fn pixel_rows_of_another_width_make_a_frame_incomplete() {
 
 #[test]
 fn a_row_to_be_weighed_that_did_not_stay_in_memory_makes_a_frame_incomplete() {
-    let table = BitTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
+    let table = ByteTable::new(&HsvBox::RED, ByteOrder::Native).unwrap();
     let mut pixels = [0; 40 * 6];
     pixels[40 * 3 + 7] = 0xf800;
     let (above, below) = pixels.split_at(40 * 3);
@@ -158,7 +158,7 @@ fn settings_out_of_range_are_named() {
 #[test]
 fn boxes_without_meaning_are_named_and_change_nothing() {
     let red = HsvBox::RED;
-    let mut table = BitTable::new(&red, ByteOrder::Native).unwrap();
+    let mut table = ByteTable::new(&red, ByteOrder::Native).unwrap();
     let before = table.clone();
     for (bad, error) in [
         (

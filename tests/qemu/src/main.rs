@@ -12,7 +12,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use cortex_m_semihosting::{debug, hio};
 use hivtac_tests::golden::{
-    Buffers, MAX_FRAME_PIXELS, MAX_ROW_PIXELS, ModelBuffer, NO_MODEL, Runner,
+    Buffers, MAX_ROW_PIXELS, ModelBuffer, NO_MODEL, Runner, TWO_BANDS_PIXELS,
 };
 
 use file::{Reader, Writer};
@@ -60,12 +60,12 @@ fn buffers() -> Result<Buffers<'static>, &'static str> {
         #[unsafe(link_section = ".rows")]
         ROW: [u16; MAX_ROW_PIXELS] = [0; MAX_ROW_PIXELS]
     );
-    let frame = cortex_m::singleton!(
+    let bands = cortex_m::singleton!(
         #[unsafe(link_section = ".rows")]
-        FRAME: [u16; MAX_FRAME_PIXELS] = [0; MAX_FRAME_PIXELS]
+        BANDS: [u16; TWO_BANDS_PIXELS] = [0; TWO_BANDS_PIXELS]
     );
-    match (model, row, frame) {
-        (Some(model), Some(row), Some(frame)) => Ok(Buffers { model, row, frame }),
+    match (model, row, bands) {
+        (Some(model), Some(row), Some(bands)) => Ok(Buffers { model, row, bands }),
         _ => Err("the buffers are taken"),
     }
 }

@@ -3,7 +3,6 @@
 //! A script is a sequence of records, each a kind in one byte and what [`Kind`] says, little-endian, until its end.
 //! Every result is one line, printed by `Debug`: all numbers are integers, so equal text means equal bits.
 
-mod cropped;
 mod marks;
 mod record;
 
@@ -20,10 +19,9 @@ use hivtac_sensing::network::Network;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tables::{BitTable, ByteTable, Pixels};
+use hivtac_sensing::tables::{ByteTable, Pixels};
 use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_sensing::units::{MicroNewtons, MilliDegrees, Px};
-use hivtac_sensing::windows::Tracks;
 
 use marks::{counting_begins, counting_ends, last_band_begins};
 pub use record::{Kind, ScriptError, Source};
@@ -42,10 +40,10 @@ pub type ModelBuffer = AlignedFile<[u8; MAX_MODEL_BYTES]>;
 pub const NO_MODEL: ModelBuffer = AlignedFile([0; MAX_MODEL_BYTES]);
 /// Room for the widest row of pixels.
 pub const MAX_ROW_PIXELS: usize = MAX_WIDTH as usize;
-/// Room for the largest frame that is looked at in windows.
-pub const MAX_FRAME_PIXELS: usize = 800 * 600;
 /// Rows that arrive at once: those of the firmware's bands.
 pub const BAND_ROWS: u16 = 8;
+/// Room for two bands of the widest rows.
+pub const TWO_BANDS_PIXELS: usize = 2 * BAND_ROWS as usize * MAX_ROW_PIXELS;
 /// Blobs that a scan keeps.
 pub const BLOBS: usize = 64;
 
@@ -55,8 +53,8 @@ pub struct Buffers<'b> {
     pub model: &'b mut AlignedFile<[u8]>,
     /// The row of pixels that is pushed.
     pub row: &'b mut [u16; MAX_ROW_PIXELS],
-    /// A frame that lies in memory.
-    pub frame: &'b mut [u16; MAX_FRAME_PIXELS],
+    /// The band that is pushed, and the one above it.
+    pub bands: &'b mut [u16; TWO_BANDS_PIXELS],
 }
 
 /// How later frames are looked at.
@@ -74,7 +72,6 @@ pub struct Runner<'b> {
     model_place: Range<usize>,
     look: Look,
     pixels: Formats<ByteTable>,
-    slim_pixels: Formats<BitTable>,
     scanner: Scanner<BLOBS>,
     cases: u32,
 }
@@ -91,7 +88,6 @@ impl<'b> Runner<'b> {
                 weighted: false,
             },
             pixels: Formats::CLOSED,
-            slim_pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             cases: 0,
         }
@@ -116,7 +112,6 @@ impl<'b> Runner<'b> {
                 Kind::Sense => self.sense(source, results)?,
                 Kind::Network => self.network(source, results)?,
                 Kind::Force => self.force(source, results)?,
-                Kind::Windows => self.windows(source, results)?,
                 Kind::Press => self.press(source, results)?,
             }
             self.cases += 1;
@@ -152,8 +147,7 @@ impl<'b> Runner<'b> {
         }
         let set = self.pixels.set(&threshold, order);
         counting_ends();
-        set.and_then(|()| self.slim_pixels.set(&threshold, order))
-            .map_err(ScriptError::Threshold)
+        set.map_err(ScriptError::Threshold)
     }
 
     fn scan(
@@ -174,17 +168,12 @@ impl<'b> Runner<'b> {
         };
         self.scanner.begin(settings).map_err(ScriptError::Scan)?;
         let (scanner, pixels) = (&mut self.scanner, &self.pixels);
-        let mut tables_agree = true;
         let words = [pixels.row_length(width), height.into()];
         for_each_row(source, self.buffers.row, words, |row| {
             counting_begins();
             scanner.push_row(pixels, row);
             counting_ends();
-            tables_agree &= masks_agree(row, width, (pixels, &self.slim_pixels));
         })?;
-        if !tables_agree {
-            return Err(ScriptError::TablesDiffer);
-        }
         counting_begins();
         let scan = scanner.finish(pixels);
         counting_ends();
@@ -201,51 +190,12 @@ impl<'b> Runner<'b> {
         let mut sensor = sensor(file, self.look, [width, height])?;
         let words = [self.pixels.row_length(width), height.into()];
         for _ in 0..frames {
-            let buffers = (&mut self.buffers.row[..], &mut self.buffers.frame[..]);
+            let buffers = (&mut self.buffers.row[..], &mut self.buffers.bands[..]);
             let measurement = sense_frame(&mut sensor, source, buffers, words)?;
             say(results, self.cases, format_args!("{measurement:?}"))?;
             say(results, self.cases, format_args!("{:?}", sensor.blobs()))?;
         }
         Ok(())
-    }
-
-    /// Only the last frame is counted: those before it show where the markers were.
-    fn windows(
-        &mut self,
-        source: &mut impl Source,
-        results: &mut impl Write,
-    ) -> Result<(), ScriptError> {
-        let (width, height, frames) = (number(source)?, number(source)?, number(source)?);
-        let [tracked] = bytes(source)?;
-        let file = &self.buffers.model.0[self.model_place.clone()];
-        let mut sensor = sensor(file, self.look, [width, height])?;
-        let mut tracks = Tracks::new();
-        let words = [self.pixels.row_length(width), height.into()];
-        for number in 0..frames {
-            let (row, frame) = (&mut *self.buffers.row, &mut *self.buffers.frame);
-            let window = match tracked {
-                2 => cropped::window(&sensor, &tracks),
-                _ => None,
-            };
-            let frame = read_frame(source, row, frame, words)?;
-            let last = number + 1 == frames;
-            if let Some(window) = window {
-                let frame = cropped::crop(frame, width, &window);
-                let measurement = cropped::measure(&mut sensor, &mut tracks, frame, &window, last);
-                say(results, self.cases, format_args!("{measurement:?}"))?;
-                continue;
-            }
-            if last {
-                counting_begins();
-            }
-            let measurement = match tracked {
-                0 => sensor.measure_frame(frame),
-                _ => sensor.measure_tracked(&mut tracks, frame),
-            };
-            counting_ends();
-            say(results, self.cases, format_args!("{measurement:?}"))?;
-        }
-        say(results, self.cases, format_args!("{:?}", tracks.tally()))
     }
 
     fn network(
@@ -338,22 +288,22 @@ fn sensor(
     Ok(sensor)
 }
 
-/// Reads a frame into memory, row by row.
-fn read_frame<'f>(
+/// Reads rows into memory, one by one.
+fn read_band<'f>(
     source: &mut impl Source,
     row: &mut [u16],
-    frame: &'f mut [u16],
+    band: &'f mut [u16],
     words: [usize; 2],
 ) -> Result<&'f mut [u16], ScriptError> {
-    let frame = frame.get_mut(..words[0] * words[1]);
-    let frame = frame.ok_or(ScriptError::TooLarge(words))?;
-    let mut rows = frame.chunks_exact_mut(words[0].max(1));
+    let band = band.get_mut(..words[0] * words[1]);
+    let band = band.ok_or(ScriptError::TooLarge(words))?;
+    let mut rows = band.chunks_exact_mut(words[0].max(1));
     for_each_row(source, row, words, |row| {
         if let Some(place) = rows.next() {
             place.copy_from_slice(row);
         }
     })?;
-    Ok(frame)
+    Ok(band)
 }
 
 fn model(file: &[u8]) -> Result<Option<Model<'_>>, ScriptError> {
@@ -370,19 +320,19 @@ fn say(results: &mut impl Write, case: u32, result: fmt::Arguments<'_>) -> Resul
 fn sense_frame(
     sensor: &mut Sensor<'_, BLOBS>,
     source: &mut impl Source,
-    (row, frame): (&mut [u16], &mut [u16]),
+    (row, bands): (&mut [u16], &mut [u16]),
     [length, height]: [usize; 2],
 ) -> Result<Measurement, ScriptError> {
     let mut left = height;
     // As in the firmware, a band stays in memory until the next one was pushed.
-    let (mut above, mut below) = frame.split_at_mut(frame.len() / 2);
+    let (mut above, mut below) = bands.split_at_mut(bands.len() / 2);
     let mut above_length = 0;
     counting_begins();
     sensor.begin_frame();
     counting_ends();
     while left > 0 {
         let rows = left.min(usize::from(BAND_ROWS));
-        let band = read_frame(source, row, below, [length, rows])?;
+        let band = read_band(source, row, below, [length, rows])?;
         if left <= usize::from(BAND_ROWS) {
             last_band_begins();
         }
@@ -397,16 +347,6 @@ fn sense_frame(
     let measurement = sensor.finish_frame();
     counting_ends();
     Ok(measurement)
-}
-
-/// Whether both tables give a row the same mask.
-fn masks_agree(row: &[u16], width: u16, tables: (&Formats<ByteTable>, &Formats<BitTable>)) -> bool {
-    let mut masks = [[0; MAX_ROW_PIXELS / 32]; 2];
-    let words = usize::from(width).div_ceil(32);
-    let [by_bytes, by_bits] = &mut masks;
-    tables.0.mask_row(row, &mut by_bytes[..words]);
-    tables.1.mask_row(row, &mut by_bits[..words]);
-    by_bytes == by_bits
 }
 
 /// Reads `height` rows of `length` words one after the other into `row`, and hands out each.

@@ -14,7 +14,7 @@ pub enum Kind {
     /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model file that later records
     /// use.
     Model = 1,
-    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the byte table takes; above them the number
+    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the table takes; above them the number
     /// of the pixel format), then the threshold (6 × u8) for later frames, as a model file has it.
     Threshold = 2,
     /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16 each, or for two of mono): blobs.
@@ -25,24 +25,19 @@ pub enum Kind {
     Network = 5,
     /// Three numbers (i32), taken as a force vector in µN and as α, β in m° and |F| in µN.
     Force = 6,
-    /// Width, height, number of frames (u16), how they are looked at (u8: 0 coarsely and then in windows, 1 in windows that
-    /// follow the markers, 2 cropped to these windows' rectangle), then the pixels: the pipeline on frames that lie in
-    /// memory.
-    Windows = 7,
     /// x, y (i32) and area (u32) of markers 0–3, then eleven features (i64) and four areas (u32) of the rest position: the
     /// network and the steps from its answer.
-    Press = 8,
+    Press = 7,
 }
 
 impl Kind {
-    pub(super) const ALL: [Kind; 8] = [
+    pub(super) const ALL: [Kind; 7] = [
         Kind::Model,
         Kind::Threshold,
         Kind::Scan,
         Kind::Sense,
         Kind::Network,
         Kind::Force,
-        Kind::Windows,
         Kind::Press,
     ];
 }
@@ -72,7 +67,7 @@ pub enum ScriptError {
     UnknownKind(u8),
     /// Rows of so many words are longer than the longest.
     TooWide(usize),
-    /// A frame with rows of so many words, and so many of them, is larger than there is room for.
+    /// So many rows of so many words are more than there is room for.
     TooLarge([usize; 2]),
     /// A model needs more room than there is.
     ModelTooLarge(usize),
@@ -90,8 +85,6 @@ pub enum ScriptError {
     Scan(ScanError),
     /// The sensor cannot be set so.
     Settings(SettingsError),
-    /// The two threshold tables say different things of a pixel.
-    TablesDiffer,
     /// The results could not be written.
     Output(fmt::Error),
 }

@@ -27,10 +27,8 @@ pub struct Case {
 /// A part of the trade between speed and accuracy, or some of them together.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Part {
-    /// How markers' positions are taken, and how the frame is scanned; nothing without a frame.
+    /// How markers' positions are taken; nothing without a frame.
     pub centroid: Option<String>,
-    /// See `centroid`.
-    pub scan: Option<String>,
     /// The model's name.
     pub model: String,
     /// Size of its file.
@@ -42,11 +40,6 @@ pub struct Part {
 pub enum Work {
     /// One frame, from its first row to the force; what is special about it, empty for the usual one.
     Frame(String),
-    /// One usual frame that lies in memory, looked at in windows.
-    Windows {
-        /// Windows follow the markers; otherwise it is not known where they are.
-        tracked: bool,
-    },
     /// One inference of a model with these layer widths.
     Network(Vec<u64>),
     /// The network of a model that tells places, and so many steps from its answer.

@@ -21,8 +21,9 @@ pub struct Report<'i> {
 /// One measured item. Its three numbers are per frame, or per inference; those of `mac` are per multiplication.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Item {
-    /// `threshold`, `blobs`, `frame full`, `frame windows`, `latency`, `network …`, `mac` or `table` (the threshold's, of 256 × 256 values); of a frame that is not the usual one, what it
-    /// is follows after a comma.
+    /// `threshold`, `blobs`, `frame full`, `latency`, `network …`, `mac` or `table` (the
+    /// threshold's, of 256 × 256 values); of a frame that is not the usual one, what it is follows
+    /// after a comma.
     pub item: String,
     /// Columns and rows: `320x240`.
     pub frame: String,
@@ -89,10 +90,6 @@ fn of_one(measured: &Measured) -> Vec<Item> {
             ];
             let costs = parts.chain(whole);
             costs.map(|(part, cost)| make(&name(part), cost)).collect()
-        }
-        Work::Windows { tracked: false } => vec![make("frame windows", measured.total())],
-        Work::Windows { tracked: true } => {
-            vec![make("frame windows, tracked", measured.total())]
         }
         Work::Table => vec![make("table", measured.total())],
         Work::Steps(steps) => vec![make(&steps_of(*steps), measured.total())],

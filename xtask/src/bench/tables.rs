@@ -144,10 +144,6 @@ fn name(measured: &Measured) -> String {
     match &case.work {
         Work::Frame(special) if special.is_empty() => format!("{} {}", case.frame(), case.format),
         Work::Frame(special) => format!("{} {}, {special}", case.frame(), case.format),
-        Work::Windows { tracked: false } => format!("{} {}, windows", case.frame(), case.format),
-        Work::Windows { tracked: true } => {
-            format!("{} {}, windows, tracked", case.frame(), case.format)
-        }
         Work::Table => "the threshold's table".to_owned(),
         Work::Steps(steps) => steps_of(*steps),
         Work::Network(widths) => {

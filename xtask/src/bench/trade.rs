@@ -48,7 +48,6 @@ struct Numbers {
 struct Frame {
     size: [u64; 2],
     centroid: String,
-    scan: String,
     whole: Numbers,
     /// Of that, what is left to do after the last pixel came.
     latency: Numbers,
@@ -84,7 +83,6 @@ struct Film {
 struct Together {
     size: [u64; 2],
     centroid: String,
-    scan: String,
     model: String,
     counted: Numbers,
     sum: Numbers,
@@ -188,24 +186,22 @@ fn frames(measured: &[Measured], models: &[Model]) -> Result<Vec<Frame>> {
     let mut frames = Vec::new();
     for measured in measured {
         let part = part(measured)?;
-        let (Some(centroid), Some(scan)) = (&part.centroid, &part.scan) else {
+        let Some(centroid) = &part.centroid else {
             continue;
         };
         if part.model == BEHIND {
             let whole = minus(numbers(measured.total())?, behind);
-            // A frame in memory is complete before anything is done.
-            let (latency, answers_last) = match (scan.as_str(), measured.answers_last) {
-                ("windows", _) => (whole, true),
-                (_, true) => (minus(numbers(measured.last_band)?, behind), true),
-                (_, false) => (numbers(measured.last_band)?, false),
+            let last_band = numbers(measured.last_band)?;
+            let latency = match measured.answers_last {
+                true => minus(last_band, behind),
+                false => last_band,
             };
             frames.push(Frame {
                 size: measured.case.size,
                 centroid: centroid.clone(),
-                scan: scan.clone(),
                 whole,
                 latency,
-                answers_last,
+                answers_last: measured.answers_last,
             });
         }
     }
@@ -221,22 +217,20 @@ fn together(
     let mut together = Vec::new();
     for measured in measured {
         let part = part(measured)?;
-        let (Some(centroid), Some(scan)) = (&part.centroid, &part.scan) else {
+        let Some(centroid) = &part.centroid else {
             continue;
         };
         if part.model == BEHIND {
             continue;
         }
-        let is_same = |frame: &&Frame| {
-            (frame.size, &frame.centroid, &frame.scan) == (measured.case.size, centroid, scan)
-        };
+        let is_same =
+            |frame: &&Frame| (frame.size, &frame.centroid) == (measured.case.size, centroid);
         let frame = frames.iter().find(is_same);
         let frame = frame.with_context(|| format!("no frame without {}", part.model))?;
         let (a, b) = (frame.whole, behind(models, film, &part.model)?);
         let whole = Together {
             size: measured.case.size,
             centroid: centroid.clone(),
-            scan: scan.clone(),
             model: part.model.clone(),
             counted: numbers(measured.total())?,
             sum: Numbers {
@@ -259,9 +253,8 @@ impl Together {
             off(sum.cycles, counted.cycles),
         ];
         eprintln!(
-            "{} behind a {} scan of {:?}, {}: the sum of its parts is off by {:+.2} % in instructions and {:+.2} % in cycles",
+            "{} behind a frame of {:?}, {}: the sum of its parts is off by {:+.2} % in instructions and {:+.2} % in cycles",
             self.model,
-            self.scan,
             self.size,
             self.centroid,
             1e2 * offs[0],
@@ -312,7 +305,6 @@ mod tests {
         let mut whole = Together {
             size: [320, 240],
             centroid: String::new(),
-            scan: String::new(),
             model: String::new(),
             counted: numbers(1000, 500),
             sum: numbers(1009, 496),

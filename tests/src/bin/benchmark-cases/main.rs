@@ -1,6 +1,6 @@
 //! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
 //! one JSON object a line: `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
-//! what is special about the frame, `{"Windows":{"tracked":…}}`, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
+//! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
 //! for `tests/board`. `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is made of
 //! (`trade`), and each line says the `"part"`, too. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
 
@@ -80,13 +80,6 @@ enum Work {
         special: &'static str,
         pixels: Vec<u16>,
     },
-    /// One frame in memory, looked at in windows.
-    Windows {
-        /// Windows follow the markers, which lay somewhat elsewhere in the frame before.
-        tracked: bool,
-        before: Vec<u16>,
-        pixels: Vec<u16>,
-    },
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
     /// The network of a model that tells places, and so many steps from its answer.
@@ -110,15 +103,6 @@ impl Case {
         script.threshold(Threshold::red(self.format), ByteOrder::Swapped);
         match &self.work {
             Work::Frame { pixels, .. } => script.sense(self.size[0], &[pixels]),
-            Work::Windows {
-                tracked,
-                before,
-                pixels,
-            } => {
-                let frames = [before.as_slice(), pixels];
-                let frames = if *tracked { &frames[..] } else { &frames[1..] };
-                script.windows(self.size[0], frames, *tracked)
-            }
             Work::Table => {
                 script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped)
             }
@@ -133,7 +117,6 @@ impl Work {
     fn description(&self) -> Value {
         match self {
             Work::Frame { special, .. } => json!({ "Frame": special }),
-            Work::Windows { tracked, .. } => json!({ "Windows": { "tracked": tracked } }),
             Work::Network(widths) => json!({ "Network": widths }),
             Work::Steps(steps, ..) => json!({ "Steps": steps }),
             Work::Table => json!("Table"),
@@ -162,19 +145,6 @@ fn cases() -> Result<Vec<Case>> {
             model: weighted_model?,
             ..case(("weighted", usual.clone()))
         });
-        let before = frame(&scene("static", format, size)?, ATTEMPTS, 1.0);
-        for tracked in [false, true] {
-            cases.push(Case {
-                work: Work::Windows {
-                    tracked,
-                    before: before.clone(),
-                    pixels: usual.clone(),
-                },
-                model: model.clone(),
-                size,
-                format,
-            });
-        }
         // What is special are colours, drawn in RGB565.
         if format == PixelFormat::Rgb565 && STRAINED.contains(&size) {
             cases.extend(strained(size, &usual).map(case));
@@ -247,7 +217,7 @@ impl Board {
         let file = |name: &str| folder.join(format!("{number}.{name}"));
         let (model, pixels) = (file("model"), file("rgb565"));
         match &case.work {
-            Work::Windows { .. } | Work::Steps(..) | Work::Table => return Ok(()),
+            Work::Steps(..) | Work::Table => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
             // The board's program reads RGB565.
             Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),

@@ -17,15 +17,12 @@ use hivtac_tests::models::{self, Weights};
 use hivtac_tests::script::Script;
 use serde_json::{Value, json};
 
-use super::{ATTEMPTS, SIZES, position, stepping, usual_frame, write};
+use super::{SIZES, position, stepping, usual_frame, write};
 
 const ESTIMATORS: [(&str, CentroidEstimator); 2] = [
     ("binary-mask", CentroidEstimator::BinaryMask),
     ("redness-weighted", CentroidEstimator::RednessWeighted),
 ];
-/// Every pixel as the rows arrive; a frame in memory, coarsely and then in windows; the rectangle around the windows that
-/// follow the markers, as its rows arrive.
-const SCANS: [&str; 3] = ["full", "windows", "tracked"];
 /// The format of all of them.
 const FORMAT: PixelFormat = PixelFormat::Rgb565;
 /// The size whose models are measured.
@@ -48,9 +45,7 @@ struct Made {
 struct Frames {
     geometry: Geometry,
     centroid: (&'static str, CentroidEstimator),
-    /// The usual one and one before it.
     usual: Vec<u16>,
-    before: Vec<u16>,
     rest: Rest,
 }
 
@@ -70,13 +65,11 @@ pub fn write_cases(folder: &Path) -> Result<()> {
     for size in SIZES {
         for centroid in ESTIMATORS {
             let frames = Frames::of(size, centroid)?;
-            for scan in SCANS {
-                let together = together(size, centroid.0, scan);
-                let with = |model: &&Made| [Some(BEHIND), together].contains(&Some(&model.name));
-                for model in models.iter().filter(with) {
-                    let file = frames.model(model);
-                    write_one(&frames.script(scan, &file), frames.part(scan, model, &file))?;
-                }
+            let together = together(size, centroid.0);
+            let with = |model: &&Made| [Some(BEHIND), together].contains(&Some(&model.name));
+            for model in models.iter().filter(with) {
+                let file = frames.model(model);
+                write_one(&frames.script(&file), frames.part(&model.name, &file))?;
             }
             if size == SIZE && centroid == ESTIMATORS[1] {
                 for model in &models {
@@ -93,8 +86,8 @@ pub fn write_cases(folder: &Path) -> Result<()> {
                     )?;
                 }
                 let file = models::anywhere(1);
-                let stepping = frames.part_of("full", &format!("{BEFORE_STEPS}, 1 step"), &file);
-                write_one(&frames.script("full", &file), stepping)?;
+                let stepping = frames.part(&format!("{BEFORE_STEPS}, 1 step"), &file);
+                write_one(&frames.script(&file), stepping)?;
             }
         }
     }
@@ -110,11 +103,11 @@ fn preset(size: [u16; 2]) -> (Preset, hivtac_scene::Preset) {
 }
 
 /// The model that is also measured behind such frames.
-fn together(size: [u16; 2], centroid: &str, scan: &str) -> Option<&'static str> {
-    match (size, centroid, scan) {
-        (SIZE, "redness-weighted", "full") => Some("64-64 int8"),
-        (SIZE, "binary-mask", "windows") => Some("64-64 int16"),
-        ([800, 600], "redness-weighted", "tracked") => Some("512-512-512 int8"),
+fn together(size: [u16; 2], centroid: &str) -> Option<&'static str> {
+    match (size, centroid) {
+        (SIZE, "redness-weighted") => Some("64-64 int8"),
+        (SIZE, "binary-mask") => Some("64-64 int16"),
+        ([800, 600], "redness-weighted") => Some("512-512-512 int8"),
         _ => None,
     }
 }
@@ -160,7 +153,6 @@ impl Frames {
             geometry,
             centroid,
             usual: usual_frame(&model, FORMAT, &scene("static")?, size)?,
-            before: scene("static")?.frame(ATTEMPTS, 1.0).pixels,
             rest,
         })
     }
@@ -170,17 +162,12 @@ impl Frames {
         models::trade_file(conditions, &made.widths, made.weights)
     }
 
-    fn script(&self, scan: &str, model: &[u8]) -> Script {
+    fn script(&self, model: &[u8]) -> Script {
         let mut script = Script::new();
         script
             .model(model)
             .threshold(Threshold::red(FORMAT), ByteOrder::Swapped);
-        let (width, usual) = (self.geometry.width, &self.usual[..]);
-        match scan {
-            "full" => script.sense(width, &[usual]),
-            "windows" => script.windows(width, &[usual], false),
-            _ => script.cropped(width, &[&self.before, usual]),
-        };
+        script.sense(self.geometry.width, &[&self.usual]);
         script
     }
 
@@ -193,20 +180,11 @@ impl Frames {
         Ok(script)
     }
 
-    fn part(&self, scan: &str, made: &Made, file: &[u8]) -> Value {
-        self.part_of(scan, &made.name, file)
-    }
-
-    fn part_of(&self, scan: &str, model: &str, file: &[u8]) -> Value {
-        let work = match scan {
-            "full" => json!({ "Frame": "" }),
-            _ => json!({ "Windows": { "tracked": scan == "tracked" } }),
-        };
+    fn part(&self, model: &str, file: &[u8]) -> Value {
         let size = [self.geometry.width, self.geometry.height];
         let centroid = self.centroid.0;
-        let part =
-            json!({ "centroid": centroid, "scan": scan, "model": model, "bytes": file.len() });
-        json!({ "work": work, "size": size, "part": part })
+        let part = json!({ "centroid": centroid, "model": model, "bytes": file.len() });
+        json!({ "work": { "Frame": "" }, "size": size, "part": part })
     }
 }
 
