@@ -47,9 +47,9 @@ impl Pixels for NearTable {
         }
     }
 
-    fn mask_rows(&self, pixels: &[u16], stride: usize, width: u16, mask: &mut [u32]) {
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
         match &self.0 {
-            Some(table) => table.mask_rows(pixels, stride, width, mask),
+            Some(table) => table.mask_rows(rows, width, mask),
             None => mask.fill(0),
         }
     }

@@ -2,7 +2,7 @@
 //! debug probe, one line each: the items of `cargo xtask bench`.
 //!
 //! The core runs at 480 MHz from its internal oscillator, so that any board with this chip will do. Placement is the
-//! firmware's (`memory.x`): the sensing's code in ITCM, what it works on in DTCM. Rows
+//! firmware's (`memory.x`): the sensing's code in ITCM, what it works on in DTCM, the scanner's state in SRAM. Rows
 //! are copied to DTCM before they are timed, as is a model that is measured by itself and fits; other models are read from
 //! flash through the data cache.
 #![no_std]
@@ -11,6 +11,8 @@
 mod data;
 mod measure;
 mod meter;
+#[path = "../../../firmware/src/near_table.rs"]
+mod near_table;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug;
@@ -19,7 +21,7 @@ use embassy_stm32::Config;
 use embassy_stm32::rcc::*;
 use panic_probe as _;
 
-use measure::Workplace;
+use measure::{Scanners, Workplace};
 use meter::Meter;
 use static_cell::ConstStaticCell;
 
@@ -27,6 +29,8 @@ use static_cell::ConstStaticCell;
 core::arch::global_asm!(include_str!("../../../firmware/src/start.s"));
 
 static WORKPLACE: ConstStaticCell<Workplace> = ConstStaticCell::new(Workplace::new());
+#[unsafe(link_section = ".sram.scanners")]
+static SCANNERS: ConstStaticCell<Scanners> = ConstStaticCell::new(Scanners::new());
 
 #[entry]
 fn main() -> ! {
@@ -35,9 +39,9 @@ fn main() -> ! {
     core.SCB.enable_dcache(&mut core.CPUID);
     let _peripherals = embassy_stm32::init(clocks());
     let meter = Meter::start(core.DCB, core.DWT);
-    let place = WORKPLACE.take();
+    let (place, scanners) = (WORKPLACE.take(), SCANNERS.take());
     for frame in data::FRAMES {
-        measure::frame(place, frame, &meter);
+        measure::frame(scanners, place, frame, &meter);
     }
     for network in data::NETWORKS {
         measure::network(place, network, &meter);

@@ -6,14 +6,15 @@ use hivtac_sensing::network::Network as Inference;
 use hivtac_sensing::pipeline;
 use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tables::{BitTable, Table};
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_sensing::tables::Pixels;
+use hivtac_sensing::threshold::ByteOrder;
 
 use crate::data::{Frame, Network};
 use crate::meter::Meter;
+use crate::near_table::NearTable;
 
 /// As in the firmware.
-type Sensor = pipeline::Sensor<'static, 64, BitTable>;
+type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
 /// Widest row, in pixels.
 const ROW: usize = MAX_WIDTH as usize;
@@ -28,61 +29,42 @@ const REPETITIONS: usize = 2;
 #[repr(align(8))]
 struct ModelFile([u8; MODEL]);
 
-/// Everything that is worked on, in DTCM as all statics are.
+/// What is too large for DTCM beside the table: as in the firmware.
+pub struct Scanners {
+    sensor: Sensor,
+    scanner: Scanner<64>,
+}
+
+impl Scanners {
+    /// Ready for the first frame.
+    pub const fn new() -> Scanners {
+        Scanners {
+            sensor: Sensor::new(),
+            scanner: Scanner::new(),
+        }
+    }
+}
+
+/// Everything else that is worked on, in DTCM as all statics are.
 pub struct Workplace {
-    worker: Worker,
     inference: Inference,
     row: [u16; ROW],
     model: ModelFile,
-}
-
-/// DTCM holds one of the two at a time.
-#[allow(clippy::large_enum_variant)]
-enum Worker {
-    Sensor(Sensor),
-    Scanner(Scanner<64>, BitTable),
-}
-
-impl Worker {
-    /// Constants, so that they are copied from flash to their place and never lie on the stack.
-    const SENSOR: Worker = Worker::Sensor(Sensor::new());
-    const SCANNER: Worker = Worker::Scanner(Scanner::new(), BitTable::CLOSED);
 }
 
 impl Workplace {
     /// Ready for the first frame.
     pub const fn new() -> Workplace {
         Workplace {
-            worker: Worker::SENSOR,
             inference: Inference::new(),
             row: [0; ROW],
             model: ModelFile([0; MODEL]),
         }
     }
-
-    fn sensor(&mut self) -> (&mut Sensor, &mut [u16; ROW]) {
-        if !matches!(self.worker, Worker::Sensor(_)) {
-            self.worker = Worker::SENSOR;
-        }
-        match &mut self.worker {
-            Worker::Sensor(sensor) => (sensor, &mut self.row),
-            Worker::Scanner(..) => defmt::unreachable!(),
-        }
-    }
-
-    fn scanner(&mut self) -> (&mut Scanner<64>, &mut BitTable, &mut [u16; ROW]) {
-        if !matches!(self.worker, Worker::Scanner(..)) {
-            self.worker = Worker::SCANNER;
-        }
-        match &mut self.worker {
-            Worker::Scanner(scanner, table) => (scanner, table, &mut self.row),
-            Worker::Sensor(_) => defmt::unreachable!(),
-        }
-    }
 }
 
 /// Times the parts of one frame and prints them.
-pub fn frame(place: &mut Workplace, frame: &Frame, meter: &Meter) {
+pub fn frame(scanners: &mut Scanners, place: &mut Workplace, frame: &Frame, meter: &Meter) {
     let [width, height] = frame.size;
     let print = |item: &str, cycles: u32| {
         let (comma, special) = (
@@ -101,12 +83,12 @@ pub fn frame(place: &mut Workplace, frame: &Frame, meter: &Meter) {
     };
     let (mut whole, mut last_band) = (0, 0);
     for _ in 0..REPETITIONS {
-        (whole, last_band) = sense(place, frame, meter);
+        (whole, last_band) = sense(&mut scanners.sensor, &mut place.row, frame, meter);
     }
     let (mut rows, mut masks) = (0, 0);
     for _ in 0..REPETITIONS {
-        rows = scan(place, frame, meter, Entry::Pixels);
-        masks = scan(place, frame, meter, Entry::Mask);
+        rows = scan(scanners, &mut place.row, frame, meter, Entry::Pixels);
+        masks = scan(scanners, &mut place.row, frame, meter, Entry::Mask);
     }
     print("threshold", rows.saturating_sub(masks));
     print("blobs", masks);
@@ -127,10 +109,9 @@ pub fn network(place: &mut Workplace, network: &Network, meter: &Meter) {
 }
 
 /// Cycles of a frame from its first row to the force, and from its last band on.
-fn sense(place: &mut Workplace, frame: &Frame, meter: &Meter) -> (u32, u32) {
+fn sense(sensor: &mut Sensor, buffer: &mut [u16; ROW], frame: &Frame, meter: &Meter) -> (u32, u32) {
     let model = parse(frame.model);
     let settings = Settings::of_model(&model, ByteOrder::Swapped);
-    let (sensor, buffer) = place.sensor();
     let configured = sensor.configure(settings, Some(model));
     defmt::assert!(configured.is_ok(), "the model does not fit the frame");
     let (_, mut whole) = meter.time(|| sensor.begin_frame());
@@ -155,8 +136,14 @@ enum Entry {
     Mask,
 }
 
-/// Cycles of the scanner alone.
-fn scan(place: &mut Workplace, frame: &Frame, meter: &Meter, entry: Entry) -> u32 {
+/// Cycles of the scanner alone, which reads pixels as the sensor was configured to.
+fn scan(
+    Scanners { sensor, scanner }: &mut Scanners,
+    buffer: &mut [u16; ROW],
+    frame: &Frame,
+    meter: &Meter,
+    entry: Entry,
+) -> u32 {
     let [width, height] = frame.size;
     let settings = ScanSettings {
         width,
@@ -166,28 +153,23 @@ fn scan(place: &mut Workplace, frame: &Frame, meter: &Meter, entry: Entry) -> u3
         weighted: false,
         max_runs: u32::MAX,
     };
-    let (scanner, table, buffer) = place.scanner();
-    let set = table.set(&HsvBox::RED, ByteOrder::Swapped);
-    defmt::assert!(set.is_ok(), "the usual box is a threshold");
+    let pixels = sensor.pixels();
     let begun = scanner.begin(settings);
     defmt::assert!(begun.is_ok(), "the frame can be scanned");
     let mut cycles = 0;
     for y in 0..height {
         let row = copy_row(buffer, frame, usize::from(y));
         cycles += match entry {
-            Entry::Pixels => meter.time(|| scanner.push_row(table, row)).1,
+            Entry::Pixels => meter.time(|| scanner.push_row(pixels, row)).1,
             Entry::Mask => {
                 let mut mask = [0; ROW.div_ceil(32)];
                 let mask = &mut mask[..row.len().div_ceil(32)];
-                for (x, &raw) in row.iter().enumerate() {
-                    mask[x / 32] |= u32::from(table.accepts(raw)) << (x % 32);
-                }
+                pixels.mask_row(row, mask);
                 meter.time(|| scanner.push_mask_row(mask)).1
             }
         };
     }
-    let table: &BitTable = table;
-    cycles + meter.time(|| scanner.finish(table).blobs.len()).1
+    cycles + meter.time(|| scanner.finish(pixels).blobs.len()).1
 }
 
 /// Row `y` in DTCM.

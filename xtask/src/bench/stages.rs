@@ -6,6 +6,9 @@ use std::path::Path;
 use addr2line::Loader;
 use anyhow::{Context, Result, anyhow};
 
+/// The files of each stage, a line each.
+const LISTED: &str = include_str!("../../../sensing/stages.txt");
+
 /// The stages, in the order in which a frame goes through them.
 pub const ORDER: [&str; 10] = [
     "threshold",
@@ -96,19 +99,16 @@ fn stage(files: &[String]) -> Option<&'static str> {
 fn stage_of_file(file: &str) -> Option<&'static str> {
     let (_, module) = file.rsplit_once("sensing/src/")?;
     let module = module.split(['/', '.']).next()?;
-    match module {
-        "threshold" | "tables" | "formats" | "hsv" => Some("threshold"),
-        "dilate" => Some("dilation"),
-        "runs" | "label" | "blob" | "moments" => Some("runs, labels, moments"),
-        "markers" | "geometry" => Some("markers"),
-        "features" => Some("features"),
-        "network" | "model" => Some("network"),
-        "forward" => Some("steps"),
-        "force" | "angle" | "cordic" => Some("angles, force"),
-        // Small things that belong to whoever uses them.
-        "units" | "status" | "kernels" | "mask" | "division" | "root" => None,
-        _ => Some("pipeline"),
-    }
+    ORDER
+        .into_iter()
+        .find(|stage| modules_of(stage).any(|name| name == module))
+}
+
+/// The files and folders of a stage.
+fn modules_of(stage: &str) -> impl Iterator<Item = &'static str> {
+    let lines = LISTED.lines().filter_map(|line| line.rsplit_once(':'));
+    let of_it = lines.filter(move |(name, _)| *name == stage);
+    of_it.flat_map(|(_, modules)| modules.split_whitespace())
 }
 
 /// Functions in assembly are called `hivtac_` and what they do.
@@ -156,6 +156,21 @@ mod tests {
             stage_of(&["/p/sensing/src/markers/shape.rs"]),
             Some("markers")
         );
+    }
+
+    #[test]
+    fn every_file_of_the_sensing_is_listed_once() {
+        let stages = ORDER.into_iter().chain(["caller"]);
+        let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
+        listed.sort();
+        let entries = std::fs::read_dir(crate::workspace::folder("sensing/src")).unwrap();
+        let name = |entry: std::io::Result<std::fs::DirEntry>| {
+            let path = entry.unwrap().path();
+            path.file_stem().unwrap().to_str().unwrap().to_owned()
+        };
+        let mut files: Vec<String> = entries.map(name).collect();
+        files.sort();
+        assert_eq!(listed, files);
     }
 
     #[test]
