@@ -156,6 +156,16 @@ fn fill(mut regions: Vec<Region>, sections: &[Section]) -> Result<Vec<Region>> {
     Ok(regions)
 }
 
+/// Memories, as a table in Markdown.
+pub fn table(regions: &[Region]) -> String {
+    let row = |region: &Region| {
+        let (used, length) = (grouped(region.used), grouped(region.length));
+        format!("| {} | {used} | {length} |\n", region.name)
+    };
+    let rows: String = regions.iter().map(row).collect();
+    format!("| memory | bytes used | of |\n|---|---:|---:|\n{rows}")
+}
+
 fn print(regions: &[Region], sections: &[Section]) {
     println!(
         "{:<16}{:>12}{:>12}  from flash",

@@ -1,4 +1,4 @@
-//! The tables of `docs/performance.md`, written by the commands that measure them.
+//! The tables of `docs/results/performance.md`, written by the commands that measure them.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ use crate::workspace;
 /// # Errors
 /// When the document cannot be read or written, or has no such lines.
 pub fn write(name: &str, text: &str) -> Result<()> {
-    let file = workspace::folder("docs/performance.md");
+    let file = workspace::folder("docs/results/performance.md");
     let before =
         fs::read_to_string(&file).with_context(|| format!("reading {}", file.display()))?;
     let after = replaced(&before, name, text)

@@ -22,7 +22,7 @@ use anyhow::Result;
 use clap::Args;
 
 use crate::toolchain::Toolchain;
-use crate::{artifacts, packages, workspace};
+use crate::{artifacts, packages, size, workspace};
 use baseline::Baseline;
 use items::{Item, Report};
 
@@ -35,7 +35,7 @@ pub struct Bench {
     /// Make what is measured now the baseline that later counts are held to.
     #[arg(long)]
     write_baseline: bool,
-    /// Put the tables into docs/performance.md.
+    /// Put the tables into docs/results/performance.md.
     #[arg(long)]
     write_docs: bool,
     /// Compare with OpenCV on this computer instead.
@@ -99,6 +99,7 @@ impl Bench {
         }
         if self.write_docs {
             document::write("bench", &tables::all(&items, &measured))?;
+            document::write("memory", &size::table(&size::of_firmware(toolchain)?.0))?;
         }
         self.gate(toolchain, &items)
     }

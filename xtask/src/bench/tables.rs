@@ -1,4 +1,4 @@
-//! What was measured, as tables in Markdown: for people, and for `docs/performance.md`.
+//! What was measured, as tables in Markdown: for people, and for `docs/results/performance.md`.
 
 use std::fmt::Write;
 
