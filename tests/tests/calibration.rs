@@ -82,12 +82,6 @@ fn press(here: &Path, number: usize, [force_n, alpha, beta]: [f64; 3]) {
         truth.to_str().unwrap(),
         "--ahead-s",
         &ahead,
-        "--noise-n",
-        "0.0005",
-        "--zero-n",
-        "0.012",
-        "--damaged-every",
-        "61",
         "--out",
         &gauge,
     ];

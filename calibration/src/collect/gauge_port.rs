@@ -24,11 +24,10 @@ pub struct GaugeArgs {
     /// For a gauge that only answers: what it is asked with, again and again (`\r` and `\n` as in C).
     #[arg(long, value_name = "TEXT", requires = "gauge_port")]
     pub gauge_ask: Option<String>,
-    /// How often it is asked, ms.
-    #[arg(long, default_value_t = 20, requires = "gauge_ask", value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    pub gauge_ask_every_ms: u64,
 }
 
+/// How often a gauge is asked that only answers.
+const ASK_EVERY: Duration = Duration::from_millis(20);
 /// Longest wait of one read.
 const PATIENCE: Duration = Duration::from_millis(5);
 /// A line that is longer is noise.
@@ -65,7 +64,6 @@ impl GaugePort {
             port,
             name: name.clone(),
             ask: args.gauge_ask.as_deref().map(unescaped),
-            every: Duration::from_millis(args.gauge_ask_every_ms),
             file,
             run,
             begun,
@@ -109,7 +107,6 @@ struct Listener {
     port: Box<dyn serialport::SerialPort>,
     name: String,
     ask: Option<Vec<u8>>,
-    every: Duration,
     file: File,
     run: usize,
     begun: Instant,
@@ -124,7 +121,7 @@ impl Listener {
         let mut ask_at = Instant::now();
         while !self.end.load(Ordering::Relaxed) {
             if let Some(ask) = self.ask.as_ref().filter(|_| Instant::now() >= ask_at) {
-                ask_at = Instant::now() + self.every;
+                ask_at = Instant::now() + ASK_EVERY;
                 self.port.write_all(ask).with_context(|| self.lost())?;
             }
             match self.port.read(&mut buffer) {

@@ -29,23 +29,38 @@ pub struct SimulatedGauge {
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     pub ahead_s: f64,
     /// How much faster its clock runs, parts in a million.
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(skip = SimulatedGauge::default().drift_ppm)]
     pub drift_ppm: f64,
     /// Readings in a second.
-    #[arg(long, default_value_t = 100.0)]
+    #[arg(skip = SimulatedGauge::default().rate_hz)]
     pub rate_hz: f64,
     /// Standard deviation of its readings, N.
-    #[arg(long, default_value_t = 0.0005)]
+    #[arg(skip = SimulatedGauge::default().noise_n)]
     pub noise_n: f64,
     /// What it shows without a force, N.
-    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    #[arg(skip = SimulatedGauge::default().zero_n)]
     pub zero_n: f64,
     /// One line in so many is damaged; 0: none.
-    #[arg(long, default_value_t = 0)]
+    #[arg(skip = SimulatedGauge::default().damaged_every)]
     pub damaged_every: usize,
     /// Decides the noise.
-    #[arg(long, default_value_t = 1)]
+    #[arg(skip = SimulatedGauge::default().seed)]
     pub seed: u64,
+}
+
+impl Default for SimulatedGauge {
+    /// A usual one: 0.5 mN of noise, a zero that is off, and some damaged lines.
+    fn default() -> Self {
+        Self {
+            ahead_s: 0.0,
+            drift_ppm: 0.0,
+            rate_hz: 100.0,
+            noise_n: 0.000_5,
+            zero_n: 0.012,
+            damaged_every: 61,
+            seed: 1,
+        }
+    }
 }
 
 #[derive(Deserialize)]
