@@ -1,4 +1,4 @@
-"""Trains a network on a data set in PyTorch and saves it for `hivtac-calibrate import`.
+"""Trains a network on a data set in PyTorch and saves it for `hivtac-calibrate train --start`.
 
     python calibration/python/train_pytorch.py data.csv net.safetensors [--hidden 64,64] [--epochs 100]
 

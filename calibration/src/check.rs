@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Result, anyhow, bail, ensure};
 use hivtac_scene::Contact;
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::{ContactReading, Model};
@@ -12,10 +12,10 @@ use hivtac_sensing::settings::Settings;
 use hivtac_sensing::threshold::ByteOrder;
 use rayon::prelude::*;
 
-use crate::conditions::ContactName;
-use crate::dataset::{Loads, Recipe, Spread, measure, reasons};
+use crate::conditions::meaning;
+use crate::dataset::{Loads, Recipe, measure, reasons};
 use crate::errors::{Errors, WEAK_N};
-use crate::weights::Range;
+use crate::range::Range;
 
 /// What a check found.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct Report {
     /// The model: its widths and preset, and what its numbers mean.
     pub model: String,
     /// What the frames' labels mean.
-    pub contact: ContactName,
+    pub contact: Contact,
     /// Errors of all frames that gave a force, those that carry a warning included.
     pub errors: Errors,
     /// Frames that gave no force, by status.
@@ -31,7 +31,6 @@ pub struct Report {
 }
 
 /// Renders `samples` frames of random loads inside the model's calibrated range and lets the pipeline measure them.
-/// `friction` is the friction ratio of the loads when the model's contact reading is `slip`.
 ///
 /// # Errors
 /// When the bytes are no model, or the model is for conditions that cannot be rendered.
@@ -39,7 +38,6 @@ pub fn check(
     model: &[u8],
     samples: usize,
     seed: u64,
-    friction: f64,
     progress: impl Fn() + Sync,
 ) -> Result<Report> {
     let model = Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
@@ -48,7 +46,7 @@ pub fn check(
         "the model was made from a unit's own data, and `check` renders frames of the simulated sensor: use `evaluate` with data of \
          that unit"
     );
-    let recipe = recipe(&model, samples, seed, friction);
+    let recipe = recipe(&model, samples, seed)?;
     let scene = recipe.scene(0)?;
     let eyes = || sensor(&model);
     let measured = (0..samples).into_par_iter().map_init(eyes, |sensor, row| {
@@ -61,7 +59,7 @@ pub fn check(
     });
     let mut report = Report {
         model: describe(&model),
-        contact: ContactName(recipe.contact),
+        contact: recipe.contact,
         errors: Errors::default(),
         rejected: BTreeMap::new(),
     };
@@ -83,7 +81,10 @@ pub fn check(
 }
 
 /// Random loads inside what the model says it can do.
-fn recipe(model: &Model<'_>, samples: usize, seed: u64, friction: f64) -> Recipe {
+///
+/// # Errors
+/// When the model does not hold all that its frames depend on.
+fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
     let geometry = model.conditions.geometry;
     let range = Range {
         force_n: f64::from(model.range.magnitude.0) / 1e6,
@@ -92,24 +93,26 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64, friction: f64) -> Recipe
         place_mm: f64::from(model.range.place.0) / 1e3,
     };
     let (width, height) = (geometry.width, geometry.height);
-    Recipe {
+    Ok(Recipe {
         preset: model.conditions.preset,
         width,
         height,
-        format: model.conditions.threshold.format().into(),
+        format: model.conditions.threshold.format(),
         centroid: model.conditions.centroid.into(),
         contact: match model.conditions.contact {
             ContactReading::Force => Contact::Force,
             ContactReading::Stick => Contact::Stick,
-            ContactReading::Slip => Contact::Slip { mu: friction },
+            ContactReading::Slip => bail!(
+                "the model's contact reading is `slip`, and its file does not hold the friction \
+                 ratio: use `evaluate` with data of that ratio"
+            ),
         },
         loads: Loads::Random(samples),
         rest: 0,
         range,
         sessions: 1,
-        spread: Spread::default(),
         seed,
-    }
+    })
 }
 
 fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
@@ -154,7 +157,7 @@ impl fmt::Display for Report {
         writeln!(
             f,
             "labels                contact reading `{contact}`: {}",
-            contact.meaning()
+            meaning(*contact)
         )?;
         writeln!(f, "forces                {}", errors.count())?;
         writeln!(

@@ -1,10 +1,7 @@
 //! Under which conditions data was taken and a model holds, in words that files can carry.
 
-use std::fmt;
-
 use anyhow::{Context, Result, ensure};
-use clap::ValueEnum;
-use hivtac_scene::{Camera, Contact, SceneError};
+use hivtac_scene::{Camera, Contact};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin};
 use hivtac_sensing::threshold::{PixelFormat, Threshold};
@@ -21,7 +18,8 @@ pub struct Conditions {
     /// Rows of a frame.
     pub height: u16,
     /// What a pixel is.
-    pub pixel_format: PixelName,
+    #[serde(with = "names::pixel_format")]
+    pub pixel_format: PixelFormat,
     /// Threshold, as the model file has it: lowest and highest hue, saturation and value (OpenCV's 8-bit HSV; hue may wrap
     /// through 0); the lowest Cr of YUV422 and zeros; the lowest and highest luma of mono and zeros.
     pub threshold: [u8; 6],
@@ -29,26 +27,15 @@ pub struct Conditions {
     pub dilations: u8,
     /// How a marker's position is taken from its pixels.
     pub centroid: CentroidName,
-    /// What the labels mean.
-    pub contact: ContactName,
+    /// What the labels mean; model files leave the friction ratio of `slip` out.
+    #[serde(with = "names::contact")]
+    pub contact: Contact,
     /// Where the data came from.
     pub origin: OriginName,
 }
 
-/// Pixel formats by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum PixelName {
-    /// 16-bit colour.
-    Rgb565,
-    /// Luma of each pixel and colour of each pair.
-    Yuv422,
-    /// Luma alone, in green light.
-    Mono,
-}
-
 /// Centroid estimators by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CentroidName {
     /// The mean of a marker's pixels in the mask.
@@ -56,11 +43,6 @@ pub enum CentroidName {
     /// The mean of the same pixels, weighted with their redness.
     RednessWeighted,
 }
-
-/// A contact reading by name: `force`, `stick`, or `slip:0.6` with its friction ratio, which model files leave out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct ContactName(pub Contact);
 
 /// Origins by name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -99,27 +81,6 @@ impl OriginName {
     }
 }
 
-impl PixelName {
-    /// The same as the model file holds it.
-    pub fn to_model(self) -> PixelFormat {
-        match self {
-            PixelName::Rgb565 => PixelFormat::Rgb565,
-            PixelName::Yuv422 => PixelFormat::Yuv422,
-            PixelName::Mono => PixelFormat::Mono,
-        }
-    }
-}
-
-impl From<PixelFormat> for PixelName {
-    fn from(format: PixelFormat) -> Self {
-        match format {
-            PixelFormat::Rgb565 => PixelName::Rgb565,
-            PixelFormat::Yuv422 => PixelName::Yuv422,
-            PixelFormat::Mono => PixelName::Mono,
-        }
-    }
-}
-
 impl CentroidName {
     /// The same as the model file holds it.
     pub fn to_model(self) -> CentroidEstimator {
@@ -130,48 +91,17 @@ impl CentroidName {
     }
 }
 
-impl ContactName {
-    /// The same as the model file holds it.
-    pub fn to_model(self) -> ContactReading {
-        match self.0 {
-            Contact::Force => ContactReading::Force,
-            Contact::Stick => ContactReading::Stick,
-            Contact::Slip { .. } => ContactReading::Slip,
+/// What α, β and |F| mean in a contact reading, for reports.
+pub fn meaning(contact: Contact) -> &'static str {
+    match contact {
+        Contact::Force => "α, β and |F| are the force on the film",
+        Contact::Stick => {
+            "α and β are the pressing direction of a tip that sticks to the film, |F| is the force along it"
         }
-    }
-
-    /// What α, β and |F| mean, for reports.
-    pub fn meaning(self) -> &'static str {
-        match self.0 {
-            Contact::Force => "α, β and |F| are the force on the film",
-            Contact::Stick => {
-                "α and β are the pressing direction of a tip that sticks to the film, |F| is the force along it"
-            }
-            Contact::Slip { .. } => {
-                "α and β are the pressing direction of a tip that sticks to the film until it slips, |F| is the force \
-                 along it"
-            }
+        Contact::Slip { .. } => {
+            "α and β are the pressing direction of a tip that sticks to the film until it slips, |F| is the force \
+             along it"
         }
-    }
-}
-
-impl fmt::Display for ContactName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl TryFrom<String> for ContactName {
-    type Error = SceneError;
-
-    fn try_from(text: String) -> Result<Self, SceneError> {
-        text.parse().map(Self)
-    }
-}
-
-impl From<ContactName> for String {
-    fn from(name: ContactName) -> String {
-        name.to_string()
     }
 }
 
@@ -186,16 +116,16 @@ impl From<CentroidEstimator> for CentroidName {
 
 impl Conditions {
     /// What the scene renders and the pipeline does by default, at a frame size and in a pixel format.
-    pub fn simulated(preset: Preset, width: u16, height: u16, pixel_format: PixelName) -> Self {
+    pub fn simulated(preset: Preset, width: u16, height: u16, pixel_format: PixelFormat) -> Self {
         Self {
             preset: preset.name().into(),
             width,
             height,
             pixel_format,
-            threshold: Threshold::red(pixel_format.to_model()).limits(),
+            threshold: Threshold::red(pixel_format).limits(),
             dilations: 1,
             centroid: CentroidName::BinaryMask,
-            contact: ContactName::default(),
+            contact: Contact::default(),
             origin: OriginName::Simulated,
         }
     }
@@ -218,10 +148,14 @@ impl Conditions {
         Ok(model::Conditions {
             preset,
             geometry: Geometry::preset(preset, self.width, self.height),
-            threshold: Threshold::of_limits(self.pixel_format.to_model(), self.threshold)?,
+            threshold: Threshold::of_limits(self.pixel_format, self.threshold)?,
             dilations: self.dilations,
             centroid: self.centroid.to_model(),
-            contact: self.contact.to_model(),
+            contact: match self.contact {
+                Contact::Force => ContactReading::Force,
+                Contact::Stick => ContactReading::Stick,
+                Contact::Slip { .. } => ContactReading::Slip,
+            },
             origin: self.origin.to_model()?,
         })
     }
@@ -235,13 +169,55 @@ pub fn preset(name: &str) -> Result<Preset> {
     Preset::from_name(name).with_context(|| format!("unknown preset `{name}`: use paper or ov7725"))
 }
 
+/// The pixel format of that name.
+///
+/// # Errors
+/// When there is none.
+pub fn pixel_format(name: &str) -> Result<PixelFormat> {
+    let mut all = PixelFormat::ALL.into_iter();
+    let found = all.find(|format| format.name() == name);
+    found.with_context(|| format!("unknown pixel format `{name}`: use rgb565, yuv422 or mono"))
+}
+
+/// What files hold by its name.
+mod names {
+    pub mod pixel_format {
+        use hivtac_sensing::threshold::PixelFormat;
+        use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+        pub fn serialize<S: Serializer>(format: &PixelFormat, to: S) -> Result<S::Ok, S::Error> {
+            to.serialize_str(format.name())
+        }
+
+        pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<PixelFormat, D::Error> {
+            let name = String::deserialize(from)?;
+            super::super::pixel_format(&name).map_err(D::Error::custom)
+        }
+    }
+
+    pub mod contact {
+        use hivtac_scene::Contact;
+        use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+        /// `force`, `stick`, or `slip:0.6` with its friction ratio.
+        pub fn serialize<S: Serializer>(contact: &Contact, to: S) -> Result<S::Ok, S::Error> {
+            to.collect_str(contact)
+        }
+
+        pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Contact, D::Error> {
+            let name = String::deserialize(from)?;
+            name.parse().map_err(D::Error::custom)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_default_is_what_the_firmware_uses() {
-        let model = Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565)
+        let model = Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565)
             .to_model()
             .unwrap();
         assert_eq!(model.threshold, Threshold::red(PixelFormat::Rgb565));
@@ -257,8 +233,9 @@ mod tests {
             ("stick", ContactReading::Stick),
             ("slip:0.6", ContactReading::Slip),
         ] {
-            let mut conditions = Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565);
-            conditions.contact = ContactName(name.parse().unwrap());
+            let mut conditions =
+                Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565);
+            conditions.contact = name.parse().unwrap();
             assert_eq!(conditions.to_model().unwrap().contact, reading);
             let text = serde_json::to_string(&conditions).unwrap();
             assert!(text.contains(&format!("\"contact\":\"{name}\"")), "{text}");
@@ -293,7 +270,7 @@ mod tests {
 
     #[test]
     fn an_unknown_preset_is_named() {
-        let mut conditions = Conditions::simulated(Preset::Paper, 800, 600, PixelName::Rgb565);
+        let mut conditions = Conditions::simulated(Preset::Paper, 800, 600, PixelFormat::Rgb565);
         conditions.preset = "Paper".into();
         assert!(
             conditions

@@ -18,7 +18,7 @@
 //! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
 //! | `peers` | beside the paper's own pipeline, on the same frames |
 //! | `tradeoff` | speed against accuracy: a sweep, its Pareto front, the best under limits |
-//! | `plot`, `loss_plot`, `document` | SVG; tables in documents |
+//! | `plot`, `document` | SVG; tables in documents |
 //! | `progress` | bars on the terminal |
 //! | `scene` | pictures and figures of the simulated sensor |
 
@@ -34,12 +34,13 @@ pub mod fit;
 pub mod forward;
 pub mod import;
 pub mod loads;
-pub mod loss_plot;
 pub mod network;
 pub mod peers;
 pub mod plot;
 pub mod progress;
 pub mod quantize;
+pub mod range;
+pub mod rest;
 pub mod scene;
 pub mod tradeoff;
 pub mod train;

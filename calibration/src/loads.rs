@@ -8,7 +8,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::weights::Range;
+use crate::range::Range;
 
 /// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to their
 /// limits.

@@ -3,6 +3,7 @@
 mod reach;
 
 use anyhow::{Result, ensure};
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
 /// Features that enter the network (`sensing::features`).
@@ -79,14 +80,12 @@ impl Meaning {
 }
 
 /// How the chip holds weights.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Arithmetic {
     /// int8 weights with a scale for each output of a layer, but int16 in the first and the last.
     #[default]
     Int8PerChannel,
-    /// The same with one scale for a layer.
-    Int8PerTensor,
     /// int16 weights with a scale for each output of a layer, and activations of twelve bits.
     Int16,
 }

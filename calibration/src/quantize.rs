@@ -13,7 +13,7 @@ use hivtac_sensing::model::{
 use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::forward::FilmModel;
-use crate::network::{Arithmetic, Layer, Meaning, Network, Standardization};
+use crate::network::{Layer, Meaning, Network, Standardization};
 use crate::weights::{Range, Rest, Uncertainty, Weights, features_from_q16};
 
 /// Steps of the network's input in one standard deviation of a feature.
@@ -133,7 +133,6 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
         largest_input: LARGEST_INPUT,
         // Its inputs have 16 bits, whatever the others have.
         width: WeightWidth::Int16,
-        one_scale: network.arithmetic == Arithmetic::Int8PerTensor,
     };
     // What takes up a hidden layer, and its largest activation. The output layer has few rows only: int16 costs nothing there, and
     // spares the last activations and the answer itself the coarse steps.
@@ -155,7 +154,6 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
                 step: next,
                 largest_input: largest,
                 width,
-                ..form
             };
             if let Ok(quantized) = &mut quantized {
                 quantized.spec.largest_activation = largest;
@@ -183,8 +181,6 @@ struct Form {
     /// Its input's largest magnitude, in steps.
     largest_input: u16,
     width: WeightWidth,
-    /// Whether all rows have the same scale.
-    one_scale: bool,
 }
 
 /// What becomes of y = W·x + b: (y + offset)·factor.
@@ -209,26 +205,16 @@ fn quantize_layer(
         shifts: Vec::new(),
     };
     let step = form.step;
-    let biases = || {
-        layer
-            .bias
-            .iter()
-            .enumerate()
-            .map(|(o, &b)| f64::from(b) + output(o).offset)
-    };
-    let rows = layer.weights.iter().zip(biases());
-    let mut scales: Vec<f64> = rows
-        .map(|(row, bias)| weight_scale(row, bias, form))
-        .collect();
-    if form.one_scale {
-        let largest = scales.iter().copied().fold(0.0, f64::max);
-        scales.fill(largest);
-    }
-    for (o, (row, bias)) in layer.weights.iter().zip(biases()).enumerate() {
-        // A row of zeros without bias is zero at any scale.
-        let scale = if scales[o] > 0.0 { scales[o] } else { 1.0 };
-        scales[o] = scale;
-        let limit = f64::from(form.width.largest_weight());
+    let limit = f64::from(form.width.largest_weight());
+    let mut scales = Vec::with_capacity(layer.outputs());
+    for (o, (row, &bias)) in layer.weights.iter().zip(&layer.bias).enumerate() {
+        let bias = f64::from(bias) + output(o).offset;
+        let scale = match weight_scale(row, bias, form) {
+            scale if scale > 0.0 => scale,
+            // A row of zeros without bias is zero at any scale.
+            _ => 1.0,
+        };
+        scales.push(scale);
         spec.weights
             .extend(row.iter().map(|&w| round_weight(w, scale, limit)));
         spec.biases.push((bias / (scale * step)).round() as i32);
@@ -296,12 +282,11 @@ mod tests {
         assert_eq!(multiplier_and_shift(1e-30, 24).unwrap(), (1, 62));
     }
 
-    fn form(width: WeightWidth, one_scale: bool) -> Form {
+    fn form(width: WeightWidth) -> Form {
         Form {
             step: 1.0 / 4096.0,
             largest_input: 127,
             width,
-            one_scale,
         }
     }
 
@@ -316,20 +301,12 @@ mod tests {
             weights: vec![vec![0.5, -1.0, 0.25], vec![0.125, 0.0, 0.25]],
             bias: vec![0.5, 0.0],
         };
-        let spec = quantize_layer(&layer, &form(WeightWidth::Int8, false), |_| ONE)
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int8), |_| ONE)
             .unwrap()
             .spec;
         assert_eq!(spec.weights, [64, -127, 32, 64, 0, 127]);
         assert_eq!(spec.biases, [260_096, 0]);
-        let spec = quantize_layer(&layer, &form(WeightWidth::Int8, true), |_| ONE)
-            .unwrap()
-            .spec;
-        assert_eq!(
-            spec.weights,
-            [64, -127, 32, 16, 0, 32],
-            "one scale for all rows"
-        );
-        let spec = quantize_layer(&layer, &form(WeightWidth::Int16, false), |_| ONE)
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int16), |_| ONE)
             .unwrap()
             .spec;
         assert_eq!(spec.weights, [16_384, -32_767, 8192, 16_384, 0, 32_767]);
@@ -343,7 +320,7 @@ mod tests {
         };
         let form = Form {
             largest_input: 4095,
-            ..form(WeightWidth::Int16, false)
+            ..form(WeightWidth::Int16)
         };
         let spec = quantize_layer(&layer, &form, |_| ONE).unwrap().spec;
         let products: i64 = spec.weights.iter().map(|&w| i64::from(w) * 4095).sum();
@@ -364,7 +341,7 @@ mod tests {
             factor: 1000.0,
             offset: 0.0,
         };
-        let spec = quantize_layer(&layer, &form(WeightWidth::Int8, false), output)
+        let spec = quantize_layer(&layer, &form(WeightWidth::Int8), output)
             .unwrap()
             .spec;
         assert_eq!(spec.biases[0], 0);

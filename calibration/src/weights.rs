@@ -3,14 +3,13 @@
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result, ensure};
-use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::units::Px;
 use serde::{Deserialize, Serialize};
 
 use crate::conditions::Conditions;
-use crate::dataset::Split;
 use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
+pub use crate::range::Range;
+pub use crate::rest::{Rest, features_from_q16};
 pub use crate::uncertainty::Uncertainty;
 
 /// What the file calls itself.
@@ -39,61 +38,6 @@ pub struct Weights {
     pub network: Network,
 }
 
-/// The rest position.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Rest {
-    /// The eleven features in 1/65,536 px (the rectangle's area in 1/65,536 px²).
-    pub features_q16: [i64; FEATURES],
-    /// Areas of markers 0–3 in the mask, px.
-    pub areas_px: [u32; 4],
-}
-
-impl Rest {
-    /// The features in px (px²).
-    pub fn features_px(&self) -> [f64; FEATURES] {
-        self.features_q16.map(|q16| q16 as f64 / 65_536.0)
-    }
-}
-
-/// The calibrated range: 0 to `force_n`, angles to ± their limit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Range {
-    /// Largest |F|, N.
-    pub force_n: f64,
-    /// Largest |α|, degrees.
-    pub alpha_deg: f64,
-    /// Largest |β|, degrees.
-    pub beta_deg: f64,
-    /// How far from the film's middle the tip is at most, along x and along y, mm; 0 where it is in
-    /// the middle, as far as anyone knows.
-    #[serde(default, skip_serializing_if = "is_middle")]
-    pub place_mm: f64,
-}
-
-/// Whether a tip so far from the middle is in it.
-fn is_middle(place_mm: &f64) -> bool {
-    *place_mm == 0.0
-}
-
-impl Range {
-    /// Whether the tip's place is known and may be anywhere.
-    pub fn knows_places(&self) -> bool {
-        !is_middle(&self.place_mm)
-    }
-}
-
-impl Default for Range {
-    /// The paper's range (Section 6).
-    fn default() -> Self {
-        Self {
-            force_n: 0.2,
-            alpha_deg: 10.0,
-            beta_deg: 8.0,
-            place_mm: 0.0,
-        }
-    }
-}
-
 /// How a network was trained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Training {
@@ -109,9 +53,9 @@ pub struct Training {
     pub epochs: usize,
     /// Passes with the chip's rounding.
     pub rounded_epochs: usize,
-    /// What was held out together.
+    /// What was held out together; `within-pose` for single rows.
     #[serde(default)]
-    pub split: Split,
+    pub split: String,
 }
 
 impl Weights {
@@ -218,23 +162,4 @@ impl Weights {
         let text = serde_json::to_string(self)? + "\n";
         fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
     }
-}
-
-/// The eleven numbers in the paper's order, each with 16 fractional bits, as features.
-///
-/// # Errors
-/// When a coordinate does not fit 32 bits.
-pub fn features_from_q16(q16: &[i64; FEATURES]) -> Result<Features> {
-    let px = |i: usize| -> Result<Px> {
-        let value = i32::try_from(q16[i]);
-        Ok(Px(value.with_context(|| {
-            format!("feature {i} is {} and does not fit 32 bits", q16[i])
-        })?))
-    };
-    let pair = |i: usize| -> Result<(Px, Px)> { Ok((px(2 * i)?, px(2 * i + 1)?)) };
-    Ok(Features {
-        centroids: [pair(0)?, pair(1)?, pair(2)?, pair(3)?],
-        rect_center: pair(4)?,
-        rect_area: q16[10],
-    })
 }

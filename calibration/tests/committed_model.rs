@@ -42,7 +42,7 @@ fn it_measures_force_and_place_wherever_the_tip_presses() {
         ..Recipe::default()
     };
     let dataset = generate(&recipe, || ()).unwrap();
-    let evaluation = Evaluation::of(&committed(), &dataset, None).unwrap();
+    let evaluation = Evaluation::of(&committed(), &dataset).unwrap();
     let parts = by_place(&evaluation.judged);
     assert!(parts.len() >= 8, "{parts:?}");
     for part in &parts {
@@ -68,7 +68,7 @@ fn the_weakest_presses_are_measured() {
         ..Recipe::default()
     };
     let dataset = generate(&weak, || ()).unwrap();
-    let evaluation = Evaluation::of(&committed(), &dataset, None).unwrap();
+    let evaluation = Evaluation::of(&committed(), &dataset).unwrap();
     assert!(evaluation.judged.len() >= 995, "{evaluation}");
     let off = |judged: &Judged| (judged.found_polar[2] - judged.truth_polar[2]).abs();
     let worst = evaluation.judged.iter().map(off).fold(0.0, f64::max);
@@ -96,7 +96,7 @@ fn the_model_for_yuv422_is_made_for_the_same_unit_and_measures_its_frames() {
     let mut expected = Model::parse(&usual).unwrap().conditions;
     expected.threshold = Threshold::red(PixelFormat::Yuv422);
     assert_eq!(conditions, expected);
-    let report = check(&bytes, 400, 77, 0.6, || ()).unwrap();
+    let report = check(&bytes, 400, 77, || ()).unwrap();
     let errors = &report.errors;
     assert!(errors.count() >= 380, "{report}");
     // It sees half as many columns in colour.
@@ -124,7 +124,7 @@ fn it_is_made_for_the_firmware() {
 
 #[test]
 fn it_measures_frames_that_no_training_saw() {
-    let report = check(&committed(), 1000, 77, 0.6, || ()).unwrap();
+    let report = check(&committed(), 1000, 77, || ()).unwrap();
     let errors = &report.errors;
     // Where a strong press is far off the middle, a marker leaves the picture.
     let hidden = report.rejected.get("markers_missing").copied();
@@ -150,7 +150,7 @@ fn presses(each: usize, sessions: usize) -> Evaluation {
         ..Recipe::default()
     };
     let dataset = generate(&recipe, || ()).unwrap();
-    Evaluation::of(&committed(), &dataset, None).unwrap()
+    Evaluation::of(&committed(), &dataset).unwrap()
 }
 
 /// A camera that is mounted otherwise cannot be told from dots that are glued otherwise: what is stated allows for both.
@@ -184,7 +184,7 @@ fn its_uncertainties_are_honest() {
 fn damaged_models_are_not_checked() {
     let mut bytes = committed();
     bytes[300] ^= 1;
-    let error = check(&bytes, 10, 1, 0.6, || ()).unwrap_err().to_string();
+    let error = check(&bytes, 10, 1, || ()).unwrap_err().to_string();
     assert!(error.contains("not a usable model file"), "{error}");
 }
 

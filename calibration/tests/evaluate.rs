@@ -3,17 +3,27 @@
 use std::sync::LazyLock;
 
 use hivtac_calibration::conditions::CentroidName;
-use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::evaluate::Evaluation;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
+use hivtac_calibration::weights::Range;
+
+/// A tip in the film's middle.
+const MIDDLE: Range = Range {
+    force_n: 0.22,
+    alpha_deg: 11.0,
+    beta_deg: 8.8,
+    place_mm: 0.0,
+};
 
 fn data(loads: Loads, seed: u64) -> Dataset {
     let recipe = Recipe {
         loads,
         rest: 8,
+        range: MIDDLE,
         seed,
         ..Recipe::default()
     };
@@ -28,10 +38,11 @@ fn model() -> &'static [u8] {
             rounded_epochs: 60,
             batch: 64,
             arithmetic: Arithmetic::Int16,
+            direction_weight: None,
             ..Options::default()
         };
         let data = data(Loads::Random(1500), 1);
-        let fitted = fit(&data, Split::WithinPose, &options, |_| ()).unwrap();
+        let fitted = fit(&data, &options, |_| ()).unwrap();
         export(&fitted.weights).unwrap()
     });
     &MODEL
@@ -40,7 +51,7 @@ fn model() -> &'static [u8] {
 #[test]
 fn the_report_says_what_it_is_and_needs_nothing_else() {
     let poses = data(Loads::PaperPoses(2), 2);
-    let evaluation = Evaluation::of(model(), &poses, None).unwrap();
+    let evaluation = Evaluation::of(model(), &poses).unwrap();
     let [(_, all), (_, weak), (_, strong)] = evaluation.groups();
     let (all, weak, strong) = (all.unwrap(), weak.unwrap(), strong.unwrap());
     assert_eq!((all.frames, weak.frames + strong.frames), (714, 714));
@@ -66,10 +77,7 @@ fn the_report_says_what_it_is_and_needs_nothing_else() {
             .all(|words| !outside.contains(words))
     );
 
-    let held_out = Evaluation::of(model(), &poses, Some((Split::Poses, 1))).unwrap();
-    assert_eq!(held_out.judged.len(), 70);
-    assert!(held_out.to_html().contains("whole poses held out (seed 1)"));
-    let random = Evaluation::of(model(), &data(Loads::Random(60), 3), None).unwrap();
+    let random = Evaluation::of(model(), &data(Loads::Random(60), 3)).unwrap();
     assert_eq!(random.to_html().matches("<svg").count(), 7);
 }
 
@@ -78,22 +86,17 @@ fn what_does_not_fit_is_refused() {
     let recipe = Recipe {
         loads: Loads::Random(30),
         rest: 2,
+        range: MIDDLE,
         centroid: CentroidName::BinaryMask,
         ..Recipe::default()
     };
     let other = generate(&recipe, || ()).unwrap();
-    let error = Evaluation::of(model(), &other, None)
-        .unwrap_err()
-        .to_string();
+    let error = Evaluation::of(model(), &other).unwrap_err().to_string();
     assert!(error.contains("other conditions"), "{error}");
-    let error = Evaluation::of(b"HVTM", &other, None)
-        .unwrap_err()
-        .to_string();
+    let error = Evaluation::of(b"HVTM", &other).unwrap_err().to_string();
     assert!(error.contains("not a usable model file"), "{error}");
     let mut untouched = data(Loads::Random(1), 4);
     untouched.rows.truncate(8);
-    let error = Evaluation::of(model(), &untouched, None)
-        .unwrap_err()
-        .to_string();
+    let error = Evaluation::of(model(), &untouched).unwrap_err().to_string();
     assert!(error.contains("no accepted frame with a force"), "{error}");
 }

@@ -3,8 +3,7 @@
 
 use std::collections::HashMap;
 
-use hivtac_calibration::conditions::{Conditions, PixelName};
-use hivtac_calibration::dataset::Split;
+use hivtac_calibration::conditions::Conditions;
 use hivtac_calibration::import::parse;
 use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
 use hivtac_calibration::quantize::export;
@@ -13,6 +12,7 @@ use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, f
 use hivtac_sensing::geometry::Preset;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::{Network as ChipNetwork, Output};
+use hivtac_sensing::threshold::PixelFormat;
 use safetensors::serialize;
 use safetensors::tensor::{Dtype, TensorView};
 
@@ -28,17 +28,14 @@ fn q16(features: &[f64; INPUTS]) -> [i64; INPUTS] {
 fn weights(network: Network) -> Weights {
     Weights {
         format: Weights::format(),
-        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565),
+        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
             features_q16: q16(&REST),
             areas_px: [190; 4],
         },
         range: Range::default(),
         uncertainty: Uncertainty::default(),
-        training: Training {
-            split: Split::WithinPose,
-            ..Training::default()
-        },
+        training: Training::default(),
         film: None,
         network,
     }
@@ -61,6 +58,7 @@ fn small() -> Options {
         rounded_epochs: 20,
         batch: 64,
         learning_rate: 5e-3,
+        direction_weight: None,
         ..Options::default()
     }
 }

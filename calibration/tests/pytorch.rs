@@ -4,10 +4,12 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use hivtac_calibration::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::fit::adopt;
+use hivtac_calibration::fit::fit;
 use hivtac_calibration::import::{load, parse};
 use hivtac_calibration::network::{INPUTS, Meaning, Network, OUTPUTS};
 use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
+use hivtac_calibration::weights::Range;
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensors, serialize};
 
@@ -50,13 +52,23 @@ fn it_goes_on_to_the_chip() {
         &Recipe {
             loads: Loads::Random(52),
             rest: 8,
+            range: Range::default(),
             ..Recipe::default()
         },
         || (),
     )
     .unwrap();
-    let fitted = adopt(&data, load(&path()).unwrap(), "a test").unwrap();
-    assert_eq!(fitted.weights.training.scene, "imported from a test");
+    let network = load(&path()).unwrap();
+    let options = Options {
+        epochs: 0,
+        rounded_epochs: 0,
+        start: Some(network.clone()),
+        ..Options::default()
+    };
+    let fitted = fit(&data, &options, |_| ()).unwrap();
+    let found = &fitted.weights.network;
+    assert_eq!(found.layers, network.layers);
+    assert_ne!(found.activation_max, network.activation_max);
     assert!(export(&fitted.weights).is_ok());
 }
 

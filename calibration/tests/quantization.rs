@@ -1,6 +1,6 @@
 //! The exported network against the floats that it came from: never further than its roundings add up to.
 
-use hivtac_calibration::conditions::{Conditions, PixelName};
+use hivtac_calibration::conditions::Conditions;
 use hivtac_calibration::network::{
     Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization,
 };
@@ -9,6 +9,7 @@ use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, f
 use hivtac_sensing::geometry::Preset;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
+use hivtac_sensing::threshold::PixelFormat;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -49,7 +50,7 @@ fn network() -> impl Strategy<Value = Network> {
 fn weights(network: Network) -> Weights {
     Weights {
         format: Weights::format(),
-        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565),
+        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
             features_q16: [1 << 20; INPUTS],
             areas_px: [200; 4],

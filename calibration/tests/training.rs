@@ -1,6 +1,6 @@
 //! Training, small: it learns, it is repeatable, it says what it cannot learn from.
 
-use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::evaluate::{Evaluation, by_place};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
@@ -8,10 +8,19 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
 use hivtac_calibration::weights::Range;
 
+/// A tip in the film's middle.
+const MIDDLE: Range = Range {
+    force_n: 0.22,
+    alpha_deg: 11.0,
+    beta_deg: 8.8,
+    place_mm: 0.0,
+};
+
 fn data() -> Dataset {
     let recipe = Recipe {
         loads: Loads::Random(392),
         rest: 8,
+        range: MIDDLE,
         ..Recipe::default()
     };
     generate(&recipe, || ()).unwrap()
@@ -23,6 +32,7 @@ fn small() -> Options {
         epochs: 60,
         rounded_epochs: 30,
         learning_rate: 5e-3,
+        direction_weight: None,
         ..Options::default()
     }
 }
@@ -30,10 +40,7 @@ fn small() -> Options {
 #[test]
 fn a_few_hundred_frames_teach_the_force() {
     let mut losses = Vec::new();
-    let fitted = fit(&data(), Split::WithinPose, &small(), |progress| {
-        losses.push(progress)
-    })
-    .unwrap();
+    let fitted = fit(&data(), &small(), |progress| losses.push(progress)).unwrap();
     assert_eq!(losses.len(), 90);
     assert_eq!(losses.iter().filter(|p| p.rounded).count(), 30);
     // Standardized forces: always answering their mean has a loss of 1.
@@ -54,7 +61,7 @@ fn data_of_places() -> Dataset {
     let range = Range {
         force_n: 0.25,
         place_mm: 4.2,
-        ..Recipe::default().range
+        ..MIDDLE
     };
     let recipe = Recipe {
         loads: Loads::Random(1_492),
@@ -72,7 +79,7 @@ fn frames_of_places_teach_the_place() {
         meaning: Meaning::ForceAndPlace,
         ..small()
     };
-    let fitted = fit(&data, Split::WithinPose, &options, |_| ()).unwrap();
+    let fitted = fit(&data, &options, |_| ()).unwrap();
     // Always answering the middle is 2.4 mm off.
     let place_mm = fitted.quantized.place_rmse_mm().unwrap();
     assert!(place_mm < 1.2, "{place_mm}");
@@ -86,7 +93,7 @@ fn frames_of_places_teach_the_place() {
     assert!(weights.uncertainty.place_mm.iter().all(|&mm| mm > 0.0));
 
     let model = export(weights).unwrap();
-    let evaluation = Evaluation::of(&model, &data, None).unwrap();
+    let evaluation = Evaluation::of(&model, &data).unwrap();
     let parts = by_place(&evaluation.judged);
     assert_eq!(parts.len(), 8, "five distances and three sizes");
     let places = parts.iter().filter_map(|part| part.place);
@@ -101,7 +108,7 @@ fn frames_of_places_teach_the_place() {
         rounded_epochs: 1,
         ..small()
     };
-    let fitted = fit(&data, Split::WithinPose, &force, |_| ()).unwrap();
+    let fitted = fit(&data, &force, |_| ()).unwrap();
     assert_eq!(fitted.quantized.place_rmse_mm(), None);
     assert_eq!(fitted.weights.range.place_mm, 0.0);
 }
@@ -112,7 +119,7 @@ fn what_no_data_tell_cannot_be_learnt() {
         meaning: Meaning::ForceAndPlace,
         ..small()
     };
-    assert!(fit(&data(), Split::WithinPose, &options, |_| ()).is_err());
+    assert!(fit(&data(), &options, |_| ()).is_err());
 }
 
 #[test]
@@ -123,11 +130,7 @@ fn the_same_seed_gives_the_same_weights() {
         rounded_epochs: 1,
         ..small()
     };
-    let weights = |options: &Options| {
-        fit(&data, Split::WithinPose, options, |_| ())
-            .unwrap()
-            .weights
-    };
+    let weights = |options: &Options| fit(&data, options, |_| ()).unwrap().weights;
     assert_eq!(weights(&options), weights(&options));
     let other = Options {
         seed: 2,
@@ -156,11 +159,6 @@ fn options_that_do_not_fit(refused: &dyn Fn(&Options, &str)) {
         ..small()
     };
     refused(&weighed, "0 of forces");
-    let polar = Options {
-        meaning: Meaning::AnglesMagnitude,
-        ..weighed.clone()
-    };
-    refused(&polar, "force vector only");
     let nothing = Options {
         direction_weight: Some(0.0),
         ..weighed
@@ -255,7 +253,7 @@ fn what_cannot_be_trained_on_is_said() {
 
     let mut untouched_missing = data();
     untouched_missing.rows.drain(..8);
-    let error = fit(&untouched_missing, Split::WithinPose, &small(), |_| ())
+    let error = fit(&untouched_missing, &small(), |_| ())
         .unwrap_err()
         .to_string();
     assert!(error.contains("without force"), "{error}");

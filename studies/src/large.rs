@@ -5,7 +5,7 @@ use std::fmt::Write;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use hivtac_calibration::conditions::CentroidName;
-use hivtac_calibration::dataset::{Dataset, Loads, Recipe, Split, generate};
+use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
@@ -92,9 +92,12 @@ impl Large {
         let options = Training {
             hidden: vec![32, 32],
             meaning: Meaning::ForceAndPlace,
+            epochs: 150,
+            rounded_epochs: 100,
+            direction_weight: None,
             ..Training::default()
         };
-        let network = fit(&dataset, Split::default(), &options, |_| ())?.weights;
+        let network = fit(&dataset, &options, |_| ())?.weights;
         network.with_film(STEPS, &dataset)
     }
 }

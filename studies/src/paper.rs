@@ -5,7 +5,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use hivtac_calibration::answer::Chip;
 use hivtac_calibration::conditions::CentroidName;
-use hivtac_calibration::dataset::{Dataset, Observation, Split};
+use hivtac_calibration::dataset::{Dataset, Observation};
 use hivtac_calibration::errors::{angle_deg, norm};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
@@ -118,9 +118,10 @@ impl Paper {
             learning_rate: 1e-3,
             batch: 64,
             whitened: false,
+            direction_weight: None,
             ..Training::default()
         };
-        let weights = fit(&training, Split::default(), &options, |_| ())?.weights;
+        let weights = fit(&training, &options, |_| ())?.weights;
         let test = dataset(CentroidName::BinaryMask, self.judged, TEST_SEED)?;
         Ok(judged(&test, |row| {
             let features = row.features_px();

@@ -152,8 +152,8 @@ fn convincing(found: &Alignment, at_an_end: bool) -> Result<()> {
     );
     ensure!(
         !at_an_end,
-        "the best lag, {:.3} s, is the last one that was tried: are gauge and sensor of the same recording, and does the \
-         gauge send its readings at once?",
+        "the best lag, {:.3} s, is the last one that was tried: are gauge and sensor of the same \
+         recording, and does the gauge send its readings at once?",
         found.lag_s
     );
     ensure!(

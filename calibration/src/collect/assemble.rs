@@ -11,20 +11,9 @@ use super::holds;
 use super::poses::Pose;
 use super::report::{Report, RunReport};
 use super::series::{Joined, Series};
-use crate::dataset::{About, Dataset, Loads, Observation, Place, Row, Spread};
+use crate::dataset::{About, Dataset, Loads, Observation, Place, Row};
 use crate::loads::PaperPoses;
-use crate::weights::Range;
-
-/// What is made of a recording.
-#[derive(Clone, Copy, Debug)]
-pub struct Choices {
-    /// The largest lag of a gauge at a serial port, s.
-    pub max_lag_s: f64,
-    /// Smaller forces are no contact, N.
-    pub least_n: f64,
-    /// Only steady stretches, each one load.
-    pub holds: bool,
-}
+use crate::range::Range;
 
 /// Where the gauge's readings are.
 #[derive(Clone, Debug)]
@@ -35,6 +24,10 @@ pub enum Gauge {
     Files(Vec<Series>),
 }
 
+/// The largest lag of a gauge at a serial port, s.
+const LARGEST_LAG_S: f64 = 2.0;
+/// Smaller forces are no contact, N.
+const LEAST_N: f64 = 0.001;
 /// Noise of the gauge beyond which a force counts as contact, in standard deviations.
 const CONTACT_SIGMAS: f64 = 4.0;
 /// Half as many samples around one give its time on the computer's clock.
@@ -49,7 +42,7 @@ pub(super) struct Loaded<'a> {
     pub force_n: f64,
 }
 
-/// Makes the data set.
+/// Makes the data set, with `holds` only of steady stretches, each one load.
 ///
 /// # Errors
 /// When a run has no frames of the untouched film, or its clocks cannot be aligned; names the run.
@@ -57,7 +50,7 @@ pub fn assemble(
     recording: &Recording,
     gauge: &Gauge,
     unit: super::gauge::Unit,
-    choices: Choices,
+    holds: bool,
 ) -> Result<(Dataset, Report)> {
     ensure!(recording.runs() > 0, "the recording has no samples yet");
     let mut rows = Vec::new();
@@ -76,7 +69,7 @@ pub fn assemble(
         let session = report.runs.len();
         let one = || format!("run {run}");
         let (series, alignment, times) = match gauge {
-            Gauge::AtThePort => at_the_port(recording, &kept, run, unit, choices),
+            Gauge::AtThePort => at_the_port(recording, &kept, run, unit),
             Gauge::Files(files) => from_file(files, session, &kept),
         }
         .with_context(one)?;
@@ -85,7 +78,7 @@ pub fn assemble(
             times: &times,
             gauge: series.joined(),
             alignment,
-            choices,
+            holds,
         };
         let (more, mut of_run) = done.rows(session).with_context(one)?;
         of_run.run = run;
@@ -115,7 +108,6 @@ fn at_the_port(
     kept: &[&Kept],
     run: usize,
     unit: super::gauge::Unit,
-    choices: Choices,
 ) -> Result<(Series, Alignment, Vec<f64>)> {
     let mut series = Series::default();
     let lines = recording.gauge_lines.iter().filter(|(r, ..)| *r == run);
@@ -129,7 +121,7 @@ fn at_the_port(
     );
     let times = on_the_computers_clock(kept);
     let search = Search {
-        lags_s: [-choices.max_lag_s, choices.max_lag_s],
+        lags_s: [-LARGEST_LAG_S, LARGEST_LAG_S],
         drift: false,
     };
     let alignment = align(&seen(kept, &times)?, series.joined(), search)?;
@@ -216,7 +208,8 @@ struct Run<'a> {
     times: &'a [f64],
     gauge: Joined<'a>,
     alignment: Alignment,
-    choices: Choices,
+    /// Only steady stretches, each one load.
+    holds: bool,
 }
 
 impl Run<'_> {
@@ -229,7 +222,7 @@ impl Run<'_> {
         let count = at_rest.len().max(1) as f64;
         let zero_n = at_rest.iter().sum::<f64>() / count;
         let noise_n = (at_rest.iter().map(|f| (f - zero_n).powi(2)).sum::<f64>() / count).sqrt();
-        let least_n = self.choices.least_n.max(CONTACT_SIGMAS * noise_n);
+        let least_n = LEAST_N.max(CONTACT_SIGMAS * noise_n);
         let mut report = RunReport {
             alignment: self.alignment,
             zero_n,
@@ -255,7 +248,7 @@ impl Run<'_> {
                 }),
             }
         }
-        if self.choices.holds {
+        if self.holds {
             let before = loaded.len();
             loaded = holds::steady(&loaded, noise_n);
             report.unsteady = before - loaded.len();
@@ -336,7 +329,6 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
         loads: Loads::Measured(poses.len()),
         rest: at_rest / report.runs.len(),
         sessions: report.runs.len(),
-        spread: Spread::default(),
         seed: 0,
         range: Range {
             force_n: largest(&|row| crate::errors::norm(row.force_n)),

@@ -14,12 +14,13 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+use hivtac_scene::Contact;
 use hivtac_wire::message::{Centroid, DeviceHello, Sample};
 use hivtac_wire::status::Status;
 use serde::{Deserialize, Serialize};
 
 use super::poses::Pose;
-use crate::conditions::{CentroidName, Conditions, ContactName, OriginName};
+use crate::conditions::{CentroidName, Conditions, OriginName};
 
 const SAMPLES: &str = "samples.csv";
 const GAUGE: &str = "gauge.csv";
@@ -210,14 +211,14 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
         preset: hello.preset.as_str().to_owned(),
         width: hello.width,
         height: hello.height,
-        pixel_format: threshold.format().into(),
+        pixel_format: threshold.format(),
         threshold: threshold.limits(),
         dilations: hello.dilations,
         centroid: match hello.centroid {
             Centroid::BinaryMask => CentroidName::BinaryMask,
             Centroid::RednessWeighted => CentroidName::RednessWeighted,
         },
-        contact: ContactName::default(),
+        contact: Contact::default(),
         origin: OriginName::unit(hello.device_id),
     })
 }
@@ -359,7 +360,7 @@ fn takes_done(path: &Path) -> Result<Vec<Pose>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conditions::PixelName;
+    use hivtac_sensing::threshold::PixelFormat;
     use hivtac_wire::message::{HsvBox, Marker, Threshold};
 
     fn conditions() -> Conditions {
@@ -369,7 +370,7 @@ mod tests {
                 hivtac_sensing::geometry::Preset::Ov7725,
                 320,
                 240,
-                PixelName::Rgb565,
+                PixelFormat::Rgb565,
             )
         }
     }
@@ -454,7 +455,7 @@ mod tests {
             centroid: Centroid::RednessWeighted,
         };
         let yuv422 = conditions_of(&hello).unwrap();
-        assert_eq!(yuv422.pixel_format, PixelName::Yuv422);
+        assert_eq!(yuv422.pixel_format, PixelFormat::Yuv422);
         assert_eq!(yuv422.threshold, [170, 0, 0, 0, 0, 0]);
         let model = yuv422.to_model().unwrap();
         assert_eq!(
@@ -463,7 +464,7 @@ mod tests {
         );
         hello.threshold = Threshold::Rgb565(HsvBox::of_limits([1, 2, 3, 4, 5, 6]));
         let rgb565 = conditions_of(&hello).unwrap();
-        assert_eq!(rgb565.pixel_format, PixelName::Rgb565);
+        assert_eq!(rgb565.pixel_format, PixelFormat::Rgb565);
         assert_eq!(rgb565.threshold, [1, 2, 3, 4, 5, 6]);
     }
 

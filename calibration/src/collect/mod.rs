@@ -25,12 +25,10 @@ use std::path::PathBuf;
 use anyhow::Result;
 use hivtac_scene::Contact;
 
-use assemble::{Choices, Gauge, assemble};
+use assemble::{Gauge, assemble};
 use folder::Recording;
 use gauge::Unit;
 use series::Series;
-
-use crate::conditions::ContactName;
 
 /// Calibration data from a real unit.
 #[derive(Debug, clap::Subcommand)]
@@ -55,14 +53,8 @@ pub struct AlignArgs {
     #[arg(long, value_name = "FILE")]
     gauge: Vec<PathBuf>,
     /// The unit of readings that name none.
-    #[arg(long, default_value = "N", value_parser = unit)]
+    #[arg(long, default_value = "N")]
     gauge_unit: Unit,
-    /// The largest lag between sensor and a gauge at a serial port, s.
-    #[arg(long, default_value_t = 2.0)]
-    max_lag_s: f64,
-    /// Smaller forces than this are no contact, N; never less than four times the gauge's noise at rest.
-    #[arg(long, default_value_t = 0.001)]
-    least_n: f64,
     /// What the poses' angles say: `force` (the direction of the force, as of a weight that hangs), or the pressing direction of
     /// a tip that sticks (`stick`) or slips from a friction ratio on (`slip:0.6`).
     #[arg(long, default_value = "force")]
@@ -73,11 +65,6 @@ pub struct AlignArgs {
     /// The CSV file to write.
     #[arg(long)]
     out: PathBuf,
-}
-
-fn unit(name: &str) -> Result<Unit, String> {
-    name.parse()
-        .map_err(|error: anyhow::Error| error.to_string())
 }
 
 impl CollectCommand {
@@ -105,13 +92,8 @@ impl AlignArgs {
             files if files.is_empty() => Gauge::AtThePort,
             files => Gauge::Files(files),
         };
-        let choices = Choices {
-            max_lag_s: self.max_lag_s,
-            least_n: self.least_n,
-            holds: self.holds,
-        };
-        recording.conditions.contact = ContactName(self.contact);
-        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, choices)?;
+        recording.conditions.contact = self.contact;
+        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, self.holds)?;
         dataset.save(&self.out)?;
         println!("{report}");
         println!(

@@ -41,7 +41,7 @@ impl Sensing<'static> {
         let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
         let mut sensor = Box::new(Sensor::new());
         let settings = Settings {
-            threshold: Threshold::red(recipe.format.to_model()),
+            threshold: Threshold::red(recipe.format),
             centroid: recipe.centroid.to_model(),
             ..Settings::usual(geometry, ByteOrder::Native)
         };

@@ -75,12 +75,14 @@ mod tests {
     use super::*;
 
     use super::super::Loads;
+    use crate::range::Range;
     use hivtac_scene::Contact;
 
     fn small(seed: u64) -> Recipe {
         Recipe {
             loads: Loads::Random(20),
             rest: 4,
+            range: Range::default(),
             seed,
             ..Recipe::default()
         }
@@ -173,7 +175,7 @@ mod tests {
                 ..small(6)
             };
             let dataset = generate(&recipe, || ()).unwrap();
-            assert_eq!(dataset.about.conditions.contact.0, contact);
+            assert_eq!(dataset.about.conditions.contact, contact);
             let rest = dataset.rest().unwrap().features_px();
             let strong = dataset.rows.iter().filter(|row| row.force_n[2] < -0.05);
             let sideways = strong.filter_map(|row| {

@@ -15,15 +15,14 @@ use hivtac_sensing::features::FEATURES;
 use serde::{Deserialize, Serialize};
 
 use crate::conditions::Conditions;
-use crate::weights::{Range, Rest};
+use crate::range::Range;
+use crate::rest::Rest;
 
 pub use eye::{Eye, Eyes, Seen, Sensing};
 pub(crate) use eye::{measure, reasons};
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};
-pub use session::Spread;
-pub use split::Split;
 
 /// A pixel in Q16.16.
 const PX: f64 = 65_536.0;
@@ -39,7 +38,6 @@ pub struct Dataset {
 
 /// Where a data set came from and what its numbers mean.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct About {
     /// What frames and labels are.
     pub conditions: Conditions,
@@ -51,9 +49,6 @@ pub struct About {
     pub rest: usize,
     /// How many times the sensor was set up anew.
     pub sessions: usize,
-    /// How far the sessions are apart in what a tare does not see.
-    #[serde(default)]
-    pub spread: Spread,
     /// Decides loads, sessions and noise.
     pub seed: u64,
     /// The limits of its forces.
@@ -211,8 +206,8 @@ impl Dataset {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conditions::PixelName;
     use hivtac_sensing::geometry::Preset;
+    use hivtac_sensing::threshold::PixelFormat;
 
     pub(super) fn example() -> Dataset {
         let seen = |x: i64| Observation {
@@ -220,12 +215,11 @@ mod tests {
             areas_px: [200; 4],
         };
         let about = About {
-            conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelName::Rgb565),
+            conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
             scene: "made up".into(),
             loads: Loads::Random(2),
             rest: 2,
             sessions: 1,
-            spread: Spread::default(),
             seed: 3,
             range: Range::default(),
         };

@@ -1,15 +1,17 @@
 //! What a data set shows: camera, sessions, loads.
 
 use anyhow::{Context, Result, ensure};
+use clap::Args;
 use hivtac_scene::{Contact, Format, Load, Options, Preset as ScenePreset, Scene};
 use hivtac_sensing::geometry::Preset;
+use hivtac_sensing::threshold::PixelFormat;
 use serde::{Deserialize, Serialize};
 
-use super::session::{Session, Spread};
+use super::session::Session;
 use super::{About, Place};
-use crate::conditions::{CentroidName, Conditions, ContactName, PixelName};
+use crate::conditions::{CentroidName, Conditions, pixel_format};
 use crate::loads::{PaperPoses, RandomLoads};
-use crate::weights::Range;
+use crate::range::Range;
 
 /// Which loads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,56 +29,65 @@ pub enum Loads {
     Measured(usize),
 }
 
-/// What to generate.
-#[derive(Clone, Copy, Debug)]
+/// What to generate. What has no argument is for studies, which make their recipes themselves.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
     /// Lens and camera.
+    #[arg(skip = Recipe::default().preset)]
     pub preset: Preset,
     /// Columns of a frame.
+    #[arg(long, default_value_t = Recipe::default().width)]
     pub width: u16,
     /// Rows of a frame.
+    #[arg(long, default_value_t = Recipe::default().height)]
     pub height: u16,
-    /// What a pixel is.
-    pub format: PixelName,
+    /// What a pixel is: rgb565, yuv422 or mono.
+    #[arg(long, value_parser = pixel_format, default_value = "rgb565")]
+    pub format: PixelFormat,
     /// How markers' positions are taken.
+    #[arg(skip = Recipe::default().centroid)]
     pub centroid: CentroidName,
     /// What the loads' labels mean.
+    #[arg(skip)]
     pub contact: Contact,
-    /// The loads of each session.
+    /// Random loads of each session.
+    #[arg(id = "samples", long, value_name = "COUNT", value_parser = random)]
+    #[arg(default_value = "80000")]
     pub loads: Loads,
     /// Frames of the untouched film, first in each session.
+    #[arg(skip = Recipe::default().rest)]
     pub rest: usize,
     /// The limits of the forces; the paper's poses have limits of their own for angles.
+    #[command(flatten)]
     pub range: Range,
-    /// Sessions: the first is the nominal sensor, the others are mounted, lit and focused a little differently.
+    /// Sessions: the first is the nominal sensor, the others are mounted, lit and focused a little
+    /// differently.
+    #[arg(skip = Recipe::default().sessions)]
     pub sessions: usize,
-    /// How far they are apart in what a tare does not see.
-    pub spread: Spread,
     /// Decides loads, sessions and noise.
+    #[arg(long, default_value_t = Recipe::default().seed)]
     pub seed: u64,
 }
 
+fn random(count: &str) -> Result<Loads, String> {
+    let count = count.parse().map_err(|_| "a number is needed")?;
+    Ok(Loads::Random(count))
+}
+
 impl Default for Recipe {
-    /// The sensor's camera at the firmware's frame size; forces a tenth beyond the calibrated range, so that its
-    /// ends are inside the data.
+    /// The frames that the default model's network learns from.
     fn default() -> Self {
         Self {
             preset: Preset::Ov7725,
             width: 320,
             height: 240,
-            format: PixelName::Rgb565,
+            format: PixelFormat::Rgb565,
             centroid: CentroidName::RednessWeighted,
             contact: Contact::Force,
-            loads: Loads::Random(40_000),
+            loads: Loads::Random(80_000),
             rest: 64,
-            range: Range {
-                force_n: 0.22,
-                alpha_deg: 11.0,
-                beta_deg: 8.8,
-                place_mm: 0.0,
-            },
+            range: Range::RENDERED,
             sessions: 1,
-            spread: Spread::default(),
             seed: 1,
         }
     }
@@ -171,13 +182,13 @@ impl Recipe {
             self.height.into(),
             self.seed,
         )?;
-        let session = Session::numbered(session, self.seed, &self.spread);
+        let session = Session::numbered(session, self.seed);
         let mut options = session.options(self.width);
         options.film.contact = self.contact;
         options.format = match self.format {
-            PixelName::Rgb565 => Format::Rgb565,
-            PixelName::Yuv422 => Format::Yuv422,
-            PixelName::Mono => Format::Mono,
+            PixelFormat::Rgb565 => Format::Rgb565,
+            PixelFormat::Yuv422 => Format::Yuv422,
+            PixelFormat::Mono => Format::Mono,
         };
         Ok(scene.with_options(options)?)
     }
@@ -222,7 +233,7 @@ impl Recipe {
         Ok(About {
             conditions: Conditions {
                 centroid: self.centroid,
-                contact: ContactName(self.contact),
+                contact: self.contact,
                 ..Conditions::simulated(self.preset, self.width, self.height, self.format)
             },
             scene: format!(
@@ -232,9 +243,26 @@ impl Recipe {
             loads: self.loads,
             rest: self.rest,
             sessions: self.sessions,
-            spread: self.spread,
             seed: self.seed,
             range: self.range,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        recipe: Recipe,
+    }
+
+    #[test]
+    fn without_arguments_it_is_the_default() {
+        assert_eq!(Command::parse_from(["dataset"]).recipe, Recipe::default());
     }
 }

@@ -146,11 +146,13 @@ mod tests {
     use super::super::eye::Sensing;
     use super::super::{Loads, generate};
     use super::*;
+    use crate::range::Range;
 
     fn recipe() -> Recipe {
         Recipe {
             loads: Loads::Random(20),
             rest: 2,
+            range: Range::default(),
             sessions: 2,
             ..Recipe::default()
         }

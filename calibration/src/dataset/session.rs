@@ -1,31 +1,10 @@
 //! What differs between one day's calibration and another's.
 
-use hivtac_scene::{Lens, Mechanics, Mounting, Options};
+use hivtac_scene::{Lens, Mounting, Options};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
-/// How far apart sessions lie in what has no tare: every force is then a little wrong in its own way.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Spread {
-    /// Each marker is glued up to this far from its place, along x and along y, mm.
-    pub glue_mm: f64,
-    /// The tip touches the film up to this far from its middle, along x and along y, mm.
-    pub offset_mm: f64,
-}
-
-impl Default for Spread {
-    /// Markers and tip in their places.
-    fn default() -> Self {
-        Self {
-            glue_mm: 0.0,
-            offset_mm: 0.0,
-        }
-    }
-}
-
-/// How a sensor was built, mounted, lit, focused and pressed in one session.
+/// How a sensor was mounted, lit and focused in one session.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Session {
     /// Shift of the picture in parts of its width.
@@ -36,17 +15,13 @@ pub(super) struct Session {
     gradient: [f64; 2],
     /// Blur in parts of the frame's width.
     blur: f64,
-    /// How far from their places the markers are glued, mm.
-    glued_mm: [[f64; 2]; 4],
-    /// Where the tip touches the film, mm from the middle.
-    offset_mm: [f64; 2],
 }
 
 impl Session {
-    /// Session 0 is the nominal one. The others: the picture up to 1 % of its width off and turned by up to 1°, the
-    /// light up to 20 % off and up to 20 % uneven, the focus up to 1/500 of the width wrong (0.64 px at QVGA); each marker
-    /// and the tip as far off, along x and y, as `spread` says.
-    pub fn numbered(session: usize, seed: u64, spread: &Spread) -> Self {
+    /// Session 0 is the nominal one. The others: the picture up to 1 % of its width off and turned by
+    /// up to 1°, the light up to 20 % off and up to 20 % uneven, the focus up to 1/500 of the width
+    /// wrong (0.64 px at QVGA).
+    pub fn numbered(session: usize, seed: u64) -> Self {
         if session == 0 {
             return Self::default();
         }
@@ -59,8 +34,6 @@ impl Session {
             brighter: within(0.2),
             gradient: [within(0.2), within(0.2)],
             blur: within(0.002).abs(),
-            glued_mm: [0; 4].map(|_: u8| [0; 2].map(|_: u8| within(spread.glue_mm))),
-            offset_mm: [0; 2].map(|_: u8| within(spread.offset_mm)),
         }
     }
 
@@ -77,11 +50,6 @@ impl Session {
                 blur_px: px(self.blur),
                 ..Lens::default()
             },
-            glued_mm: self.glued_mm,
-            film: Mechanics {
-                offset_mm: self.offset_mm,
-                ..Mechanics::default()
-            },
             ..Options::default()
         }
     }
@@ -93,43 +61,10 @@ mod tests {
 
     #[test]
     fn sessions_differ_and_the_first_is_nominal() {
-        let spread = Spread {
-            glue_mm: 0.05,
-            offset_mm: 0.1,
-        };
-        let session = |number, seed| Session::numbered(number, seed, &spread);
+        let session = Session::numbered;
         assert_eq!(session(0, 7).options(320), Options::default());
         assert_eq!(session(1, 7), session(1, 7));
         assert_ne!(session(1, 7), session(2, 7));
         assert_ne!(session(1, 7), session(1, 8));
-    }
-
-    #[test]
-    fn markers_and_tip_are_as_far_off_as_the_spread_says() {
-        let spread = Spread {
-            glue_mm: 0.04,
-            offset_mm: 0.2,
-        };
-        let largest = |of: fn(&Options) -> Vec<f64>| {
-            (1..200)
-                .flat_map(|number| of(&Session::numbered(number, 7, &spread).options(320)))
-                .fold(0.0, |most: f64, mm| most.max(mm.abs()))
-        };
-        let glued = largest(|options| options.glued_mm.as_flattened().to_vec());
-        let offset = largest(|options| options.film.offset_mm.to_vec());
-        assert!((0.039..=0.04).contains(&glued), "{glued}");
-        assert!((0.195..=0.2).contains(&offset), "{offset}");
-        let none = Spread {
-            glue_mm: 0.0,
-            offset_mm: 0.0,
-        };
-        let plain = Session::numbered(1, 7, &none).options(320);
-        assert_eq!(plain.film, Mechanics::default());
-        assert_eq!(plain.glued_mm, [[0.0; 2]; 4]);
-        assert_eq!(
-            plain.mounting,
-            Session::numbered(1, 7, &spread).options(320).mounting,
-            "the rest stays"
-        );
     }
 }

@@ -1,128 +1,60 @@
 //! Which rows a training does not see.
 
 use anyhow::{Result, ensure};
-use clap::ValueEnum;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
-use serde::{Deserialize, Serialize};
 
-use super::{Dataset, Row};
+use super::Dataset;
 
-/// What is held out together: one row or pose in ten, one session in four.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Split {
-    /// Single rows: every pose is seen in training, with other forces (the paper's).
-    #[default]
-    WithinPose,
-    /// All rows of a pose: directions between those of training.
-    Poses,
-    /// All rows of a session: built, mounted, lit, focused and pressed otherwise than in training.
-    Sessions,
-}
+/// One accepted row in so many is held out, at least one.
+const PART: usize = 10;
 
-impl Split {
-    /// What it says, for reports.
-    pub fn words(self) -> &'static str {
-        match self {
-            Split::WithinPose => "rows held out at random within poses",
-            Split::Poses => "whole poses held out",
-            Split::Sessions => "whole sessions held out",
-        }
-    }
-
-    /// One group in this many is held out, at least one. Each session is wrong in its own way: it takes many to know how much.
-    fn part(self) -> usize {
-        match self {
-            Split::WithinPose | Split::Poses => 10,
-            Split::Sessions => 4,
-        }
-    }
-
-    fn group(self, index: usize, row: &Row) -> Option<usize> {
-        match self {
-            Split::WithinPose => Some(index),
-            Split::Poses => row.place.pose,
-            Split::Sessions => Some(row.place.session),
-        }
-    }
-
-    /// Numbers of the rows to train on and of those held out, each in order. Rejected rows are in neither; rows without
-    /// a pose are trained on when poses are held out.
+impl Dataset {
+    /// Numbers of the rows to train on and of those held out, each in order; rejected rows are in
+    /// neither. The same seed holds out the same rows.
     ///
     /// # Errors
-    /// When there are fewer than two groups.
-    pub fn of(self, dataset: &Dataset, seed: u64) -> Result<[Vec<usize>; 2]> {
-        let rows = || {
-            dataset
-                .rows
-                .iter()
-                .enumerate()
-                .filter(|(_, row)| row.seen.is_ok())
-        };
-        let mut groups: Vec<usize> = rows().filter_map(|(i, row)| self.group(i, row)).collect();
-        groups.sort_unstable();
-        groups.dedup();
-        let what = match self {
-            Split::WithinPose => "rows",
-            Split::Poses => "poses",
-            Split::Sessions => "sessions",
-        };
+    /// When there are fewer than two accepted rows.
+    pub fn split(&self, seed: u64) -> Result<[Vec<usize>; 2]> {
+        let rows = self.rows.iter().enumerate();
+        let accepted = rows.filter(|(_, row)| row.seen.is_ok());
+        let accepted: Vec<usize> = accepted.map(|(number, _)| number).collect();
         ensure!(
-            groups.len() > 1,
-            "the data set has {} {what}: none can be held out",
-            groups.len()
+            accepted.len() > 1,
+            "the data set has {} rows: none can be held out",
+            accepted.len()
         );
-        groups.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
-        groups.truncate((groups.len() / self.part()).max(1));
-        groups.sort_unstable();
-        let held = |&(i, row): &(usize, &Row)| {
-            self.group(i, row)
-                .is_some_and(|g| groups.binary_search(&g).is_ok())
-        };
-        let (held_out, training): (Vec<_>, Vec<_>) = rows().partition(held);
-        Ok([training, held_out].map(|rows| rows.into_iter().map(|(i, _)| i).collect()))
+        let mut held_out = accepted.clone();
+        held_out.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
+        held_out.truncate((held_out.len() / PART).max(1));
+        held_out.sort_unstable();
+        let is_left = |number: &usize| held_out.binary_search(number).is_err();
+        let training = accepted.into_iter().filter(is_left).collect();
+        Ok([training, held_out])
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::super::tests::many;
-    use super::*;
 
     #[test]
-    fn groups_are_held_out_whole() {
+    fn a_tenth_is_held_out_the_same_for_the_same_seed() {
         let dataset = many(3, 20, 5);
-        for split in [Split::WithinPose, Split::Poses, Split::Sessions] {
-            let [training, held_out] = split.of(&dataset, 4).unwrap();
-            let groups = |rows: &[usize]| -> BTreeSet<Option<usize>> {
-                rows.iter()
-                    .map(|&i| split.group(i, &dataset.rows[i]))
-                    .collect()
-            };
-            assert!(
-                groups(&training).is_disjoint(&groups(&held_out)),
-                "{split:?}"
-            );
-            assert_eq!(training.len() + held_out.len(), dataset.accepted().count());
-            let expected = match split {
-                Split::WithinPose => 30,
-                Split::Poses => 30,
-                Split::Sessions => 101,
-            };
-            assert_eq!(held_out.len(), expected, "{split:?}");
-            assert_eq!(split.of(&dataset, 4).unwrap(), [training, held_out]);
-        }
+        let [training, held_out] = dataset.split(4).unwrap();
+        assert_eq!(training.len() + held_out.len(), dataset.accepted().count());
+        assert_eq!(held_out.len(), 30);
+        assert!(held_out.iter().all(|row| !training.contains(row)));
+        assert_eq!(dataset.split(4).unwrap(), [training, held_out.clone()]);
+        assert_ne!(dataset.split(5).unwrap()[1], held_out);
     }
 
     #[test]
     fn what_there_is_not_cannot_be_held_out() {
-        let dataset = many(1, 1, 5);
-        assert!(Split::WithinPose.of(&dataset, 1).is_ok());
-        let error = Split::Sessions.of(&dataset, 1).unwrap_err().to_string();
-        assert!(error.contains("1 sessions"), "{error}");
-        assert!(Split::Poses.of(&dataset, 1).is_err());
+        let mut dataset = many(1, 1, 5);
+        assert!(dataset.split(1).is_ok());
+        dataset.rows.truncate(1);
+        let error = dataset.split(1).unwrap_err().to_string();
+        assert!(error.contains("1 rows"), "{error}");
     }
 }

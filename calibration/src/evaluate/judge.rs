@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
 use anyhow::{Result, anyhow, ensure};
+use hivtac_scene::Contact;
 use hivtac_sensing::force::{Force, Place};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::status::Status;
 
 use crate::answer::Chip;
-use crate::conditions::{ContactName, OriginName};
-use crate::dataset::{Dataset, Row, Split, reasons};
+use crate::conditions::OriginName;
+use crate::dataset::{Dataset, Row, reasons};
 
 /// One answer with its truth. Angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,9 +48,7 @@ pub struct Evaluation {
     /// Whether they were measured with a unit rather than simulated.
     pub measured: bool,
     /// The contact reading.
-    pub contact: ContactName,
-    /// Which rows were taken, in words.
-    pub rows: String,
+    pub contact: Contact,
     /// Frames with a force and an answer, warnings included.
     pub judged: Vec<Judged>,
     /// Frames without an answer, by status.
@@ -57,12 +56,12 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    /// Runs a model on the rows of a data set that show a force, as the chip would, each session tared. `held_out` takes
-    /// only the rows that a training with this split and seed did not see.
+    /// Runs a model on the rows of a data set that show a force, as the chip would, each session
+    /// tared.
     ///
     /// # Errors
     /// When the bytes are no model, it is for other conditions than the data's, or there is no such row.
-    pub fn of(model: &[u8], dataset: &Dataset, held_out: Option<(Split, u64)>) -> Result<Self> {
+    pub fn of(model: &[u8], dataset: &Dataset) -> Result<Self> {
         let model =
             Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
         let about = &dataset.about;
@@ -76,11 +75,7 @@ impl Evaluation {
         let mut rejected = unseen
             .map(|(status, count)| (status.to_owned(), count))
             .collect();
-        let chosen: Vec<usize> = match held_out {
-            Some((split, seed)) => split.of(dataset, seed)?[1].clone(),
-            None => (0..dataset.rows.len()).collect(),
-        };
-        let judged = judge(&model, dataset, &chosen, &mut rejected)?;
+        let judged = judge(&model, dataset, &mut rejected)?;
         ensure!(
             !judged.is_empty(),
             "the data set has no accepted frame with a force"
@@ -93,27 +88,22 @@ impl Evaluation {
             ),
             measured: about.conditions.origin != OriginName::Simulated,
             contact: about.conditions.contact,
-            rows: match held_out {
-                Some((split, seed)) => format!("{} (seed {seed})", split.words()),
-                None => "all rows of a data set of its own".to_owned(),
-            },
             judged,
             rejected,
         })
     }
 }
 
-/// The answers to some rows, each session tared on its own frames without force; those that the chip sends without a force are
+/// The answers to all rows, each session tared on its own frames without force; those that the chip sends without a force are
 /// counted by status.
 fn judge(
     model: &Model<'_>,
     dataset: &Dataset,
-    rows: &[usize],
     rejected: &mut BTreeMap<String, usize>,
 ) -> Result<Vec<Judged>> {
     let mut chips = BTreeMap::new();
     let mut judged = Vec::new();
-    for row in rows.iter().map(|&i| &dataset.rows[i]) {
+    for row in &dataset.rows {
         let Ok(seen) = &row.seen else { continue };
         if row.force_n == [0.0; 3] {
             continue;

@@ -7,6 +7,7 @@ use super::figures::{error_against_force, found_against_true, histograms, pose_m
 use super::numbers::{PoseNumbers, by_pose, errors};
 use super::places::{PlaceNumbers, by_place};
 use super::{Evaluation, Interval, Judged, Numbers};
+use crate::conditions::meaning;
 use crate::errors::{WEAK_N, norm};
 use crate::plot::escaped;
 
@@ -32,21 +33,21 @@ impl Evaluation {
     pub fn sentence(&self) -> String {
         if self.measured {
             return format!(
-                "Frames of a real unit ({}), contact reading `{}` ({}), {}. The truth is the gauge's reading and the pose that was set: \
+                "Frames of a real unit ({}), contact reading `{}` ({}), all rows of a data set of \
+                 its own. The truth is the gauge's reading and the pose that was set: \
                  their errors are in these numbers, too.",
                 self.frames,
                 self.contact,
-                self.contact.meaning(),
-                self.rows
+                meaning(self.contact)
             );
         }
         format!(
-            "Simulated frames ({}), contact reading `{}` ({}), {}. Nothing here was measured on a real sensor, and the \
+            "Simulated frames ({}), contact reading `{}` ({}), all rows of a data set of its own. \
+             Nothing here was measured on a real sensor, and the \
              paper's numbers hold its gauge, its stage and its film's hysteresis, too: they are beside ours, not below.",
             self.frames,
             self.contact,
-            self.contact.meaning(),
-            self.rows
+            meaning(self.contact)
         )
     }
 

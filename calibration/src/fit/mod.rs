@@ -5,13 +5,16 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 
-use crate::dataset::{About, Dataset, Observation, Sample, Split};
+use crate::dataset::{About, Dataset, Observation, Sample};
 use crate::errors::{Errors, norm};
 use crate::network::Network;
 use crate::quantize::export;
 use crate::train::{Options, Progress, Samples, train};
 use crate::uncertainty::Miss;
 use crate::weights::{Range, Training, Uncertainty, Weights, features_from_q16};
+
+/// What was held out together, in files: single rows, whatever their pose.
+const WITHIN_POSE: &str = "within-pose";
 
 /// The fewest accepted rows to train on.
 const FEWEST_ROWS: usize = 20;
@@ -34,14 +37,9 @@ type Rows<'a> = Vec<Sample<'a>>;
 ///
 /// # Errors
 /// When the data set has too few accepted rows or none at rest, or training fails.
-pub fn fit(
-    dataset: &Dataset,
-    split: Split,
-    options: &Options,
-    report: impl FnMut(Progress),
-) -> Result<Fit> {
+pub fn fit(dataset: &Dataset, options: &Options, report: impl FnMut(Progress)) -> Result<Fit> {
     let dataset = dataset.clone().tared()?;
-    let (training, held_out) = parts(&dataset, split, options.seed)?;
+    let (training, held_out) = parts(&dataset, options.seed)?;
     ensure!(
         dataset.knows_places() || !options.meaning_in_use().tells_place(),
         "the data set does not know where the tip is: no network can learn it"
@@ -52,62 +50,19 @@ pub fn fit(
         seed: options.seed,
         epochs: options.epochs,
         rounded_epochs: options.rounded_epochs,
-        ..record(&dataset, split, training.len())
+        ..record(&dataset, training.len())
     };
     finished(&dataset, network, record, &held_out)
 }
 
-/// Takes a network that was trained elsewhere: what the chip's hidden layers must carry, the rest position and the
-/// uncertainties come from the data set.
-///
-/// # Errors
-/// When the data set has no accepted row inside the calibrated range or none at rest, or the network does not fit the
-/// chip.
-pub fn adopt(dataset: &Dataset, network: Network, source: &str) -> Result<Fit> {
-    let dataset = dataset.clone().tared()?;
-    let rows: Rows<'_> = dataset.samples().collect();
-    let inside = in_range(&rows, &calibrated(&dataset.about));
-    ensure!(
-        !inside.is_empty(),
-        "the data set has no accepted row inside the calibrated range"
-    );
-    let features: Vec<_> = inside.iter().map(|row| row.seen.features_px()).collect();
-    let network = Network {
-        activation_max: network.activation_maxima(&features),
-        ..network
-    };
-    let record = Training {
-        scene: format!("imported from {source}"),
-        ..Training::default()
-    };
-    finished(&dataset, network, record, &rows)
-}
-
-/// Makes a model's uncertainties anew, from a data set that it was not made from, its sessions tared: what it is off by in
-/// other set-ups than that of its training.
-///
-/// # Errors
-/// When the data set is for other conditions, or has no accepted row with a force or none at rest.
-pub fn judged_by(weights: Weights, dataset: &Dataset) -> Result<Fit> {
-    ensure!(
-        dataset.about.conditions == weights.conditions,
-        "the weights are for other conditions than the data set's: {:?} and {:?}",
-        weights.conditions,
-        dataset.about.conditions
-    );
-    let dataset = dataset.clone().tared()?;
-    let tare = features_from_q16(&dataset.rest()?.features_q16)?;
-    measured(weights, &tare, &dataset.samples().collect())
-}
-
 /// Rows to train on, and held-out ones.
-fn parts(dataset: &Dataset, split: Split, seed: u64) -> Result<(Rows<'_>, Rows<'_>)> {
+fn parts(dataset: &Dataset, seed: u64) -> Result<(Rows<'_>, Rows<'_>)> {
     let accepted = dataset.accepted().count();
     ensure!(
         accepted >= FEWEST_ROWS,
         "{accepted} accepted rows are too few to train on"
     );
-    let [training, held_out] = split.of(dataset, seed)?.map(|rows| dataset.pick(&rows));
+    let [training, held_out] = dataset.split(seed)?.map(|rows| dataset.pick(&rows));
     Ok((training, held_out))
 }
 
@@ -251,12 +206,12 @@ fn samples(rows: &Rows<'_>, options: &Options) -> Samples {
     }
 }
 
-fn record(dataset: &Dataset, split: Split, rows: usize) -> Training {
+fn record(dataset: &Dataset, rows: usize) -> Training {
     Training {
         scene: dataset.about.scene.clone(),
         data_seed: dataset.about.seed,
         rows,
-        split,
+        split: WITHIN_POSE.to_owned(),
         ..Training::default()
     }
 }

@@ -9,7 +9,7 @@ use hivtac_sensing::model::Model;
 use super::PeersArgs;
 use super::models::How;
 use crate::conditions::CentroidName;
-use crate::dataset::{Dataset, Eye, Eyes, Loads, Recipe, Sensing, Split, generate_files};
+use crate::dataset::{Dataset, Eye, Eyes, Loads, Recipe, Sensing, generate_files};
 use crate::fit::fit;
 use crate::quantize::export;
 use crate::scene::size::Size;
@@ -95,7 +95,7 @@ impl Frames {
             rounded_epochs: 0,
             ..Options::default()
         };
-        let bytes = export(&fit(&ours, Split::WithinPose, &smallest, |_| ())?.weights)?;
+        let bytes = export(&fit(&ours, &smallest, |_| ())?.weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"));
         let model = model.context("the model that tells what the chip refuses")?;
         let [our_test, their_test] = see(&test, "test", Some(&model))?;

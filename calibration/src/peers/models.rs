@@ -9,7 +9,7 @@ use hivtac_sensing::network::Network;
 use super::frames::{Frames, Sets};
 use super::{PeersArgs, there};
 use crate::check::vector_n;
-use crate::dataset::{Dataset, Split};
+use crate::dataset::Dataset;
 use crate::fit::fit;
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
@@ -122,8 +122,8 @@ impl Kept<'_> {
             return Weights::load(&path);
         }
         println!("training {}", path.display());
-        let fitted = fit(data, Split::WithinPose, options, |_| ())
-            .with_context(|| format!("training {}", path.display()))?;
+        let fitted =
+            fit(data, options, |_| ()).with_context(|| format!("training {}", path.display()))?;
         fitted.weights.save(&path)?;
         Ok(fitted.weights)
     }
@@ -161,6 +161,7 @@ fn plain(args: &PeersArgs) -> Options {
         arithmetic: Arithmetic::Int16,
         epochs: args.our_epochs,
         rounded_epochs: 0,
+        direction_weight: None,
         seed: SEED,
         ..Options::default()
     }

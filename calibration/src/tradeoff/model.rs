@@ -10,7 +10,7 @@ use super::plan::{RENDERED, preset};
 use super::table::Configuration;
 use crate::check::check;
 use crate::conditions::Conditions;
-use crate::dataset::{Loads, Recipe, Split, generate};
+use crate::dataset::{Loads, Recipe, generate};
 use crate::fit::fit;
 use crate::network::Meaning;
 use crate::quantize::export;
@@ -55,7 +55,7 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
         arithmetic: picked.numbers.arithmetic().unwrap_or_default(),
         ..Options::default()
     };
-    let mut weights = fit(&dataset, Split::WithinPose, &options, |_| ())?.weights;
+    let mut weights = fit(&dataset, &options, |_| ())?.weights;
     if picked.steps > 0 {
         let (rows, seed) = NOISE;
         let recipe = Recipe {
@@ -82,7 +82,7 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
     )?;
     let (samples, seed) = CHECKED;
     // The contact reading is `force`: no friction has a part in it.
-    let report = check(&bytes, samples, seed, 0.0, || ())?;
+    let report = check(&bytes, samples, seed, || ())?;
     Ok(format!(
         "{report}\n\nwrote model.hvtm, model.weights and settings.json into {}\n\n{}",
         folder.display(),

@@ -13,7 +13,7 @@ use super::frames::{Frames, frames};
 use super::plan::{CENTROIDS, JUDGED_MM, JUDGED_N, Numbers, Plan, STEPS, Task};
 use super::results::{Figures, Finished, Results};
 use crate::answer::Chip;
-use crate::dataset::{Dataset, Row, Split};
+use crate::dataset::{Dataset, Row};
 use crate::errors::{WEAK_N, angle_deg, norm};
 use crate::fit::fit;
 use crate::network::Meaning;
@@ -118,7 +118,7 @@ fn parted(dataset: &Dataset, parts: usize, seed: usize) -> [Dataset; 2] {
 
 fn models(plan: &Plan, training: &Dataset, task: &Task) -> Result<Vec<(Numbers, Weights)>> {
     let estimator = &task.estimator;
-    let (seed, split) = (task.seed as u64, Split::WithinPose);
+    let seed = task.seed as u64;
     let [epochs, rounded_epochs] = plan.epochs_of(estimator);
     let mut options = Options {
         meaning: Meaning::ForceAndPlace,
@@ -133,7 +133,7 @@ fn models(plan: &Plan, training: &Dataset, task: &Task) -> Result<Vec<(Numbers, 
         (options.learning_rate, options.batch) = (PAPER_RATE, PAPER_BATCH);
         options.direction_weight = None;
     }
-    let float = fit(training, split, &options, |_| ())?.weights;
+    let float = fit(training, &options, |_| ())?.weights;
     let mut models = vec![(Numbers::F32, float.clone())];
     for numbers in Numbers::ALL {
         let Some(arithmetic) = numbers.arithmetic() else {
@@ -146,7 +146,7 @@ fn models(plan: &Plan, training: &Dataset, task: &Task) -> Result<Vec<(Numbers, 
             start: Some(float.network.clone()),
             ..options.clone()
         };
-        models.push((numbers, fit(training, split, &options, |_| ())?.weights));
+        models.push((numbers, fit(training, &options, |_| ())?.weights));
     }
     Ok(models)
 }

@@ -39,7 +39,7 @@ pub struct Samples {
 pub struct Progress {
     /// Passes finished, from 1.
     pub epoch: usize,
-    /// Passes in all, if nothing stops early.
+    /// Passes in all.
     pub epochs: usize,
     /// Whether the chip's rounding was on.
     pub rounded: bool,
@@ -101,9 +101,6 @@ pub fn train(
                 loss.is_finite(),
                 "training diverged: try a smaller learning rate"
             );
-            if state.stale(options.patience) {
-                break;
-            }
         }
         state.take_best();
         before += phase.epochs;
@@ -122,7 +119,7 @@ impl Samples {
         );
         let forces = self.forces_n.len();
         ensure!(
-            options.direction_weight.is_none() || forces == rows,
+            options.direction_weight_in_use().is_none() || forces == rows,
             "{rows} rows of features, but {forces} of forces to weigh them by"
         );
         let (places, wanted) = (self.places_mm.len(), options.meaning_in_use().tells_place());

@@ -1,64 +1,86 @@
 //! How to train.
 
-use anyhow::{Result, ensure};
+use std::path::Path;
 
+use anyhow::{Result, ensure};
+use clap::Args;
+
+use crate::import;
 use crate::network::{Arithmetic, Layer, Meaning, Network};
+use crate::weights::Weights;
 
 /// The widest layer that a model file can hold.
 const WIDEST: usize = hivtac_sensing::model::MAX_WIDTH;
 /// The most layers between inputs and outputs.
 const MOST_HIDDEN: usize = hivtac_sensing::model::MAX_LAYERS - 1;
 
-/// How to train.
-#[derive(Clone, Debug)]
+/// How to train. Those without an argument are for studies of other networks: what they are by
+/// default is what helps.
+#[derive(Args, Clone, Debug, PartialEq)]
 pub struct Options {
     /// Widths of the hidden layers.
+    #[arg(long, value_delimiter = ',', default_values_t = Options::default().hidden)]
     pub hidden: Vec<usize>,
     /// What the outputs are.
+    #[arg(skip)]
     pub meaning: Meaning,
     /// How the chip holds the weights.
+    #[arg(long, value_enum, default_value_t)]
     pub arithmetic: Arithmetic,
     /// Passes over the data in floats.
+    #[arg(long, default_value_t = Options::default().epochs)]
     pub epochs: usize,
     /// Passes over the data after that, with the chip's rounding.
+    #[arg(long, default_value_t = Options::default().rounded_epochs)]
     pub rounded_epochs: usize,
     /// Rows that share one optimizer step.
+    #[arg(skip = Options::default().batch)]
     pub batch: usize,
     /// Adam's step size at the beginning; it falls linearly to nothing.
+    #[arg(skip = Options::default().learning_rate)]
     pub learning_rate: f64,
-    /// Passes without a better loss on held-out samples after which a phase ends early; 0 for never.
-    pub patience: usize,
-    /// Whether the first layer is trained on the features' principal components, weak ones made larger; the network is then
-    /// folded back to features.
+    /// Whether the first layer is trained on the features' principal components, weak ones made
+    /// larger; the network is then folded back to features.
+    #[arg(skip = Options::default().whitened)]
     pub whitened: bool,
-    /// Weighs what is off across each row's force by 1 / √(|F|² + (10 mN)²), times what makes the mean weight this, so that weak
-    /// forces' directions count, too; what is off along the force counts 1 everywhere. For force vectors. `None` weighs nothing.
+    /// Weighs what is off across each row's force by 1 / √(|F|² + (10 mN)²), times what makes the
+    /// mean weight this, so that weak forces' directions count, too; what is off along the force
+    /// counts 1 everywhere. `None` weighs nothing, and nothing is weighed where angles are the
+    /// outputs.
+    #[arg(skip = Options::default().direction_weight)]
     pub direction_weight: Option<f64>,
-    /// Each step takes this times the step size off every weight (AdamW), biases excepted. What no data ask for goes away, such
-    /// as the weights of components that never vary, which would make the chip's rounding of inputs larger.
+    /// Each step takes this times the step size off every weight (AdamW), biases excepted. What no
+    /// data ask for goes away, such as the weights of components that never vary, which would make
+    /// the chip's rounding of inputs larger.
+    #[arg(skip)]
     pub weight_decay: f64,
-    /// Before training with rounding, each unit whose activation would have seven bits becomes so many, one for each part of its
-    /// reach ([`Network::split`]): the layer is as many times wider on the chip, and its steps as many times finer. For int8.
+    /// Before training with rounding, each unit whose activation would have seven bits becomes so
+    /// many, one for each part of its reach ([`Network::split`]): the layer is as many times wider
+    /// on the chip, and its steps as many times finer. For int8.
+    #[arg(skip = Options::default().unit_parts)]
     pub unit_parts: usize,
     /// Decides first weights and shuffling.
+    #[arg(skip = Options::default().seed)]
     pub seed: u64,
-    /// A network to go on from instead of random weights; its widths, meaning and scaling then hold.
+    /// A weights file, or a network of PyTorch (.safetensors), to go on from instead of random
+    /// weights; its widths, outputs and scaling then hold.
+    #[arg(long, value_name = "FILE", value_parser = network_in)]
     pub start: Option<Network>,
 }
 
 impl Default for Options {
+    /// As the default model is trained, but for the place.
     fn default() -> Self {
         Self {
             hidden: vec![64, 64],
             meaning: Meaning::ForceVector,
             arithmetic: Arithmetic::Int8PerChannel,
-            epochs: 150,
-            rounded_epochs: 100,
+            epochs: 400,
+            rounded_epochs: 300,
             batch: 256,
             learning_rate: 5e-3,
-            patience: 0,
             whitened: true,
-            direction_weight: None,
+            direction_weight: Some(3.0),
             weight_decay: 0.0,
             unit_parts: 1,
             seed: 1,
@@ -67,10 +89,26 @@ impl Default for Options {
     }
 }
 
+/// The network in a weights file or in one of PyTorch.
+fn network_in(file: &str) -> Result<Network, String> {
+    let path = Path::new(file);
+    let network = match path.extension().is_some_and(|it| it == "safetensors") {
+        true => import::load(path),
+        false => Weights::load(path).map(|weights| weights.network),
+    };
+    network.map_err(|error| format!("{error:#}"))
+}
+
 impl Options {
     /// What the outputs of the trained network are.
     pub(crate) fn meaning_in_use(&self) -> Meaning {
         self.start.as_ref().map_or(self.meaning, |it| it.meaning)
+    }
+
+    /// The mean weight of directions: none where angles are the outputs.
+    pub(super) fn direction_weight_in_use(&self) -> Option<f64> {
+        let is_vector = self.meaning_in_use().is_vector();
+        self.direction_weight.filter(|_| is_vector)
     }
 
     pub(super) fn check(&self) -> Result<()> {
@@ -104,10 +142,6 @@ impl Options {
         ensure!(
             weight.is_finite() && weight > 0.0,
             "the weight of directions must be above zero"
-        );
-        ensure!(
-            self.meaning_in_use().is_vector(),
-            "directions are weighed for networks that answer with a force vector only"
         );
         Ok(())
     }
@@ -148,5 +182,23 @@ impl Options {
             self.unit_parts
         );
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        options: Options,
+    }
+
+    #[test]
+    fn without_arguments_they_are_the_default() {
+        assert_eq!(Command::parse_from(["train"]).options, Options::default());
     }
 }

@@ -16,8 +16,6 @@ use crate::weights::features_from_q16;
 
 /// Rows that are measured at a time.
 const MEASURED_ROWS: usize = 256;
-/// A loss counts as better from this much below the best one on.
-const BETTER: f64 = 1e-3;
 
 /// One half of a training.
 pub(super) struct Phase {
@@ -48,10 +46,6 @@ pub(super) struct State {
 struct Best {
     layers: Mlp,
     loss: f64,
-    /// Passes since a clearly better loss.
-    age: usize,
-    /// The last clearly better loss.
-    mark: f64,
 }
 
 /// Data as the network takes it.
@@ -143,7 +137,7 @@ impl State {
         }
         let rows = |samples: &Samples| {
             let weighed = |weight| Across::new(samples, training, weight);
-            let across = options.direction_weight.map(weighed);
+            let across = options.direction_weight_in_use().map(weighed);
             Rows::new(samples, &network, &whitening, across)
         };
         Ok(Self {
@@ -251,13 +245,7 @@ impl State {
         let best = self.best.get_or_insert_with(|| Best {
             layers: self.mlp.clone(),
             loss,
-            age: 0,
-            mark: loss,
         });
-        best.age += 1;
-        if loss < best.mark * (1.0 - BETTER) {
-            (best.mark, best.age) = (loss, 0);
-        }
         // A loss that is no number never is the best: without held-out samples the last pass is.
         if loss <= best.loss || loss.is_nan() {
             (best.layers, best.loss) = (self.mlp.clone(), loss);
@@ -276,11 +264,6 @@ impl State {
     pub fn chip_inputs(&self) -> Vec<f64> {
         let all: Vec<usize> = (0..self.training.steps.len()).collect();
         gathered(&self.training.steps, &all)
-    }
-
-    /// Whether nothing has got better for `patience` passes.
-    pub fn stale(&self, patience: usize) -> bool {
-        patience > 0 && self.best.as_ref().is_some_and(|best| best.age >= patience)
     }
 
     /// Goes back to the best weights of the phase.

@@ -1,0 +1,6 @@
+//! The commands, one file for each kind of file that they write.
+
+pub mod data;
+pub mod default_model;
+pub mod model;
+pub mod network;

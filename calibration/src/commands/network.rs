@@ -1,0 +1,130 @@
+//! Weights files: a network, the film beside it, a unit's own.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use hivtac_calibration::dataset::Dataset;
+use hivtac_calibration::errors::{Errors, WEAK_N};
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::Meaning;
+use hivtac_calibration::progress::bar;
+use hivtac_calibration::train::Options;
+use hivtac_calibration::weights::Weights;
+
+/// Options of `train`.
+#[derive(Args)]
+pub struct TrainArgs {
+    /// The data set.
+    #[arg(long)]
+    data: PathBuf,
+    #[command(flatten)]
+    options: Options,
+    /// The weights file to write.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl TrainArgs {
+    pub fn run(self) -> Result<()> {
+        let dataset = Dataset::load(&self.data)?;
+        let options = Options {
+            meaning: match dataset.knows_places() {
+                true => Meaning::ForceAndPlace,
+                false => Meaning::ForceVector,
+            },
+            ..self.options
+        };
+        trained(&dataset, &options)?.save(&self.out)
+    }
+}
+
+/// Trains, and prints the errors on held-out rows.
+pub fn trained(dataset: &Dataset, options: &Options) -> Result<Weights> {
+    let bar = bar("training", options.epochs + options.rounded_epochs);
+    let fitted = fit(dataset, options, |progress| {
+        bar.inc(1);
+        let phase = if progress.rounded {
+            "with rounding"
+        } else {
+            "in floats"
+        };
+        bar.set_message(format!("loss {:.5} {phase}", progress.loss));
+    })?;
+    bar.finish_and_clear();
+    println!("contact reading `{}`", fitted.weights.conditions.contact);
+    print_errors("held-out rows, floats", &fitted.float);
+    print_errors("held-out rows, quantized", &fitted.quantized);
+    Ok(fitted.weights)
+}
+
+fn print_errors(what: &str, errors: &Errors) {
+    let place = errors.place_rmse_mm().map_or(String::new(), |mm| {
+        format!(", RMSE of the place {:.0} µm along x and y each", mm * 1e3)
+    });
+    println!(
+        "{what}: {} rows, mean direction error {:.3}° ({:.3}° from {} mN up), RMSE of |F| {:.3} mN{}",
+        errors.count(),
+        errors.mean_direction_deg(),
+        errors.mean_strong_direction_deg(),
+        WEAK_N * 1e3,
+        errors.magnitude_rmse_n() * 1e3,
+        place,
+    );
+}
+
+/// Options of `film`.
+#[derive(Args)]
+pub struct FilmArgs {
+    /// The weights file.
+    #[arg(long)]
+    weights: PathBuf,
+    /// Presses anywhere (`dataset --samples 6000 --seed 5`), 200 and more.
+    #[arg(long)]
+    data: PathBuf,
+    /// Gauss–Newton steps from the network's answer, 0 to 3.
+    #[arg(long, default_value_t = 1)]
+    steps: u8,
+    /// The weights file to write.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl FilmArgs {
+    pub fn run(&self) -> Result<()> {
+        let weights = Weights::load(&self.weights)?;
+        let dataset = Dataset::load(&self.data)?;
+        weights.with_film(self.steps, &dataset)?.save(&self.out)
+    }
+}
+
+/// Options of `unit`.
+#[derive(Args)]
+pub struct UnitArgs {
+    /// A weights file with a film (`calibration/models/default.weights`).
+    #[arg(long)]
+    weights: PathBuf,
+    /// The unit's data set: frames without force, and frames of each load, with its place
+    /// (`x_mm`, `y_mm`); without places, all in the film's middle.
+    #[arg(long)]
+    data: PathBuf,
+    /// Standard uncertainty of a load's |F|, N.
+    #[arg(long, default_value_t = 0.001)]
+    gauge_n: f64,
+    /// Standard uncertainty of where the stage's zero is on the film, mm.
+    #[arg(long, default_value_t = 0.1)]
+    stage_mm: f64,
+    /// The weights file to write.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl UnitArgs {
+    pub fn run(&self) -> Result<()> {
+        let weights = Weights::load(&self.weights)?;
+        let dataset = Dataset::load(&self.data)?;
+        let (weights, fit) = weights.for_unit(&dataset, self.gauge_n, self.stage_mm)?;
+        print!("{fit}");
+        weights.save(&self.out)
+    }
+}
