@@ -30,6 +30,12 @@ impl Weights {
                 && own.centroid == other.centroid,
             "the weights are for other frames than the data set's"
         );
+        ensure!(
+            own.contact == other.contact,
+            "the weights are for the contact reading `{}`, and the data set's is `{}`",
+            own.contact,
+            other.contact
+        );
         let origin = other.origin.clone();
         let (mut weights, found) =
             self.fitted(dataset.rest()?, &loads(dataset)?, gauge_n, stage_mm)?;
@@ -123,4 +129,35 @@ fn seen(observation: &Observation) -> [[f64; 2]; 4] {
 /// Markers 0–3 of a frame's features.
 fn places(features_px: &[f64]) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| [features_px[2 * k], features_px[2 * k + 1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use hivtac_scene::Contact;
+
+    use super::*;
+    use crate::dataset::{Loads, Recipe, generate};
+    use crate::range::Range;
+
+    /// A pressing direction is no direction of the force that the film model explains.
+    #[test]
+    fn loads_of_another_contact_reading_are_refused() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/default.weights");
+        let recipe = Recipe {
+            contact: Contact::Stick,
+            loads: Loads::Random(5),
+            range: Range::default(),
+            rest: 2,
+            ..Recipe::default()
+        };
+        let dataset = generate(&recipe, || ()).unwrap();
+        let refused = Weights::load(&file).unwrap().for_unit(&dataset, 1e-3, 0.1);
+        let error = refused.unwrap_err().to_string();
+        assert!(
+            error.contains("reading `force`") && error.contains("`stick`"),
+            "{error}"
+        );
+    }
 }
