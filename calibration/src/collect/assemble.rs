@@ -338,3 +338,6 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
         },
     }
 }
+
+#[cfg(test)]
+mod tests;
