@@ -36,44 +36,26 @@ use crate::band_dma::BandDma;
 use crate::bands::SHAPE;
 use crate::camera::{self, Format};
 use crate::seeded_bugs::INVERTED_POLARITIES;
+use crate::shared::{BANDS_FINISHED, CAPTURE, CAPTURE_ACTIVITY, CAPTURE_EVENTS, CAPTURED_FORMAT};
 use crate::{stats, vsync};
-use core::cell::{Cell, RefCell};
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::cell::Cell;
+use core::sync::atomic::Ordering;
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::pac::{DCMI, RCC};
 use embassy_stm32::{Peri, peripherals, rcc};
-use embassy_sync::blocking_mutex::CriticalSectionMutex;
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use hivtac_capture::{Edge, Event, Interface, Tracker};
-
-/// Events that wait for the pipeline: more than bands that are still whole.
-const EVENTS_WAITING: usize = 72;
 
 /// An event, and what pixels the camera sends since the newest start.
 #[derive(Clone, Copy)]
-pub struct Told {
+pub struct CaptureEvent {
     /// What happened.
     pub event: Event,
     /// The frames' pixels.
     pub format: Format,
 }
 
-/// What happens, in order. When there is no room an event is lost; the pipeline notices that by the next one.
-pub static EVENTS: Channel<CriticalSectionRawMutex, Told, EVENTS_WAITING> = Channel::new();
-
-/// Of the frames that are captured; changes only while the capture is stopped.
-static FORMAT: CriticalSectionMutex<Cell<Format>> =
-    CriticalSectionMutex::new(Cell::new(Format::Rgb565));
-
-static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
-    CriticalSectionMutex::new(RefCell::new(None));
-/// [`Tracker::finished`].
-static FINISHED: AtomicU32 = AtomicU32::new(0);
-/// Events so far, lost ones too.
-static ACTIVITY: AtomicU32 = AtomicU32::new(0);
-
-struct Running {
+/// The tracker, and what it steers.
+pub struct Running {
     tracker: Tracker,
     hardware: Hardware,
 }
@@ -107,23 +89,22 @@ impl Capture {
 
     /// What pixels the camera sends.
     pub fn format(&self) -> Format {
-        FORMAT.lock(Cell::get)
+        CAPTURED_FORMAT.lock(Cell::get)
     }
 
     /// The camera sends such pixels from now on. Only while nothing is captured.
     pub fn set_format(&mut self, format: Format) {
-        FORMAT.lock(|cell| cell.set(format));
+        CAPTURED_FORMAT.lock(|cell| cell.set(format));
     }
 
     /// Captures from the next frame on, after the time that `passed` tells of.
     pub async fn start(&mut self, passed: Event) {
         let format = self.format();
-        EVENTS
-            .send(Told {
-                event: passed,
-                format,
-            })
-            .await;
+        let event = CaptureEvent {
+            event: passed,
+            format,
+        };
+        CAPTURE_EVENTS.send(event).await;
         act(|running, _| running.tracker.start(&mut running.hardware));
     }
 
@@ -139,13 +120,13 @@ impl Capture {
 
     /// A number that changes whenever something comes from the camera: at least once a frame.
     pub fn activity(&self) -> u32 {
-        ACTIVITY.load(Ordering::Relaxed)
+        CAPTURE_ACTIVITY.load(Ordering::Relaxed)
     }
 }
 
 /// Bands finished since boot, modulo 2³².
 pub fn finished() -> u32 {
-    FINISHED.load(Ordering::Acquire)
+    BANDS_FINISHED.load(Ordering::Acquire)
 }
 
 /// Whether anything has come since the newest band that an event told of.
@@ -163,16 +144,16 @@ fn act(what: impl FnOnce(&mut Running, fn(Event))) {
             && let Some(running) = capture.as_mut()
         {
             what(running, tell);
-            FINISHED.store(running.tracker.finished(), Ordering::Release);
+            BANDS_FINISHED.store(running.tracker.finished(), Ordering::Release);
         }
     });
 }
 
 fn tell(event: Event) {
-    ACTIVITY.fetch_add(1, Ordering::Relaxed);
-    let format = FORMAT.lock(Cell::get);
-    // Documented at `EVENTS`.
-    let _ = EVENTS.try_send(Told { event, format });
+    CAPTURE_ACTIVITY.fetch_add(1, Ordering::Relaxed);
+    let format = CAPTURED_FORMAT.lock(Cell::get);
+    // Documented at `CAPTURE_EVENTS`.
+    let _ = CAPTURE_EVENTS.try_send(CaptureEvent { event, format });
 }
 
 impl Interface for Hardware {

@@ -5,11 +5,10 @@ use crate::camera::{self, Camera, FRAME_TIME, Format};
 use crate::capture::Capture;
 use crate::health::{self, Condition};
 use crate::session::Asked;
+use crate::shared::{EXPOSING, REQUESTED_EXPOSURE, REQUESTED_FORMAT};
 use crate::{log, outbox, stats, vsync};
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::Ordering;
 use embassy_futures::select::{Either3, select3};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
 use hivtac_wire::message::{DeviceMessage, LogLevel, Outcome, Reply};
@@ -22,22 +21,14 @@ const SILENCES: u32 = 3;
 /// Pause before the next attempt when the camera does not answer.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// What pixels the camera shall send. Done once it does.
-pub static WANTED_FORMAT: Signal<CriticalSectionRawMutex, Format> = Signal::new();
-
-/// Who wants exposure and gain to be found anew. Replied to when they are.
-static WANTED_EXPOSURE: Signal<CriticalSectionRawMutex, Asked> = Signal::new();
-
 /// Has exposure and gain found anew for the command `id`; `Busy` while they are.
 pub fn expose(id: u16) -> Option<Outcome> {
     if EXPOSING.swap(true, Ordering::Relaxed) {
         return Some(Outcome::Busy);
     }
-    WANTED_EXPOSURE.signal(Asked::by(id));
+    REQUESTED_EXPOSURE.signal(Asked::by(id));
     None
 }
-
-static EXPOSING: AtomicBool = AtomicBool::new(false);
 
 /// Runs for ever at the capture executor's priority. The camera begins with `format`.
 #[embassy_executor::task]
@@ -54,7 +45,8 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
     task.start_camera().await;
     loop {
         let frame_time = Timer::after(FRAME_TIME);
-        match select3(WANTED_FORMAT.wait(), WANTED_EXPOSURE.wait(), frame_time).await {
+        let (format, exposure) = (REQUESTED_FORMAT.wait(), REQUESTED_EXPOSURE.wait());
+        match select3(format, exposure, frame_time).await {
             Either3::First(format) => task.change_format(format).await,
             Either3::Second(asked) => task.expose(asked).await,
             Either3::Third(()) => task.listen().await,

@@ -1,6 +1,7 @@
 //! What the host asks for, and the answers.
 
-use crate::pipeline_task::{self, Order};
+use crate::pipeline_task::Order;
+use crate::shared::ORDERS;
 use crate::{capture_task, info, outbox, session, stats};
 use hivtac_sensing::model::Model;
 use hivtac_wire::decoder::Received;
@@ -68,7 +69,7 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
 
 /// Passes an order on; `Busy` when there are too many.
 fn order(order: Order) -> Option<Outcome> {
-    match pipeline_task::ORDERS.try_send(order) {
+    match ORDERS.try_send(order) {
         Ok(()) => None,
         Err(_) => Some(Outcome::Busy),
     }

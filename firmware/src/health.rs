@@ -7,7 +7,8 @@
 //! | blinks five times a second | no camera |
 //! | two flashes a second | silicon too old: `board/silicon.rs` |
 
-use core::sync::atomic::{AtomicU8, Ordering};
+use crate::shared::CONDITION;
+use core::sync::atomic::Ordering;
 use embassy_stm32::gpio::Output;
 use embassy_time::{Duration, Instant, Timer};
 use micromath::F32Ext;
@@ -23,8 +24,6 @@ pub enum Condition {
     /// Frames give forces.
     Good = 2,
 }
-
-static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
 
 /// One period of the LED's dimming: fast enough not to flicker.
 const PERIOD: Duration = Duration::from_millis(10);

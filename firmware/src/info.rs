@@ -1,9 +1,9 @@
 //! What the device says about itself.
 
+use crate::shared::SETTINGS;
 use crate::{board, camera, convert};
 use core::cell::Cell;
 use core::fmt::Write;
-use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use heapless::String;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::settings::Settings;
@@ -11,18 +11,14 @@ use hivtac_sensing::threshold::ByteOrder;
 use hivtac_wire::message::{DeviceHello, ModelIdentity};
 use hivtac_wire::version::HelloPrefix;
 
-/// How the pipeline looks at frames; nothing before it is configured.
-static LOOKING: CriticalSectionMutex<Cell<Option<Settings>>> =
-    CriticalSectionMutex::new(Cell::new(None));
-
-/// The pipeline tells how it looks at frames.
-pub fn set_looking(settings: &Settings) {
-    LOOKING.lock(|cell| cell.set(Some(*settings)));
+/// Tells what settings the pipeline has from now on.
+pub fn set_settings(settings: &Settings) {
+    SETTINGS.lock(|cell| cell.set(Some(*settings)));
 }
 
 /// The device's hello.
 pub fn hello(model: Option<&Model>) -> DeviceHello {
-    let settings = LOOKING
+    let settings = SETTINGS
         .lock(Cell::get)
         .unwrap_or_else(|| Settings::usual(camera::GEOMETRY, ByteOrder::Swapped));
     DeviceHello {

@@ -7,7 +7,8 @@
 //!                             orders ← commands ←──┘
 //! ```
 //!
-//! Who interrupts whom: [`priorities`]. What lies where: `memory.x`, [`caches`]. Nothing is allocated after boot.
+//! Who interrupts whom: [`priorities`]. What they share: [`shared`]. What lies where: `memory.x`,
+//! [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
 
@@ -33,6 +34,7 @@ mod pipeline_task;
 mod priorities;
 mod seeded_bugs;
 mod session;
+mod shared;
 mod stats;
 mod tare;
 mod usb;
@@ -107,7 +109,7 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
         defmt::panic!("the built-in settings are out of range");
     }
     sensor.set_motion(Motion::rolling(camera::LINES));
-    info::set_looking(sensor.settings());
+    info::set_settings(sensor.settings());
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(Format::Rgb565)
 }

@@ -2,9 +2,9 @@
 //! another pixel format, with the first frame of that format. Until then the one before serves.
 
 use crate::camera::Format;
-use crate::capture_task;
 use crate::pipeline_task::Sensor;
 use crate::session::Asked;
+use crate::shared::REQUESTED_FORMAT;
 use hivtac_sensing::threshold::Threshold;
 use hivtac_wire::message::Outcome;
 
@@ -39,7 +39,7 @@ impl NextThreshold {
             return Ok(true);
         }
         self.0 = Some((Asked::by(id), threshold));
-        capture_task::WANTED_FORMAT.signal(format);
+        REQUESTED_FORMAT.signal(format);
         Ok(false)
     }
 

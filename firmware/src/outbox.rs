@@ -1,16 +1,9 @@
 //! What waits to be sent to the host. Bounded: nobody who measures ever waits for the host.
 
+use crate::shared::{ANSWERS, SAMPLES};
 use crate::{session, stats};
 use embassy_futures::select::{Either, select};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use hivtac_wire::message::{DeviceMessage, Sample};
-
-/// Hellos, replies, stats and log lines.
-static ANSWERS: Channel<CriticalSectionRawMutex, DeviceMessage, 8> = Channel::new();
-/// Samples: 0.2 s of them. Older ones are worth more than a gap, but not more than a fresh measurement's latency.
-#[unsafe(link_section = ".sram.samples")]
-static SAMPLES: Channel<CriticalSectionRawMutex, Sample, 32> = Channel::new();
 
 /// Queues an answer that the host waits for; waits for room. Only for tasks that serve the host.
 pub async fn answer(message: DeviceMessage) {

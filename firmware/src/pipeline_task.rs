@@ -3,17 +3,16 @@
 use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
 use crate::camera;
-use crate::capture::{self, EVENTS, Told};
+use crate::capture::{self, CaptureEvent};
 use crate::convert;
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
 use crate::next_threshold::NextThreshold;
 use crate::session::Asked;
+use crate::shared::{CAPTURE_EVENTS, ORDERS};
 use crate::tare::Taring;
 use crate::{info, outbox, session, stats, vsync};
 use embassy_futures::select::{Either3, select3};
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::channel::Channel;
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
@@ -40,9 +39,6 @@ pub enum Order {
 
 /// The pipeline, its table in DTCM.
 pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
-
-/// Orders that wait.
-pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
@@ -88,9 +84,10 @@ impl PipelineTask {
         }
         self.taring.take_if(|taring| !taring.is_wanted());
         let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
-        match select3(ORDERS.receive(), EVENTS.receive(), Timer::at(deadline)).await {
+        let (order, event) = (ORDERS.receive(), CAPTURE_EVENTS.receive());
+        match select3(order, event, Timer::at(deadline)).await {
             Either3::First(order) => self.obey(order),
-            Either3::Second(told) => self.follow(told),
+            Either3::Second(event) => self.take(event),
             Either3::Third(()) => self.give_up_tare(),
         }
     }
@@ -98,16 +95,17 @@ impl PipelineTask {
     /// Goes on with the frame under way. One that has all its rows need not wait for its end.
     async fn go_on(&mut self) {
         let complete = self.follower.is_complete();
-        if complete && EVENTS.is_empty() && !capture::has_begun_a_band() {
+        if complete && CAPTURE_EVENTS.is_empty() && !capture::has_begun_a_band() {
             let action = self.follower.deliver();
             self.act(action);
         } else {
-            let told = EVENTS.receive().await;
-            self.follow(told);
+            let event = CAPTURE_EVENTS.receive().await;
+            self.take(event);
         }
     }
 
-    fn follow(&mut self, Told { event, format }: Told) {
+    /// Takes what the capture tells, and does what follows from it.
+    fn take(&mut self, CaptureEvent { event, format }: CaptureEvent) {
         if let Event::Ended { edge, how } = event
             && how != Ending::Whole
         {
@@ -192,10 +190,10 @@ impl PipelineTask {
     /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
     /// which frames pass.
     fn threshold_changed(&mut self) {
-        info::set_looking(self.sensor.settings());
+        info::set_settings(self.sensor.settings());
         self.sensor.forget_motion();
         let mut missed = false;
-        while let Ok(Told { event, .. }) = EVENTS.try_receive() {
+        while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
             missed = true;
             if let Event::Passed { from, .. } = event {
                 self.follower.pass_over(from);

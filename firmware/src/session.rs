@@ -1,17 +1,13 @@
 //! Whether a host listens, and what it wants: a conversation as `docs/wire.md` defines it.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-
-static OPEN: AtomicBool = AtomicBool::new(false);
-static STREAMING: AtomicBool = AtomicBool::new(false);
-static MARKERS: AtomicBool = AtomicBool::new(false);
-static NUMBER: AtomicU32 = AtomicU32::new(0);
+use crate::shared::{CONVERSATION, SESSION_OPEN, STREAMING, WITH_MARKERS};
+use core::sync::atomic::Ordering;
 
 /// A hello began a new conversation; `understood` when host and device speak the same version.
 pub fn begin(understood: bool) {
     STREAMING.store(false, Ordering::Relaxed);
-    OPEN.store(understood, Ordering::Relaxed);
-    NUMBER.fetch_add(1, Ordering::Relaxed);
+    SESSION_OPEN.store(understood, Ordering::Relaxed);
+    CONVERSATION.fetch_add(1, Ordering::Relaxed);
 }
 
 /// The host is gone.
@@ -21,12 +17,12 @@ pub fn end() {
 
 /// True between the host's hello and its end.
 pub fn is_open() -> bool {
-    OPEN.load(Ordering::Relaxed)
+    SESSION_OPEN.load(Ordering::Relaxed)
 }
 
 /// Another one for each conversation, so that no reply of an earlier one reaches the next.
 pub fn number() -> u32 {
-    NUMBER.load(Ordering::Relaxed)
+    CONVERSATION.load(Ordering::Relaxed)
 }
 
 /// Starts or stops the flow of samples and stats.
@@ -36,12 +32,12 @@ pub fn stream(on: bool) {
 
 /// From the next sample on, with markers or without.
 pub fn send_markers(on: bool) {
-    MARKERS.store(on, Ordering::Relaxed);
+    WITH_MARKERS.store(on, Ordering::Relaxed);
 }
 
 /// True while samples shall carry the markers.
 pub fn wants_markers() -> bool {
-    MARKERS.load(Ordering::Relaxed)
+    WITH_MARKERS.load(Ordering::Relaxed)
 }
 
 /// True while samples and stats flow.

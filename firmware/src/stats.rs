@@ -1,5 +1,6 @@
 //! Counters since boot, from every task and handler.
 
+use crate::shared::PASSING_OVER;
 use crate::vsync;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_time::Instant;
@@ -37,9 +38,8 @@ impl Counter {
     }
 }
 
-/// Number of the newest frame before the camera's set-up, while that lasts.
-static PASSING_OVER: AtomicU32 = AtomicU32::new(NOT_PASSING);
-const NOT_PASSING: u32 = u32::MAX;
+/// [`PASSING_OVER`] while the camera is not being set up.
+pub const NOT_PASSING: u32 = u32::MAX;
 
 /// From now on, every frame after number `last` counts as dropped.
 pub fn pass_over_frames_after(last: u32) {
@@ -60,9 +60,9 @@ fn passed_over(newest: u32) -> u32 {
 }
 
 macro_rules! counters {
-    ($($name:ident => $field:ident;)*) => {
+    ($($name:ident => $field:ident, $writers:literal;)*) => {
         $(
-            #[doc = concat!("[`Stats::", stringify!($field), "`].")]
+            #[doc = concat!("[`Stats::", stringify!($field), "`]. Written by the ", $writers, ".")]
             pub static $name: Counter = Counter::new();
         )*
 
@@ -82,16 +82,16 @@ macro_rules! counters {
 }
 
 counters! {
-    FRAMES_PROCESSED => frames_processed;
-    DROPPED_BUSY => dropped_busy;
-    DROPPED_OVERRUN => dropped_overrun;
-    DROPPED_SIZE => dropped_size;
-    DROPPED_SETUP => dropped_setup;
-    CAMERA_TIMEOUTS => camera_timeouts;
-    CAMERA_RESTARTS => camera_restarts;
-    CAPTURE_OVERRUNS => capture_overruns;
-    USB_DROPPED => usb_dropped;
-    HOST_FRAMES_REJECTED => host_frames_rejected;
-    PROCESSING_US => processing_us;
-    LATENCY_US => latency_us;
+    FRAMES_PROCESSED => frames_processed, "pipeline";
+    DROPPED_BUSY => dropped_busy, "pipeline";
+    DROPPED_OVERRUN => dropped_overrun, "pipeline";
+    DROPPED_SIZE => dropped_size, "pipeline";
+    DROPPED_SETUP => dropped_setup, "pipeline and the capture task";
+    CAMERA_TIMEOUTS => camera_timeouts, "capture task";
+    CAMERA_RESTARTS => camera_restarts, "capture task";
+    CAPTURE_OVERRUNS => capture_overruns, "capture handlers";
+    USB_DROPPED => usb_dropped, "pipeline and the USB tasks";
+    HOST_FRAMES_REJECTED => host_frames_rejected, "USB tasks";
+    PROCESSING_US => processing_us, "pipeline";
+    LATENCY_US => latency_us, "pipeline";
 }

@@ -5,21 +5,16 @@
 //! counted edge is the one that began it, however late a handler looks within that time.
 
 use crate::camera;
+use crate::shared::NEWEST_EDGE;
 use core::cell::Cell;
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::{self, EXTI, SYSCFG};
-use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::Instant;
 use hivtac_capture::Edge;
 
 /// The VSYNC pin is PB7 on every board with this camera connector.
 const LINE: usize = 7;
 const PORT_B: u8 = 1;
-
-static NEWEST: CriticalSectionMutex<Cell<Edge>> = CriticalSectionMutex::new(Cell::new(Edge {
-    number: 0,
-    time_us: 0,
-}));
 
 /// Begins to listen. The pin itself is set up with the camera interface's pins: EXTI sees it whatever its function.
 pub fn start() {
@@ -33,18 +28,18 @@ pub fn start() {
         pac::EXTI.imr(0).modify(|w| w.set_line(LINE, true));
     });
     interrupt::EXTI9_5.unpend();
-    // SAFETY: the handler below shares only `NEWEST`, behind a mutex.
+    // SAFETY: the handler below shares only `NEWEST_EDGE`, behind a mutex.
     unsafe { interrupt::EXTI9_5.enable() };
 }
 
 /// The newest edge; number 0 when there was none yet.
 pub fn newest() -> Edge {
-    NEWEST.lock(Cell::get)
+    NEWEST_EDGE.lock(Cell::get)
 }
 
 /// Begins to count from zero: the next edge gets number 1.
 pub fn restart_count() {
-    NEWEST.lock(|newest| newest.set(Edge::default()));
+    NEWEST_EDGE.lock(|newest| newest.set(Edge::default()));
 }
 
 #[embassy_stm32::interrupt]
@@ -55,7 +50,7 @@ fn EXTI9_5() {
     // return, or it runs twice and counts an edge that there was not; a read waits for the write.
     let _ = pending.read();
     let time_us = Instant::now().as_micros();
-    NEWEST.lock(|newest| {
+    NEWEST_EDGE.lock(|newest| {
         let number = newest.get().number.saturating_add(1);
         newest.set(Edge { number, time_us });
     });

@@ -5,8 +5,9 @@ use super::ov7725_registers::{
     AUTOMATIC, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, PID, TABLE, VER,
 };
 use crate::board::XCLK_HZ;
+use crate::shared::EXPOSURE_MIDDLE_US;
 use core::fmt;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::Ordering;
 use embassy_stm32::gpio::Output;
 use embassy_stm32::i2c;
 use embassy_time::{Duration, Instant, Timer};
@@ -58,8 +59,6 @@ const STEADY_FRAMES: u32 = 3;
 const PATIENCE: Duration = Duration::from_millis(300);
 /// Between two register writes: lets tasks of lower priority run.
 const PAUSE: Duration = Duration::from_micros(100);
-
-static EXPOSURE_MIDDLE_US: AtomicU32 = AtomicU32::new(0);
 
 /// From the VSYNC edge that begins a frame to the middle of its middle row's exposure, µs.
 pub fn exposure_middle_us() -> u32 {

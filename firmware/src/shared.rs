@@ -1,0 +1,127 @@
+//! All state that more than one context touches: who writes it, and who reads it.
+//!
+//! Contexts are those of [`priorities`](crate::priorities): the *VSYNC handler*, the *capture
+//! handlers* (DCMI and its DMA, of one priority), the *capture task*, the *USB tasks* (receiver,
+//! sender, watch on DTR, statistics; of one executor, as is the *LED task*), and in thread mode the
+//! *pipeline*. Each item is a lock, a queue or an atomic; the functions around it stand in the module
+//! of its subject, and nothing else touches it.
+//!
+//! Elsewhere, with the type or the list that belongs to them:
+//!
+//! | static | where | written by | read by |
+//! |---|---|---|---|
+//! | counters | `stats`, one for each field of the wire's statistics | see there | USB tasks |
+//! | `RING` | `bands`, in AXI SRAM | DMA of the camera; the core clears it at boot | MDMA |
+//! | `BUFFERS` | `band_copy`, in DTCM | MDMA | pipeline, which owns it from boot on |
+//! | `CAPTURE_EXECUTOR`, `USB_EXECUTOR` | `main` | embassy | embassy: boot and one handler each |
+//!
+//! Not shared: memory with one owner, which takes it once (`main::SENSOR`, `near_table::TABLE`),
+//! and constants (`model`).
+
+use crate::camera::Format;
+use crate::capture::{CaptureEvent, Running};
+use crate::health::Condition;
+use crate::pipeline_task::Order;
+use crate::session::Asked;
+use crate::stats;
+use core::cell::{Cell, RefCell};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embassy_sync::signal::Signal;
+use hivtac_capture::Edge;
+use hivtac_sensing::settings::Settings;
+use hivtac_wire::message::{DeviceMessage, Sample};
+
+/// What waits for one receiver; whoever sends never waits longer than for room.
+type Queue<T, const N: usize> = Channel<CriticalSectionRawMutex, T, N>;
+
+/// The newest thing that one receiver is asked for.
+type Request<T> = Signal<CriticalSectionRawMutex, T>;
+
+// The camera and its capture.
+
+/// The newest VSYNC edge. Written by the VSYNC handler, and set to zero by the capture task; read by
+/// the capture handlers, the capture task, the pipeline and the USB tasks (`vsync`).
+pub static NEWEST_EDGE: CriticalSectionMutex<Cell<Edge>> =
+    CriticalSectionMutex::new(Cell::new(Edge {
+        number: 0,
+        time_us: 0,
+    }));
+
+/// The tracker and the hardware that it steers. Used by the capture handlers, the capture task and
+/// the pipeline, one at a time (`capture`).
+pub static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
+    CriticalSectionMutex::new(RefCell::new(None));
+
+/// Pixels of the frames that are captured. Written by the capture task while the capture is stopped;
+/// read by the capture handlers and the capture task (`capture`).
+pub static CAPTURED_FORMAT: CriticalSectionMutex<Cell<Format>> =
+    CriticalSectionMutex::new(Cell::new(Format::Rgb565));
+
+/// Bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by the pipeline.
+pub static BANDS_FINISHED: AtomicU32 = AtomicU32::new(0);
+
+/// Capture events so far, lost ones too. Written by the capture handlers and the capture task; read
+/// by the capture task.
+pub static CAPTURE_ACTIVITY: AtomicU32 = AtomicU32::new(0);
+
+/// Capture events that wait: more than bands that are still whole.
+const CAPTURE_EVENTS_WAITING: usize = 72;
+
+/// What happens, in order. From the capture handlers and the capture task to the pipeline. When there
+/// is no room a handler's event is lost; the pipeline notices that by the next one.
+pub static CAPTURE_EVENTS: Queue<CaptureEvent, CAPTURE_EVENTS_WAITING> = Queue::new();
+
+/// What pixels the camera shall send. From the pipeline to the capture task.
+pub static REQUESTED_FORMAT: Request<Format> = Request::new();
+
+/// Who asks for exposure and gain to be found anew. From the USB tasks to the capture task.
+pub static REQUESTED_EXPOSURE: Request<Asked> = Request::new();
+
+/// Such a request is under way. Set by the USB tasks, cleared by the capture task (`capture_task`).
+pub static EXPOSING: AtomicBool = AtomicBool::new(false);
+
+/// From VSYNC back to the middle of the exposure, µs. Written by the capture task; read by the
+/// pipeline (`camera`).
+pub static EXPOSURE_MIDDLE_US: AtomicU32 = AtomicU32::new(0);
+
+/// Number of the newest frame before the camera's set-up, while that lasts. Written by the capture
+/// task; read by the USB tasks (`stats`).
+pub static PASSING_OVER: AtomicU32 = AtomicU32::new(stats::NOT_PASSING);
+
+// The pipeline.
+
+/// Orders of the host that wait. From the USB tasks to the pipeline.
+pub static ORDERS: Queue<Order, 4> = Queue::new();
+
+/// The pipeline's settings; nothing before it is configured. Written at boot and by the pipeline;
+/// read by the USB tasks (`info`).
+pub static SETTINGS: CriticalSectionMutex<Cell<Option<Settings>>> =
+    CriticalSectionMutex::new(Cell::new(None));
+
+/// How the sensor is doing, a [`Condition`]. Written by the pipeline and the capture task; read by the
+/// LED task (`health`).
+pub static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
+
+// The conversation with the host.
+
+/// Hellos, replies, statistics and log lines. From the USB tasks, the pipeline and the capture task to
+/// the sender, one of the USB tasks (`outbox`).
+pub static ANSWERS: Queue<DeviceMessage, 8> = Queue::new();
+
+/// Samples: 0.2 s of them. Older ones are worth more than a gap, but not more than a fresh
+/// measurement's latency. From the pipeline to the sender (`outbox`).
+#[unsafe(link_section = ".sram.samples")]
+pub static SAMPLES: Queue<Sample, 32> = Queue::new();
+
+/// A host speaks our version. This and the following are written by the USB tasks (`session`); this
+/// one is read by them, the pipeline and the capture task.
+pub static SESSION_OPEN: AtomicBool = AtomicBool::new(false);
+/// Samples and statistics flow. Read by the pipeline and the USB tasks.
+pub static STREAMING: AtomicBool = AtomicBool::new(false);
+/// Samples carry markers. Read by the pipeline.
+pub static WITH_MARKERS: AtomicBool = AtomicBool::new(false);
+/// Another one for each conversation. Read by the USB tasks, the pipeline and the capture task.
+pub static CONVERSATION: AtomicU32 = AtomicU32::new(0);
