@@ -96,7 +96,7 @@ struct Report {
 }
 
 /// The sensor without its camera: centroids of the film's markers, with noise, in place of frames.
-struct Eye<'m> {
+struct CentroidSource<'m> {
     model: Model<'m>,
     weights: &'m Weights,
     camera: Camera,
@@ -110,7 +110,7 @@ impl Touches {
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
-        let eye = Eye {
+        let source = CentroidSource {
             model: Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?,
             camera: weights.conditions.camera()?,
             weights: &weights,
@@ -118,7 +118,7 @@ impl Touches {
         let film = Film::new(&Design::default())?;
         let presses: Vec<Press> = pairs().into_iter().chain(faces()).collect();
         let rows = presses.par_iter();
-        let rows = rows.map(|press| self.outcome(&eye, &film, press));
+        let rows = rows.map(|press| self.outcome(&source, &film, press));
         let rows: Vec<Outcome> = rows.collect::<Result<_>>()?;
         if self.json {
             println!("{}", serde_json::to_string(&Report { rows })?);
@@ -133,14 +133,14 @@ impl Touches {
         page::write("touches.md", include_str!("touches.md"), &text)
     }
 
-    fn outcome(&self, eye: &Eye<'_>, film: &Film, press: &Press) -> Result<Outcome> {
+    fn outcome(&self, source: &CentroidSource<'_>, film: &Film, press: &Press) -> Result<Outcome> {
         let state = (film.press_all(&press.touches)).with_context(|| press.name.clone())?;
-        let moved_px = eye.moved_px(film, &state)?;
-        let mut chip = Chip::new(eye.model, &eye.weights.rest)?;
+        let moved_px = source.moved_px(film, &state)?;
+        let mut chip = Chip::new(source.model, &source.weights.rest)?;
         let mut random = seeded(1);
         let (mut unexplained, mut forces) = (0, Vec::new());
         for _ in 0..self.frames {
-            let (force, status) = chip.force(&eye.seen(&moved_px, &mut random))?;
+            let (force, status) = chip.force(&source.observation(&moved_px, &mut random))?;
             if status.contains(Status::UNEXPLAINED) {
                 unexplained += 1;
             } else {
@@ -156,7 +156,7 @@ impl Touches {
     }
 }
 
-impl Eye<'_> {
+impl CentroidSource<'_> {
     /// How the images of markers move, px.
     fn moved_px(&self, film: &Film, state: &hivtac_film::Equilibrium) -> Result<[[f64; 2]; 4]> {
         let rest = markers(film, &film.rest(), &self.camera);
@@ -165,8 +165,8 @@ impl Eye<'_> {
         Ok(std::array::from_fn(moved))
     }
 
-    /// What the sensor would see of that in a frame.
-    fn seen(&self, moved_px: &[[f64; 2]; 4], random: &mut ChaCha8Rng) -> Observation {
+    /// What the sensor would make of that in a frame.
+    fn observation(&self, moved_px: &[[f64; 2]; 4], random: &mut ChaCha8Rng) -> Observation {
         let rest_px = self.weights.rest.features_px();
         let off_px = (self.weights.film.as_ref()).map_or([[0.0; 2]; 4], |film| film.rest_px);
         let mut marker = |k: usize| {

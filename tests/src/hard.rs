@@ -11,14 +11,14 @@ use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::threshold::PixelFormat;
 
-use crate::looking::{Seen, View};
+use crate::tared::{Detection, View};
 
 /// What the pipeline made of the frames of one case.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The case.
     pub case: HardCase,
-    /// How it was looked at.
+    /// The camera and pipeline that saw it.
     pub view: View,
     /// Frames shown.
     pub frames: usize,
@@ -79,8 +79,8 @@ impl Outcome {
 ///
 /// # Errors
 /// When the frame size is not one.
-pub fn look_at_all(view: View, repeats: u64) -> Result<Vec<Outcome>> {
-    let mut looker = view.looker()?;
+pub fn detect_in_all(view: View, repeats: u64) -> Result<Vec<Outcome>> {
+    let mut sensor = view.sensor()?;
     let mut outcomes = Vec::new();
     for case in hard_cases() {
         let [width, height] = view.size;
@@ -98,12 +98,12 @@ pub fn look_at_all(view: View, repeats: u64) -> Result<Vec<Outcome>> {
         };
         for frame in frames(&scene, case.moves(), repeats)? {
             outcome.frames += 1;
-            match looker.look(&frame) {
-                Seen::Trusted { worst_px, .. } => {
+            match sensor.detect(&frame) {
+                Detection::Trusted { worst_px, .. } => {
                     outcome.trusted += 1;
                     outcome.worst_px = outcome.worst_px.max(worst_px);
                 }
-                Seen::Refused(status) => {
+                Detection::Refused(status) => {
                     let forbids = |(bit, _): &&(Status, &str)| {
                         Status::NO_FORCE.contains(*bit) && status.contains(*bit)
                     };

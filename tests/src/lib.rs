@@ -16,8 +16,6 @@ pub mod hard;
 #[cfg(feature = "host")]
 pub mod judged;
 #[cfg(feature = "host")]
-pub mod looking;
-#[cfg(feature = "host")]
 pub mod models;
 #[cfg(feature = "host")]
 pub mod pictures;
@@ -27,3 +25,5 @@ pub mod qemu;
 pub mod rig;
 #[cfg(feature = "host")]
 pub mod script;
+#[cfg(feature = "host")]
+pub mod tared;

@@ -2,8 +2,8 @@
 
 use hivtac_scene::film::{MAX_FORCE_N, MAX_LABEL_N};
 use hivtac_scene::{Contact, Load};
-use hivtac_tests::hard::look_at_all;
-use hivtac_tests::looking::{Seen, View, views};
+use hivtac_tests::hard::detect_in_all;
+use hivtac_tests::tared::{Detection, View, views};
 
 const STICK: Contact = Contact::Stick;
 const SLIP: Contact = Contact::Slip { mu: 0.6 };
@@ -12,7 +12,7 @@ const SLIP: Contact = Contact::Slip { mu: 0.6 };
 fn hold(views: &[View], repeats: u64) {
     let mut wrong = Vec::new();
     for &view in views {
-        for outcome in look_at_all(view, repeats).unwrap() {
+        for outcome in detect_in_all(view, repeats).unwrap() {
             println!("{view:?} {}", outcome.row());
             if outcome.is_silently_wrong() || outcome.is_overlooked() {
                 wrong.push(format!("{view:?}\n{}", outcome.row()));
@@ -72,7 +72,7 @@ fn honest_load(contact: Contact, index: usize) -> Load {
 
 /// Shows nominal frames and counts the refused; no accepted one may be off.
 fn refused(view: View, frames: usize) -> usize {
-    let mut looker = view.looker().unwrap();
+    let mut sensor = view.sensor().unwrap();
     let scene = view.nominal().unwrap();
     let mut refused = 0;
     let mut worst = 0.0f64;
@@ -80,9 +80,9 @@ fn refused(view: View, frames: usize) -> usize {
         let frame = scene
             .render_load(&honest_load(view.contact, index), index as u64)
             .unwrap();
-        match looker.look(&frame) {
-            Seen::Trusted { worst_px, .. } => worst = worst.max(worst_px),
-            Seen::Refused(status) => {
+        match sensor.detect(&frame) {
+            Detection::Trusted { worst_px, .. } => worst = worst.max(worst_px),
+            Detection::Refused(status) => {
                 refused += 1;
                 println!(
                     "{view:?}: {:?} {:?}",

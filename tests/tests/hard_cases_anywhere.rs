@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use hivtac_scene::{Expected, HardCase, Preset, hard_cases};
 use hivtac_sensing::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
-use hivtac_tests::looking::Looker;
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
+use hivtac_tests::tared::TaredSensor;
 
 /// What presses hard cases: within the calibrated range.
 const PRESSES: Contacts = Contacts {
@@ -24,8 +24,8 @@ const HONEST: Contacts = Contacts {
     place_mm: 4.0,
 };
 
-fn looker() -> Looker {
-    Looker::of_model(models::anywhere(1)).unwrap()
+fn sensor() -> TaredSensor {
+    TaredSensor::of_model(models::anywhere(1)).unwrap()
 }
 
 /// What was made of the frames of a case.
@@ -36,14 +36,14 @@ struct Outcome {
     wrong: Vec<String>,
 }
 
-fn outcome(looker: &mut Looker, case: &HardCase, presses: u64) -> Outcome {
+fn outcome(sensor: &mut TaredSensor, case: &HardCase, presses: u64) -> Outcome {
     let scene = case.scene(Preset::Ov7725, 320, 240, 7).unwrap();
     let mut random = Random::new(17);
     let mut outcome = Outcome::default();
     for number in 0..presses {
         let load = PRESSES.draw(&mut random).unwrap();
         let frame = scene.render_load(&load, number).unwrap();
-        match Judged::of(&looker.sense(&frame), &frame.truth) {
+        match Judged::of(&sensor.sense(&frame), &frame.truth) {
             Judged::Right => outcome.right += 1,
             Judged::Refused(_) => outcome.refused += 1,
             Judged::Wrong(how) => outcome.wrong.push(format!("{}: {how}", case.name)),
@@ -76,10 +76,10 @@ impl Outcome {
 
 /// Cases in which things move are about one frame's time: what moves there is the force.
 fn hold(presses: u64) {
-    let mut looker = looker();
+    let mut sensor = sensor();
     let mut wrong = Vec::new();
     for case in hard_cases().iter().filter(|case| !case.moves()) {
-        let outcome = outcome(&mut looker, case, presses);
+        let outcome = outcome(&mut sensor, case, presses);
         println!(
             "{}: {} right, {} refused, {} wrong",
             case.name,
@@ -106,14 +106,14 @@ fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
 /// Of so many honest frames, in which no marker reaches the picture's border, one in a thousand may
 /// be refused, and none wrong.
 fn hardly_any_is_refused(frames: u64) {
-    let mut looker = looker();
+    let mut sensor = sensor();
     let scene = hivtac_scene::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
     let mut random = Random::new(23);
     let (mut refused, mut reasons) = (0, BTreeMap::new());
     for number in 0..frames {
         let load = HONEST.draw(&mut random).unwrap();
         let frame = scene.render_load(&load, number).unwrap();
-        match Judged::of(&looker.sense(&frame), &frame.truth) {
+        match Judged::of(&sensor.sense(&frame), &frame.truth) {
             Judged::Right => {}
             Judged::Refused(status) if status.contains(Status::MARKERS_MISSING) => {}
             Judged::Refused(status) => {

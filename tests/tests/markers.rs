@@ -3,7 +3,7 @@
 use hivtac_scene::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::threshold::PixelFormat;
-use hivtac_tests::looking::{ESTIMATORS, Looker, Seen, View};
+use hivtac_tests::tared::{Detection, ESTIMATORS, TaredSensor, View};
 
 /// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small spot on its edge.
 const COVERED_WEIGHTED: f64 = 0.3;
@@ -39,22 +39,22 @@ fn press(newtons: f64) -> Load {
 }
 
 /// How far the markers are off, px: the worst of them, and their mean. `None` when there may be no force.
-fn trusted(looker: &mut Looker, frame: &Frame) -> Option<(f64, f64)> {
-    match looker.look(frame) {
-        Seen::Trusted { worst_px, mean_px } => Some((worst_px, mean_px)),
-        Seen::Refused(_) => None,
+fn trusted(sensor: &mut TaredSensor, frame: &Frame) -> Option<(f64, f64)> {
+    match sensor.detect(frame) {
+        Detection::Trusted { worst_px, mean_px } => Some((worst_px, mean_px)),
+        Detection::Refused(_) => None,
     }
 }
 
 /// The worst error of the accepted frames of a sweep, px, and how many were accepted.
 fn sweep(view: View, load: &Load, options: impl IntoIterator<Item = Options>) -> (f64, usize) {
-    let mut looker = view.looker().unwrap();
+    let mut sensor = view.sensor().unwrap();
     let (mut worst, mut accepted) = (0.0f64, 0);
     for (number, options) in (0..).zip(options) {
         let frame = scene(view.preset, options)
             .render_load(load, number)
             .unwrap();
-        if let Some((error, _)) = trusted(&mut looker, &frame) {
+        if let Some((error, _)) = trusted(&mut sensor, &frame) {
             worst = worst.max(error);
             accepted += 1;
         }
@@ -83,7 +83,7 @@ fn around(count: u32) -> impl Iterator<Item = (f64, f64)> {
 fn every_honest_press_is_trusted() {
     for preset in [Preset::Ov7725, Preset::Paper] {
         for view in ESTIMATORS.map(|estimator| view(preset, estimator)) {
-            let mut looker = view.looker().unwrap();
+            let mut sensor = view.sensor().unwrap();
             let scene = scene(preset, Options::default());
             for newtons in [0.0, 0.005, 0.02, 0.05, 0.1, 0.2, 0.24] {
                 for (x, y) in [
@@ -96,7 +96,7 @@ fn every_honest_press_is_trusted() {
                 ] {
                     let load = Load::from_vector([newtons * x, newtons * y, -newtons]).unwrap();
                     let frame = scene.render_load(&load, 11).unwrap();
-                    let (worst, _) = trusted(&mut looker, &frame)
+                    let (worst, _) = trusted(&mut sensor, &frame)
                         .unwrap_or_else(|| panic!("{view:?}: {newtons} N, tilted by ({x}, {y})"));
                     let limit = view.tolerance_px();
                     assert!(worst < limit, "{view:?}: {newtons} N: off by {worst} px");
@@ -214,12 +214,12 @@ fn stand_ins() -> Vec<(Options, f64)> {
 #[test]
 fn a_disc_in_place_of_a_marker_is_refused() {
     for (view, farthest_mm) in [(WEIGHTED, 0.04), (BINARY, 0.11)] {
-        let mut looker = view.looker().unwrap();
+        let mut sensor = view.sensor().unwrap();
         for (options, distance) in stand_ins() {
             let frame = scene(view.preset, options)
                 .render_load(&press(0.05), 5)
                 .unwrap();
-            let accepted = trusted(&mut looker, &frame).is_some();
+            let accepted = trusted(&mut sensor, &frame).is_some();
             assert!(
                 !accepted || distance < farthest_mm,
                 "{view:?}: {distance} mm away"
@@ -231,7 +231,7 @@ fn a_disc_in_place_of_a_marker_is_refused() {
 #[test]
 fn a_fifth_disc_never_takes_a_markers_place() {
     for view in [WEIGHTED, BINARY] {
-        let mut looker = view.looker().unwrap();
+        let mut sensor = view.sensor().unwrap();
         let mut told_apart = 0;
         for radius_mm in [0.3, 0.5, 1.2] {
             for (x, y) in (-7..=7).flat_map(|x| (-7..=7).map(move |y| (f64::from(x), f64::from(y))))
@@ -242,7 +242,7 @@ fn a_fifth_disc_never_takes_a_markers_place() {
                 };
                 let load = Load::from_vector([0.01, 0.0, -0.1]).unwrap();
                 let frame = scene(view.preset, options).render_load(&load, 5).unwrap();
-                if let Some((worst, _)) = trusted(&mut looker, &frame) {
+                if let Some((worst, _)) = trusted(&mut sensor, &frame) {
                     let limit = view.tolerance_px();
                     assert!(
                         worst < limit,

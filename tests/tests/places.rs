@@ -5,8 +5,8 @@ use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::threshold::PixelFormat;
 use hivtac_tests::judged::Contacts;
-use hivtac_tests::looking::{ESTIMATORS, Looker, Seen, View};
 use hivtac_tests::pictures::Random;
+use hivtac_tests::tared::{Detection, ESTIMATORS, TaredSensor, View};
 
 /// Frames of each view.
 const FRAMES: u64 = 2_400;
@@ -38,7 +38,7 @@ struct Counts {
     trusted: u64,
 }
 
-fn look(looker: &mut Looker, scene: &Scene) -> Counts {
+fn count(sensor: &mut TaredSensor, scene: &Scene) -> Counts {
     let mut random = Random::new(5);
     let mut counts = Counts::default();
     for number in 0..FRAMES {
@@ -48,16 +48,16 @@ fn look(looker: &mut Looker, scene: &Scene) -> Counts {
         let inside = |marker: &Option<_>| {
             marker.is_some_and(|marker: hivtac_scene::MarkerTruth| marker.visible == 1.0)
         };
-        match looker.look(&frame) {
-            Seen::Trusted { .. } => counts.trusted += 1,
+        match sensor.detect(&frame) {
+            Detection::Trusted { .. } => counts.trusted += 1,
             // A marker whose edge is at the border, but for what the threshold adds, is cut, too.
-            Seen::Refused(status)
+            Detection::Refused(status)
                 if status.contains(Status::MARKERS_MISSING)
                     || !frame.truth.markers.iter().all(inside) =>
             {
                 counts.cut += 1;
             }
-            Seen::Refused(_) => counts.refused += 1,
+            Detection::Refused(_) => counts.refused += 1,
         }
     }
     counts
@@ -65,8 +65,8 @@ fn look(looker: &mut Looker, scene: &Scene) -> Counts {
 
 fn compare(view: View) {
     let scene = view.nominal().unwrap();
-    let middle = look(&mut view.looker().unwrap(), &scene);
-    let anywhere = look(&mut view.looker_anywhere().unwrap(), &scene);
+    let middle = count(&mut view.sensor().unwrap(), &scene);
+    let anywhere = count(&mut view.sensor_anywhere().unwrap(), &scene);
     println!("{view:?}: of {FRAMES} frames, in the middle {middle:?}, anywhere {anywhere:?}");
     // Nine in ten are whole, and of these no more are refused than the finder finds too wide.
     assert!(anywhere.cut * 10 < FRAMES, "{view:?}: {anywhere:?}");

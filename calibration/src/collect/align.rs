@@ -11,7 +11,7 @@ use super::series::Joined;
 
 /// What the sensor saw at a time of its own clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct RadiusSample {
     /// s.
     pub time_s: f64,
     /// Mean distance of the markers from their middle, less that at rest, px.
@@ -76,13 +76,13 @@ impl Alignment {
 ///
 /// # Errors
 /// When the peak is not convincing; says why and what to do.
-pub fn align(frames: &[Seen], gauge: Joined<'_>, search: Search) -> Result<Alignment> {
+pub fn align(frames: &[RadiusSample], gauge: Joined<'_>, search: Search) -> Result<Alignment> {
     ensure!(
         frames.len() >= FEWEST,
         "{} frames with markers are too few to align clocks: {FEWEST} at least",
         frames.len()
     );
-    let sparse: Vec<Seen> = frames
+    let sparse: Vec<RadiusSample> = frames
         .iter()
         .step_by(frames.len().div_ceil(GRID_FRAMES))
         .copied()
@@ -165,7 +165,7 @@ fn convincing(found: &Alignment, at_an_end: bool) -> Result<()> {
 }
 
 /// The best lag near one of the grid, and the clocks' difference of rate if it may be one.
-fn refine(frames: &[Seen], gauge: Joined<'_>, lag_s: f64, drift: bool) -> Alignment {
+fn refine(frames: &[RadiusSample], gauge: Joined<'_>, lag_s: f64, drift: bool) -> Alignment {
     let ends = [frames[0].time_s, frames[frames.len() - 1].time_s];
     let middle = f64::midpoint(ends[0], ends[1]);
     let drift = drift && ends[1] - ends[0] >= SHORTEST_FOR_DRIFT_S;
@@ -225,10 +225,16 @@ struct Fit {
 
 impl Fit {
     /// At a lag; nothing when too few frames have a reading.
-    fn of(frames: &[Seen], gauge: Joined<'_>, lag: f64, drift: f64, middle: f64) -> Option<Self> {
-        let pair = |seen: &Seen| {
-            let time = seen.time_s + lag + drift * (seen.time_s - middle);
-            Some((seen.radius_px, gauge.at(time)?))
+    fn of(
+        frames: &[RadiusSample],
+        gauge: Joined<'_>,
+        lag: f64,
+        drift: f64,
+        middle: f64,
+    ) -> Option<Self> {
+        let pair = |sample: &RadiusSample| {
+            let time = sample.time_s + lag + drift * (sample.time_s - middle);
+            Some((sample.radius_px, gauge.at(time)?))
         };
         let pairs: Vec<(f64, f64)> = frames.iter().filter_map(pair).collect();
         if (pairs.len() as f64) < COVERED * frames.len() as f64 || pairs.len() < FEWEST {

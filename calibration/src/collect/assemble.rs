@@ -5,7 +5,7 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::markers::Marker;
 use hivtac_sensing::units::Px;
 
-use super::align::{Alignment, Search, Seen, align};
+use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};
 use super::holds;
 use super::poses::Pose;
@@ -124,7 +124,7 @@ fn at_the_port(
         lags_s: [-LARGEST_LAG_S, LARGEST_LAG_S],
         drift: false,
     };
-    let alignment = align(&seen(kept, &times)?, series.joined(), search)?;
+    let alignment = align(&radius_samples(kept, &times)?, series.joined(), search)?;
     Ok((series, alignment, times))
 }
 
@@ -166,12 +166,12 @@ fn from_file(
         lags_s: [first - ends[1], last - ends[0]],
         drift: true,
     };
-    let alignment = align(&seen(kept, &times)?, series.joined(), search)?;
+    let alignment = align(&radius_samples(kept, &times)?, series.joined(), search)?;
     Ok((series.clone(), alignment, times))
 }
 
 /// Times and mean radii of the frames with markers, from the untouched film on.
-fn seen(kept: &[&Kept], times: &[f64]) -> Result<Vec<Seen>> {
+fn radius_samples(kept: &[&Kept], times: &[f64]) -> Result<Vec<RadiusSample>> {
     let radii: Vec<Option<f64>> = kept
         .iter()
         .map(|kept| kept.seen.as_ref().ok().map(mean_radius_px))
@@ -186,7 +186,7 @@ fn seen(kept: &[&Kept], times: &[f64]) -> Result<Vec<Seen>> {
     );
     let rest = at_rest.iter().sum::<f64>() / at_rest.len() as f64;
     let frames = radii.iter().zip(times).filter_map(|(radius, &time_s)| {
-        Some(Seen {
+        Some(RadiusSample {
             time_s,
             radius_px: (*radius)? - rest,
         })

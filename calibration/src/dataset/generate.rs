@@ -1,4 +1,4 @@
-//! Data sets from the scene: render a frame, let `sensing` look at it.
+//! Data sets from the scene: render a frame, let `sensing` measure it.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use anyhow::Result;
 use hivtac_scene::Scene;
 use rayon::prelude::*;
 
-use super::eye::{Pool, Sensing};
+use super::detector::{Pool, Sensing};
 use super::{Dataset, Recipe, Row};
 
 /// Renders the frames of a recipe on all cores and looks at each with the pipeline. `progress` is called once for
@@ -44,7 +44,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Some of the rows, in order, each as all eyes of the pool see it.
+    /// Some of the rows, in order, each as all detectors of the pool see it.
     pub fn rows(
         &self,
         rows: Range<usize>,
@@ -55,7 +55,7 @@ impl<'a> Renderer<'a> {
             let place = self.recipe.place(row);
             let scene = &self.scenes[place.session];
             let frame = scene.render_load(&self.recipe.load(row)?, row as u64)?;
-            let seen = pool.look(&frame)?;
+            let seen = pool.detect(&frame)?;
             progress();
             let known = self.recipe.range.knows_places();
             let row = |seen| Row {

@@ -1,6 +1,6 @@
 //! Data sets: forces with the features that `sensing` found in the frames.
 
-mod eye;
+mod detector;
 mod file;
 mod generate;
 mod recipe;
@@ -18,8 +18,8 @@ use crate::conditions::Conditions;
 use crate::range::Range;
 use crate::rest::Rest;
 
-pub use eye::{Eye, Eyes, Seen, Sensing};
-pub(crate) use eye::{measure, reasons};
+pub use detector::{Detection, Detectors, MarkerDetector, Sensing};
+pub(crate) use detector::{measure, reasons};
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};

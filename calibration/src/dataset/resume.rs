@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use super::eye::{Eyes, Pool};
+use super::detector::{Detectors, Pool};
 use super::file::{lines, opening};
 use super::generate::{Renderer, sensing};
 use super::{About, Dataset, Recipe};
@@ -46,14 +46,14 @@ pub fn generate_file(
     Dataset::load(path)
 }
 
-/// The same with eyes of its own, which look at the same frames: each has its file, and says in `files` what its rows are.
+/// The same with detectors of its own, for the same frames: each has its file, and says in `files` what its rows are.
 ///
 /// # Errors
-/// As [`generate_file`], and when eyes cannot be opened or are not as many as files.
+/// As [`generate_file`], and when detectors cannot be opened or are not as many as files.
 pub fn generate_files<'a>(
     recipe: &Recipe,
     files: Vec<(PathBuf, About)>,
-    open: impl Fn() -> Result<Eyes<'a>> + Sync + 'a,
+    open: impl Fn() -> Result<Detectors<'a>> + Sync + 'a,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Vec<Dataset>> {
     let files = files.into_iter();
@@ -85,7 +85,7 @@ fn write(
         for (i, target) in targets.iter().enumerate() {
             let seen = rows.iter().map(|row| row.get(i).cloned());
             let rows: Option<Vec<_>> = seen.collect();
-            let rows = rows.context("there are fewer eyes than files")?;
+            let rows = rows.context("there are fewer detectors than files")?;
             let mut file = OpenOptions::new().append(true).open(&target.path)?;
             file.write_all(&lines(&target.about, &rows)?)
                 .with_context(|| format!("cannot write {}", target.path.display()))?;
@@ -143,7 +143,7 @@ fn ends(bytes: &[u8]) -> impl Iterator<Item = usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::eye::Sensing;
+    use super::super::detector::Sensing;
     use super::super::{Loads, generate};
     use super::*;
     use crate::range::Range;
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Two eyes on the same frames: files that were cut in different places end up the same.
+    /// Two detectors on the same frames: files that were cut in different places end up the same.
     #[test]
     fn files_of_several_eyes_go_on_together() {
         let directory = tempfile::tempdir().unwrap();
@@ -186,9 +186,9 @@ mod tests {
             let mut other = about.clone();
             other.scene.push_str(", seen otherwise");
             let files = vec![(path("a.csv"), about), (path("b.csv"), other)];
-            let open = || -> Result<Eyes<'_>> {
-                let eye = || Sensing::unmodelled(&recipe);
-                Ok(vec![Box::new(eye()?), Box::new(eye()?)])
+            let open = || -> Result<Detectors<'_>> {
+                let detector = || Sensing::unmodelled(&recipe);
+                Ok(vec![Box::new(detector()?), Box::new(detector()?)])
             };
             generate_files(&recipe, files, open, |_| ()).unwrap()
         };

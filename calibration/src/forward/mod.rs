@@ -18,7 +18,7 @@ use hivtac_sensing::model::{ForwardSpec, TableSpec};
 use serde::{Deserialize, Serialize};
 
 pub use noise::Noise;
-pub use tables::Seen;
+pub use tables::UnitSetup;
 pub use ten_loads::{Bench, Fit, KnownLoad, fit};
 
 /// What is known of a unit's film and camera.
@@ -189,15 +189,15 @@ impl FilmModel {
         self.check()?;
         // Tables are in focal lengths: all cameras have this lens.
         let camera = Camera::new(Preset::Ov7725, 320, 240)?;
-        let seen = Seen {
+        let setup = UnitSetup {
             unit: self.unit.as_ref().map_or_else(Unit::default, OwnUnit::film),
             tip_radius_mm: self.tip_radius_mm,
             camera: &camera,
         };
-        let stiffness_n = seen.stiffness_n().map(|part| part as f32);
+        let stiffness_n = setup.stiffness_n().map(|part| part as f32);
         let [moved, beside] = match (&self.unit, self.tip_radius_mm == NOMINAL_RADIUS_MM) {
             (None, true) => nominal_tables(&camera)?,
-            _ => [seen.moved_table()?, seen.beside_table()?],
+            _ => [setup.moved_table()?, setup.beside_table()?],
         };
         let mut spec = ForwardSpec {
             steps: self.steps,
@@ -226,7 +226,7 @@ impl FilmModel {
             let bytes = spec.to_bytes();
             let forward = forward::Forward::parse(&bytes)
                 .map_err(|error| anyhow!("a film's tables cannot be kept: {error}"))?;
-            spec.own_table = Some(seen.own_table(|pose| told(&forward, pose))?);
+            spec.own_table = Some(setup.own_table(|pose| told(&forward, pose))?);
         }
         Ok(spec)
     }
@@ -240,12 +240,12 @@ fn nominal_tables(camera: &Camera) -> Result<[TableSpec; 2]> {
     if let Some(tables) = &*made {
         return Ok(tables.clone());
     }
-    let seen = Seen {
+    let setup = UnitSetup {
         unit: Unit::default(),
         tip_radius_mm: NOMINAL_RADIUS_MM,
         camera,
     };
-    let tables = [seen.moved_table()?, seen.beside_table()?];
+    let tables = [setup.moved_table()?, setup.beside_table()?];
     *made = Some(tables.clone());
     Ok(tables)
 }
@@ -326,7 +326,7 @@ mod tests {
     /// How far what the chip predicts is from the simulated film, px at 320×240: root mean square and largest.
     fn off_px(model: &FilmModel) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
-        let seen = Seen {
+        let setup = UnitSetup {
             unit: model
                 .unit
                 .as_ref()
@@ -334,14 +334,14 @@ mod tests {
             tip_radius_mm: model.tip_radius_mm,
             camera: &camera,
         };
-        let film = Film::of(seen.unit).unwrap();
+        let film = Film::of(setup.unit).unwrap();
         let bytes = model.spec().unwrap().to_bytes();
         let forward = forward::Forward::parse(&bytes).unwrap();
         let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
         for pose in poses() {
             let chip = told(&forward, &pose);
             for marker in 0..4 {
-                let truth = seen.moved(&film, &pose, marker).unwrap();
+                let truth = setup.moved(&film, &pose, marker).unwrap();
                 for axis in [0, 1] {
                     let off = camera.focal_px() * (chip[2 * marker + axis] - truth[axis]);
                     sum += off * off;

@@ -5,7 +5,7 @@ use hivtac_scene::MARKERS;
 use hivtac_scene::film::Film;
 use hivtac_scene::film::reduced::{Pose, Unit};
 
-use super::Seen;
+use super::UnitSetup;
 use crate::dataset::{Dataset, Sample};
 
 /// The mean of what is normally distributed, without sign, over its standard deviation: √(2/π).
@@ -98,7 +98,7 @@ impl Line {
 
 fn all_off(dataset: &Dataset, tip_radius_mm: f64) -> Result<Vec<Off>> {
     let camera = dataset.about.conditions.camera()?;
-    let seen = Seen {
+    let setup = UnitSetup {
         unit: Unit::default(),
         tip_radius_mm,
         camera: &camera,
@@ -113,7 +113,7 @@ fn all_off(dataset: &Dataset, tip_radius_mm: f64) -> Result<Vec<Off>> {
         let features = sample.seen.features_px();
         let mut px = [[0.0; 2]; 4];
         for (k, px) in px.iter_mut().enumerate() {
-            let moved = seen.moved(&film, &pose, k)?;
+            let moved = setup.moved(&film, &pose, k)?;
             *px = [0, 1].map(|i| {
                 let at = 2 * k + i;
                 features[at] - rest_px[at] - camera.focal_px() * moved[i]

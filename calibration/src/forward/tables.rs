@@ -30,7 +30,7 @@ const STEEP_COUNTS_LESS: f64 = 12.0;
 const WITHIN: f64 = 1.0 - 1e-6;
 
 /// A film under a tip of a radius, and how a camera sees it.
-pub struct Seen<'a> {
+pub struct UnitSetup<'a> {
     /// The unit's film.
     pub unit: Unit,
     /// The tip's radius, mm.
@@ -39,7 +39,7 @@ pub struct Seen<'a> {
     pub camera: &'a Camera,
 }
 
-impl Seen<'_> {
+impl UnitSetup<'_> {
     /// How the image of a marker moves under a load, in focal lengths.
     pub fn moved(&self, film: &Film, pose: &Pose, marker: usize) -> Result<[f64; 2]> {
         let force_n = self.force_n(pose);
@@ -87,7 +87,7 @@ impl Seen<'_> {
 
     /// How marker 2 moves along x on a film whose posts and markers are where they should be.
     pub fn moved_table(&self) -> Result<TableSpec> {
-        let even = Seen {
+        let even = UnitSetup {
             unit: self.even(),
             ..*self
         };
@@ -99,7 +99,7 @@ impl Seen<'_> {
 
     /// What gluing it beside its place along x and along y does to that, per mm, when the tip is as far beside its own.
     pub fn beside_table(&self) -> Result<TableSpec> {
-        let even = Seen {
+        let even = UnitSetup {
             unit: self.even(),
             ..*self
         };

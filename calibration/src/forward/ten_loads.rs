@@ -10,7 +10,7 @@ use hivtac_scene::{Camera, Load, Preset};
 use hivtac_sensing::forward::{Column, Stiffness, solve};
 
 use super::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
-use super::{OwnUnit, Seen, ToleranceOf};
+use super::{OwnUnit, ToleranceOf, UnitSetup};
 
 /// A load that was put on, and what was seen of it.
 #[derive(Clone, Copy, Debug)]
@@ -230,8 +230,8 @@ impl Problem<'_> {
         made
     }
 
-    fn seen(&self, made: &Made) -> Seen<'_> {
-        Seen {
+    fn setup(&self, made: &Made) -> UnitSetup<'_> {
+        UnitSetup {
             unit: made.unit.film(),
             tip_radius_mm: made.tip_radius_mm,
             camera: &self.camera,
@@ -241,8 +241,8 @@ impl Problem<'_> {
     /// What is seen less what should be, in parts of the noise: the rest position, then the loads.
     fn residuals(&self, parts: &[f64]) -> Result<Vec<f64>> {
         let made = self.made(parts);
-        let seen = self.seen(&made);
-        let film = Film::of(seen.unit)?;
+        let setup = self.setup(&made);
+        let film = Film::of(setup.unit)?;
         let to_px = made.unit.to_px();
         let mut residuals = Vec::new();
         let mut add = |seen: [f64; 2], should: [f64; 2]| {
@@ -257,7 +257,7 @@ impl Problem<'_> {
         for (number, load) in self.loads.iter().enumerate() {
             let pose = self.pose(load, &made, number)?;
             for k in 0..4 {
-                let moved = to_px(seen.moved_by(&film, &pose, k)?);
+                let moved = to_px(setup.moved_by(&film, &pose, k)?);
                 let should = [0, 1].map(|i| self.rest_px[k][i] - made.rest_px[k][i] + moved[i]);
                 add(load.seen_px[k], should);
             }
@@ -467,24 +467,24 @@ struct Tried {
 /// How the markers of a unit move.
 struct Moving<'a> {
     unit: OwnUnit,
-    seen: Seen<'a>,
+    setup: UnitSetup<'a>,
     film: Film,
 }
 
 impl<'a> Moving<'a> {
     fn new(problem: &'a Problem, parts: &[f64]) -> Result<Self> {
         let made = problem.made(parts);
-        let seen = problem.seen(&made);
+        let setup = problem.setup(&made);
         Ok(Self {
-            film: Film::of(seen.unit)?,
-            seen,
+            film: Film::of(setup.unit)?,
+            setup,
             unit: made.unit,
         })
     }
 
     /// The pose of a force straight into the film.
     fn pose(&self, force_n: f64, place_mm: [f64; 2]) -> Pose {
-        Pose::of_force([0.0, 0.0, -force_n], place_mm, self.seen.stiffness_n())
+        Pose::of_force([0.0, 0.0, -force_n], place_mm, self.setup.stiffness_n())
     }
 
     /// x and y of markers 0–3, px.
@@ -492,14 +492,14 @@ impl<'a> Moving<'a> {
         let to_px = self.unit.to_px();
         let mut moved = [0.0; 8];
         for (marker, place) in moved.chunks_exact_mut(2).enumerate() {
-            place.copy_from_slice(&to_px(self.seen.moved(&self.film, pose, marker)?));
+            place.copy_from_slice(&to_px(self.setup.moved(&self.film, pose, marker)?));
         }
         Ok(moved)
     }
 
     fn tried(&self, force_n: f64, place_mm: [f64; 2]) -> Result<Tried> {
         let pose = self.pose(force_n, place_mm);
-        let [linear_n, cubic_n] = self.seen.stiffness_n().map(|part| part as f32);
+        let [linear_n, cubic_n] = self.setup.stiffness_n().map(|part| part as f32);
         let stiffness = Stiffness { linear_n, cubic_n };
         let size = pose.size as f32;
         Ok(Tried {

@@ -9,15 +9,15 @@ use hivtac_sensing::model::Model;
 use super::PeersArgs;
 use super::models::How;
 use crate::conditions::CentroidName;
-use crate::dataset::{Dataset, Eye, Eyes, Loads, Recipe, Sensing, generate_files};
+use crate::dataset::{Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files};
 use crate::fit::fit;
 use crate::quantize::export;
 use crate::scene::size::Size;
 use crate::train::Options;
 use crate::weights::Range;
 
-/// Opens a peer's eye for frames of so many columns and rows.
-pub type Open<'a> = dyn Fn(u16, u16) -> Result<Box<dyn Eye>> + Sync + 'a;
+/// Opens a peer's detector for frames of so many columns and rows.
+pub type Open<'a> = dyn Fn(u16, u16) -> Result<Box<dyn MarkerDetector>> + Sync + 'a;
 
 /// Seeds of loads and noise.
 const TRAINING_SEED: u64 = 11;
@@ -43,7 +43,7 @@ pub struct Frames {
 
 impl Frames {
     /// Renders them, or goes on with what is there.
-    pub fn make(args: &PeersArgs, contact: Contact, size: Size, eye: &Open) -> Result<Self> {
+    pub fn make(args: &PeersArgs, contact: Contact, size: Size, detector: &Open) -> Result<Self> {
         let recipe = |loads: Loads, rest: usize, seed: u64| -> Result<Recipe> {
             Ok(Recipe {
                 preset: args.preset,
@@ -74,12 +74,15 @@ impl Frames {
                 return Ok([Dataset::load(&ours.0)?, Dataset::load(&theirs)?]);
             }
             let files = vec![ours, (theirs, about)];
-            let open = || -> Result<Eyes<'_>> {
+            let open = || -> Result<Detectors<'_>> {
                 let sensing = match model {
                     None => Sensing::unmodelled(recipe)?,
                     Some(model) => Sensing::tared(model)?,
                 };
-                Ok(vec![Box::new(sensing), eye(recipe.width, recipe.height)?])
+                Ok(vec![
+                    Box::new(sensing),
+                    detector(recipe.width, recipe.height)?,
+                ])
             };
             let bar = crate::progress::bar(&format!("{contact} {size} {part}"), recipe.rows());
             let made = generate_files(recipe, files, open, |rows| bar.inc(rows))?;

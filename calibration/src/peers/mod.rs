@@ -82,8 +82,8 @@ impl PeersArgs {
     pub fn run(&self) -> Result<()> {
         let python = Python::in_folder(&self.folder)
             .context("without OpenCV there is nothing to compare with")?;
-        let eye: &Open = &|width, height| Ok(Box::new(python.eye(width, height)?));
-        let comparisons = self.compare(eye)?;
+        let detector: &Open = &|width, height| Ok(Box::new(python.detector(width, height)?));
+        let comparisons = self.compare(detector)?;
         let text = table::markdown(&comparisons);
         println!("{text}");
         if let Some(path) = &self.json {
@@ -97,16 +97,16 @@ impl PeersArgs {
     }
 
     /// Compares with whatever finds the markers for the paper's network.
-    fn compare(&self, eye: &Open) -> Result<Vec<Comparison>> {
+    fn compare(&self, detector: &Open) -> Result<Vec<Comparison>> {
         ensure!(!self.sizes.is_empty(), "name at least one frame size");
         self.contacts
             .iter()
-            .map(|&contact| self.reading(contact, eye))
+            .map(|&contact| self.reading(contact, detector))
             .collect()
     }
 
-    fn reading(&self, contact: Contact, eye: &Open) -> Result<Comparison> {
-        let seen = |size: &Size| Frames::make(self, contact, *size, eye);
+    fn reading(&self, contact: Contact, detector: &Open) -> Result<Comparison> {
+        let seen = |size: &Size| Frames::make(self, contact, *size, detector);
         let sizes: Vec<Frames> = self.sizes.iter().map(seen).collect::<Result<_>>()?;
         let rendered = frames::rendered_everywhere(&sizes);
         let everywhere = frames::seen_everywhere(&sizes);

@@ -1,4 +1,4 @@
-//! The paper's image processing in OpenCV, as an eye: a Python that is shown frames through a pipe.
+//! The paper's image processing in OpenCV, as a detector: a Python that is shown frames through a pipe.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -11,7 +11,7 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::markers::Marker;
 use hivtac_sensing::units::Px;
 
-use crate::dataset::{Eye, Observation, Seen};
+use crate::dataset::{Detection, MarkerDetector, Observation};
 
 const ENVIRONMENT: &str = include_str!("../../python/opencv_environment.py");
 const PIPELINE: &str = include_str!("../../python/paper_pipeline.py");
@@ -52,11 +52,11 @@ impl Python {
         })
     }
 
-    /// An eye for frames of a size.
+    /// A detector for frames of a size.
     ///
     /// # Errors
     /// When Python cannot be started.
-    pub fn eye(&self, width: u16, height: u16) -> Result<OpenCv> {
+    pub fn detector(&self, width: u16, height: u16) -> Result<OpenCv> {
         OpenCv::start(
             Command::new(&self.python).arg(&self.pipeline),
             width,
@@ -88,8 +88,8 @@ impl OpenCv {
     }
 }
 
-impl Eye for OpenCv {
-    fn look(&mut self, frame: &Frame) -> Result<Seen> {
+impl MarkerDetector for OpenCv {
+    fn detect(&mut self, frame: &Frame) -> Result<Detection> {
         let bytes: Vec<u8> = frame.pixels.iter().flat_map(|p| p.to_le_bytes()).collect();
         let mut line = String::new();
         let frames = self.frames.as_mut().context("it takes no frames")?;
@@ -112,7 +112,7 @@ impl Drop for OpenCv {
 }
 
 /// The paper's features of four contours (x, y, area in px), which lie in the four quadrants about their middle.
-fn observation(contours: &[[f64; 3]]) -> Seen {
+fn observation(contours: &[[f64; 3]]) -> Detection {
     let missing = || "markers_missing".to_owned();
     if contours.len() != 4 {
         return Err(missing());
@@ -176,9 +176,9 @@ mod tests {
         let script =
             format!("head -c 153600 >/dev/null; echo '{answer}'; head -c 153600 >/dev/null");
         let mut shell = Command::new("sh");
-        let mut eye = OpenCv::start(shell.args(["-c", &script]), 320, 240).unwrap();
-        assert_eq!(eye.look(&frame).unwrap().unwrap().areas_px, [5; 4]);
-        let error = format!("{:#}", eye.look(&frame).unwrap_err());
+        let mut detector = OpenCv::start(shell.args(["-c", &script]), 320, 240).unwrap();
+        assert_eq!(detector.detect(&frame).unwrap().unwrap().areas_px, [5; 4]);
+        let error = format!("{:#}", detector.detect(&frame).unwrap_err());
         assert!(error.contains("OpenCV"), "{error}");
     }
 }

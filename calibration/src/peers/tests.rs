@@ -1,5 +1,5 @@
 use super::*;
-use crate::dataset::{Eye, Recipe, Sensing};
+use crate::dataset::{MarkerDetector, Recipe, Sensing};
 
 /// The whole study, small, without OpenCV: the sensing with the paper's binary centroids stands in for it.
 #[test]
@@ -20,7 +20,7 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
         json: None,
         document: None,
     };
-    let eye = |width, height| -> Result<Box<dyn Eye>> {
+    let detector = |width, height| -> Result<Box<dyn MarkerDetector>> {
         let recipe = Recipe {
             preset: Preset::Paper,
             width,
@@ -30,7 +30,7 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
         };
         Ok(Box::new(Sensing::unmodelled(&recipe)?))
     };
-    let comparisons = args.compare(&eye).unwrap();
+    let comparisons = args.compare(&detector).unwrap();
     let [comparison] = &comparisons[..] else {
         panic!("one reading")
     };
@@ -53,9 +53,9 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
     let text = table::markdown(&comparisons);
     assert!(text.contains("| 160x120 | the paper's |"), "{text}");
 
-    let again = args.compare(&eye).unwrap();
+    let again = args.compare(&detector).unwrap();
     assert_eq!(table::markdown(&again), text);
-    let blind = |_, _| -> Result<Box<dyn Eye>> { anyhow::bail!("nothing is rendered") };
+    let blind = |_, _| -> Result<Box<dyn MarkerDetector>> { anyhow::bail!("nothing is rendered") };
     let kept = PeersArgs {
         kept_frames: true,
         ..args

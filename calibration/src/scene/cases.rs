@@ -7,7 +7,7 @@ use clap::Args;
 use hivtac_scene::{Frame, HardCase, Preset, Scene, hard_cases};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, Colour, WHITE};
-use super::eye::{Eye, worst_px};
+use super::pipeline::{Pipeline, worst_px};
 
 /// The moment of a moving case that is shown, s.
 pub const SHOWN_S: f64 = 0.25;
@@ -80,12 +80,18 @@ impl CasesArgs {
         legend(&mut sheet);
 
         let nominal = Scene::preset("rest", self.preset, SIZE[0], SIZE[1], 1)?;
-        let mut eye = Eye::tared(&nominal)?;
+        let mut pipeline = Pipeline::tared(&nominal)?;
         for (number, case) in (0..).zip(&cases) {
             let frame = shown(case, self.preset)?;
             let x = GAP + number % self.columns * place[0];
             let y = top + number / self.columns * place[1];
-            draw(&mut sheet, [x.into(), y.into()], case, &frame, &mut eye);
+            draw(
+                &mut sheet,
+                [x.into(), y.into()],
+                case,
+                &frame,
+                &mut pipeline,
+            );
         }
         sheet.save(&self.out)?;
         println!(
@@ -110,24 +116,30 @@ fn legend(sheet: &mut Canvas) {
     }
 }
 
-fn draw(sheet: &mut Canvas, [x, y]: [i64; 2], case: &HardCase, frame: &Frame, eye: &mut Eye) {
+fn draw(
+    sheet: &mut Canvas,
+    [x, y]: [i64; 2],
+    case: &HardCase,
+    frame: &Frame,
+    pipeline: &mut Pipeline,
+) {
     sheet.paste([x, y], &Canvas::of_frame(frame, 1).halved());
-    let (said, colour) = outcome(case, frame, eye);
+    let (said, colour) = outcome(case, frame, pipeline);
     let below = y + i64::from(PICTURE[1] + 4);
     sheet.text([x, below], 1, &case.name, BLACK);
     sheet.text([x, below + i64::from(LINE)], 1, &said, colour);
 }
 
 /// What the sensing makes of a frame.
-fn outcome(case: &HardCase, frame: &Frame, eye: &mut Eye) -> (String, Colour) {
-    let sight = eye.look(frame);
-    match sight.centroids_px {
-        Some(centroids_px) if sight.rejected.is_empty() => {
+fn outcome(case: &HardCase, frame: &Frame, pipeline: &mut Pipeline) -> (String, Colour) {
+    let measurement = pipeline.measure(frame);
+    match measurement.centroids_px {
+        Some(centroids_px) if measurement.rejected.is_empty() => {
             let worst = worst_px(&centroids_px, &frame.truth);
             let right = worst <= case.tolerance_px(frame.width);
             let said = format!("within {worst:.2} px");
             (said, if right { RIGHT } else { WRONG })
         }
-        _ => (sight.rejected, REJECTED),
+        _ => (measurement.rejected, REJECTED),
     }
 }

@@ -3,10 +3,10 @@
 mod canvas;
 mod cases;
 mod effects;
-mod eye;
 mod figures;
 mod film;
 mod overlay;
+mod pipeline;
 mod render;
 pub(crate) mod size;
 

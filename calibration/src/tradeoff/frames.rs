@@ -26,13 +26,13 @@ pub struct Frames {
     /// In the order of [`CENTROIDS`].
     pub datasets: [Dataset; 2],
     /// Of them.
-    pub seen: Seen,
+    pub seen: FrameTally,
 }
 
 /// What became of the frames of one size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Seen {
+pub struct FrameTally {
     /// Frames with a load.
     pub frames: usize,
     /// Those without a force, by the estimator.
@@ -42,13 +42,13 @@ pub struct Seen {
 }
 
 /// What an estimator makes of a frame, and whether windows make the same of it.
-type Look = Result<Observation, String>;
+type EstimatorResult = Result<Observation, String>;
 
 /// A frame's force, N, where its tip touches the film, mm, and what both estimators make of it.
 struct Looked {
     force_n: [f64; 3],
     tip_mm: Option<[f64; 2]>,
-    looks: [Look; 2],
+    looks: [EstimatorResult; 2],
 }
 
 /// The frames of a size, from `folder` or rendered into it. `progress` is called for each, from any thread.
@@ -65,7 +65,7 @@ pub fn frames(
     let files = [0, 1].map(|i| file(folder, &recipes[i]));
     let mark = folder.join(format!("{}x{}.json", size[0], size[1]));
     if let Ok(text) = fs::read_to_string(&mark) {
-        let seen: Seen = serde_json::from_str(&text)?;
+        let seen: FrameTally = serde_json::from_str(&text)?;
         let datasets = [Dataset::load(&files[0])?, Dataset::load(&files[1])?];
         let same = |i: usize| -> Result<bool> { Ok(datasets[i].about == recipes[i].about()?) };
         ensure!(
@@ -116,7 +116,7 @@ fn rendered(recipes: &[Recipe; 2], progress: impl Fn() + Sync) -> Result<Frames>
     let looks = look(recipes, recipe.rest..recipe.rows(), models, &progress)?;
     add(&mut datasets, recipe, looks)?;
     let rejected = |dataset: &Dataset| dataset.rejected().values().sum();
-    let seen = Seen {
+    let seen = FrameTally {
         frames: recipe.rows() - recipe.rest,
         rejected: [rejected(&datasets[0]), rejected(&datasets[1])],
         fingerprint: fingerprint(&datasets),
@@ -199,7 +199,7 @@ fn eye<'m>(recipe: &Recipe, model: Option<Model<'m>>) -> Result<Box<Sensor<'m>>>
     Ok(sensor)
 }
 
-fn look_once(sensor: &mut Sensor<'_>, frame: &Frame) -> Look {
+fn look_once(sensor: &mut Sensor<'_>, frame: &Frame) -> EstimatorResult {
     observation(&measure(sensor, frame))
 }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::frames::Seen;
+use super::frames::FrameTally;
 use super::plan::{Numbers, Plan, Task};
 
 /// How far one model was from the truth, on frames that it was not made from, within the calibrated range of |F|.
@@ -51,7 +51,7 @@ pub struct Finished {
 #[serde(rename_all = "kebab-case")]
 enum Line {
     Plan(Plan),
-    Frames { size: [u16; 2], seen: Seen },
+    Frames { size: [u16; 2], seen: FrameTally },
     Finished(Finished),
 }
 
@@ -62,7 +62,7 @@ pub struct Results {
     /// What is swept.
     pub plan: Plan,
     /// What became of the frames of each size.
-    pub seen: Vec<([u16; 2], Seen)>,
+    pub seen: Vec<([u16; 2], FrameTally)>,
     /// Finished trainings.
     pub finished: Vec<Finished>,
 }
@@ -150,7 +150,7 @@ impl Results {
     ///
     /// # Errors
     /// When there are results of other frames, or it cannot be written.
-    pub fn saw(&mut self, size: [u16; 2], seen: Seen) -> Result<()> {
+    pub fn saw(&mut self, size: [u16; 2], seen: FrameTally) -> Result<()> {
         let before = self.seen.iter().find(|(known, _)| *known == size);
         if let Some((_, before)) = before {
             ensure!(
@@ -244,13 +244,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("results.jsonl");
         let mut results = Results::open(&file, Some(&small())).unwrap();
-        let seen = Seen {
+        let seen = FrameTally {
             frames: 10,
             rejected: [0; 2],
             fingerprint: 1,
         };
         results.saw([160, 120], seen).unwrap();
-        let other = Seen {
+        let other = FrameTally {
             fingerprint: 2,
             ..seen
         };

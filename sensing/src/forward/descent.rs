@@ -26,7 +26,7 @@ pub struct Descent<'a> {
     forward: &'a Forward<'a>,
     observed: &'a Observed,
     mounting: &'a Mounting,
-    here: Look,
+    here: Linearization,
     /// How much of the next step is tried.
     part: f32,
     /// How often the film was run forwards.
@@ -34,7 +34,7 @@ pub struct Descent<'a> {
 }
 
 /// A load, and what the markers say there.
-struct Look {
+struct Linearization {
     pose: Pose,
     /// What the load does not explain of the markers: the sum of squares in parts of their variances.
     unexplained: f32,
@@ -51,7 +51,7 @@ impl<'a> Descent<'a> {
         mounting: &'a Mounting,
         guess: Pose,
     ) -> Self {
-        let here = Look::at(forward, observed, mounting, within(forward, guess));
+        let here = Linearization::at(forward, observed, mounting, within(forward, guess));
         Self {
             forward,
             observed,
@@ -69,7 +69,7 @@ impl<'a> Descent<'a> {
             return false;
         };
         let pose = after(self.forward, &self.here.pose, solved, self.part);
-        let there = Look::at(self.forward, self.observed, self.mounting, pose);
+        let there = Linearization::at(self.forward, self.observed, self.mounting, pose);
         self.looks += 1;
         if there.square < self.here.square {
             (self.here, self.part) = (there, 1.0);
@@ -125,8 +125,13 @@ fn square(parts: &[f32]) -> f32 {
     parts.iter().fold(0.0, |sum, part| sum + part * part)
 }
 
-impl Look {
-    fn at(forward: &Forward<'_>, observed: &Observed, mounting: &Mounting, pose: Pose) -> Look {
+impl Linearization {
+    fn at(
+        forward: &Forward<'_>,
+        observed: &Observed,
+        mounting: &Mounting,
+        pose: Pose,
+    ) -> Linearization {
         let tables = &forward.tables;
         let Prediction { moved, slopes } =
             tables.predict(&pose, &forward.limits, &mounting.beside_mm);
@@ -136,7 +141,7 @@ impl Look {
         };
         let left: Column = weigh(&core::array::from_fn(|i| observed.moved[i] - moved[i]));
         let equations = Equations::new(&slopes.each_ref().map(weigh), &left, &pose);
-        Look {
+        Linearization {
             pose,
             unexplained: square(&left),
             square: square(&equations.side),

@@ -52,19 +52,21 @@ impl Tables<'_> {
             let at = place(&self.moved, place_mm);
             let beside_at = is_beside.then(|| place(&self.beside, place_mm));
             for axis in [0, 1] {
-                let seen = Seen { corner, axis };
+                let reflection = Reflection { corner, axis };
                 let load = Load {
                     sizes: &sizes,
-                    tilts: &tilts[axis].mirrored(seen.signs()),
+                    tilts: &tilts[axis].mirrored(reflection.signs()),
                 };
-                let mut answer = self.moved.answer(0, &seen.swapped(at), &load, &mut sums);
+                let mut answer = self
+                    .moved
+                    .answer(0, &reflection.swapped(at), &load, &mut sums);
                 if let Some(at) = beside_at {
-                    let at = seen.swapped(at);
-                    for (output, part) in seen.vector(beside_mm).into_iter().enumerate() {
+                    let at = reflection.swapped(at);
+                    for (output, part) in reflection.vector(beside_mm).into_iter().enumerate() {
                         answer.value += part * self.beside.value(output, &at, &load, &mut sums);
                     }
                 }
-                prediction.set(2 * marker + axis, &seen.back(&answer));
+                prediction.set(2 * marker + axis, &reflection.back(&answer));
             }
         }
         if let Some(own) = &self.own {
@@ -91,14 +93,14 @@ impl Prediction {
     }
 }
 
-/// The mirrors in which a marker is in the lower right corner, and moves along x where it moves along `axis`.
-struct Seen {
+/// The reflection in which a marker is in the lower right corner, and moves along x where it moves along `axis`.
+struct Reflection {
     corner: [f32; 2],
     axis: usize,
 }
 
-impl Seen {
-    /// A vector along the film, as it is seen; and one that was seen, as it is.
+impl Reflection {
+    /// A vector along the film, reflected; and a reflected one, as it is.
     fn vector(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sx, sy] = self.corner;
         match self.axis {
@@ -107,7 +109,7 @@ impl Seen {
         }
     }
 
-    /// The signs of what is seen.
+    /// The signs of what is reflected.
     fn signs(&self) -> [f32; 2] {
         let [sx, sy] = self.corner;
         match self.axis {
@@ -116,7 +118,7 @@ impl Seen {
         }
     }
 
-    /// A place in the lower right corner, as it is seen.
+    /// A place, reflected into the lower right corner.
     fn swapped(&self, place: Place) -> Place {
         match self.axis {
             0 => place,
@@ -127,10 +129,10 @@ impl Seen {
         }
     }
 
-    /// What was seen, as it is.
-    fn back(&self, seen: &Answer) -> Answer {
+    /// What was reflected, as it is.
+    fn back(&self, reflected: &Answer) -> Answer {
         let sign = self.corner[self.axis];
-        let [size, a, b, x, y] = seen.slopes;
+        let [size, a, b, x, y] = reflected.slopes;
         let along = |[a, b]: [f32; 2]| {
             let [sx, sy] = self.corner;
             match self.axis {
@@ -140,7 +142,7 @@ impl Seen {
         };
         let ([a, b], [x, y]) = (along([a, b]), along([x, y]));
         Answer {
-            value: sign * seen.value,
+            value: sign * reflected.value,
             slopes: [sign * size, a, b, x, y],
         }
     }

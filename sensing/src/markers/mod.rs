@@ -43,7 +43,7 @@ use crate::{
 };
 use heapless::Vec;
 use pattern::Pattern;
-use shape::{Seen, Shape, nominal_edge};
+use shape::{RadialShape, Shape, nominal_edge};
 
 /// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3 lower left
 /// as the image shows them.
@@ -84,7 +84,7 @@ impl Found {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Image {
     /// As the pattern's centre sees it.
-    seen: Seen,
+    radial: RadialShape,
     /// [`Shape::area`].
     area: u32,
     /// [`Shape::passed`].
@@ -225,16 +225,19 @@ impl Finder {
 
     /// A marker's image, when its size fits its distance from the pattern's centre.
     fn image(&self, shape: &Shape, pattern: &Pattern) -> Option<Image> {
-        let seen = shape.seen_from(pattern.center)?;
-        let expected = self.across.at(seen.distance).0;
-        let excess = i64::from((seen.across - self.edge.0).abs_diff(expected));
+        let radial = shape.about(pattern.center)?;
+        let expected = self.across.at(radial.distance).0;
+        let excess = i64::from((radial.across - self.edge.0).abs_diff(expected));
         // ⌊256·along / across⌋ within the limits.
-        let (along, across) = (256 * i64::from(seen.along), i64::from(seen.across.max(1)));
+        let (along, across) = (
+            256 * i64::from(radial.along),
+            i64::from(radial.across.max(1)),
+        );
         let is_plausible = excess * 256 <= i64::from(expected) * SIZE_TOLERANCE
             && along >= LEAST_ASPECT * across
             && along < (LARGEST_ASPECT + 1) * across;
         is_plausible.then_some(Image {
-            seen,
+            radial,
             area: shape.area,
             passed: shape.passed,
             expected,

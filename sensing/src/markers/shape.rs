@@ -37,9 +37,9 @@ pub struct Shape {
     central: Central,
 }
 
-/// A shape as its pattern's centre sees it. Diameters in px, Q16.16.
+/// A shape along and across the radius from its pattern's centre. Diameters in px, Q16.16.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seen {
+pub struct RadialShape {
     /// Distance from the centre.
     pub distance: Px,
     /// Diameter across the radius.
@@ -90,8 +90,8 @@ impl Shape {
         })
     }
 
-    /// Seen from a centre; `None` from its own.
-    pub fn seen_from(&self, center: (Px, Px)) -> Option<Seen> {
+    /// About a centre; `None` about its own.
+    pub fn about(&self, center: (Px, Px)) -> Option<RadialShape> {
         let distance = distance((self.x, self.y), center);
         if distance.0 == 0 {
             return None;
@@ -105,7 +105,7 @@ impl Shape {
         let across = direction.across(variance).max(1);
         let [by_along, by_across] = [along, across].map(|it| Reciprocal::of(it as u32));
         let deviation = deviation(across);
-        Some(Seen {
+        Some(RadialShape {
             distance,
             across: diameter(deviation),
             along: diameter(self::deviation(along)),

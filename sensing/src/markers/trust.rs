@@ -10,7 +10,7 @@ use super::{
     Found, Image,
     pattern::{Pattern, distance, length},
     reading::Reading,
-    shape::Seen,
+    shape::RadialShape,
 };
 use crate::{
     dilate::MAX_DILATIONS,
@@ -172,14 +172,14 @@ impl Trust {
         let mut inner_densities = [0; 4];
         let images = found.images.iter().zip(&self.edges);
         for ((image, edge), inner) in images.zip(&mut inner_densities) {
-            let seen = &image.seen;
-            let by_across = by(seen.across);
+            let radial = &image.radial;
+            let by_across = by(radial.across);
             if !self.image_fits(image, &by_across, *edge, taper) {
                 return false;
             }
-            let aspect = by_across.part(seen.along);
+            let aspect = by_across.part(radial.along);
             (narrowest, widest) = (narrowest.min(aspect), widest.max(aspect));
-            width = width.min(seen.across);
+            width = width.min(radial.across);
             if self.reading.inner_density_area.is_some() {
                 *inner = inner_density(image, &by_across, *edge);
             }
@@ -201,8 +201,11 @@ impl Trust {
     }
 
     fn image_fits(&self, image: &Image, by_across: &Reciprocal, edge: i32, taper: i32) -> bool {
-        let Image { seen, expected, .. } = image;
-        let lopsided = grid_of_means(self.grid, LOPSIDED_PIXELS) + scaled(seen.across, LOPSIDED, 8);
+        let Image {
+            radial, expected, ..
+        } = image;
+        let lopsided =
+            grid_of_means(self.grid, LOPSIDED_PIXELS) + scaled(radial.across, LOPSIDED, 8);
         let skew = by_across
             .part(self.grid * SKEW_PIXELS)
             .saturating_add(scaled(taper, self.reading.skew_by_taper, 8))
@@ -212,21 +215,21 @@ impl Trust {
             self.by_rest_width
                 .times(i64::from(LEAN) * i64::from(*expected)),
         );
-        let bent = scaled(scaled(seen.across, seen.across, 32), taper, 0);
+        let bent = scaled(scaled(radial.across, radial.across, 32), taper, 0);
         let lean = LEAN
             .max(wider)
             .saturating_add(scaled(bent, self.reading.lean_by_taper, 16));
-        self.width_fits(*expected, seen, edge)
-            && seen.skew.saturating_abs() <= skew
+        self.width_fits(*expected, radial, edge)
+            && radial.skew.saturating_abs() <= skew
             && image.hollow <= self.hollow
-            && seen.lean <= scaled(lean, self.grid + 1, 1)
+            && radial.lean <= scaled(lean, self.grid + 1, 1)
             && image.lopsided <= lopsided
             && is_filled(image, self.rim, self.reading.holes)
     }
 
     /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
-    fn width_fits(&self, expected: i32, seen: &Seen, edge: i32) -> bool {
-        let excess = i64::from(seen.across) - i64::from(edge) - i64::from(expected);
+    fn width_fits(&self, expected: i32, radial: &RadialShape, edge: i32) -> bool {
+        let excess = i64::from(radial.across) - i64::from(edge) - i64::from(expected);
         let pixels = grid_of_means(self.grid, WIDTH_PIXELS);
         excess.abs() <= i64::from(expected) * self.reading.width / 256 + i64::from(pixels)
     }
@@ -252,7 +255,7 @@ fn over_square(area: i32, by_width: &Reciprocal) -> i32 {
 fn inner_density(image: &Image, by_across: &Reciprocal, edge: i32) -> i32 {
     let outer = by_across
         .part(edge)
-        .saturating_add(by(image.seen.along).part(edge));
+        .saturating_add(by(image.radial.along).part(edge));
     by(65_536_i32.saturating_sub(outer).max(1 << 13)).part(image.density)
 }
 
@@ -265,7 +268,7 @@ fn grid_of_means(grid: i32, limit: i32) -> i32 {
 /// of them. Both products are below
 /// 2⁵⁷: diameters are below 2¹⁸ then, and an area is at most 640,000 px.
 fn is_filled(image: &Image, rim: i32, holes: i64) -> bool {
-    let [across, along] = [image.seen.across, image.seen.along].map(|length| length >> 8);
+    let [across, along] = [image.radial.across, image.radial.along].map(|length| length >> 8);
     let product = |count: u32, a: i32, b: i32| i64::from(count) * (i64::from(a) * i64::from(b));
     let least = product(image.area, (across - rim).max(0), (along - rim).max(0));
     product(image.passed, across, along) >= least - least / 256 * holes

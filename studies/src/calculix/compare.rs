@@ -15,7 +15,7 @@ const COORDINATES: usize = 8;
 
 /// What is compared of a pressed film.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct FilmObservation {
     /// Where the tip's disc went, mm.
     pub tip_mm: [f64; 3],
     /// The markers' motion and images.
@@ -56,15 +56,15 @@ pub fn press(film: &mut Film, force_n: [f64; 3], place_mm: [f64; 2]) -> Result<E
 }
 
 /// What is compared of the project's film.
-pub fn seen(film: &Film, state: &Equilibrium, camera: &Camera) -> Seen {
-    Seen {
+pub fn seen(film: &Film, state: &Equilibrium, camera: &Camera) -> FilmObservation {
+    FilmObservation {
         tip_mm: state.tip_mm,
         markers: markers(film, state, camera),
     }
 }
 
 /// How far the second film is from the first.
-pub fn difference(first: &Seen, second: &Seen) -> Difference {
+pub fn difference(first: &FilmObservation, second: &FilmObservation) -> Difference {
     let pairs = || first.markers.iter().zip(&second.markers);
     let space = pairs().map(|(a, b)| {
         let [x, y, z] = [0, 1, 2].map(|axis| b.moved_mm[axis] - a.moved_mm[axis]);
@@ -100,7 +100,7 @@ pub fn largest_and_rms(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
 pub fn read(
     design: &Design,
     camera: &Camera,
-    seen: &Seen,
+    seen: &FilmObservation,
     force_n: [f64; 3],
     place_mm: [f64; 2],
 ) -> Result<Reading> {
@@ -227,7 +227,7 @@ mod tests {
 
     #[test]
     fn differences_are_distances() {
-        let at = |x: f64, px: f64, depth: f64| Seen {
+        let at = |x: f64, px: f64, depth: f64| FilmObservation {
             tip_mm: [0.0, 0.0, -depth],
             markers: [Marker {
                 moved_mm: [x, 0.0, 2.0 * x],

@@ -18,7 +18,7 @@ use clap::Args;
 use hivtac_film::{Design, Film, markers_on, paper_camera};
 use hivtac_scene::{Camera, MARKER_REST_MM};
 
-use compare::{Reading, Seen};
+use compare::{FilmObservation, Reading};
 use deck::Deck;
 use mesh::Mesh;
 use page::Page;
@@ -56,7 +56,7 @@ struct Job {
 /// What CalculiX made of it.
 #[derive(Clone)]
 struct Solved {
-    seen: Seen,
+    seen: FilmObservation,
     /// The film's thickness under the tip and at marker 2, mm.
     thickness_mm: [f64; 2],
     elements: [usize; 3],
@@ -66,7 +66,7 @@ struct Solved {
 /// A press in the project's film and in CalculiX's two.
 struct Compared {
     press: Press,
-    own: Seen,
+    own: FilmObservation,
     /// St Venant's law and neo-Hooke's; why not, where there is no equilibrium.
     theirs: [Result<Solved, String>; 2],
     /// What the project's film takes them for.
@@ -76,9 +76,9 @@ struct Compared {
 /// Variations at one press.
 struct Varied {
     press: Press,
-    own: Seen,
+    own: FilmObservation,
     /// The project's film on a mesh twice as fine.
-    finer: Seen,
+    finer: FilmObservation,
     theirs: Vec<(Variant, Result<Solved, String>)>,
 }
 
@@ -187,7 +187,7 @@ impl Study {
         varied.collect()
     }
 
-    fn own(&self, film: &mut Film, press: Press) -> Result<Seen> {
+    fn own(&self, film: &mut Film, press: Press) -> Result<FilmObservation> {
         let state = compare::press(film, press.force_n, press.place_mm)?;
         Ok(compare::seen(film, &state, &self.camera))
     }
@@ -256,14 +256,14 @@ impl Study {
         })
     }
 
-    fn seen(&self, design: &Design, pressed: &Pressed<'_>) -> Seen {
+    fn seen(&self, design: &Design, pressed: &Pressed<'_>) -> FilmObservation {
         let mut tip_mm = [0.0; 3];
         for ([x, y], share) in design.tip_points() {
             for (sum, part) in tip_mm.iter_mut().zip(pressed.at([x, y, 0.0])) {
                 *sum += share * part;
             }
         }
-        Seen {
+        FilmObservation {
             tip_mm,
             markers: markers_on(|rest| pressed.camera_side(rest), &self.camera),
         }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use anyhow::{Context, Result};
 use hivtac_film::{Design, Film};
 
-use super::compare::{Difference, Seen, difference, largest_and_rms};
+use super::compare::{Difference, FilmObservation, difference, largest_and_rms};
 use super::{Compared, Solved, Varied};
 
 /// The page, with `{names}` where figures go.
@@ -229,7 +229,7 @@ fn own_mesh() -> Result<String> {
 }
 
 /// The rest of a press's row.
-fn apart(own: &Seen, solved: &Solved) -> String {
+fn apart(own: &FilmObservation, solved: &Solved) -> String {
     let found = difference(own, &solved.seen);
     let ([space, space_rms], [picture, picture_rms]) = (found.space_um, found.picture_px);
     let [tip, marker] = solved.thickness_mm;
@@ -241,7 +241,7 @@ fn apart(own: &Seen, solved: &Solved) -> String {
 }
 
 /// The rest of a variation's row.
-fn against(own: &Seen, other: &Seen) -> String {
+fn against(own: &FilmObservation, other: &FilmObservation) -> String {
     let found = difference(own, other);
     let ([space, space_rms], [picture, picture_rms]) = (found.space_um, found.picture_px);
     let depth = -other.tip_mm[2];

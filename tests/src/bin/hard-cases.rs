@@ -3,8 +3,8 @@
 
 use anyhow::{Context, Result};
 use hivtac_scene::Contact;
-use hivtac_tests::hard::{look_at_all, table};
-use hivtac_tests::looking::{View, views};
+use hivtac_tests::hard::{detect_in_all, table};
+use hivtac_tests::tared::{View, views};
 
 /// Frames for each case and load.
 const REPEATS: u64 = 4;
@@ -28,7 +28,7 @@ fn main() -> Result<()> {
     };
     let views = views(contact, &[[320, 240], [800, 600]]);
     for view in views.into_iter().chain([yuv422]) {
-        println!("{}", table(view, &look_at_all(view, repeats)?));
+        println!("{}", table(view, &detect_in_all(view, repeats)?));
     }
     Ok(())
 }

@@ -57,9 +57,9 @@ pub struct Buffers<'b> {
     pub bands: &'b mut [u16; TWO_BANDS_PIXELS],
 }
 
-/// How later frames are looked at.
+/// Which pixels later frames have, and how they are taken.
 #[derive(Clone, Copy)]
-struct Look {
+struct PixelSettings {
     order: ByteOrder,
     threshold: Threshold,
     weighted: bool,
@@ -70,7 +70,7 @@ pub struct Runner<'b> {
     buffers: Buffers<'b>,
     /// Where in its buffer the model file lies.
     model_place: Range<usize>,
-    look: Look,
+    sent: PixelSettings,
     pixels: Formats<ByteTable>,
     scanner: Scanner<BLOBS>,
     cases: u32,
@@ -82,7 +82,7 @@ impl<'b> Runner<'b> {
         Runner {
             buffers,
             model_place: 0..0,
-            look: Look {
+            sent: PixelSettings {
                 order: ByteOrder::Native,
                 threshold: Threshold::red(PixelFormat::Rgb565),
                 weighted: false,
@@ -129,19 +129,19 @@ impl<'b> Runner<'b> {
 
     fn set_threshold(&mut self, source: &mut impl Source) -> Result<(), ScriptError> {
         let [flags, limits @ ..] = bytes::<7>(source)?;
-        self.look.weighted = flags & 2 != 0;
-        self.look.order = if flags & 1 != 0 {
+        self.sent.weighted = flags & 2 != 0;
+        self.sent.order = if flags & 1 != 0 {
             ByteOrder::Swapped
         } else {
             ByteOrder::Native
         };
         let format = PixelFormat::ALL.get(usize::from(flags >> 3));
         let format = *format.ok_or(ScriptError::Format(flags >> 3))?;
-        self.look.threshold =
+        self.sent.threshold =
             Threshold::of_limits(format, limits).map_err(ScriptError::Threshold)?;
-        let Look {
+        let PixelSettings {
             order, threshold, ..
-        } = self.look;
+        } = self.sent;
         if flags & 4 != 0 {
             counting_begins();
         }
@@ -163,7 +163,7 @@ impl<'b> Runner<'b> {
             height,
             dilations,
             min_area,
-            weighted: self.look.weighted,
+            weighted: self.sent.weighted,
             max_runs: u32::MAX,
         };
         self.scanner.begin(settings).map_err(ScriptError::Scan)?;
@@ -187,7 +187,7 @@ impl<'b> Runner<'b> {
     ) -> Result<(), ScriptError> {
         let (width, height, frames) = (number(source)?, number(source)?, number(source)?);
         let file = &self.buffers.model.0[self.model_place.clone()];
-        let mut sensor = sensor(file, self.look, [width, height])?;
+        let mut sensor = sensor(file, self.sent, [width, height])?;
         let words = [self.pixels.row_length(width), height.into()];
         for _ in 0..frames {
             let buffers = (&mut self.buffers.row[..], &mut self.buffers.bands[..]);
@@ -270,16 +270,16 @@ impl<'b> Runner<'b> {
 
 fn sensor(
     file: &[u8],
-    look: Look,
+    sent: PixelSettings,
     [width, height]: [u16; 2],
 ) -> Result<Sensor<'_, BLOBS>, ScriptError> {
     let model = model(file)?;
     let mut settings = match &model {
-        Some(model) => Settings::of_model(model, look.order),
-        None => Settings::usual(Geometry::preset(Preset::Ov7725, width, height), look.order),
+        Some(model) => Settings::of_model(model, sent.order),
+        None => Settings::usual(Geometry::preset(Preset::Ov7725, width, height), sent.order),
     };
-    settings.threshold = look.threshold;
-    if model.is_none() && look.weighted {
+    settings.threshold = sent.threshold;
+    if model.is_none() && sent.weighted {
         settings.centroid = CentroidEstimator::RednessWeighted;
     }
     let mut sensor = Sensor::new();

@@ -32,13 +32,13 @@ fn gauge(of: impl Fn(f64) -> f64, span_s: f64, lag_s: f64, drift: f64, noise_n: 
     series
 }
 
-fn frames(of: impl Fn(f64) -> f64, span_s: f64) -> Vec<Seen> {
+fn frames(of: impl Fn(f64) -> f64, span_s: f64) -> Vec<RadiusSample> {
     let mut random = ChaCha8Rng::seed_from_u64(9);
     (0..(span_s * 39.0) as usize)
         .map(|i| {
             let time_s = i as f64 / 39.0;
             let noise = 0.03 * random.random_range(-1.7..1.7);
-            Seen {
+            RadiusSample {
                 time_s,
                 radius_px: radius(of(time_s)) + noise,
             }
@@ -81,7 +81,7 @@ fn a_clock_that_runs_faster_is_followed() {
 }
 
 /// The refusal's words.
-fn refused(frames: &[Seen], series: &Series, search: Search) -> String {
+fn refused(frames: &[RadiusSample], series: &Series, search: Search) -> String {
     align(frames, series.joined(), search)
         .unwrap_err()
         .to_string()

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::frames::Frames;
 use super::models::Answers;
-use crate::dataset::{Eye, Sensing};
+use crate::dataset::{MarkerDetector, Sensing};
 use crate::errors::{angle_deg, norm};
 use bound::{Bound, COORDINATES, Noise, bound, centroids, jacobian};
 use matrix::{dot, least_squares};
@@ -43,7 +43,7 @@ pub struct Tenth {
 }
 
 /// One test frame: its label, the true centroids and how they follow the force, and how far the sensing was off.
-struct Look {
+struct TestSample {
     row: usize,
     force_n: [f64; 3],
     jacobian: [[f64; COORDINATES]; 3],
@@ -61,11 +61,11 @@ pub fn tenths(
 ) -> Result<Vec<Tenth>> {
     let recipe = &frames.test_recipe;
     let scene = recipe.scene(0)?;
-    let look = |&row: &usize| look(&scene, recipe.contact, frames, row);
-    let mut looks: Vec<Look> = rows.par_iter().map(look).collect::<Result<_>>()?;
-    looks.sort_by(|a, b| norm(a.force_n).total_cmp(&norm(b.force_n)));
-    let count = looks.len();
-    let part = |i: usize| &looks[i * count / PARTS..(i + 1) * count / PARTS];
+    let sample = |&row: &usize| sample(&scene, recipe.contact, frames, row);
+    let mut samples: Vec<TestSample> = rows.par_iter().map(sample).collect::<Result<_>>()?;
+    samples.sort_by(|a, b| norm(a.force_n).total_cmp(&norm(b.force_n)));
+    let count = samples.len();
+    let part = |i: usize| &samples[i * count / PARTS..(i + 1) * count / PARTS];
     let parts = (0..PARTS)
         .map(part)
         .filter(|part| part.len() > COORDINATES * 4);
@@ -74,7 +74,7 @@ pub fn tenths(
         .collect()
 }
 
-fn look(scene: &Scene, contact: Contact, frames: &Frames, row: usize) -> Result<Look> {
+fn sample(scene: &Scene, contact: Contact, frames: &Frames, row: usize) -> Result<TestSample> {
     let seen = &frames.ours.test.rows[row];
     let force_n = seen.force_n;
     let truth = centroids(scene, contact, force_n)?;
@@ -83,7 +83,7 @@ fn look(scene: &Scene, contact: Contact, frames: &Frames, row: usize) -> Result<
         .as_ref()
         .map_err(|why| anyhow::anyhow!("{why}"))?
         .features_px();
-    Ok(Look {
+    Ok(TestSample {
         row,
         force_n,
         jacobian: jacobian(scene, contact, force_n)?,
@@ -94,27 +94,28 @@ fn look(scene: &Scene, contact: Contact, frames: &Frames, row: usize) -> Result<
 fn tenth(
     scene: &Scene,
     frames: &Frames,
-    looks: &[Look],
+    samples: &[TestSample],
     models: &[(&'static str, Answers)],
 ) -> Result<Tenth> {
-    let scatter = scatter(looks)?;
-    let repeats = repeats(scene, frames, looks)?;
-    let found = |(name, answers): &(&'static str, Answers)| (*name, errors(looks, answers));
+    let scatter = scatter(samples)?;
+    let repeats = repeats(scene, frames, samples)?;
+    let found = |(name, answers): &(&'static str, Answers)| (*name, errors(samples, answers));
     Ok(Tenth {
-        force_mn: [looks.first(), looks.last()].map(|l| l.map_or(0.0, |l| 1e3 * norm(l.force_n))),
+        force_mn: [samples.first(), samples.last()]
+            .map(|l| l.map_or(0.0, |l| 1e3 * norm(l.force_n))),
         scatter_px: rms(&scatter),
         repeat_px: rms(&repeats),
-        bound: least(looks, &scatter)?,
-        noise_bound: least(looks, &repeats)?,
+        bound: least(samples, &scatter)?,
+        noise_bound: least(samples, &repeats)?,
         found: models.iter().map(found).collect(),
     })
 }
 
 /// Covariance of what is off, less what follows the force: a model learns that.
-fn scatter(looks: &[Look]) -> Result<Noise> {
-    let a = |look: &Look| {
-        let size = norm(look.force_n);
-        let [x, y, _] = look.force_n;
+fn scatter(samples: &[TestSample]) -> Result<Noise> {
+    let a = |sample: &TestSample| {
+        let size = norm(sample.force_n);
+        let [x, y, _] = sample.force_n;
         [
             1.0,
             10.0 * size,
@@ -124,17 +125,17 @@ fn scatter(looks: &[Look]) -> Result<Noise> {
             300.0 * size * y,
         ]
     };
-    let mut left = vec![[0.0; COORDINATES]; looks.len()];
+    let mut left = vec![[0.0; COORDINATES]; samples.len()];
     let mut known = 0;
     for i in 0..COORDINATES {
-        let rows: Vec<_> = looks.iter().map(|l| (a(l), l.off_px[i])).collect();
+        let rows: Vec<_> = samples.iter().map(|l| (a(l), l.off_px[i])).collect();
         let x = least_squares(&rows)?;
         known = x.len();
         for (left, (a, off)) in left.iter_mut().zip(&rows) {
             left[i] = off - dot(a, &x);
         }
     }
-    Ok(covariance(&left, looks.len() - known))
+    Ok(covariance(&left, samples.len() - known))
 }
 
 fn covariance(rows: &[[f64; COORDINATES]], freedom: usize) -> Noise {
@@ -143,17 +144,17 @@ fn covariance(rows: &[[f64; COORDINATES]], freedom: usize) -> Noise {
 }
 
 /// Covariance over repeats of the same loads with other noise.
-fn repeats(scene: &Scene, frames: &Frames, looks: &[Look]) -> Result<Noise> {
+fn repeats(scene: &Scene, frames: &Frames, samples: &[TestSample]) -> Result<Noise> {
     let recipe = &frames.test_recipe;
-    let step = (looks.len() / REPEATED_LOADS).max(1);
-    let one = |look: &Look| -> Result<Vec<[f64; COORDINATES]>> {
-        let mut eye = Sensing::unmodelled(recipe)?;
-        let load = Load::from_vector(look.force_n)?.with_contact(recipe.contact)?;
+    let step = (samples.len() / REPEATED_LOADS).max(1);
+    let one = |sample: &TestSample| -> Result<Vec<[f64; COORDINATES]>> {
+        let mut detector = Sensing::unmodelled(recipe)?;
+        let load = Load::from_vector(sample.force_n)?.with_contact(recipe.contact)?;
         let mut seen = Vec::new();
         for repeat in 0..REPEATS {
             // No row of the data set has this noise.
-            let number = (recipe.rows() + look.row * REPEATS + repeat) as u64;
-            if let Ok(found) = eye.look(&scene.render_load(&load, number)?)? {
+            let number = (recipe.rows() + sample.row * REPEATS + repeat) as u64;
+            if let Ok(found) = detector.detect(&scene.render_load(&load, number)?)? {
                 let px = found.features_px();
                 seen.push(std::array::from_fn(|i| px[i]));
             }
@@ -166,19 +167,19 @@ fn repeats(scene: &Scene, frames: &Frames, looks: &[Look]) -> Result<Noise> {
             .map(|s| std::array::from_fn(|i| s[i] - mean[i]))
             .collect())
     };
-    let chosen: Vec<&Look> = looks.iter().step_by(step).take(REPEATED_LOADS).collect();
+    let chosen: Vec<&TestSample> = samples.iter().step_by(step).take(REPEATED_LOADS).collect();
     let off = chosen
         .par_iter()
-        .map(|look| one(look))
+        .map(|sample| one(sample))
         .collect::<Result<Vec<_>>>()?;
     let freedom = off.iter().map(|seen| seen.len().saturating_sub(1)).sum();
     Ok(covariance(&off.concat(), freedom))
 }
 
 /// Root mean squares of the bounds: direction in degrees, |F| in mN.
-fn least(looks: &[Look], noise: &Noise) -> Result<[f64; 2]> {
-    let one = |look: &Look| bound(noise, &look.jacobian, look.force_n);
-    let bounds: Vec<Bound> = looks
+fn least(samples: &[TestSample], noise: &Noise) -> Result<[f64; 2]> {
+    let one = |sample: &TestSample| bound(noise, &sample.jacobian, sample.force_n);
+    let bounds: Vec<Bound> = samples
         .iter()
         .map(one)
         .collect::<Result<_>>()
@@ -189,8 +190,11 @@ fn least(looks: &[Look], noise: &Noise) -> Result<[f64; 2]> {
 }
 
 /// A model's root mean square errors on the same frames.
-fn errors(looks: &[Look], answers: &Answers) -> [f64; 2] {
-    let known: Vec<_> = looks.iter().filter_map(|look| answers[look.row]).collect();
+fn errors(samples: &[TestSample], answers: &Answers) -> [f64; 2] {
+    let known: Vec<_> = samples
+        .iter()
+        .filter_map(|sample| answers[sample.row])
+        .collect();
     let mean = |of: &dyn Fn([[f64; 3]; 2]) -> f64| {
         (known.iter().map(|&pair| of(pair).powi(2)).sum::<f64>() / known.len() as f64).sqrt()
     };

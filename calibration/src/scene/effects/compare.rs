@@ -4,7 +4,7 @@ use anyhow::Result;
 use hivtac_scene::{Compare, Effect, Frame, Options, Preset, Scene};
 
 use crate::errors::{WEAK_N, angle_deg, norm};
-use crate::scene::eye::{Eye, Sight};
+use crate::scene::pipeline::{FrameMeasurement, Pipeline};
 use crate::scene::size::Size;
 
 /// Frames per second.
@@ -17,16 +17,16 @@ const SEED: u64 = 1;
 /// The default sensor, and what is found in its frames.
 pub struct Nominal {
     noisy: Scene,
-    quiet: Seen,
+    quiet: Measurements,
     frames: u32,
 }
 
 /// What is found in the frames of a scene, after a tare on its own untouched film.
-struct Seen {
+struct Measurements {
     rest_px: Option<[[f64; 2]; 4]>,
     /// The true centroids at rest.
     rest_truth_px: Option<[[f64; 2]; 4]>,
-    sights: Vec<Sight>,
+    frames: Vec<FrameMeasurement>,
     /// |F| in each frame, N.
     sizes_n: Vec<f64>,
     /// The true centroids in each frame.
@@ -75,7 +75,7 @@ impl Nominal {
         let noisy = Scene::preset("sweep", preset, size.width, size.height, SEED)?;
         let silent = quiet(&noisy)?;
         Ok(Nominal {
-            quiet: Seen::of(&silent, Eye::tared(&silent)?, frames, 0),
+            quiet: Measurements::of(&silent, Pipeline::tared(&silent)?, frames, 0),
             noisy,
             frames,
         })
@@ -83,8 +83,8 @@ impl Nominal {
 
     /// Whether forces can be told.
     pub fn has_model(&self) -> bool {
-        let mut sights = self.quiet.sights.iter();
-        sights.any(|sight| sight.force_n.is_some())
+        let mut frames = self.quiet.frames.iter();
+        frames.any(|frame| frame.force_n.is_some())
     }
 
     /// What an effect changes, without noise where it is not about noise: the change and not the noise is measured.
@@ -99,22 +99,22 @@ impl Nominal {
         } else {
             quiet(&switched)?
         };
-        let seen = Seen::of(&scene, self.eye(&scene)?, self.frames, 0);
-        Ok(self.quiet.against(&seen))
+        let measured = Measurements::of(&scene, self.pipeline(&scene)?, self.frames, 0);
+        Ok(self.quiet.against(&measured))
     }
 
     /// What other noise changes: the default sensor twice.
     pub fn noise_floor(&self) -> Result<Change> {
-        let seen = |series| -> Result<Seen> {
-            let eye = self.eye(&self.noisy)?;
-            Ok(Seen::of(&self.noisy, eye, self.frames, series))
+        let measured = |series| -> Result<Measurements> {
+            let pipeline = self.pipeline(&self.noisy)?;
+            Ok(Measurements::of(&self.noisy, pipeline, self.frames, series))
         };
-        Ok(seen(0)?.against(&seen(1)?))
+        Ok(measured(0)?.against(&measured(1)?))
     }
 
     /// A sensor with a tare on the untouched film of a scene, or on the default one where that is not to be had.
-    fn eye(&self, scene: &Scene) -> Result<Eye> {
-        Eye::tared(scene).or_else(|_| Eye::tared(&self.noisy))
+    fn pipeline(&self, scene: &Scene) -> Result<Pipeline> {
+        Pipeline::tared(scene).or_else(|_| Pipeline::tared(&self.noisy))
     }
 }
 
@@ -126,31 +126,31 @@ fn quiet(scene: &Scene) -> Result<Scene> {
     Ok(scene.clone().with_options(options)?)
 }
 
-impl Seen {
-    /// Looks at frames of a scene; `series` selects the noise.
-    fn of(scene: &Scene, mut eye: Eye, frames: u32, series: u64) -> Seen {
+impl Measurements {
+    /// Measures frames of a scene; `series` selects the noise.
+    fn of(scene: &Scene, mut pipeline: Pipeline, frames: u32, series: u64) -> Measurements {
         let at_rest = scene.frame(series << 32, 0.0);
-        let mut seen = Seen {
-            rest_px: eye.look(&at_rest).centroids_px,
+        let mut measurements = Measurements {
+            rest_px: pipeline.measure(&at_rest).centroids_px,
             rest_truth_px: truth_px(&at_rest),
-            sights: Vec::new(),
+            frames: Vec::new(),
             sizes_n: Vec::new(),
             truths_px: Vec::new(),
         };
         for number in 0..frames {
             let time_s = PRESSED_S + f64::from(number) / RATE;
             let frame = scene.frame((series << 32) + 1 + u64::from(number), time_s);
-            seen.sights.push(eye.look(&frame));
-            seen.sizes_n.push(frame.truth.force.magnitude_n());
-            seen.truths_px.push(truth_px(&frame));
+            measurements.frames.push(pipeline.measure(&frame));
+            measurements.sizes_n.push(frame.truth.force.magnitude_n());
+            measurements.truths_px.push(truth_px(&frame));
         }
-        seen
+        measurements
     }
 
-    fn against(&self, other: &Seen) -> Change {
+    fn against(&self, other: &Measurements) -> Change {
         let mut change = Change::default();
         let rest = [&self.rest_px, &other.rest_px];
-        for (frame, (a, b)) in self.sights.iter().zip(&other.sights).enumerate() {
+        for (frame, (a, b)) in self.frames.iter().zip(&other.frames).enumerate() {
             if let (Some(a), Some(b)) = (&a.centroids_px, &b.centroids_px) {
                 change.add_centroids([a, b], rest);
             }
@@ -167,8 +167,8 @@ impl Seen {
     /// What is found against what is true.
     fn against_truth(&self) -> Change {
         let mut change = Change::default();
-        for (sight, truth_px) in self.sights.iter().zip(&self.truths_px) {
-            if let (Some(centroids_px), Some(truth_px)) = (&sight.centroids_px, truth_px) {
+        for (frame, truth_px) in self.frames.iter().zip(&self.truths_px) {
+            if let (Some(centroids_px), Some(truth_px)) = (&frame.centroids_px, truth_px) {
                 change.add_centroids(
                     [centroids_px, truth_px],
                     [&self.rest_px, &self.rest_truth_px],

@@ -1,4 +1,4 @@
-//! What looks at rendered frames: `sensing`, or something that it is compared with.
+//! What finds markers in rendered frames: `sensing`, or something that it is compared with.
 
 use std::sync::Mutex;
 
@@ -14,22 +14,22 @@ use hivtac_sensing::threshold::{ByteOrder, Threshold};
 
 use super::{Observation, Recipe};
 
-/// What was seen in a frame, or why nothing was.
-pub type Seen = Result<Observation, String>;
+/// What was found in a frame, or why nothing was.
+pub type Detection = Result<Observation, String>;
 
 /// Finds markers in frames.
-pub trait Eye: Send {
-    /// Looks at a frame.
+pub trait MarkerDetector: Send {
+    /// Finds the markers of a frame.
     ///
     /// # Errors
-    /// When it cannot look at all; a frame without markers is no error.
-    fn look(&mut self, frame: &Frame) -> Result<Seen>;
+    /// When it cannot work at all; a frame without markers is no error.
+    fn detect(&mut self, frame: &Frame) -> Result<Detection>;
 }
 
-/// Eyes that look at the same frames: each gives a data set of its own.
-pub type Eyes<'a> = Vec<Box<dyn Eye + 'a>>;
+/// Detectors for the same frames: each gives a data set of its own.
+pub type Detectors<'a> = Vec<Box<dyn MarkerDetector + 'a>>;
 
-/// `sensing` as an eye.
+/// `sensing` as a detector.
 pub struct Sensing<'m>(Box<Sensor<'m>>);
 
 impl Sensing<'static> {
@@ -66,8 +66,8 @@ impl<'m> Sensing<'m> {
     }
 }
 
-impl Eye for Sensing<'_> {
-    fn look(&mut self, frame: &Frame) -> Result<Seen> {
+impl MarkerDetector for Sensing<'_> {
+    fn detect(&mut self, frame: &Frame) -> Result<Detection> {
         let measurement = measure(&mut self.0, frame);
         let refused = reasons(measurement.status);
         Ok(match (measurement.markers, measurement.features) {
@@ -99,31 +99,34 @@ pub(crate) fn reasons(status: Status) -> String {
     status.names().filter(forbids).collect::<Vec<_>>().join(" ")
 }
 
-/// Opens eyes.
-type Open<'a> = dyn Fn() -> Result<Eyes<'a>> + Sync + 'a;
+/// Opens detectors.
+type Open<'a> = dyn Fn() -> Result<Detectors<'a>> + Sync + 'a;
 
-/// Eyes for as many threads as look at a time, opened as they are needed.
+/// Detectors for as many threads as run at a time, opened as they are needed.
 pub(super) struct Pool<'a> {
     open: Box<Open<'a>>,
-    idle: Mutex<Vec<Eyes<'a>>>,
+    idle: Mutex<Vec<Detectors<'a>>>,
 }
 
 impl<'a> Pool<'a> {
-    pub fn new(open: impl Fn() -> Result<Eyes<'a>> + Sync + 'a) -> Self {
+    pub fn new(open: impl Fn() -> Result<Detectors<'a>> + Sync + 'a) -> Self {
         Self {
             open: Box::new(open),
             idle: Mutex::default(),
         }
     }
 
-    /// Lets all eyes of a set look at a frame.
-    pub fn look(&self, frame: &Frame) -> Result<Vec<Seen>> {
+    /// Has all detectors of a set find the markers of a frame.
+    pub fn detect(&self, frame: &Frame) -> Result<Vec<Detection>> {
         let idle = || self.idle.lock().map_err(|error| anyhow!("{error}"));
         let ready = idle()?.pop();
-        let mut eyes = ready.map_or_else(&self.open, Ok)?;
-        let seen = eyes.iter_mut().map(|eye| eye.look(frame)).collect();
-        idle()?.push(eyes);
-        seen
+        let mut detectors = ready.map_or_else(&self.open, Ok)?;
+        let detections = detectors
+            .iter_mut()
+            .map(|detector| detector.detect(frame))
+            .collect();
+        idle()?.push(detectors);
+        detections
     }
 }
 

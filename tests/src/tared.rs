@@ -1,4 +1,4 @@
-//! Rendered frames, looked at by the pipeline with a model that knows nothing of forces: where it finds the markers, and
+//! Rendered frames, measured by the pipeline with a model that knows nothing of forces: where it finds the markers, and
 //! whether it would trust them with a force.
 
 use std::boxed::Box;
@@ -25,7 +25,7 @@ pub const ESTIMATORS: [CentroidEstimator; 2] = [
 /// Frames that make a rest position, as many as `hivtac tare` takes at least.
 const TARE_FRAMES: u16 = 8;
 
-/// What is looked at.
+/// The camera and the pipeline behind it.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Lens and camera.
@@ -42,7 +42,7 @@ pub struct View {
 
 /// What was made of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Seen {
+pub enum Detection {
     /// A force would be given.
     Trusted {
         /// The largest distance of a marker from its true place, px; infinite when there is no such marker.
@@ -55,7 +55,7 @@ pub enum Seen {
 }
 
 /// A sensor that was tared on the nominal scene at rest. Its model is for such frames and such a contact.
-pub struct Looker {
+pub struct TaredSensor {
     sensor: Box<Sensor<'static>>,
 }
 
@@ -151,23 +151,23 @@ impl View {
         }
     }
 
-    /// A sensor that looks so, with a model of presses in the middle.
+    /// A sensor for this view, with a model of presses in the middle.
     ///
     /// # Errors
     /// When the frame size is not one, or the nominal scene is not found.
-    pub fn looker(&self) -> Result<Looker> {
-        self.looker_with(OutputKind::ForceVector)
+    pub fn sensor(&self) -> Result<TaredSensor> {
+        self.sensor_with(OutputKind::ForceVector)
     }
 
     /// The same with a model that tells places.
     ///
     /// # Errors
-    /// As [`Self::looker`].
-    pub fn looker_anywhere(&self) -> Result<Looker> {
-        self.looker_with(OutputKind::ForceAndPlace)
+    /// As [`Self::sensor`].
+    pub fn sensor_anywhere(&self) -> Result<TaredSensor> {
+        self.sensor_with(OutputKind::ForceAndPlace)
     }
 
-    fn looker_with(&self, output: OutputKind) -> Result<Looker> {
+    fn sensor_with(&self, output: OutputKind) -> Result<TaredSensor> {
         let lens = match self.preset {
             Preset::Paper => geometry::Preset::Paper,
             Preset::Ov7725 => geometry::Preset::Ov7725,
@@ -182,24 +182,24 @@ impl View {
         let mut sensor = Box::new(Sensor::new());
         let configured = sensor.configure(settings, None);
         configured.map_err(|error| anyhow!("{error}"))?;
-        let mut looker = Looker { sensor };
-        let rest = looker.rest(&self.nominal()?)?;
+        let mut tared = TaredSensor { sensor };
+        let rest = tared.rest(&self.nominal()?)?;
         let file = models::file_read_so(&settings, rest, self.reading(), output);
         // A few hundred bytes that a test keeps to its end.
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
-        let configured = looker.sensor.configure(settings, Some(model));
+        let configured = tared.sensor.configure(settings, Some(model));
         configured.map_err(|error| anyhow!("{error}"))?;
-        looker.sensor.set_tare(Some(rest));
-        Ok(looker)
+        tared.sensor.set_tare(Some(rest));
+        Ok(tared)
     }
 }
 
-impl Looker {
+impl TaredSensor {
     /// A sensor with a committed model, tared on the nominal scene of its camera.
     ///
     /// # Errors
     /// When the file is no model's, or the nominal scene is not found.
-    pub fn of_model(file: Vec<u8>) -> Result<Looker> {
+    pub fn of_model(file: Vec<u8>) -> Result<TaredSensor> {
         // Some tens of kilobytes that a test keeps to its end.
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let geometry = &model.conditions.geometry;
@@ -209,10 +209,10 @@ impl Looker {
         let settings = Settings::of_model(&model, ByteOrder::Native);
         let configured = sensor.configure(settings, Some(model));
         configured.map_err(|error| anyhow!("{error}"))?;
-        let mut looker = Looker { sensor };
-        let rest = looker.rest(&Scene::preset("rest", preset, width, height, 7)?)?;
-        looker.sensor.set_tare(Some(rest));
-        Ok(looker)
+        let mut tared = TaredSensor { sensor };
+        let rest = tared.rest(&Scene::preset("rest", preset, width, height, 7)?)?;
+        tared.sensor.set_tare(Some(rest));
+        Ok(tared)
     }
 
     /// Where the markers of a scene rest.
@@ -236,11 +236,11 @@ impl Looker {
     }
 
     /// What the pipeline makes of a frame.
-    pub fn look(&mut self, frame: &Frame) -> Seen {
+    pub fn detect(&mut self, frame: &Frame) -> Detection {
         let seen = self.sense(frame);
         let markers = match seen.markers {
             Some(markers) if !seen.status.intersects(Status::NO_FORCE) => markers,
-            _ => return Seen::Refused(seen.status),
+            _ => return Detection::Refused(seen.status),
         };
         let (mut worst_px, mut sum) = (0.0f64, [0.0, 0.0]);
         for (marker, truth) in markers.iter().zip(&frame.truth.markers) {
@@ -250,16 +250,16 @@ impl Looker {
             sum = [sum[0] + dx, sum[1] + dy];
         }
         let mean_px = f64::hypot(sum[0], sum[1]) / 4.0;
-        Seen::Trusted { worst_px, mean_px }
+        Detection::Trusted { worst_px, mean_px }
     }
 }
 
-impl Seen {
+impl Detection {
     /// The largest distance of a marker from its true place, px; `None` without a force.
     pub fn worst_px(&self) -> Option<f64> {
         match self {
-            Seen::Trusted { worst_px, .. } => Some(*worst_px),
-            Seen::Refused(_) => None,
+            Detection::Trusted { worst_px, .. } => Some(*worst_px),
+            Detection::Refused(_) => None,
         }
     }
 }

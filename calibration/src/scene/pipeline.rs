@@ -1,4 +1,4 @@
-//! The pipeline that looks at simulated frames, with the default model where that is made for them.
+//! The pipeline on simulated frames, with the default model where that is made for them.
 
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_scene::{Camera, Frame, Load, Preset as ScenePreset, Scene, Truth};
@@ -19,14 +19,14 @@ const TARE_FRAMES: u16 = 16;
 /// A pixel in Q16.16.
 const PX: f64 = 65_536.0;
 
-/// A sensor that looks at frames.
-pub struct Eye {
+/// The pipeline of a sensor.
+pub struct Pipeline {
     sensor: Box<Sensor<'static>>,
 }
 
 /// What it made of a frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sight {
+pub struct FrameMeasurement {
     /// Centroids by identity, px, when four markers were found, trusted or not.
     pub centroids_px: Option<[[f64; 2]; 4]>,
     /// N, film frame, when there is a model and nothing forbids a force.
@@ -35,12 +35,12 @@ pub struct Sight {
     pub rejected: String,
 }
 
-impl Eye {
+impl Pipeline {
     /// One for a camera, without a tare.
     ///
     /// # Errors
     /// When the default model cannot be read, or the pipeline does not take such frames.
-    pub fn new(camera: &Camera) -> Result<Eye> {
+    pub fn new(camera: &Camera) -> Result<Pipeline> {
         let size = |count: u32| u16::try_from(count).context("the frame is too large");
         let preset = match camera.preset() {
             ScenePreset::Paper => Preset::Paper,
@@ -57,47 +57,47 @@ impl Eye {
         let mut sensor = Box::new(Sensor::new());
         let configured = sensor.configure(settings, model);
         configured.map_err(|error| anyhow!("{error}"))?;
-        Ok(Eye { sensor })
+        Ok(Pipeline { sensor })
     }
 
     /// One that was tared on the untouched film of a scene.
     ///
     /// # Errors
-    /// As [`Eye::new`], and when the markers of the untouched film are not found.
-    pub fn tared(scene: &Scene) -> Result<Eye> {
-        let mut eye = Eye::new(scene.camera())?;
+    /// As [`Pipeline::new`], and when the markers of the untouched film are not found.
+    pub fn tared(scene: &Scene) -> Result<Pipeline> {
+        let mut pipeline = Pipeline::new(scene.camera())?;
         let mut builder = TareBuilder::new(TARE_FRAMES).context("not a number of frames")?;
         // Numbers that no test frame has: their noise is the tare's alone.
         for number in (1 << 40).. {
             let frame = scene.render_load(&Load::REST, number)?;
-            let measured = eye.measure(&frame);
+            let measured = pipeline.run(&frame);
             let (Some(markers), Some(features)) = (measured.markers, measured.features) else {
                 bail!("no tare: {}", reasons(measured.status));
             };
             if let Some(rest) = builder.add(&markers, &features) {
-                eye.sensor.set_tare(Some(rest));
+                pipeline.sensor.set_tare(Some(rest));
                 break;
             }
         }
-        Ok(eye)
+        Ok(pipeline)
     }
 
-    /// Looks at a frame, whatever its format.
-    pub fn look(&mut self, frame: &Frame) -> Sight {
+    /// Measures a frame, whatever its format.
+    pub fn measure(&mut self, frame: &Frame) -> FrameMeasurement {
         let Measurement {
             status,
             markers,
             force,
             ..
-        } = self.measure(frame);
-        Sight {
+        } = self.run(frame);
+        FrameMeasurement {
             centroids_px: markers.map(|markers| markers.map(centroid_px)),
             force_n: force.map(crate::check::vector_n),
             rejected: reasons(status),
         }
     }
 
-    fn measure(&mut self, frame: &Frame) -> Measurement {
+    fn run(&mut self, frame: &Frame) -> Measurement {
         self.sensor.begin_frame();
         for row in frame.to_rgb565().chunks(frame.width as usize) {
             self.sensor.push_row(row);
