@@ -17,6 +17,9 @@ pub const SEEDED_BUGS: [&str; 5] = [
     "bug-usb-clock",
 ];
 
+/// The profile of programs that run here, which is quick to build.
+const TOOLS: &str = "tools";
+
 /// The firmware, as it is flashed.
 pub fn firmware(toolchain: &Toolchain) -> Result<PathBuf> {
     build(&mut firmware_command(toolchain), "hivtac-firmware")
@@ -44,22 +47,16 @@ fn firmware_command(toolchain: &Toolchain) -> Command {
 /// The host tool `hivtac`.
 pub fn host_tool() -> Result<PathBuf> {
     let mut command = cargo("build", workspace::root());
-    build(command.args(["--package", "hivtac", "--release"]), "hivtac")
+    command.args(["--profile", TOOLS, "--package", "hivtac"]);
+    build(&mut command, "hivtac")
 }
 
 /// The calibration, without the solver of the film, which takes minutes to build.
 pub fn calibrate() -> Result<PathBuf> {
     let mut command = cargo("build", workspace::root());
-    command.args([
-        "--package",
-        "hivtac-calibration",
-        "--no-default-features",
-        "--release",
-    ]);
-    build(
-        command.args(["--bin", "hivtac-calibrate"]),
-        "hivtac-calibrate",
-    )
+    command.args(["--profile", TOOLS, "--package", "hivtac-calibration"]);
+    command.args(["--no-default-features", "--bin", "hivtac-calibrate"]);
+    build(&mut command, "hivtac-calibrate")
 }
 
 /// The rig.
@@ -68,11 +65,11 @@ pub fn rig() -> Result<PathBuf> {
     build(command.args(["--bin", "hivtac-rig"]), "hivtac-rig")
 }
 
-/// A cargo command for the rig: always in release, so that its emulator is built once, and with an emulator that
-/// declares a newer compiler than it needs.
+/// A cargo command for the rig: always in one profile, so that its emulator is built once, and with
+/// an emulator that declares a newer compiler than it needs.
 pub fn rig_cargo(verb: &str) -> Command {
     let mut command = cargo(verb, &workspace::folder("rig"));
-    command.args(["--release", "--ignore-rust-version"]);
+    command.args(["--profile", TOOLS, "--ignore-rust-version"]);
     command
 }
 
