@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use crate::rig::Rig;
@@ -61,6 +61,10 @@ impl Demo {
     }
 
     fn show(&self, stage: &Stage) -> Result<()> {
+        eprintln!(
+            "The board boots, and {} frames pass: some half a minute.",
+            self.frames
+        );
         let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
         process::run(&mut self.monitor(stage, rig.port()))?;
         rig.finish()?;
@@ -106,12 +110,24 @@ pub fn json_lines(toolchain: &Toolchain, frames: u64) -> Result<String> {
 }
 
 impl Stage {
+    /// Builds the firmware beside the rig, whose emulator takes longest, and the host tool.
     fn build(toolchain: &Toolchain) -> Result<Stage> {
+        eprintln!(
+            "Building the firmware, the emulated board and the host tool: some three minutes the \
+             first time on two cores, a second from then on."
+        );
         let folder = workspace::work_folder("demo")?;
+        let (firmware, tools) = std::thread::scope(|scope| {
+            let firmware = scope.spawn(|| artifacts::firmware(toolchain));
+            let tools = artifacts::rig().and_then(|rig| Ok((rig, artifacts::host_tool()?)));
+            (firmware.join(), tools)
+        });
+        let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))??;
+        let (rig, tool) = tools?;
         Ok(Stage {
-            firmware: artifacts::firmware(toolchain)?,
-            rig: artifacts::rig()?,
-            tool: artifacts::host_tool()?,
+            firmware,
+            rig,
+            tool,
             truth: folder.join("truth.jsonl"),
             arrivals: folder.join("arrivals.jsonl"),
             log: folder.join("rig.log"),
