@@ -13,7 +13,10 @@ fn main() {
     let root = Path::new(&std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("..");
     let file = root.join(named);
     let file = file.canonicalize().unwrap_or_else(|error| {
-        panic!("HIVTAC_MODEL={named}: {error}; name a model file, from the root of the repository or in full")
+        panic!(
+            "HIVTAC_MODEL={named}: {error}; name a model file, from the root of the repository \
+                or in full"
+        )
     });
     println!("cargo:rerun-if-changed={}", file.display());
     println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());

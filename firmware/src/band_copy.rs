@@ -1,14 +1,16 @@
 //! MDMA channel 0: bands from AXI SRAM into DTCM, where the core reads them without waiting.
 //!
 //! # Design
-//! Three buffers: while the core scans one band, the next one is copied when it is there already, and the one before
-//! stays, as its last rows may have to be weighed yet. The core asks for a band when it knows that it is finished, so it
-//! waits for a copy only when it had nothing to do: one band of 320 × 8 pixels moves in about 6 µs (640 reads of 8 bytes
-//! and 1280 writes of 4 at the 240 MHz of the bus; an estimate, not measured).
+//! Three buffers: while the core scans one band, the next one is copied when it is there already,
+//! and the one before stays, as its last rows may have to be weighed yet. The core asks for a band
+//! when it knows that it is finished, so it waits for a copy only when it had nothing to do: one
+//! band of 320 × 8 pixels moves in about 6 µs (640 reads of 8 bytes and 1280 writes of 4 at the
+//! 240 MHz of the bus; an estimate, not measured).
 //!
 //! # Note
-//! Coherence: the MDMA reads AXI SRAM past the caches, where the camera's DMA has written past them; it writes DTCM,
-//! which is never cached. A barrier keeps the core from reading ahead of the end of a copy.
+//! Coherence: the MDMA reads AXI SRAM past the caches, where the camera's DMA has written past
+//! them; it writes DTCM, which is never cached. A barrier keeps the core from reading ahead of the
+//! end of a copy.
 
 use crate::bands::{self, BAND_PIXELS, SHAPE};
 use embassy_stm32::pac::mdma::{Ch, regs, vals};
@@ -18,7 +20,8 @@ use hivtac_capture::Band;
 use static_cell::ConstStaticCell;
 
 const CHANNEL: usize = 0;
-/// Bytes that the MDMA reads and then writes at once: its whole buffer. Every band is a multiple of it.
+/// Bytes that the MDMA reads and then writes at once: its whole buffer. Every band is a multiple of
+/// it.
 const BUFFER_BYTES: u8 = 128;
 /// Looks at a copy under way before it counts as failed: a few milliseconds.
 const PATIENCE: u32 = 100_000;
@@ -66,8 +69,9 @@ impl BandCopy {
         }
     }
 
-    /// A finished band. `finished` tells how many bands are finished by now; when there is one more already, its copy
-    /// begins. `None` when the band was overwritten meanwhile, or could not be copied.
+    /// A finished band. `finished` tells how many bands are finished by now; when there is one more
+    /// already, its copy begins. `None` when the band was overwritten meanwhile, or could not be
+    /// copied.
     pub fn fetch(&mut self, band: &Band, finished: impl Fn() -> u32) -> Option<Fetched<'_>> {
         if self.ahead.take() != Some(band.sequence) {
             self.start(band.sequence);
@@ -131,8 +135,8 @@ impl BandCopy {
 /// TEIF to TCIF of IFCR.
 const ALL_FLAGS: u32 = 0x1F;
 
-/// One software request moves one block: read as words of 8 bytes over AXI, written as words of 4 bytes into DTCM
-/// (more is not allowed there: RM0433, MDMA_CxTCR).
+/// One software request moves one block: read as words of 8 bytes over AXI, written as words of
+/// 4 bytes into DTCM (more is not allowed there: RM0433, MDMA_CxTCR).
 fn set_up_transfer(w: &mut regs::Tcr) {
     w.set_sinc(vals::Incmode::INCREMENT);
     w.set_ssize(vals::Wordsize::DOUBLE_WORD);

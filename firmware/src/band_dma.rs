@@ -1,9 +1,9 @@
 //! DMA1 stream 0: DCMI's data register into the ring of bands, without end.
 //!
 //! # Design
-//! Double-buffer mode: while the stream fills one target, the handler of its interrupt sets the other one to the slot
-//! after. Direct mode (no DMA FIFO), so that the count of missing words is exact at any moment and nothing has to be
-//! flushed. One interrupt a band.
+//! Double-buffer mode: while the stream fills one target, the handler of its interrupt sets the
+//! other one to the slot after. Direct mode (no DMA FIFO), so that the count of missing words is
+//! exact at any moment and nothing has to be flushed. One interrupt a band.
 //!
 //! # Note
 //! The ring lies in AXI SRAM: this DMA reaches neither DTCM nor ITCM.
@@ -58,8 +58,8 @@ impl BandDma {
         });
     }
 
-    /// Stops the stream and forgets its events; returns when its last write is done. That takes some bus cycles; if it
-    /// should ever take longer, the watchdog ends it.
+    /// Stops the stream and forgets its events; returns when its last write is done. That takes
+    /// some bus cycles; if it should ever take longer, the watchdog ends it.
     pub fn halt(&mut self) {
         let control = registers().cr();
         control.modify(|w| w.set_en(false));

@@ -6,7 +6,8 @@ use crate::camera::{HEIGHT, WIDTH};
 use core::mem::MaybeUninit;
 use hivtac_capture::Shape;
 
-/// Rows of a band: as many as the sensing takes at a time, for each time costs it some hundred cycles.
+/// Rows of a band: as many as the sensing takes at a time, for each time costs it some hundred
+/// cycles.
 pub const ROWS: u16 = 8;
 /// Bands in the ring: at 320 × 240 a little more than a frame.
 pub const SLOTS: u16 = 32;
@@ -40,7 +41,8 @@ pub fn address(slot: u16) -> u32 {
     base + u32::from(slot % SLOTS) * (BAND_PIXELS * size_of::<u16>()) as u32
 }
 
-/// Writes every word once, which gives the memory's error correction codes a defined start. Call before the DMA runs.
+/// Writes every word once, which gives the memory's error correction codes a defined start. Call
+/// before the DMA runs.
 pub fn clear() {
     // SAFETY: no reference to the ring is ever made, and nothing else writes to it yet.
     unsafe { (&raw mut RING).write_bytes(0, 1) };

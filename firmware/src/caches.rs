@@ -1,13 +1,15 @@
 //! Caches and the memory protection unit.
 //!
-//! Both caches are on: code and model lie in flash, which is slow without them. What the DMA writes and the core
-//! reads lies in AXI SRAM, which one MPU region makes normal, non-cacheable memory. So no cache line can ever
-//! hold a stale pixel and no code has to remember to invalidate one. DTCM is never cached.
+//! Both caches are on: code and model lie in flash, which is slow without them. What the DMA writes
+//! and the core reads lies in AXI SRAM, which one MPU region makes normal, non-cacheable memory. So
+//! no cache line can ever hold a stale pixel and no code has to remember to invalidate one. DTCM is
+//! never cached.
 
 use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 
-/// `MPU_RASR` of a region: attributes in the bits that the architecture gives them (ARMv7-M, B3.5.9).
+/// `MPU_RASR` of a region: attributes in the bits that the architecture gives them (ARMv7-M,
+/// B3.5.9).
 struct Region {
     base: u32,
     /// log2 of the size in bytes.
@@ -28,8 +30,8 @@ const STRONGLY_ORDERED: u32 = 0;
 const NORMAL_NON_CACHEABLE: u32 = 1 << 19 | 1 << 18;
 const NEVER_EXECUTE: u32 = 1 << 28;
 
-/// External memory (0x6000_0000 to 0xDFFF_FFFF) is not fitted, but the core may read there speculatively and then
-/// waits for ever (ST AN4838, section 4): no access at all.
+/// External memory (0x6000_0000 to 0xDFFF_FFFF) is not fitted, but the core may read there
+/// speculatively and then waits for ever (ST AN4838, section 4): no access at all.
 const EXTERNAL_MEMORY: Region = Region {
     base: 0,
     size_log2: 32,
@@ -49,7 +51,8 @@ const DMA_BUFFERS: Region = Region {
     execute: false,
 };
 
-/// ITCM, once its code is loaded: a stray write, as through a null pointer, faults instead of changing the program.
+/// ITCM, once its code is loaded: a stray write, as through a null pointer, faults instead of
+/// changing the program.
 const NEAR_CODE: Region = Region {
     base: 0,
     size_log2: 16,
@@ -59,7 +62,8 @@ const NEAR_CODE: Region = Region {
     execute: true,
 };
 
-/// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA buffer.
+/// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA
+/// buffer.
 pub fn enable(core: &mut Peripherals) {
     set_regions(&mut core.MPU);
     core.SCB.enable_icache();
@@ -71,7 +75,8 @@ fn set_regions(mpu: &mut MPU) {
     /// Everywhere else the architecture's default memory map holds.
     const PRIVILEGED_DEFAULT: u32 = 1 << 2;
     cortex_m::asm::dmb();
-    // SAFETY: the program has not yet written to a region, and everything it does use keeps its default attributes.
+    // SAFETY: the program has not yet written to a region, and everything it does use keeps its
+    // default attributes.
     unsafe {
         mpu.ctrl.write(0);
         for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS, NEAR_CODE]) {

@@ -1,15 +1,16 @@
 //! The camera interface (DCMI) in continuous mode: every frame, whatever the camera does.
 //!
 //! # Design
-//! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots in AXI SRAM
-//! (`bands`), at 320 × 240 a little more than a frame, at 800 × 600 four tenths of one. Each finished band is one
-//! interrupt; so are the end of a frame (the VSYNC pulse) and an overrun. The handlers
-//! do what `hivtac_capture::Tracker` says, and pass its events to the pipeline, which has finished bands copied to DTCM
-//! (`band_copy`) and scans one while the next ones arrive. A frame is measured as soon as its last band is scanned. When
-//! more comes after that, it counts as too long, and the next sample says that a frame was lost.
+//! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots
+//! in AXI SRAM (`bands`), at 320 × 240 a little more than a frame, at 800 × 600 four tenths of one.
+//! Each finished band is one interrupt; so are the end of a frame (the VSYNC pulse) and an overrun.
+//! The handlers do what `hivtac_capture::Tracker` says, and pass its events to the pipeline, which
+//! has finished bands copied to DTCM (`band_copy`) and scans one while the next ones arrive. A
+//! frame is measured as soon as its last band is scanned. When more comes after that, it counts as
+//! too long, and the next sample says that a frame was lost.
 //!
-//! After anything unforeseen, DCMI is reset and set up anew, and the DMA begins a new band: the next frame is captured
-//! from its beginning. Between two good frames nothing is touched.
+//! After anything unforeseen, DCMI is reset and set up anew, and the DMA begins a new band: the
+//! next frame is captured from its beginning. Between two good frames nothing is touched.
 //!
 //! # Note
 //! Coherence: the core never reads the ring (see `band_copy`).
@@ -29,8 +30,8 @@
 //!   frame is dropped and counted as `dropped_busy`; the camera never waits.
 //!
 //! # Limitations
-//! A frame in which the camera lost bytes and gained as many is not noticed. Nor is it noticed that the handler of a
-//! band was late by exactly two bands in a frame that was too long by two bands.
+//! A frame in which the camera lost bytes and gained as many is not noticed. Nor is it noticed that
+//! the handler of a band was late by exactly two bands in a frame that was too long by two bands.
 
 use crate::band_dma::BandDma;
 use crate::bands::SHAPE;
@@ -70,7 +71,8 @@ struct Hardware {
 pub struct Capture(());
 
 impl Capture {
-    /// Clocks the peripheral and enables its interrupts at `priority`, which the DMA's has, too. Call once.
+    /// Clocks the peripheral and enables its interrupts at `priority`, which the DMA's has, too.
+    /// Call once.
     pub fn new(dcmi: Peri<'static, peripherals::DCMI>, dma: BandDma, priority: Priority) -> Self {
         rcc::enable_and_reset::<peripherals::DCMI>();
         let running = Running {
@@ -202,7 +204,8 @@ fn reset() {
     RCC.ahb2rstr().modify(|w| w.set_dcmirst(false));
 }
 
-/// Configures DCMI to what the camera's registers were set to: 8 bits, hardware synchronization, continuous.
+/// Configures DCMI to what the camera's registers were set to: 8 bits, hardware synchronization,
+/// continuous.
 fn configure() {
     DCMI.cr().write(|w| {
         w.set_pckpol(camera::SAMPLE_ON_RISING_EDGE != INVERTED_POLARITIES);
@@ -211,7 +214,8 @@ fn configure() {
     });
 }
 
-/// Waits until the DMA has written a frame's last words, some bus cycles; no longer, as they may never come.
+/// Waits until the DMA has written a frame's last words, some bus cycles; no longer, as they may
+/// never come.
 fn drain(dma: &BandDma) {
     const PATIENCE: u32 = 64;
     for _ in 0..PATIENCE {

@@ -140,7 +140,8 @@ impl CaptureTask {
         self.go_on(from, answered.is_err()).await;
     }
 
-    /// Captures no more; the newest frame so far. Frames that pass from now on count as dropped at once.
+    /// Captures no more; the newest frame so far. Frames that pass from now on count as dropped at
+    /// once.
     fn stop(&mut self) -> u32 {
         self.capture.stop();
         let from = match self.numbering {

@@ -31,7 +31,8 @@ pub fn report_reset() {
     RCC.rsr().modify(|w| w.set_rmvf(true));
 }
 
-/// Starts the watchdog and feeds it from thread mode: it bites when something above never lets thread mode run.
+/// Starts the watchdog and feeds it from thread mode: it bites when something above never lets
+/// thread mode run.
 #[embassy_executor::task]
 pub async fn feed_watchdog(mut watchdog: IndependentWatchdog<'static, IWDG1>) {
     // A debugger may hold the core for as long as it likes.

@@ -6,7 +6,8 @@ use embassy_time::Instant;
 use heapless::String;
 use hivtac_wire::message::{DeviceMessage, LogLevel, LogLine};
 
-/// Says it. A line that is too long is cut; a line that the host's queue has no room for goes to the probe only.
+/// Says it. A line that is too long is cut; a line that the host's queue has no room for goes to
+/// the probe only.
 pub fn say(level: LogLevel, line: fmt::Arguments) {
     let mut text = Cut(String::new());
     // Never fails: what does not fit is cut.

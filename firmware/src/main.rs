@@ -58,7 +58,8 @@ core::arch::global_asm!(include_str!("start.s"));
 static CAPTURE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static USB_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
-/// Too large for DTCM beside the tables; frames use small parts of it at a time, which the data cache holds.
+/// Too large for DTCM beside the tables; frames use small parts of it at a time, which the data
+/// cache holds.
 #[unsafe(link_section = ".sram.sensor")]
 static SENSOR: ConstStaticCell<Sensor> = ConstStaticCell::new(Sensor::new());
 
@@ -92,8 +93,9 @@ fn main() -> ! {
         })
 }
 
-/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to red markers in RGB565, and
-/// says what pixels it asks for. A model for pixels that the camera does not send gives no force then, and every sample says so.
+/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to
+/// red markers in RGB565, and says what pixels it asks for. A model for pixels that the camera does
+/// not send gives no force then, and every sample says so.
 fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;

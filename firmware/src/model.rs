@@ -2,11 +2,12 @@
 
 use hivtac_sensing::model::{AlignedFile, Model};
 
-/// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels run it.
+/// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels
+/// run it.
 static FILE: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!(env!("HIVTAC_MODEL_FILE")));
 
-/// A file of at most so many bytes is copied to DTCM at the start, where its weights are read without waiting; a larger
-/// one is read in flash.
+/// A file of at most so many bytes is copied to DTCM at the start, where its weights are read
+/// without waiting; a larger one is read in flash.
 const NEAR_LIMIT: usize = 12 * 1024;
 /// Bytes of the copy.
 const NEAR: usize = if FILE.0.len() <= NEAR_LIMIT {
@@ -28,7 +29,8 @@ const fn beginning<const N: usize>(bytes: &[u8]) -> [u8; N] {
     copy
 }
 
-/// The model; `None`, with a log line, when the file is not usable. Samples then say so and have no force.
+/// The model; `None`, with a log line, when the file is not usable. Samples then say so and have no
+/// force.
 pub fn embedded() -> Option<Model<'static>> {
     let file = if NEAR != 0 { &COPY.0[..] } else { &FILE.0 };
     match Model::parse(file) {

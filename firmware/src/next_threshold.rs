@@ -16,8 +16,8 @@ impl NextThreshold {
     pub const NONE: Self = Self(None);
 
     /// Takes a threshold, as it came, for the command `id`, while frames have the pixels of
-    /// `sensor`'s threshold: brings it into use, or asks the camera for its pixels. Tells whether it
-    /// is in use.
+    /// `sensor`'s threshold: brings it into use, or asks the camera for its pixels. Tells whether
+    /// it is in use.
     ///
     /// # Errors
     /// Why it is refused: another one waits, it means nothing, or the camera does not send such

@@ -1,16 +1,19 @@
 //! Deliberate bugs, each behind a cargo feature that is off by default.
 //!
-//! They exist to prove that the tests on the emulated microcontroller notice such mistakes. With no feature
-//! set every constant here has its right value and the program is the same as if this file did not exist.
+//! They exist to prove that the tests on the emulated microcontroller notice such mistakes. With no
+//! feature set every constant here has its right value and the program is the same as if this file
+//! did not exist.
 
-/// DMAMUX1 request line of DCMI (RM0433, table "DMAMUX1: assignment of multiplexer inputs"), or its neighbour's.
+/// DMAMUX1 request line of DCMI (RM0433, table "DMAMUX1: assignment of multiplexer inputs"), or its
+/// neighbour's.
 pub const DCMI_DMA_REQUEST: u8 = if cfg!(feature = "bug-dmamux-request") {
     76
 } else {
     75
 };
 
-/// True when DCMI samples on the edge on which the camera changes its data, and mistakes blanking for data.
+/// True when DCMI samples on the edge on which the camera changes its data, and mistakes blanking
+/// for data.
 pub const INVERTED_POLARITIES: bool = cfg!(feature = "bug-polarity");
 
 /// True when the camera's format register is left at YUV.

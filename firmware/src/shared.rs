@@ -3,8 +3,8 @@
 //! Contexts are those of [`priorities`](crate::priorities): the *VSYNC handler*, the *capture
 //! handlers* (DCMI and its DMA, of one priority), the *capture task*, the *USB tasks* (receiver,
 //! sender, watch on DTR, statistics; of one executor, as is the *LED task*), and in thread mode the
-//! *pipeline*. Each item is a lock, a queue or an atomic; the functions around it stand in the module
-//! of its subject, and nothing else touches it.
+//! *pipeline*. Each item is a lock, a queue or an atomic; the functions around it stand in the
+//! module of its subject, and nothing else touches it.
 //!
 //! Elsewhere, with the type or the list that belongs to them:
 //!
@@ -42,8 +42,8 @@ type Request<T> = Signal<CriticalSectionRawMutex, T>;
 
 // The camera and its capture.
 
-/// The newest VSYNC edge. Written by the VSYNC handler, and set to zero by the capture task; read by
-/// the capture handlers, the capture task, the pipeline and the USB tasks (`vsync`).
+/// The newest VSYNC edge. Written by the VSYNC handler, and set to zero by the capture task; read
+/// by the capture handlers, the capture task, the pipeline and the USB tasks (`vsync`).
 pub static NEWEST_EDGE: CriticalSectionMutex<Cell<Edge>> =
     CriticalSectionMutex::new(Cell::new(Edge {
         number: 0,
@@ -55,12 +55,13 @@ pub static NEWEST_EDGE: CriticalSectionMutex<Cell<Edge>> =
 pub static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
     CriticalSectionMutex::new(RefCell::new(None));
 
-/// Pixels of the frames that are captured. Written by the capture task while the capture is stopped;
-/// read by the capture handlers and the capture task (`capture`).
+/// Pixels of the frames that are captured. Written by the capture task while the capture is
+/// stopped; read by the capture handlers and the capture task (`capture`).
 pub static CAPTURED_FORMAT: CriticalSectionMutex<Cell<Format>> =
     CriticalSectionMutex::new(Cell::new(Format::Rgb565));
 
-/// Bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by the pipeline.
+/// Bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by the
+/// pipeline.
 pub static BANDS_FINISHED: AtomicU32 = AtomicU32::new(0);
 
 /// Capture events so far, lost ones too. Written by the capture handlers and the capture task; read
@@ -70,8 +71,8 @@ pub static CAPTURE_ACTIVITY: AtomicU32 = AtomicU32::new(0);
 /// Capture events that wait: more than bands that are still whole.
 const CAPTURE_EVENTS_WAITING: usize = 72;
 
-/// What happens, in order. From the capture handlers and the capture task to the pipeline. When there
-/// is no room a handler's event is lost; the pipeline notices that by the next one.
+/// What happens, in order. From the capture handlers and the capture task to the pipeline. When
+/// there is no room a handler's event is lost; the pipeline notices that by the next one.
 pub static CAPTURE_EVENTS: Queue<CaptureEvent, CAPTURE_EVENTS_WAITING> = Queue::new();
 
 /// What pixels the camera shall send. From the pipeline to the capture task.
@@ -101,14 +102,14 @@ pub static ORDERS: Queue<Order, 4> = Queue::new();
 pub static SETTINGS: CriticalSectionMutex<Cell<Option<Settings>>> =
     CriticalSectionMutex::new(Cell::new(None));
 
-/// How the sensor is doing, a [`Condition`]. Written by the pipeline and the capture task; read by the
-/// LED task (`health`).
+/// How the sensor is doing, a [`Condition`]. Written by the pipeline and the capture task; read by
+/// the LED task (`health`).
 pub static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
 
 // The conversation with the host.
 
-/// Hellos, replies, statistics and log lines. From the USB tasks, the pipeline and the capture task to
-/// the sender, one of the USB tasks (`outbox`).
+/// Hellos, replies, statistics and log lines. From the USB tasks, the pipeline and the capture task
+/// to the sender, one of the USB tasks (`outbox`).
 pub static ANSWERS: Queue<DeviceMessage, 8> = Queue::new();
 
 /// Samples: 0.2 s of them. Older ones are worth more than a gap, but not more than a fresh

@@ -1,6 +1,6 @@
-// Runs right after a reset, before any memory is initialized, and so uses registers only: switches on the clocks of
-// SRAM1 to 3, loads .itcm and .sram (memory.x) from flash in double words, as ITCM's error correction has them, and clears
-// .sram_zero.
+// Runs right after a reset, before any memory is initialized, and so uses registers only: switches
+// on the clocks of SRAM1 to 3, loads .itcm and .sram (memory.x) from flash in double words, as
+// ITCM's error correction has them, and clears .sram_zero.
 
     .syntax unified
     .section .text.__pre_init, "ax", %progbits

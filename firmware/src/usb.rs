@@ -1,16 +1,18 @@
 //! USB CDC-ACM: a serial port that never makes anyone else wait.
 //!
 //! # Design
-//! One task on an executor of its own, above processing and below capture. Four parts run side by side: the USB
-//! stack, the receiver, the sender, and a watch on DTR. Samples reach the sender through bounded queues (`outbox`).
+//! One task on an executor of its own, above processing and below capture. Four parts run side by
+//! side: the USB stack, the receiver, the sender, and a watch on DTR. Samples reach the sender
+//! through bounded queues (`outbox`).
 //!
 //! # Note
-//! The sender waits at most [`WRITE_TIMEOUT`] for a packet. When the host does not read, messages are dropped whole
-//! or cut; after a cut the next frame begins with a zero byte, so that the host is in step again at once.
+//! The sender waits at most [`WRITE_TIMEOUT`] for a packet. When the host does not read, messages
+//! are dropped whole or cut; after a cut the next frame begins with a zero byte, so that the host
+//! is in step again at once.
 //!
 //! # Limitations
-//! Without VBUS sensing an unplugged cable looks like a host that sleeps: the conversation ends when the next
-//! host resets the bus, or closes the port.
+//! Without VBUS sensing an unplugged cable looks like a host that sleeps: the conversation ends
+//! when the next host resets the bus, or closes the port.
 
 use crate::board::UsbPort;
 use crate::{commands, outbox, session, stats};

@@ -1,8 +1,9 @@
 //! Counts and time-stamps the camera's VSYNC edges.
 //!
-//! The counted edge is the one that ends the vertical blanking: DCMI begins a frame at the same edge. It says that
-//! a frame is finished at the *other* edge, when blanking begins. So from a frame's first row until then the newest
-//! counted edge is the one that began it, however late a handler looks within that time.
+//! The counted edge is the one that ends the vertical blanking: DCMI begins a frame at the same
+//! edge. It says that a frame is finished at the *other* edge, when blanking begins. So from a
+//! frame's first row until then the newest counted edge is the one that began it, however late a
+//! handler looks within that time.
 
 use crate::camera;
 use crate::shared::NEWEST_EDGE;
@@ -16,7 +17,8 @@ use hivtac_capture::Edge;
 const LINE: usize = 7;
 const PORT_B: u8 = 1;
 
-/// Begins to listen. The pin itself is set up with the camera interface's pins: EXTI sees it whatever its function.
+/// Begins to listen. The pin itself is set up with the camera interface's pins: EXTI sees it
+/// whatever its function.
 pub fn start() {
     SYSCFG
         .exticr(LINE / 4)

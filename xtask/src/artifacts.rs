@@ -130,14 +130,20 @@ mod tests {
 
     #[test]
     fn the_executable_is_found_in_the_messages_of_cargo() {
-        let line = r#"{"reason":"compiler-artifact","target":{"name":"hivtac"},"filenames":["/t/hivtac"],"executable":"/t/hivtac"}"#;
+        let line = concat!(
+            r#"{"reason":"compiler-artifact","target":{"name":"hivtac"},"#,
+            r#""filenames":["/t/hivtac"],"executable":"/t/hivtac"}"#
+        );
         assert_eq!(artifact(line, "hivtac"), Some(PathBuf::from("/t/hivtac")));
         assert_eq!(artifact(line, "another"), None);
     }
 
     #[test]
     fn a_library_is_found_by_its_file() {
-        let line = r#"{"reason":"compiler-artifact","target":{"name":"lib"},"filenames":["/t/lib.so"],"executable":null}"#;
+        let line = concat!(
+            r#"{"reason":"compiler-artifact","target":{"name":"lib"},"#,
+            r#""filenames":["/t/lib.so"],"executable":null}"#
+        );
         assert_eq!(artifact(line, "lib"), Some(PathBuf::from("/t/lib.so")));
     }
 

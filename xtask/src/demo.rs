@@ -1,4 +1,5 @@
-//! `cargo xtask demo`: the firmware on the emulated board, a simulated tip that presses it, and the forces.
+//! `cargo xtask demo`: the firmware on the emulated board, a simulated tip that presses it, and the
+//! forces.
 
 use std::fs;
 use std::path::{Path, PathBuf};

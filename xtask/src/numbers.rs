@@ -13,7 +13,8 @@ pub fn grouped(number: u64) -> String {
     text
 }
 
-/// A number that is not negative, with a comma after each three digits, and with up to three decimals if it has some.
+/// A number that is not negative, with a comma after each three digits, and with up to three
+/// decimals if it has some.
 pub fn decimal(number: f64) -> String {
     let thousandths = (number * 1000.0).round() as u64;
     let whole = grouped(thousandths / 1000);

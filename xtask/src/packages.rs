@@ -6,8 +6,8 @@ use anyhow::{Result, bail};
 
 use crate::process;
 
-/// Installs Debian packages as root or through sudo. Called only when something is missing, so that a machine that has
-/// everything needs no network.
+/// Installs Debian packages as root or through sudo. Called only when something is missing, so that
+/// a machine that has everything needs no network.
 ///
 /// # Errors
 /// Says which packages are missing and why they could not be installed.

@@ -80,7 +80,8 @@ pub fn succeeds(command: &mut Command) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Shows and runs the command; hands every line of its standard output to `each`, together with its end.
+/// Shows and runs the command; hands every line of its standard output to `each`, together with its
+/// end.
 pub fn for_each_line(command: &mut Command, mut each: impl FnMut(&str)) -> Result<()> {
     show(command);
     let mut child = command

@@ -1,4 +1,5 @@
-//! Steps that are run one after the other, whatever becomes of each, and the table of how they went.
+//! Steps that are run one after the other, whatever becomes of each, and the table of how they
+//! went.
 
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -17,7 +18,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Adds what a line of a test runner says, if it is its summary: `test result: ok. 6 passed; 0 failed; …`.
+    /// Adds what a line of a test runner says, if it is its summary:
+    /// `test result: ok. 6 passed; 0 failed; …`.
     pub fn add_line(&mut self, line: &str) {
         let Some((_, summary)) = line.split_once("test result: ") else {
             return;

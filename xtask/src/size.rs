@@ -206,7 +206,8 @@ fn print(regions: &[Region], sections: &[Section]) {
 mod tests {
     use super::*;
 
-    const SCRIPT: &str = "MEMORY\n{\n  FLASH : ORIGIN = 0x08000000, LENGTH = 2048K\n  RAM : ORIGIN = 0x20008000, LENGTH = 96K\n}\n";
+    const SCRIPT: &str = "MEMORY\n{\n  FLASH : ORIGIN = 0x08000000, LENGTH = 2048K\n  RAM : ORIGIN \
+                          = 0x20008000, LENGTH = 96K\n}\n";
 
     fn section(address: u64, size: u64, loaded: bool) -> Section {
         Section {

@@ -123,9 +123,12 @@ mod tests {
     use super::*;
 
     fn sample(frame: u64, time_us: u64, x_n: f64, place: &str) -> String {
-        format!(
-            r#"{{"frame":{frame},"time_us":{time_us},"force":{{"magnitude_n":0.101,"x_n":{x_n},"y_n":0.0,"z_n":-0.1,"place_x_mm":{place},"place_y_mm":{place}}},"truth":{{"magnitude_n":0.1,"x_n":0.0,"y_n":0.0,"z_n":-0.1,"place_x_mm":0.0,"place_y_mm":0.0}}}}"#
-        )
+        let load = |magnitude_n: f64, x_n: f64, place: &str| {
+            let place = format!(r#""place_x_mm":{place},"place_y_mm":{place}"#);
+            format!(r#"{{"magnitude_n":{magnitude_n},"x_n":{x_n},"y_n":0.0,"z_n":-0.1,{place}}}"#)
+        };
+        let (force, truth) = (load(0.101, x_n, place), load(0.1, 0.0, "0.0"));
+        format!(r#"{{"frame":{frame},"time_us":{time_us},"force":{force},"truth":{truth}}}"#)
     }
 
     const TRUTH: &str = "{\"frame\":7,\"time_s\":0.1}\n{\"frame\":8,\"time_s\":0.106}";

@@ -1,4 +1,5 @@
-//! The Rust toolchain for the microcontroller, found or installed without touching the version the user has.
+//! The Rust toolchain for the microcontroller, found or installed without touching the version the
+//! user has.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -111,7 +112,8 @@ pub fn cargo(verb: &str, folder: &Path) -> Command {
     command
 }
 
-/// The programs `cargo fmt` and `cargo clippy` of the toolchain in use; rustup adds them when it can.
+/// The programs `cargo fmt` and `cargo clippy` of the toolchain in use; rustup adds them when it
+/// can.
 ///
 /// # Errors
 /// Names the component that is missing.
@@ -125,7 +127,8 @@ pub fn ensure_components(folder: &Path) -> Result<()> {
         let added = process::run(Command::new("rustup").args(["component", "add", component]));
         if added.is_err() || !works() {
             bail!(
-                "`cargo {verb}` is missing: `rustup component add {component}`, or your system's package for it"
+                "`cargo {verb}` is missing: `rustup component add {component}`, or your system's \
+                 package for it"
             );
         }
     }

@@ -1,4 +1,5 @@
-//! The board in use: all of its pins and clocks. A second board is one more file with the same names.
+//! The board in use: all of its pins and clocks. A second board is one more file with the same
+//! names.
 
 mod free_bus;
 mod silicon;

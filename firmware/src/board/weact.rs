@@ -106,7 +106,8 @@ impl Board {
     }
 }
 
-/// 25 MHz crystal / 5 · 192 / 2 = 480 MHz for the core, 240 MHz for the buses, 120 MHz for the peripherals.
+/// 25 MHz crystal / 5 · 192 / 2 = 480 MHz for the core, 240 MHz for the buses, 120 MHz for the
+/// peripherals.
 fn clocks() -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hse = Some(Hse {
@@ -149,7 +150,8 @@ fn clock_usb(rcc: &mut Config) {
     }
 }
 
-/// The camera's clock comes from the crystal: its frame rate is exact, and needs no other oscillator.
+/// The camera's clock comes from the crystal: its frame rate is exact, and needs no other
+/// oscillator.
 fn start_camera_clock(mco: Peri<'static, peripherals::MCO1>, pin: Peri<'static, peripherals::PA8>) {
     let mut config = McoConfig::default();
     config.prescaler = McoPrescaler::DIV2;

@@ -1,4 +1,5 @@
-//! OmniVision OV7725: 320 × 240, RGB565 or YUV422, over SCCB (I²C with a stop between address and read).
+//! OmniVision OV7725: 320 × 240, RGB565 or YUV422, over SCCB (I²C with a stop between address and
+//! read).
 
 use super::Sccb;
 use super::ov7725_registers::{

@@ -1,4 +1,5 @@
-//! The OV7725's registers that the firmware writes, and why. Everything else keeps its value after reset.
+//! The OV7725's registers that the firmware writes, and why. Everything else keeps its value after
+//! reset.
 //!
 //! Numbers and names: OV7725 data sheet 1.31, table 17. Application note: OV7725 1.04.
 
@@ -25,8 +26,9 @@ const COM3: u8 = 0x0C;
 /// [`COM3`]: luma before chroma in YUV, as after a reset. Without it chroma comes first.
 const COM3_LUMA_FIRST: u8 = 0x10;
 
-/// The pixel formats that the sensing knows and this camera sends. Mono is not among them: its luma alone would have to be
-/// picked out of YUV422, and red markers are hardly darker than the film in white light.
+/// The pixel formats that the sensing knows and this camera sends. Mono is not among them: its luma
+/// alone would have to be picked out of YUV422, and red markers are hardly darker than the film in
+/// white light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// RGB565.
@@ -98,11 +100,11 @@ pub const TABLE: &[(u8, u8)] = &[
     (0x0E, 0x01),
     // COM6: as in OpenMV's table; its meaning is not public.
     (0x0F, 0xC5),
-    // COM10: HREF high while data is valid, PCLK runs freely and data changes on its falling edge, VSYNC high
-    // during its pulse. `ov7725.rs` tells DCMI the same.
+    // COM10: HREF high while data is valid, PCLK runs freely and data changes on its falling edge,
+    // VSYNC high during its pulse. `ov7725.rs` tells DCMI the same.
     (0x15, 0x00),
-    // HSTART, HSIZE, VSTRT, VSIZE, HREF, EXHCH: the sensor's window for QVGA, whole array (320 × 240 of binned
-    // pixels; sizes in units of 4 columns and 2 rows, low bits zero).
+    // HSTART, HSIZE, VSTRT, VSIZE, HREF, EXHCH: the sensor's window for QVGA, whole array (320 ×
+    // 240 of binned pixels; sizes in units of 4 columns and 2 rows, low bits zero).
     (0x17, 0x3F),
     (0x18, 0x50),
     (0x19, 0x03),

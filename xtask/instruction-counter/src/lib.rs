@@ -1,18 +1,20 @@
-//! A QEMU plugin that records what a program executes, exactly and repeatably: which blocks of instructions run, in which
-//! order they follow each other, and what memory they load from.
+//! A QEMU plugin that records what a program executes, exactly and repeatably: which blocks of
+//! instructions run, in which order they follow each other, and what memory they load from.
 //!
-//! Recording begins when the program calls a function named `counting_begins` and ends when it calls `counting_ends`, as
-//! often as it likes; what runs after a call of `last_band_begins` is told apart from what ran before. At the end of the
-//! run the plugin writes to QEMU's log, all numbers but counts in hexadecimal:
+//! Recording begins when the program calls a function named `counting_begins` and ends when it
+//! calls `counting_ends`, as often as it likes; what runs after a call of `last_band_begins` is
+//! told apart from what ran before. At the end of the run the plugin writes to QEMU's log, all
+//! numbers but counts in hexadecimal:
 //!
 //! ```text
-//! block NUMBER ADDRESS …              the addresses of a block's instructions, in order
-//! run PART FROM TO COUNT              block TO ran so often right after block FROM (`-`: first after a call)
-//! load PART ADDRESS COUNT             so many loads from the 32 bytes that begin there
+//! block NUMBER ADDRESS …        the addresses of a block's instructions, in order
+//! run PART FROM TO COUNT        block TO ran so often right after block FROM (`-`: after a call)
+//! load PART ADDRESS COUNT       so many loads from the 32 bytes that begin there
 //! ```
 //!
-//! PART is 0, and 1 from the last band of rows on. Several blocks may hold the same addresses; their counts add up.
-//! A program that takes no interrupt and no fault leaves a block only at its end, so the counts are exact.
+//! PART is 0, and 1 from the last band of rows on. Several blocks may hold the same addresses;
+//! their counts add up. A program that takes no interrupt and no fault leaves a block only at its
+//! end, so the counts are exact.
 
 mod qemu;
 mod record;
@@ -24,7 +26,8 @@ use std::sync::{Mutex, PoisonError};
 use qemu::{BlockHandle, PluginId};
 use record::{Mark, Record};
 
-/// The version of the plugin interface that this is written against; QEMU reads it before anything else.
+/// The version of the plugin interface that this is written against; QEMU reads it before anything
+/// else.
 #[unsafe(no_mangle)]
 #[allow(non_upper_case_globals)]
 pub static qemu_plugin_version: c_int = if cfg!(feature = "plugin-api-2") { 2 } else { 1 };

@@ -1,4 +1,5 @@
-//! What this plugin needs of QEMU's plugin interface (`qemu-plugin.h`), declared by hand: the header is not packaged everywhere.
+//! What this plugin needs of QEMU's plugin interface (`qemu-plugin.h`), declared by hand: the
+//! header is not packaged everywhere.
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
 
@@ -11,7 +12,8 @@ pub type InstructionHandle = *mut c_void;
 
 /// `QEMU_PLUGIN_CB_NO_REGS`: the callback reads no register.
 pub const NO_REGISTERS: c_int = 0;
-/// `QEMU_PLUGIN_MEM_RW`: the callback is told of loads and stores. QEMU 7.2 tells of stores when asked for loads alone.
+/// `QEMU_PLUGIN_MEM_RW`: the callback is told of loads and stores. QEMU 7.2 tells of stores when
+/// asked for loads alone.
 pub const LOADS_AND_STORES: c_int = 3;
 
 unsafe extern "C" {

@@ -1,4 +1,5 @@
-//! The gate: instruction counts against those that are committed, exact under the compiler that they name.
+//! The gate: instruction counts against those that are committed, exact under the compiler that
+//! they name.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -85,7 +86,8 @@ impl Baseline {
             );
         } else {
             bail!(
-                "{} instruction counts differ from the baseline's; when they are meant to, `{REFRESH}` and commit it",
+                "{} instruction counts differ from the baseline's; when they are meant to, \
+                 `{REFRESH}` and commit it",
                 changes.len()
             );
         }

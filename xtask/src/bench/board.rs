@@ -63,12 +63,14 @@ pub fn lint(toolchain: &Toolchain) -> Result<()> {
 
 fn find_probe() -> Result<()> {
     process::find_program("probe-rs").context(
-        "the image is built; to run it, probe-rs is missing: `cargo install probe-rs-tools --locked`",
+        "the image is built; to run it, probe-rs is missing: `cargo install probe-rs-tools \
+         --locked`",
     )?;
     let list = process::output(Command::new("probe-rs").arg("list"))?;
     ensure!(
         !list.contains("No debug probes"),
-        "the image is built; to run it, connect an STM32H743 board by a debug probe: `probe-rs list` sees none"
+        "the image is built; to run it, connect an STM32H743 board by a debug probe: `probe-rs \
+         list` sees none"
     );
     Ok(())
 }

@@ -38,7 +38,8 @@ pub struct Part {
 /// What a case runs.
 #[derive(Clone, Debug, Deserialize)]
 pub enum Work {
-    /// One frame, from its first row to the force; what is special about it, empty for the usual one.
+    /// One frame, from its first row to the force; what is special about it, empty for the usual
+    /// one.
     Frame(String),
     /// One inference of a model with these layer widths.
     Network(Vec<u64>),

@@ -11,7 +11,8 @@ use crate::process;
 /// One instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Instruction {
-    /// Without a condition: an instruction that an `it` makes conditional takes its slot either way.
+    /// Without a condition: an instruction that an `it` makes conditional takes its slot either
+    /// way.
     pub mnemonic: String,
     /// What follows it, without comments.
     pub operands: String,
@@ -63,7 +64,8 @@ fn instruction(line: &str) -> Option<(u64, Instruction)> {
     })
 }
 
-/// `it`, `ite`, `itett` …: as many conditional instructions follow as it has letters after the first.
+/// `it`, `ite`, `itett` …: as many conditional instructions follow as it has letters after the
+/// first.
 pub fn is_it(mnemonic: &str) -> bool {
     let rest = mnemonic.strip_prefix("it");
     rest.is_some_and(|rest| rest.chars().all(|c| c == 't' || c == 'e'))
@@ -85,7 +87,8 @@ mod tests {
 
     const TEXT: &str = "\nhivtac-qemu-image:\tfile format elf32-littlearm\n\n\
         00000400 <push_row>:\n     400:      \tite\tlo\n     402:      \tmovlo\tr0, #1\n\
-             \x20    404:      \tldrhs.w\tr1, [pc, #16]          @ 0x418 <push_row+0x18>\n     408:      \tbx\tlr\n";
+             \x20    404:      \tldrhs.w\tr1, [pc, #16]          @ 0x418 \
+             <push_row+0x18>\n     408:      \tbx\tlr\n";
 
     fn instruction(mnemonic: &str, operands: &str) -> Instruction {
         Instruction {

@@ -35,7 +35,8 @@ mod tests {
 
     #[test]
     fn only_what_lies_between_the_marks_changes() {
-        let document = "one\n<!-- a: begin, by x -->\nold\n<!-- a: end -->\ntwo\n<!-- b: begin -->\nkept\n<!-- b: end -->\n";
+        let document = "one\n<!-- a: begin, by x -->\nold\n<!-- a: end -->\ntwo\n<!-- b: begin \
+                        -->\nkept\n<!-- b: end -->\n";
         let expected = document.replace("\nold\n", "\n\nnew\n\n");
         assert_eq!(replaced(document, "a", "new\n"), Some(expected.clone()));
         assert_eq!(replaced(&expected, "a", "new"), Some(expected));

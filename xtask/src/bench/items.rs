@@ -18,7 +18,8 @@ pub struct Report<'i> {
     pub items: &'i [Item],
 }
 
-/// One measured item. Its three numbers are per frame, or per inference; those of `mac` are per multiplication.
+/// One measured item. Its three numbers are per frame, or per inference; those of `mac` are per
+/// multiplication.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Item {
     /// `threshold`, `blobs`, `frame full`, `latency`, `network …`, `mac` or `table` (the
@@ -145,7 +146,10 @@ mod tests {
             floor_cycles: 400_637.5,
         }];
         let text = serde_json::to_string(&Report { items: &items }).unwrap();
-        let expected = r#"{"items":[{"item":"frame full","frame":"320x240","format":"rgb565","instructions":801275,"modelled_cycles":null,"floor_cycles":400637.5}]}"#;
+        let expected = concat!(
+            r#"{"items":[{"item":"frame full","frame":"320x240","format":"rgb565","#,
+            r#""instructions":801275,"modelled_cycles":null,"floor_cycles":400637.5}]}"#
+        );
         assert_eq!(text, expected);
     }
 }

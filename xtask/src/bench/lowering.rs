@@ -1,11 +1,14 @@
-//! Instructions as LLVM's machine-code analyzer takes them: what it does not know or counts too low is written as what the
-//! core does instead.
+//! Instructions as LLVM's machine-code analyzer takes them: what it does not know or counts too low
+//! is written as what the core does instead.
 //!
-//! - Branches, calls and returns go nowhere and take one slot of the branch unit: the core's branch target cache turns
-//!   a correctly predicted one around in a cycle. Wrong predictions are counted apart (`tables`).
+//! - Branches, calls and returns go nowhere and take one slot of the branch unit: the core's branch
+//!   target cache turns a correctly predicted one around in a cycle. Wrong predictions are counted
+//!   apart (`tables`).
 //! - `it` takes one slot; what it makes conditional takes its own whether it is executed or not.
-//! - A comparison of floating-point numbers is a subtraction, and reading its flags a move to the core's registers.
-//! - Loads and stores of several registers (`ldm`, `push` …), one cycle to the analyzer, are one load or store each.
+//! - A comparison of floating-point numbers is a subtraction, and reading its flags a move to the
+//!   core's registers.
+//! - Loads and stores of several registers (`ldm`, `push` …), one cycle to the analyzer, are one
+//!   load or store each.
 
 use super::disassembly::{Instruction, is_it};
 

@@ -1,9 +1,10 @@
 //! Cycles of blocks of instructions on LLVM's model of the Cortex-M7 (`llvm-mca`).
 //!
-//! The core issues in order, so a block's cost is by how much later the instruction after it issues when the block is
-//! there: cycles(before + block + tail) − cycles(before + tail), where *before* is what usually ran before it and the
-//! tail waits for nothing. Since two instructions may issue in a cycle, this is the mean over both
-//! ways in which the pairs can fall. A block that follows itself is timed as the loop that it is.
+//! The core issues in order, so a block's cost is by how much later the instruction after it issues
+//! when the block is there: cycles(before + block + tail) − cycles(before + tail), where *before*
+//! is what usually ran before it and the tail waits for nothing. Since two instructions may issue
+//! in a cycle, this is the mean over both ways in which the pairs can fall. A block that follows
+//! itself is timed as the loop that it is.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -30,8 +31,8 @@ const TAIL: usize = 24;
 /// Regions that one run of the analyzer takes.
 const BATCH: usize = 500;
 
-/// Loops whose cycles are known from the core's rules: two issues in a cycle, one multiplication, one store, two loads, and
-/// two cycles from a load to the address that it gives.
+/// Loops whose cycles are known from the core's rules: two issues in a cycle, one multiplication,
+/// one store, two loads, and two cycles from a load to the address that it gives.
 const KNOWN: [(&[&str], f64); 7] = [
     (&["add r0, r1, r2", "add r3, r1, r2"], 1.0),
     (&["add r0, r0, r1"], 1.0),
@@ -88,8 +89,8 @@ impl Mca {
             let found = self.evaluate(&timing)?;
             ensure!(
                 found == expected,
-                "this llvm-mca gives {found} cycles to `{}` and not {expected}: its model of the core is not the one \
-                 that the figures of this project stand on (LLVM 14 to 22)",
+                "this llvm-mca gives {found} cycles to `{}` and not {expected}: its model of the \
+                 core is not the one that the figures of this project stand on (LLVM 14 to 22)",
                 lines.join("; ")
             );
         }

@@ -178,7 +178,8 @@ impl Bench {
         Ok(stages)
     }
 
-    /// The instructions of the network that run more often than there are neurons: those that multiply.
+    /// The instructions of the network that run more often than there are neurons: those that
+    /// multiply.
     fn inner_loop(&mut self, case: &Case, record: &Record, cycles: &[Option<f64>]) -> Result<Cost> {
         let Work::Network(widths) = &case.work else {
             return Ok(Cost::default());
@@ -187,7 +188,8 @@ impl Bench {
         let executions = record.executions();
         let blocks = record.blocks().iter().zip(record.counts(Part::Whole));
         for ((block, count), cycles) in blocks.zip(cycles) {
-            // An instruction may lie in several blocks: the first round of a loop is one with what comes before it.
+            // An instruction may lie in several blocks: the first round of a loop is one with what
+            // comes before it.
             let share = |cycles: f64| cycles * count as f64 / block.len() as f64;
             for address in block {
                 let often = executions[address] > neurons(widths);

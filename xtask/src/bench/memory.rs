@@ -1,14 +1,16 @@
 //! What memory costs where it has wait states.
 //!
-//! The modelled cycles stand for code in ITCM and data in DTCM, which answer without waiting (Arm, *Cortex-M7 Processor
-//! Technical Reference Manual*, "Tightly coupled memories"). The image keeps rows of pixels and the model file in memories
-//! of their own (`tests/qemu/memory.x`), so that loads from them can be counted, and charged when the
-//! chip has them elsewhere:
+//! The modelled cycles stand for code in ITCM and data in DTCM, which answer without waiting (Arm,
+//! *Cortex-M7 Processor Technical Reference Manual*, "Tightly coupled memories"). The image keeps
+//! rows of pixels and the model file in memories of their own (`tests/qemu/memory.x`), so that
+//! loads from them can be counted, and charged when the chip has them elsewhere:
 //!
-//! - a load from AXI SRAM that no cache answers: the AXI bus runs at half the core's clock (RM0433, "Bus matrix"); request,
-//!   interconnect both ways, a read with no wait state and the answer are taken as six of its cycles;
-//! - 32 bytes of flash into the data cache: 256 bits are read at once, with four wait states at 240 MHz (RM0433, "FLASH read
-//!   access latency"), and take four beats of the 64-bit bus; with the interconnect thirteen of its cycles.
+//! - a load from AXI SRAM that no cache answers: the AXI bus runs at half the core's clock (RM0433,
+//!   "Bus matrix"); request, interconnect both ways, a read with no wait state and the answer are
+//!   taken as six of its cycles;
+//! - 32 bytes of flash into the data cache: 256 bits are read at once, with four wait states at
+//!   240 MHz (RM0433, "FLASH read access latency"), and take four beats of the 64-bit bus; with the
+//!   interconnect thirteen of its cycles.
 //!
 //! The bus's share of both is an assumption that a board has to confirm (`--board`).
 

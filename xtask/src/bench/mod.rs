@@ -1,5 +1,6 @@
-//! `cargo xtask bench`: what a frame and an inference cost on the microcontroller: instructions, counted in QEMU, exactly and
-//! repeatably, and cycles that follow from them by LLVM's model of the core.
+//! `cargo xtask bench`: what a frame and an inference cost on the microcontroller: instructions,
+//! counted in QEMU, exactly and repeatably, and cycles that follow from them by LLVM's model of the
+//! core.
 
 mod baseline;
 pub mod board;
@@ -44,8 +45,8 @@ pub struct Bench {
     /// Draw the paper's Figure 14 and Table 1 with this sensor's rows, into docs.
     #[arg(long, conflicts_with_all = ["json", "write_baseline", "write_docs", "peers"])]
     paper: bool,
-    /// Count what the configurations of `hivtac-calibrate tradeoff` cost, into calibration/tradeoff/costs.json.
-    /// With `--write-docs` docs/tradeoff.md follows.
+    /// Count what the configurations of `hivtac-calibrate tradeoff` cost, into
+    /// calibration/tradeoff/costs.json. With `--write-docs` docs/tradeoff.md follows.
     #[arg(long, conflicts_with_all = ["json", "write_baseline", "peers", "paper"])]
     tradeoff: bool,
     /// Measure on an STM32H743 that is attached by a debug probe instead.
@@ -67,7 +68,8 @@ impl Bench {
         }
         if !mca::is_installed() {
             eprintln!(
-                "no modelled cycles: llvm-mca and llvm-objdump are missing; install the package {} (Debian's name)",
+                "no modelled cycles: llvm-mca and llvm-objdump are missing; install the package {} \
+                 (Debian's name)",
                 mca::PACKAGE
             );
         }

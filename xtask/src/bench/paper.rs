@@ -1,7 +1,8 @@
 //! `cargo xtask bench --paper`: the paper's Figure 14 and Table 1 with this sensor's rows.
 //!
-//! *Overall* is what the host receives from the firmware in the rig, by the device's clock: what the camera's rate leaves.
-//! *Processing* is what the core could do with frames of the same scene at the same times, by modelled cycles.
+//! *Overall* is what the host receives from the firmware in the rig, by the device's clock: what
+//! the camera's rate leaves. *Processing* is what the core could do with frames of the same scene
+//! at the same times, by modelled cycles.
 
 use std::fmt::Write;
 use std::fs;
@@ -155,13 +156,16 @@ fn figure(overall: &[Point], processing: &[Point]) -> String {
             points.trim_end()
         )
     };
-    let mut text = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 620 340\" font-family=\"sans-serif\" font-size=\"12\">\n\
-                    <rect width=\"620\" height=\"340\" fill=\"white\"/>\n".to_owned();
+    let mut text = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 620 340\" \
+                    font-family=\"sans-serif\" font-size=\"12\">\n\
+                    <rect width=\"620\" height=\"340\" fill=\"white\"/>\n"
+        .to_owned();
     for hertz in [10.0, 100.0, 1_000.0, 10_000.0] {
         let (at, label) = (y(hertz), decimal(hertz));
         let _ = writeln!(
             text,
-            "<path d=\"M60 {at:.1}H580\" stroke=\"#ccc\"/><text x=\"54\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            "<path d=\"M60 {at:.1}H580\" stroke=\"#ccc\"/><text x=\"54\" y=\"{:.1}\" \
+             text-anchor=\"end\">{label}</text>",
             at + 4.0
         );
     }
@@ -182,8 +186,10 @@ fn figure(overall: &[Point], processing: &[Point]) -> String {
     );
     let _ = write!(
         text,
-        "<text x=\"60\" y=\"330\">{begin:.2} s</text><text x=\"580\" y=\"330\" text-anchor=\"end\">{end:.2} s, device time</text>\n\
-                          <text x=\"16\" y=\"170\" transform=\"rotate(-90 16 170)\" text-anchor=\"middle\">frequency, Hz</text>\n</svg>\n"
+        "<text x=\"60\" y=\"330\">{begin:.2} s</text><text x=\"580\" y=\"330\" \
+         text-anchor=\"end\">{end:.2} s, device time</text>\n\
+                          <text x=\"16\" y=\"170\" transform=\"rotate(-90 16 170)\" \
+                          text-anchor=\"middle\">frequency, Hz</text>\n</svg>\n"
     );
     text
 }

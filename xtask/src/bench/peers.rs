@@ -1,5 +1,6 @@
-//! `cargo xtask bench --peers`: the sensing beside the paper's pipeline in OpenCV, on the same frames, on this computer, in one
-//! run. Times of a computer mean little elsewhere; their ratio does.
+//! `cargo xtask bench --peers`: the sensing beside the paper's pipeline in OpenCV, on the same
+//! frames, on this computer, in one run. Times of a computer mean little elsewhere; their ratio
+//! does.
 
 use std::fmt::Write;
 use std::fs::{self, File};
@@ -16,7 +17,8 @@ use crate::{artifacts, process, workspace};
 
 /// Where the paper's pipeline is, and what makes a Python that has OpenCV.
 const PYTHON: &str = "calibration/python";
-/// Lets OpenCV keep the memory that it frees: on a busy computer, getting its pages anew costs it as much as the work.
+/// Lets OpenCV keep the memory that it frees: on a busy computer, getting its pages anew costs it
+/// as much as the work.
 const KEEP_MEMORY: [(&str, &str); 2] = [
     ("MALLOC_MMAP_THRESHOLD_", "4000000000"),
     ("MALLOC_TRIM_THRESHOLD_", "4000000000"),
@@ -46,7 +48,8 @@ struct Comparison {
 /// Compares and prints; with `write_docs` the table goes into the documentation, too.
 ///
 /// # Errors
-/// When something fails other than getting OpenCV, or the two see different markers on a frame without salt.
+/// When something fails other than getting OpenCV, or the two see different markers on a frame
+/// without salt.
 pub fn run(write_docs: bool) -> Result<()> {
     let folder = workspace::work_folder("peers")?;
     let python = match python(&folder) {
@@ -184,7 +187,8 @@ fn table(comparisons: &[Comparison]) -> String {
         .first()
         .and_then(|first| first.theirs.opencv.clone());
     let mut text = format!(
-        "| frame | the sensing, µs | OpenCV {}, µs | times as fast | markers apart |\n|---|---:|---:|---:|---:|\n",
+        "| frame | the sensing, µs | OpenCV {}, µs | times as fast | markers apart \
+         |\n|---|---:|---:|---:|---:|\n",
         version.unwrap_or_default()
     );
     for comparison in comparisons {

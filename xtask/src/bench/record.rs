@@ -114,8 +114,8 @@ impl Record {
         best.into_iter().map(from).collect()
     }
 
-    /// How often a block was left another way than it usually is. A predictor that always guesses the usual way is wrong
-    /// so often.
+    /// How often a block was left another way than it usually is. A predictor that always guesses
+    /// the usual way is wrong so often.
     pub fn unusual_exits(&self) -> u64 {
         let mut exits: BTreeMap<usize, (u64, u64)> = BTreeMap::new();
         for ((from, _), count) in self.steps() {
@@ -179,7 +179,8 @@ mod tests {
     use super::*;
 
     /// Block 0 loops three times, then comes block 1; block 2 is block 0, translated again.
-    const LOOP: &str = "block 0 1a0 1a2\nblock 1 1a6\nblock 2 1a0 1a2\nrun 0 - 0 1\nrun 0 0 0 2\nrun 0 0 1 1\n\
+    const LOOP: &str = "block 0 1a0 1a2\nblock 1 1a6\nblock 2 1a0 1a2\nrun 0 - 0 1\nrun 0 0 0 \
+                        2\nrun 0 0 1 1\n\
                         run 1 1 2 1\nload 0 20000000 3\nload 1 20000020 4\nload 1 60000000 5\n";
 
     #[test]

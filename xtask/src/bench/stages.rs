@@ -1,4 +1,5 @@
-//! Which stage of the sensing an instruction belongs to, told by the source file that it was made from.
+//! Which stage of the sensing an instruction belongs to, told by the source file that it was made
+//! from.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -25,9 +26,10 @@ pub const ORDER: [&str; 10] = [
 
 /// The stages of an image's instructions.
 ///
-/// An instruction belongs to the innermost function of the sensing that it was inlined from, so that what the compiler
-/// made one function of is still told apart, and what comes from a library counts for the stage that uses it. Library
-/// functions that were not inlined, such as `memset`, are a stage of their own. What belongs to the harness is left out.
+/// An instruction belongs to the innermost function of the sensing that it was inlined from, so
+/// that what the compiler made one function of is still told apart, and what comes from a library
+/// counts for the stage that uses it. Library functions that were not inlined, such as `memset`,
+/// are a stage of their own. What belongs to the harness is left out.
 pub struct Stages {
     loader: Loader,
     known: HashMap<u64, Option<&'static str>>,

@@ -11,10 +11,12 @@ use crate::numbers::{decimal, grouped};
 
 /// The core's clock, in MHz.
 const CLOCK_MHZ: f64 = 480.0;
-/// Cycles of a wrong prediction: LLVM's model of the core (`ARMScheduleM7.td`) gives six for a forward branch.
+/// Cycles of a wrong prediction: LLVM's model of the core (`ARMScheduleM7.td`) gives six for a
+/// forward branch.
 const MISPREDICTION: u64 = 6;
 
-/// Everything: items, the stages of the frame that the firmware takes, and what memory and branches add.
+/// Everything: items, the stages of the frame that the firmware takes, and what memory and branches
+/// add.
 pub fn all(items: &[Item], measured: &[Measured]) -> String {
     let mut text = self::items(items);
     let usual = |measured: &&Measured| measured.case.is_usual_frame();
@@ -37,7 +39,8 @@ pub fn all(items: &[Item], measured: &[Measured]) -> String {
 
 /// Every item.
 fn items(items: &[Item]) -> String {
-    let mut text = "| item | frame | format | instructions = single issue | modelled cycles | floor | per pixel | µs at 480 MHz | per second |\n\
+    let mut text = "| item | frame | format | instructions = single issue | modelled cycles | \
+                    floor | per pixel | µs at 480 MHz | per second |\n\
                     |---|---|---|---:|---:|---:|---:|---:|---:|\n"
         .to_owned();
     for item in items {
@@ -116,7 +119,8 @@ fn cycles(cost: Cost) -> String {
 /// What the modelled cycles leave out: memory with wait states and wrong predictions.
 fn surcharges(measured: &[Measured]) -> String {
     let mut text = format!(
-        "| case | modelled cycles | + wrong predictions, ≤ {MISPREDICTION} each | + rows in AXI SRAM, uncached, {AXI_LOAD} a load | + weights in flash, {FLASH_LINE} for 32 bytes |\n\
+        "| case | modelled cycles | + wrong predictions, ≤ {MISPREDICTION} each | + rows in AXI \
+         SRAM, uncached, {AXI_LOAD} a load | + weights in flash, {FLASH_LINE} for 32 bytes |\n\
          |---|---:|---:|---:|---:|\n"
     );
     for measured in measured {

@@ -1,5 +1,6 @@
-//! What the configurations of the trade between speed and accuracy cost (`docs/tradeoff.md`): frames without a model, models
-//! without a frame, the film run forwards, and some of all together, which must be their sum.
+//! What the configurations of the trade between speed and accuracy cost (`docs/tradeoff.md`):
+//! frames without a model, models without a frame, the film run forwards, and some of all together,
+//! which must be their sum.
 
 use std::fs;
 
@@ -18,8 +19,8 @@ const BEHIND: &str = "16-16 int8";
 const ONE_STEP: &str = ", 1 step";
 /// The most steps that are counted.
 const MOST_STEPS: u64 = 3;
-/// How far from the sum of its parts a whole may be, of itself: what a force takes to become angles depends a little on it,
-/// and blocks of instructions follow others.
+/// How far from the sum of its parts a whole may be, of itself: what a force takes to become angles
+/// depends a little on it, and blocks of instructions follow others.
 const TOLERANCE: f64 = 0.01;
 /// Where the result goes.
 const FILE: &str = "calibration/tradeoff/costs.json";
@@ -253,7 +254,8 @@ impl Together {
             off(sum.cycles, counted.cycles),
         ];
         eprintln!(
-            "{} behind a frame of {:?}, {}: the sum of its parts is off by {:+.2} % in instructions and {:+.2} % in cycles",
+            "{} behind a frame of {:?}, {}: the sum of its parts is off by {:+.2} % in \
+             instructions and {:+.2} % in cycles",
             self.model,
             self.size,
             self.centroid,
