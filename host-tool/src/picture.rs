@@ -2,9 +2,6 @@
 
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
-use image::{ImageReader, RgbImage};
-use std::fs::File;
-use std::io::{self, BufReader};
 
 /// A picture in RGB565, red in the high bits.
 pub struct Picture {
@@ -16,7 +13,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads a PNG, JPEG or PPM file, told apart by content; 8 bits a channel are rounded to the nearest of RGB565.
+    /// Reads a PNG, JPEG or PPM file, told apart by content; 8 bits a channel are rounded to the
+    /// nearest of RGB565.
     ///
     /// # Errors
     /// When the file cannot be read, is no such picture, or is larger than a frame can be.
@@ -24,7 +22,7 @@ impl Picture {
         let image = decode(path)
             .map_err(|error| failure(format!("cannot read the picture {path}: {error}")))?;
         let (width, height) = size(path, &image)?;
-        let pixels = image.pixels().map(|pixel| rgb565(pixel.0)).collect();
+        let pixels = image.pixels.into_iter().map(rgb565).collect();
         Ok(Picture {
             width,
             height,
@@ -42,25 +40,47 @@ fn failure(message: String) -> Failure {
     Failure::new(Kind::Input, message)
 }
 
-fn decode(path: &str) -> Result<RgbImage, Box<dyn std::error::Error>> {
+/// A decoded picture, 8 bits a channel.
+struct Rgb {
+    width: u32,
+    height: u32,
+    pixels: Vec<[u8; 3]>,
+}
+
+#[cfg(feature = "pictures")]
+fn decode(path: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
+    use image::ImageReader;
+    use std::fs::File;
+    use std::io::{self, BufReader};
+
     let reader = ImageReader::new(BufReader::new(File::open(path)?)).with_guessed_format()?;
     if reader.format().is_none() {
         let message = "it is no PNG, JPEG or PPM file";
         return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
     }
-    Ok(reader.decode()?.into_rgb8())
+    let image = reader.decode()?.into_rgb8();
+    Ok(Rgb {
+        width: image.width(),
+        height: image.height(),
+        pixels: image.pixels().map(|pixel| pixel.0).collect(),
+    })
 }
 
-fn size(path: &str, image: &RgbImage) -> Result<(u16, u16), Failure> {
-    let (width, height) = image.dimensions();
+#[cfg(not(feature = "pictures"))]
+fn decode(_: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
+    Err("this build does without: `cargo install --path host-tool` makes one that can".into())
+}
+
+fn size(path: &str, image: &Rgb) -> Result<(u16, u16), Failure> {
+    let (width, height) = (image.width, image.height);
     if width == 0 || height == 0 {
         return Err(failure(format!("the picture {path} is empty")));
     }
     match (u16::try_from(width), u16::try_from(height)) {
         (Ok(columns @ ..=MAX_WIDTH), Ok(rows @ ..=MAX_HEIGHT)) => Ok((columns, rows)),
         _ => Err(failure(format!(
-            "the picture {path} has {width} × {height} px, more than the {MAX_WIDTH} × {MAX_HEIGHT} px of the largest \
-             frame; scale it down, for example to 640 px wide"
+            "the picture {path} has {width} × {height} px, more than the {MAX_WIDTH} × \
+             {MAX_HEIGHT} px of the largest frame; scale it down, for example to 640 px wide"
         ))),
     }
 }

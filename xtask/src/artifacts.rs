@@ -44,10 +44,16 @@ fn firmware_command(toolchain: &Toolchain) -> Command {
     command
 }
 
-/// The host tool `hivtac`.
+/// The host tool `hivtac`, without what reads pictures.
 pub fn host_tool() -> Result<PathBuf> {
     let mut command = cargo("build", workspace::root());
-    command.args(["--profile", TOOLS, "--package", "hivtac"]);
+    command.args([
+        "--profile",
+        TOOLS,
+        "--package",
+        "hivtac",
+        "--no-default-features",
+    ]);
     build(&mut command, "hivtac")
 }
 
