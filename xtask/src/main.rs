@@ -2,6 +2,7 @@
 
 mod artifacts;
 mod bench;
+mod columns;
 mod demo;
 mod numbers;
 mod packages;

@@ -8,7 +8,7 @@ use clap::Args;
 
 use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
-use crate::{artifacts, bench, packages, process, workspace};
+use crate::{artifacts, bench, columns, packages, process, workspace};
 
 /// The workspaces: folder, and whether it has more than one package.
 const WORKSPACES: [(&str, bool); 4] = [
@@ -93,7 +93,7 @@ impl Test {
             return;
         }
         if self.wants("format") {
-            report.step("format", |_| check_format());
+            report.step("format", |_| check_format().and_then(|()| columns::check()));
         }
         if self.wants("lints: host") {
             report.step("lints: host", |_| host_lints());
