@@ -198,7 +198,7 @@ impl Dcmi {
         let to = (from + GROUP).min(run.bytes);
         let waiting = self.receiver.waiting();
         let ends = to == run.bytes && run.ends_line;
-        if self.receive(&run, from, to, ends, registers).is_err() {
+        if self.receive(&run, from, to, ends).is_err() {
             self.raised |= flag::OVERRUN;
             self.counters.overruns += 1;
         } else {
@@ -221,7 +221,6 @@ impl Dcmi {
         from: u32,
         to: u32,
         ends: bool,
-        registers: &mut RegisterFile,
     ) -> Result<(), Overrun> {
         let Some(frame) = &mut self.frame else {
             return Ok(());
