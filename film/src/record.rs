@@ -6,14 +6,13 @@ use hivtac_scene::film::reduced::Pose;
 use crate::Change;
 use crate::sweep::{Moved, Solved};
 
-/// Numbers of a disc, of a [`Moved`], around the markers, and of a whole record.
+/// Numbers of a disc and of a [`Moved`].
 const DISC: usize = 9;
 const MOVED: usize = 3 + 4 * DISC;
-const AROUND: usize = 4 * 9 * 3;
 
 /// Numbers of a record.
 pub fn length() -> usize {
-    5 + (1 + Change::all().count()) * MOVED + AROUND
+    5 + (1 + Change::all().count()) * MOVED
 }
 
 /// A solution as numbers.
@@ -30,18 +29,16 @@ pub fn numbers(solved: &Solved) -> Vec<f64> {
             numbers.extend([disc.moved_mm, disc.along_x, disc.along_y].as_flattened());
         }
     }
-    numbers.extend(solved.around_mm.as_flattened().as_flattened());
     numbers
 }
 
 /// The solution that numbers are; none of a record of another length.
 pub fn solved(numbers: &[f64]) -> Option<Solved> {
-    let (&[size, x, y, px, py], rest) = numbers.split_first_chunk()?;
-    let (moved, around) = rest.split_at_checked((1 + Change::all().count()) * MOVED)?;
-    let (around, []) = around.split_first_chunk::<AROUND>()? else {
+    if numbers.len() != length() {
         return None;
-    };
-    let mut moved = moved.as_chunks::<MOVED>().0.iter().map(moved_of);
+    }
+    let (&[size, x, y, px, py], rest) = numbers.split_first_chunk()?;
+    let mut moved = rest.as_chunks::<MOVED>().0.iter().map(moved_of);
     Some(Solved {
         pose: Pose {
             size,
@@ -49,7 +46,6 @@ pub fn solved(numbers: &[f64]) -> Option<Solved> {
             place_mm: [px, py],
         },
         moved: moved.next()?,
-        around_mm: around_of(around),
         answers: moved.collect(),
     })
 }
@@ -67,11 +63,6 @@ fn moved_of(numbers: &[f64; MOVED]) -> Moved {
             }
         }),
     }
-}
-
-fn around_of(numbers: &[f64; AROUND]) -> [[[f64; 3]; 9]; 4] {
-    let at = |k: usize, i: usize, c: usize| numbers[(k * 9 + i) * 3 + c];
-    std::array::from_fn(|k| std::array::from_fn(|i| [0, 1, 2].map(|c| at(k, i, c))))
 }
 
 #[cfg(test)]

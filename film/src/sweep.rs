@@ -2,7 +2,7 @@
 
 use hivtac_scene::film::DiscMotion;
 use hivtac_scene::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
-use hivtac_scene::{Camera, Disc, MARKERS};
+use hivtac_scene::{Camera, MARKERS};
 
 use crate::film::Response;
 use crate::path::Path;
@@ -13,8 +13,6 @@ use crate::{Change, Contact, Equilibrium, Film, FilmError, Neighbours};
 const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
 /// Rings of tilts: radius in parts of the largest, and the turn of the first of their four, °.
 const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];
-/// Distance of the places around a marker's own at which its motion is looked at, mm.
-pub const STENCIL_MM: f64 = 0.25;
 /// Step by which motions are differentiated: the largest unknown changes by so many mm.
 const STEP_MM: f64 = 1e-4;
 
@@ -34,8 +32,6 @@ pub struct Solved {
     pub pose: Pose,
     /// Its motions.
     pub moved: Moved,
-    /// The motion of each marker if it sat [`STENCIL_MM`] beside its place: three rows of three, y first to last.
-    pub around_mm: [[[f64; 3]; 9]; 4],
     /// How the motions answer to each [`Change`].
     pub answers: Vec<Moved>,
 }
@@ -94,17 +90,6 @@ fn look(
     let changes: Vec<Change> = Change::all().collect();
     let answers = film.answers(beside, state, &changes)?;
     let half = film.design().material.thickness_mm / 2.0;
-    let around_mm = MARKERS.map(|disc| {
-        std::array::from_fn(|k| {
-            let by = [k % 3, k / 3].map(|i| (i as f64 - 1.0) * STENCIL_MM);
-            let [x, y] = disc.centre_mm;
-            let beside = Disc {
-                centre_mm: [x + by[0], y + by[1]],
-                ..disc
-            };
-            seen_motion(|rest| film.surface(state, rest, half), &beside, camera).moved_mm
-        })
-    });
     let answered = changes.iter().zip(&answers);
     Ok(Solved {
         pose,
@@ -112,7 +97,6 @@ fn look(
             tip_mm: state.tip_mm,
             discs: discs(film, state, half, camera),
         },
-        around_mm,
         answers: answered
             .map(|(change, answer)| answered_by(film, state, camera, *change, answer))
             .collect(),

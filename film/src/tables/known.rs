@@ -7,7 +7,7 @@ use hivtac_scene::film::reduced::{
 use super::SAME_PLACE_MM;
 use super::fit::Known;
 use super::symmetry::Mirror;
-use crate::sweep::{Moved, STENCIL_MM, Solved};
+use crate::sweep::{Moved, Solved};
 use crate::{Change, FilmError};
 
 /// Full solutions with tips of two radii.
@@ -60,10 +60,6 @@ impl<'a> Sweeps<'a> {
                         slopes: Some(slopes(&pose, &by_force(mirror, solved, of))),
                     });
                 }
-            }
-            Kind::Bends => {
-                let around = &solved.around_mm[mirror.corner()];
-                all.push(value(pose, bends(mirror, around)));
             }
             Kind::Radius => all.extend(self.by_radius(Kind::Moved, mirror, index)),
             Kind::TipRadius => all.extend(self.by_radius(Kind::Tip, mirror, index)),
@@ -174,28 +170,6 @@ fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
         }
         sum
     })
-}
-
-/// Second differences of the motion around a marker: along x by xx, xy and yy, along z by xx and xy.
-fn bends(mirror: &Mirror, around: &[[f64; 3]; 9]) -> Row {
-    let at = |i: i32, j: i32| {
-        // The point of the film that is seen there.
-        let [x, y] = mirror.back().along([f64::from(i), f64::from(j)]);
-        let index = 3 * (y.round() as i32 + 1) + x.round() as i32 + 1;
-        mirror.vector(around[index as usize])
-    };
-    let step = STENCIL_MM * STENCIL_MM;
-    let second =
-        |i: i32, j: i32, c: usize| (at(i, j)[c] - 2.0 * at(0, 0)[c] + at(-i, -j)[c]) / step;
-    let mixed =
-        |c: usize| (at(1, 1)[c] - at(1, -1)[c] - at(-1, 1)[c] + at(-1, -1)[c]) / (4.0 * step);
-    vec![
-        second(1, 0, 0),
-        mixed(0),
-        second(0, 1, 0),
-        second(1, 0, 2),
-        mixed(2),
-    ]
 }
 
 /// What a film's own differences add at a load that the nominal film would be pressed as far by.

@@ -18,7 +18,7 @@ const UNIT_NODES_MM: [f64; 11] = [-5.0, -3.8, -2.5, -1.4, 0.0, 1.4, 2.5, 3.2, 3.
 const TIP_NODES_MM: [f64; 12] = [0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0];
 /// And those at which it is known what a tip's radius does to that, mm.
 const TIP_RADIUS_NODES_MM: [f64; 7] = [0.0, 1.4, 2.5, 3.2, 3.8, 4.5, 5.0];
-/// The tip's radius in the first four tables, mm, and the largest in those of the radius.
+/// The tip's radius in the first three tables, mm, and the largest in those of the radius.
 pub const NOMINAL_RADIUS_MM: f64 = 0.5;
 /// The largest radius of the tip that a film knows, mm.
 pub const LARGEST_RADIUS_MM: f64 = 2.0;
@@ -36,8 +36,6 @@ pub enum Kind {
     Moved,
     /// Its slopes: of the motion along x by x and by y, along z by x.
     Slopes,
-    /// How these change, 1/mm: along x by xx, xy and yy, along z by xx and xy.
-    Bends,
     /// The way of a tip in the corner (+, +), mm: along x, along z.
     Tip,
     /// What the first, second and third power of ρ = (R² − 0.25) / 3.75 add for a tip of radius R mm: to
@@ -51,10 +49,9 @@ pub enum Kind {
 
 impl Kind {
     /// All, in the order of a file.
-    pub const ALL: [Kind; 7] = [
+    pub const ALL: [Kind; 6] = [
         Kind::Moved,
         Kind::Slopes,
-        Kind::Bends,
         Kind::Tip,
         Kind::Radius,
         Kind::TipRadius,
@@ -77,7 +74,7 @@ impl Kind {
             Kind::Moved | Kind::Tip => Terms::up_to(7, 4, 1),
             Kind::Slopes => Terms::up_to(5, 3, 1),
             // Of these no derivatives by the force are known: two rings of tilts tell no third degree.
-            Kind::Bends | Kind::Radius | Kind::TipRadius | Kind::Unit => Terms::up_to(4, 2, 1),
+            Kind::Radius | Kind::TipRadius | Kind::Unit => Terms::up_to(4, 2, 1),
         }
     }
 
@@ -86,7 +83,6 @@ impl Kind {
         match self {
             Kind::Moved | Kind::Tip => 2,
             Kind::Slopes => 3,
-            Kind::Bends => 5,
             Kind::Radius | Kind::TipRadius => 6,
             Kind::Unit => 2 * UNIT_PARTS,
         }
@@ -95,7 +91,7 @@ impl Kind {
 
 /// All tables of a film.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tables([Table; 7]);
+pub struct Tables([Table; 6]);
 
 impl Tables {
     /// Of each kind's coefficients: by node along y, node along x, output and term.
