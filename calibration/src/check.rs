@@ -125,7 +125,7 @@ fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
 }
 
 /// The force's vector in N, rebuilt from its angles: this holds for every contact reading.
-pub(crate) fn vector_n(force: Force) -> [f64; 3] {
+pub fn vector_n(force: Force) -> [f64; 3] {
     let degrees = |angle: i32| (f64::from(angle) / 1e3).to_radians();
     let (sin_a, cos_a) = degrees(force.alpha.0).sin_cos();
     let (sin_b, cos_b) = degrees(force.beta.0).sin_cos();

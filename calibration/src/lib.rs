@@ -16,18 +16,14 @@
 //! | `quantize` | weights to a model file, the same bytes on every machine |
 //! | `uncertainty` | what a model's errors say of its next ones |
 //! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
-//! | `peers` | beside the paper's own pipeline, on the same frames |
-//! | `tradeoff` | speed against accuracy: a sweep, its Pareto front, the best under limits |
-//! | `plot`, `document` | SVG; tables in documents |
+//! | `plot` | SVG |
 //! | `progress` | bars on the terminal |
-//! | `scene` | pictures and figures of the simulated sensor |
 
 pub mod answer;
 pub mod check;
 pub mod collect;
 pub mod conditions;
 pub mod dataset;
-pub mod document;
 pub mod errors;
 pub mod evaluate;
 pub mod fit;
@@ -35,14 +31,11 @@ pub mod forward;
 pub mod import;
 pub mod loads;
 pub mod network;
-pub mod peers;
 pub mod plot;
 pub mod progress;
 pub mod quantize;
 pub mod range;
 pub mod rest;
-pub mod scene;
-pub mod tradeoff;
 pub mod train;
 pub mod uncertainty;
 pub mod weights;

@@ -9,10 +9,6 @@ use commands::default_model::DefaultModelArgs;
 use commands::model::{CheckArgs, EvaluateArgs, ExportArgs};
 use commands::network::{FilmArgs, TrainArgs, UnitArgs};
 use hivtac_calibration::collect::CollectCommand;
-use hivtac_calibration::peers::PeersArgs;
-use hivtac_calibration::progress::bar;
-use hivtac_calibration::scene::SceneCommand;
-use hivtac_calibration::tradeoff::{Step, TradeoffArgs};
 
 /// From data to a model on the chip: a unit's own, or that of the simulated sensor.
 #[derive(Parser)]
@@ -50,15 +46,6 @@ enum Command {
     /// Dataset, train, film, export and check in one, for the model that firmware and host tool
     /// embed: a tip anywhere within ±4 mm.
     DefaultModel(DefaultModelArgs),
-    /// Speed against accuracy: sweep frame sizes, estimators, arithmetics and scans, and write docs/tradeoff.md; or pick the best
-    /// under limits. An interrupted sweep goes on.
-    Tradeoff(TradeoffArgs),
-    /// Compare with the paper's own pipeline (OpenCV, a float network 3×512) on the same rendered frames. What it renders and
-    /// trains is kept in a folder: an interrupted run goes on where it was.
-    Peers(PeersArgs),
-    /// Look at the simulated sensor: frames, its film, what each of its effects does.
-    #[command(subcommand)]
-    Scene(SceneCommand),
 }
 
 fn main() -> Result<()> {
@@ -74,17 +61,5 @@ fn main() -> Result<()> {
         Command::Film(args) => args.run(),
         Command::Check(args) => args.run(),
         Command::DefaultModel(args) => args.run(),
-        Command::Tradeoff(args) => args.run(sweep_bars),
-        Command::Peers(args) => args.run(),
-        Command::Scene(command) => command.run(),
-    }
-}
-
-/// What to call at every step of so many frames and trainings.
-fn sweep_bars([frames, trainings]: [usize; 2]) -> impl Fn(Step) + Sync {
-    let (rendering, training) = (bar("rendering", frames), bar("training", trainings));
-    move |step| match step {
-        Step::Frame => rendering.inc(1),
-        Step::Training => training.inc(1),
     }
 }

@@ -5,19 +5,24 @@ mod anywhere;
 mod calculix;
 mod convergence;
 mod coverage;
+mod document;
 mod large;
 mod maps;
 mod page;
 mod paper;
+mod peers;
 mod press;
+mod scene;
 mod tangential;
 mod tips;
 mod touches;
+mod tradeoff;
 mod units;
 mod unseen;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
+use hivtac_calibration::progress::bar;
 
 /// What only proves or compares: each study writes its page under docs/results.
 #[derive(Parser)]
@@ -42,12 +47,21 @@ enum Command {
     Large(large::Large),
     /// Train the paper's network with the place as two more outputs, and judge it beside ours.
     Paper(paper::Paper),
+    /// Compare with the paper's own pipeline (OpenCV, a float network 3×512) on the same rendered
+    /// frames. What it renders and trains is kept in a folder: an interrupted run goes on.
+    Peers(peers::PeersArgs),
+    /// Look at the simulated sensor: frames, its film, what each of its effects does.
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
     /// Press with a tangential force to 0.8 of the normal one.
     Tangential(tangential::Tangential),
     /// Press with tips of other sizes than the model believes in.
     Tips(tips::Tips),
     /// Press with two tips at once, and with flat faces, by the film's full solver.
     Touches(touches::Touches),
+    /// Speed against accuracy: sweep frame sizes, estimators, arithmetics and scans, and write
+    /// docs/tradeoff.md; or pick the best under limits. An interrupted sweep goes on.
+    Tradeoff(tradeoff::TradeoffArgs),
     /// Displace one marker and see what the residual does not tell.
     Unseen(unseen::Unseen),
     /// Draw units as people build them; measure them with a tare alone, and after ten loads.
@@ -64,10 +78,22 @@ fn main() -> Result<()> {
         Command::Coverage(study) => study.run(),
         Command::Large(study) => study.run(),
         Command::Paper(study) => study.run(),
+        Command::Peers(study) => study.run(),
+        Command::Scene(command) => command.run(),
         Command::Tangential(study) => study.run(),
         Command::Tips(study) => study.run(),
         Command::Touches(study) => study.run(),
+        Command::Tradeoff(study) => study.run(sweep_bars),
         Command::Unseen(study) => study.run(),
         Command::Units(study) => study.run(),
+    }
+}
+
+/// What to call at every step of so many frames and trainings.
+fn sweep_bars([frames, trainings]: [usize; 2]) -> impl Fn(tradeoff::Step) + Sync {
+    let (rendering, training) = (bar("rendering", frames), bar("training", trainings));
+    move |step| match step {
+        tradeoff::Step::Frame => rendering.inc(1),
+        tradeoff::Step::Training => training.inc(1),
     }
 }

@@ -3,7 +3,7 @@
 Standard input: its lines of JSON. Standard output: one line for each,
 {"name":…,"microseconds":…,"markers":[[x,y],…]}: the fastest of many repetitions, and the centroids
 of the four largest contours. Pixels are RGB565, little-endian; expanding them to the BGR that
-OpenCV wants costs it nothing here. The pipeline itself is `calibration/python/paper_pipeline.py`.
+OpenCV wants costs it nothing here. The pipeline itself is `studies/python/paper_pipeline.py`.
 """
 
 import json

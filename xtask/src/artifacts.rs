@@ -57,11 +57,11 @@ pub fn host_tool() -> Result<PathBuf> {
     build(&mut command, "hivtac")
 }
 
-/// The calibration, without the solver of the film, which takes minutes to build.
+/// The calibration.
 pub fn calibrate() -> Result<PathBuf> {
     let mut command = cargo("build", workspace::root());
     command.args(["--profile", TOOLS, "--package", "hivtac-calibration"]);
-    command.args(["--no-default-features", "--bin", "hivtac-calibrate"]);
+    command.args(["--bin", "hivtac-calibrate"]);
     build(&mut command, "hivtac-calibrate")
 }
 

@@ -81,14 +81,14 @@ impl MarkerDetector for Sensing<'_> {
 }
 
 /// Shows a frame to a sensor.
-pub(crate) fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
+pub fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
     sensor.begin_frame();
     sensor.push_rows(&frame.words());
     sensor.finish_frame()
 }
 
 /// The names of the status bits that forbid a force, but not the missing model.
-pub(crate) fn reasons(status: Status) -> String {
+pub fn reasons(status: Status) -> String {
     let forbids = |name: &&str| {
         let bit = Status::NAMES
             .iter()

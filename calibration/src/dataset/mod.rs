@@ -18,8 +18,7 @@ use crate::conditions::Conditions;
 use crate::range::Range;
 use crate::rest::Rest;
 
-pub use detector::{Detection, Detectors, MarkerDetector, Sensing};
-pub(crate) use detector::{measure, reasons};
+pub use detector::{Detection, Detectors, MarkerDetector, Sensing, measure, reasons};
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};

@@ -1,7 +1,7 @@
 //! The Cramér–Rao bound of a force and its place that are read from the centroids of four markers.
 
+use crate::peers::limit::matrix::{cholesky, dot, forward, inverse};
 use anyhow::{Context, Result};
-use hivtac_calibration::peers::limit::matrix::{cholesky, dot, forward, inverse};
 use hivtac_scene::Load;
 
 use super::TestedUnit;

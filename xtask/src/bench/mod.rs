@@ -45,8 +45,8 @@ pub struct Bench {
     /// Draw the paper's Figure 14 and Table 1 with this sensor's rows, into docs.
     #[arg(long, conflicts_with_all = ["json", "write_baseline", "write_docs", "peers"])]
     paper: bool,
-    /// Count what the configurations of `hivtac-calibrate tradeoff` cost, into
-    /// calibration/tradeoff/costs.json. With `--write-docs` docs/tradeoff.md follows.
+    /// Count what the configurations of `hivtac-studies tradeoff` cost, into
+    /// studies/tradeoff/costs.json. With `--write-docs` docs/tradeoff.md follows.
     #[arg(long, conflicts_with_all = ["json", "write_baseline", "peers", "paper"])]
     tradeoff: bool,
     /// Measure on an STM32H743 that is attached by a debug probe instead.

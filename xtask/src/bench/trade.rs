@@ -23,7 +23,7 @@ const MOST_STEPS: u64 = 3;
 /// depends a little on it, and blocks of instructions follow others.
 const TOLERANCE: f64 = 0.01;
 /// Where the result goes.
-const FILE: &str = "calibration/tradeoff/costs.json";
+const FILE: &str = "studies/tradeoff/costs.json";
 /// Everything, as the file has it.
 #[derive(Serialize)]
 struct Costs {
@@ -117,14 +117,14 @@ pub fn write(toolchain: &Toolchain, measured: &[Measured]) -> Result<()> {
     Ok(())
 }
 
-/// Has `hivtac-calibrate tradeoff` write its tables anew.
+/// Has `hivtac-studies tradeoff` write its tables anew.
 ///
 /// # Errors
 /// When it fails.
 pub fn write_documents() -> Result<()> {
     let mut command = cargo("run", workspace::root());
-    command.args(["--release", "--package", "hivtac-calibration"]);
-    process::run(command.args(["--bin", "hivtac-calibrate", "--", "tradeoff"]))
+    command.args(["--release", "--package", "hivtac-studies"]);
+    process::run(command.args(["--", "tradeoff"]))
 }
 
 fn numbers(cost: Cost) -> Result<Numbers> {

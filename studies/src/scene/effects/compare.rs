@@ -1,9 +1,9 @@
 //! How far what is found moves when an effect is switched.
 
 use anyhow::Result;
+use hivtac_calibration::errors::{WEAK_N, angle_deg, norm};
 use hivtac_scene::{Compare, Effect, Frame, Options, Preset, Scene};
 
-use crate::errors::{WEAK_N, angle_deg, norm};
 use crate::scene::pipeline::{FrameMeasurement, Pipeline};
 use crate::scene::size::Size;
 

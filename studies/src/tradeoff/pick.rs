@@ -136,10 +136,10 @@ impl Limits {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::conditions::CentroidName;
     use crate::tradeoff::costs::Cost;
     use crate::tradeoff::plan::{Estimator, Numbers};
     use crate::tradeoff::table::Mean;
+    use hivtac_calibration::conditions::CentroidName;
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F| (mN).
     pub fn made(size: [u16; 2], cycles: i64, [direction, force]: [f64; 2]) -> Configuration {

@@ -1,5 +1,6 @@
+use hivtac_calibration::dataset::{MarkerDetector, Recipe, Sensing};
+
 use super::*;
-use crate::dataset::{MarkerDetector, Recipe, Sensing};
 
 /// The whole study, small, without OpenCV: the sensing with the paper's binary centroids stands in for it.
 #[test]
@@ -25,7 +26,7 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
             preset: Preset::Paper,
             width,
             height,
-            centroid: crate::conditions::CentroidName::BinaryMask,
+            centroid: hivtac_calibration::conditions::CentroidName::BinaryMask,
             ..Recipe::default()
         };
         Ok(Box::new(Sensing::unmodelled(&recipe)?))

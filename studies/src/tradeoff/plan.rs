@@ -2,13 +2,12 @@
 
 use std::fmt;
 
+use hivtac_calibration::conditions::CentroidName;
+use hivtac_calibration::dataset::Recipe;
+use hivtac_calibration::network::Arithmetic;
+use hivtac_calibration::weights::Range;
 use hivtac_sensing::geometry::Preset;
 use serde::{Deserialize, Serialize};
-
-use crate::conditions::CentroidName;
-use crate::dataset::Recipe;
-use crate::network::Arithmetic;
-use crate::weights::Range;
 
 /// What makes a force of features.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -157,14 +156,6 @@ impl Estimator {
 impl Numbers {
     /// All of them.
     pub const ALL: [Numbers; 3] = [Numbers::F32, Numbers::Int16, Numbers::Int8PerChannel];
-
-    /// Steps that its answer is followed by: the chip runs no floats, and so nothing behind them.
-    pub fn steps(self) -> &'static [u8] {
-        match self {
-            Numbers::F32 => &STEPS[..1],
-            Numbers::Int16 | Numbers::Int8PerChannel => &STEPS,
-        }
-    }
 
     /// The same as the trainer has it; `None` for what is no arithmetic of a network on the chip.
     pub fn arithmetic(self) -> Option<Arithmetic> {

@@ -4,10 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use hivtac_calibration::conditions::CentroidName;
 use serde::Deserialize;
 
 use super::plan::{Estimator, Numbers};
-use crate::conditions::CentroidName;
 
 /// The command that counts them.
 pub const COMMAND: &str = "cargo xtask bench --tradeoff";

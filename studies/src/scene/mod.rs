@@ -1,4 +1,4 @@
-//! `hivtac-calibrate scene …`: pictures and figures of the simulated sensor (`docs/scene.md`).
+//! `hivtac-studies scene …`: pictures and figures of the simulated sensor (`docs/scene.md`).
 
 mod canvas;
 mod cases;

@@ -3,18 +3,20 @@
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, anyhow};
+use hivtac_calibration::conditions::CentroidName;
+use hivtac_calibration::dataset::{
+    Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files,
+};
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
+use hivtac_calibration::weights::Range;
 use hivtac_scene::Contact;
 use hivtac_sensing::model::Model;
 
 use super::PeersArgs;
 use super::models::How;
-use crate::conditions::CentroidName;
-use crate::dataset::{Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files};
-use crate::fit::fit;
-use crate::quantize::export;
 use crate::scene::size::Size;
-use crate::train::Options;
-use crate::weights::Range;
 
 /// Opens a peer's detector for frames of so many columns and rows.
 pub type Open<'a> = dyn Fn(u16, u16) -> Result<Box<dyn MarkerDetector>> + Sync + 'a;
@@ -84,7 +86,10 @@ impl Frames {
                     detector(recipe.width, recipe.height)?,
                 ])
             };
-            let bar = crate::progress::bar(&format!("{contact} {size} {part}"), recipe.rows());
+            let bar = hivtac_calibration::progress::bar(
+                &format!("{contact} {size} {part}"),
+                recipe.rows(),
+            );
             let made = generate_files(recipe, files, open, |rows| bar.inc(rows))?;
             bar.finish_and_clear();
             let made: [Dataset; 2] = made.try_into().map_err(|_| anyhow!("two files"))?;

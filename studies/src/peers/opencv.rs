@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
+use hivtac_calibration::dataset::{Detection, MarkerDetector, Observation};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::markers::Marker;
 use hivtac_sensing::units::Px;
-
-use crate::dataset::{Detection, MarkerDetector, Observation};
 
 const ENVIRONMENT: &str = include_str!("../../python/opencv_environment.py");
 const PIPELINE: &str = include_str!("../../python/paper_pipeline.py");
@@ -146,7 +145,7 @@ fn observation(contours: &[[f64; 3]]) -> Detection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::Recipe;
+    use hivtac_calibration::dataset::Recipe;
 
     #[test]
     fn contours_become_features_whatever_their_order() {

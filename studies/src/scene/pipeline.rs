@@ -1,6 +1,7 @@
 //! The pipeline on simulated frames, with the default model where that is made for them.
 
 use anyhow::{Context, Result, anyhow, bail};
+use hivtac_calibration::dataset::reasons;
 use hivtac_scene::{Camera, Frame, Load, Preset as ScenePreset, Scene, Truth};
 use hivtac_sensing::geometry::{Geometry, Preset};
 use hivtac_sensing::markers::Marker;
@@ -10,10 +11,8 @@ use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
 use hivtac_sensing::threshold::ByteOrder;
 
-use crate::dataset::reasons;
-
 /// The model that firmware and host tool embed.
-static MODEL: &[u8] = include_bytes!("../../models/default.hvtm");
+static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 16;
 /// A pixel in Q16.16.
@@ -92,7 +91,7 @@ impl Pipeline {
         } = self.run(frame);
         FrameMeasurement {
             centroids_px: markers.map(|markers| markers.map(centroid_px)),
-            force_n: force.map(crate::check::vector_n),
+            force_n: force.map(hivtac_calibration::check::vector_n),
             rejected: reasons(status),
         }
     }

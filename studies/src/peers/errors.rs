@@ -1,7 +1,8 @@
 //! Errors of the frames that everyone accepts.
 
+use hivtac_calibration::errors::{WEAK_N, angle_deg, mean, norm};
+
 use super::models::Answers;
-use crate::errors::{WEAK_N, angle_deg, mean, norm};
 
 /// Means over frames.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,17 +4,17 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use hivtac_calibration::check::check;
+use hivtac_calibration::conditions::Conditions;
+use hivtac_calibration::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::Meaning;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
 use serde_json::json;
 
 use super::plan::{RENDERED, preset};
 use super::table::Configuration;
-use crate::check::check;
-use crate::conditions::Conditions;
-use crate::dataset::{Loads, Recipe, generate};
-use crate::fit::fit;
-use crate::network::Meaning;
-use crate::quantize::export;
-use crate::train::Options;
 
 /// Frames that the network is trained on, in so many passes in floats and with rounding, and frames
 /// that tell the markers' noise and their seed: as for the default model.

@@ -1,4 +1,4 @@
-//! `hivtac-calibrate peers`: the sensing and its models beside the paper's own pipeline, on the same rendered frames.
+//! `hivtac-studies peers`: the sensing and its models beside the paper's own pipeline, on the same rendered frames.
 //!
 //! The paper's pipeline is its Section 5: OpenCV's HSV, threshold, dilation, contours and moments, and a float network of
 //! three hidden layers of 512 that answers with angles and |F|. Both are trained on the same frames of four fifths of the
@@ -71,7 +71,7 @@ pub struct PeersArgs {
 }
 
 fn preset(name: &str) -> Result<Preset, String> {
-    crate::conditions::preset(name).map_err(|error| error.to_string())
+    hivtac_calibration::conditions::preset(name).map_err(|error| error.to_string())
 }
 
 impl PeersArgs {

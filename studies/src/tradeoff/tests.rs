@@ -1,6 +1,6 @@
 //! A whole sweep, very small.
 
-use super::plan::{CENTROIDS, Numbers};
+use super::plan::{CENTROIDS, Estimator, Numbers};
 use super::table::Reach;
 use super::*;
 
@@ -84,7 +84,7 @@ fn the_committed_results_pick_the_default_model() {
     let all = configurations(&results, &costs).unwrap();
     let picked = best(&all, &Limits::default()).unwrap();
     assert_eq!(picked.reach(), Reach::Firmware);
-    let bytes = fs::read(folder.join("models/default.hvtm")).unwrap();
+    let bytes = fs::read(folder.join("../calibration/models/default.hvtm")).unwrap();
     let model = hivtac_sensing::model::Model::parse(&bytes).unwrap();
     assert_eq!(model.conditions.centroid, picked.centroid.to_model());
     let name = format!("11-{}-5 ov7725", picked.estimator);

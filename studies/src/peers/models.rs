@@ -1,6 +1,13 @@
 //! The models that are compared.
 
 use anyhow::{Context, Result, anyhow};
+use hivtac_calibration::check::vector_n;
+use hivtac_calibration::dataset::Dataset;
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::{Arithmetic, Meaning};
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
+use hivtac_calibration::weights::{Weights, features_from_q16};
 use hivtac_scene::Contact;
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::Model as Chip;
@@ -8,14 +15,7 @@ use hivtac_sensing::network::Network;
 
 use super::frames::{Frames, Sets};
 use super::{PeersArgs, there};
-use crate::check::vector_n;
-use crate::dataset::Dataset;
-use crate::fit::fit;
-use crate::network::{Arithmetic, Meaning};
-use crate::quantize::export;
 use crate::scene::size::Size;
-use crate::train::Options;
-use crate::weights::{Weights, features_from_q16};
 
 const SEED: u64 = 1;
 
@@ -51,7 +51,7 @@ impl Model {
     }
 
     fn in_floats(&self, sets: &Sets) -> Answers {
-        let answer = |row: &crate::dataset::Row| {
+        let answer = |row: &hivtac_calibration::dataset::Row| {
             let seen = row.seen.as_ref().ok()?;
             Some([row.force_n, self.weights.force_n(&seen.features_px())])
         };
@@ -62,7 +62,7 @@ impl Model {
         let bytes = export(&self.weights)?;
         let model = Chip::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let mut network = Network::new();
-        let answer = |row: &crate::dataset::Row| {
+        let answer = |row: &hivtac_calibration::dataset::Row| {
             let Ok(seen) = &row.seen else { return Ok(None) };
             let features = features_from_q16(&seen.features_q16)?;
             let output = network.run(&model, &features, &model.rest.features);

@@ -2,13 +2,14 @@
 
 use std::fmt::Write;
 
+use hivtac_calibration::plot::{Axis, COLOURS, Plot, Scale};
+
 use super::pick::{Limits, best, front};
 use super::plan::{
     Estimator, JUDGED_MM, JUDGED_N, Numbers, RENDERED, USUAL_STEPS, firmware_size, has_camera,
 };
 use super::results::Results;
 use super::table::{Configuration, Mean, Reach, words};
-use crate::plot::{Axis, COLOURS, Plot, Scale};
 
 /// What the document holds between its marks.
 pub fn markdown(results: &Results, configurations: &[Configuration]) -> String {
@@ -168,7 +169,7 @@ fn sizes(configurations: &[Configuration]) -> String {
 
 fn default_estimator() -> Estimator {
     Estimator {
-        hidden: crate::train::Options::default().hidden,
+        hidden: hivtac_calibration::train::Options::default().hidden,
     }
 }
 

@@ -1,4 +1,4 @@
-//! `hivtac-calibrate tradeoff`: speed against accuracy, and the best under a user's limits (`docs/tradeoff.md`).
+//! `hivtac-studies tradeoff`: speed against accuracy, and the best under a user's limits (`docs/tradeoff.md`).
 //!
 //! ```text
 //! plan → frames → sweep (train, judge) → results ┐
@@ -26,7 +26,7 @@ use clap::Args;
 use crate::document;
 pub use costs::Costs;
 pub use pick::{Limits, best};
-pub use plan::{Estimator, Plan};
+pub use plan::Plan;
 pub use results::Results;
 pub use sweep::{Step, sweep};
 pub use table::{Configuration, configurations};
@@ -61,10 +61,10 @@ pub struct TradeoffArgs {
     #[arg(long)]
     rounded_epochs: Option<usize>,
     /// What is finished; what is missing is added. Remove it to begin anew.
-    #[arg(long, default_value = "calibration/tradeoff/results.jsonl")]
+    #[arg(long, default_value = "studies/tradeoff/results.jsonl")]
     results: PathBuf,
     /// What `cargo xtask bench --tradeoff` counted.
-    #[arg(long, default_value = "calibration/tradeoff/costs.json")]
+    #[arg(long, default_value = "studies/tradeoff/costs.json")]
     costs: PathBuf,
     /// Where rendered frames are kept.
     #[arg(long, default_value = "target/tradeoff")]

@@ -4,6 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow, ensure};
+use hivtac_calibration::conditions::CentroidName;
+use hivtac_calibration::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
+use hivtac_calibration::network::{INPUTS, Layer, Meaning, Network, Standardization};
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::{Training, Uncertainty, Weights};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::geometry::Geometry;
@@ -15,11 +20,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::plan::{CENTROIDS, Plan, RENDERED, preset};
-use crate::conditions::CentroidName;
-use crate::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
-use crate::network::{INPUTS, Layer, Meaning, Network, Standardization};
-use crate::quantize::export;
-use crate::weights::{Training, Uncertainty, Weights};
 
 /// Frames of one size, as both estimators see them.
 pub struct Frames {

@@ -4,6 +4,14 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use hivtac_calibration::answer::Chip;
+use hivtac_calibration::dataset::{Dataset, Row};
+use hivtac_calibration::errors::{WEAK_N, angle_deg, norm};
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::Meaning;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
+use hivtac_calibration::weights::Weights;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::model::encode::with_steps;
 use hivtac_sensing::status::Status;
@@ -12,14 +20,6 @@ use rayon::prelude::*;
 use super::frames::{Frames, frames};
 use super::plan::{CENTROIDS, JUDGED_MM, JUDGED_N, Numbers, Plan, STEPS, Task};
 use super::results::{Figures, Finished, Results};
-use crate::answer::Chip;
-use crate::dataset::{Dataset, Row};
-use crate::errors::{WEAK_N, angle_deg, norm};
-use crate::fit::fit;
-use crate::network::Meaning;
-use crate::quantize::export;
-use crate::train::Options;
-use crate::weights::Weights;
 
 /// Adam's first step and rows that share one, for the paper's network: the paper's.
 const PAPER_RATE: f64 = 1e-3;

@@ -8,14 +8,14 @@ mod bound;
 pub mod matrix;
 
 use anyhow::{Context, Result};
+use hivtac_calibration::dataset::{MarkerDetector, Sensing};
+use hivtac_calibration::errors::{angle_deg, norm};
 use hivtac_scene::{Contact, Load, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::frames::Frames;
 use super::models::Answers;
-use crate::dataset::{MarkerDetector, Sensing};
-use crate::errors::{angle_deg, norm};
 use bound::{Bound, COORDINATES, Noise, bound, centroids, jacobian};
 use matrix::{dot, least_squares};
 

@@ -140,7 +140,6 @@ fn reduced(load: &Load, camera: &Camera) -> Result<Answer> {
     })
 }
 
-#[cfg(feature = "film")]
 fn full(load: &Load, camera: &Camera) -> Result<Answer> {
     use hivtac_film::{Design, Film, markers, press_load};
 
@@ -154,11 +153,6 @@ fn full(load: &Load, camera: &Camera) -> Result<Answer> {
             seen_px: marker.seen_px,
         }),
     })
-}
-
-#[cfg(not(feature = "film"))]
-fn full(_: &Load, _: &Camera) -> Result<Answer> {
-    anyhow::bail!("--solver full: this program was built without the feature `film`")
 }
 
 impl Answer {

@@ -1,10 +1,10 @@
 //! The Cramér–Rao bound of a force that is read from the centroids of four markers.
 
 use anyhow::{Context, Result};
+use hivtac_calibration::errors::norm;
 use hivtac_scene::{Contact, Load, Scene};
 
 use super::matrix::{cholesky, dot, forward, inverse};
-use crate::errors::norm;
 
 /// Coordinates of the four centroids.
 pub const COORDINATES: usize = 8;
@@ -104,7 +104,9 @@ mod tests {
     #[test]
     fn the_bound_is_reached_where_the_film_is_nearly_a_line() {
         use rand::{Rng, SeedableRng};
-        let scene = crate::dataset::Recipe::default().scene(0).unwrap();
+        let scene = hivtac_calibration::dataset::Recipe::default()
+            .scene(0)
+            .unwrap();
         let force = [0.01, -0.005, -0.12];
         let jacobian = jacobian(&scene, Contact::Force, force).unwrap();
         let noise: Noise =

@@ -3,11 +3,11 @@
 use std::fmt;
 
 use anyhow::Result;
+use hivtac_calibration::conditions::CentroidName;
 
 use super::costs::{Behind, Cost, Costs};
 use super::plan::{Estimator, Numbers, firmware_size, has_camera};
 use super::results::{Figures, Finished, Results};
-use crate::conditions::CentroidName;
 
 /// A mean over seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]

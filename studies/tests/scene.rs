@@ -1,4 +1,4 @@
-//! `hivtac-calibrate scene …` as a user runs it.
+//! `hivtac-studies scene …` as a user runs it.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -9,7 +9,7 @@ use hivtac_scene::{Preset, Scene};
 use serde_json::Value;
 
 fn run(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
+    Command::new(env!("CARGO_BIN_EXE_hivtac-studies"))
         .current_dir(directory)
         .arg("scene")
         .args(arguments)
