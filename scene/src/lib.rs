@@ -22,7 +22,6 @@
 //! |---|---|
 //! | `load` | the force on the film and its convention |
 //! | [`film`] | where a point of the film goes under a load: tables made from finite elements |
-//! | [`paper`] | the paper's analytic model, equations 13–25 |
 //! | `camera` | presets, equidistant fisheye |
 //! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |
 //! | `options` | what makes a frame hard, and its ranges |
@@ -33,13 +32,10 @@
 //! | `mechanics`, `surface` | the film as it is, or simplified |
 //! | `motion`, `scene` | loads in time; the scene itself |
 //! | `file` | scenes from TOML files |
-//! | `hard` | the catalogue of scenes in which markers are hard to find |
-//! | `effects` | the list of effects, each with its switch |
 
 mod camera;
 mod coverage;
 mod disc;
-mod effects;
 mod error;
 mod exposure;
 #[cfg(feature = "file")]
@@ -47,7 +43,6 @@ mod file;
 pub mod film;
 mod format;
 mod frame;
-mod hard;
 #[cfg(feature = "jpeg")]
 mod jpeg;
 mod lens;
@@ -57,21 +52,18 @@ mod mechanics;
 mod motion;
 mod noise;
 mod options;
-pub mod paper;
 mod patch;
 mod scene;
 mod surface;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Preset};
 pub use disc::{Disc, MARKER_RADIUS_MM, MARKER_REST_MM, MARKERS};
-pub use effects::{Compare, Effect, effects};
 pub use error::SceneError;
 pub use film::HALF_SIDE_MM;
 pub use format::Format;
 #[cfg(feature = "jpeg")]
 pub use format::JPEG_QUALITY;
 pub use frame::{Frame, MarkerTruth, Truth};
-pub use hard::{Expected, HardCase, hard_cases, hard_loads};
 pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
 pub use load::{Contact, Load};
 pub use mechanics::{Mechanics, Stiffness};

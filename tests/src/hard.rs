@@ -1,4 +1,4 @@
-//! The scene's hard cases, as the pipeline sees them.
+//! The hard cases, as the pipeline sees them.
 
 use std::collections::BTreeSet;
 use std::format;
@@ -6,7 +6,8 @@ use std::string::{String, ToString};
 use std::vec::Vec;
 
 use anyhow::Result;
-use hivtac_scene::{Contact, Expected, Frame, HardCase, Preset, Scene, hard_cases, hard_loads};
+use hivtac_hard_cases::{Expected, HardCase, hard_cases, hard_loads};
+use hivtac_scene::{Contact, Frame, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::threshold::PixelFormat;

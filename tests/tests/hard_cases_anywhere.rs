@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use hivtac_scene::{Expected, HardCase, Preset, hard_cases};
+use hivtac_hard_cases::{Expected, HardCase, hard_cases};
+use hivtac_scene::Preset;
 use hivtac_sensing::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;

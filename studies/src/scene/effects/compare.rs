@@ -2,10 +2,12 @@
 
 use anyhow::Result;
 use hivtac_calibration::errors::{WEAK_N, angle_deg, norm};
-use hivtac_scene::{Compare, Effect, Frame, Options, Preset, Scene};
+use hivtac_scene::{Frame, Options, Preset, Scene};
 
 use crate::scene::pipeline::{FrameMeasurement, Pipeline};
 use crate::scene::size::Size;
+
+use super::catalogue::{Compare, Effect};
 
 /// Frames per second.
 const RATE: f64 = 12.0;
@@ -211,8 +213,8 @@ impl Change {
 
 #[cfg(test)]
 mod tests {
+    use super::super::catalogue::effects;
     use super::*;
-    use hivtac_scene::effects;
 
     #[test]
     fn effects_are_told_from_noise_and_a_tare_takes_a_shift_off() {

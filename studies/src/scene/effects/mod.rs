@@ -1,5 +1,6 @@
 //! What each effect of the simulated sensor is worth: switched, and compared with the default.
 
+mod catalogue;
 mod compare;
 mod table;
 
@@ -7,10 +8,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_scene::{Preset, effects};
+use hivtac_scene::Preset;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use self::catalogue::effects;
 use self::compare::{Change, Nominal};
 use self::table::Table;
 use super::size::Size;

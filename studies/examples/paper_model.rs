@@ -1,4 +1,4 @@
-//! The paper's analytic model in numbers: `cargo run --release -p hivtac-scene --example paper_model`.
+//! The paper's analytic model in numbers: `cargo run --release -p hivtac-studies --example paper_model`.
 //!
 //! Prints the mean of R* in each reading of the paper, where disp_N peaks, and the errors of the model in `f64` and
 //! `f32` against the reference table. With `--figure8 FILE` it also writes Figure 8 as an SVG picture.
@@ -14,7 +14,7 @@ mod table;
 
 use std::error::Error;
 
-use hivtac_scene::paper::{Design, OutOfDomain, PinholeDistance};
+use hivtac_studies::paper_model::{Design, OutOfDomain, PinholeDistance};
 
 const READINGS: [PinholeDistance; 2] = [PinholeDistance::Slant, PinholeDistance::Axial];
 /// Cells along each axis for the means.

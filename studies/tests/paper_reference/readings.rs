@@ -1,6 +1,6 @@
 //! The readings of the paper's Q that are not this crate's [`Design`], as the mean of R* that each gives.
 
-use hivtac_scene::paper::{Design, NormalPress, OutOfDomain, PinholeDistance};
+use hivtac_studies::paper_model::{Design, NormalPress, OutOfDomain, PinholeDistance};
 
 use crate::scan;
 

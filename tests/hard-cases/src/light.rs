@@ -1,7 +1,7 @@
 //! Too little light, or of the wrong colour.
 
 use super::{Expected, HardCase};
-use crate::Options;
+use hivtac_scene::Options;
 
 /// Dark all over. The default threshold asks for a value of 45 of 255, which red tape reaches at a gain of about 0.3.
 pub(super) fn dark() -> Vec<HardCase> {

@@ -1,6 +1,6 @@
 //! The picture of Figure 8 in the documentation.
 
-use hivtac_scene::paper::{Design, Map, OutOfDomain, PinholeDistance};
+use hivtac_studies::paper_model::{Design, Map, OutOfDomain, PinholeDistance};
 
 /// `docs/pictures/figure8.svg`.
 pub fn figure8_svg() -> Result<String, OutOfDomain> {

@@ -1,6 +1,8 @@
 //! The reference table, and how far the model is from it in `f32` and `f64`.
 
-use hivtac_scene::paper::{Design, NormalPress, OutOfDomain, PinholeDistance, Real, disp_s_mm};
+use hivtac_studies::paper_model::{
+    Design, NormalPress, OutOfDomain, PinholeDistance, Real, disp_s_mm,
+};
 
 /// A row of `table.csv`. Fields that do not belong to a quantity are 0.
 pub struct Row {

@@ -1,7 +1,7 @@
 //! Things on the film, and markers that are not as they should be.
 
 use super::{Expected, HardCase, patched};
-use crate::{MARKERS, Options, Paint, Patch, Specks};
+use hivtac_scene::{MARKERS, Options, Paint, Patch, Specks};
 
 /// The marker that is tampered with: upper right.
 const TARGET: usize = 1;

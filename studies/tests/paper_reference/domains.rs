@@ -1,6 +1,6 @@
 //! Limits and properties over whole domains.
 
-use hivtac_scene::paper::{
+use hivtac_studies::paper_model::{
     Design, Map, NormalPress, OutOfDomain, PinholeDistance, disp_s_mm, image_radius_mm,
     shear_stretch, sheared_position_mm, stretched_projection_mm,
 };

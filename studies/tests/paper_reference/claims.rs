@@ -1,6 +1,6 @@
 //! Where the paper is ambiguous or wrong: the numbers that the documentation gives for each reading.
 
-use hivtac_scene::paper::{
+use hivtac_studies::paper_model::{
     Design, NormalPress, PinholeDistance, disp_s_mm, shear_stretch, sheared_position_mm,
     stretched_projection_mm,
 };

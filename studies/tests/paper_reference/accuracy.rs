@@ -1,6 +1,6 @@
 //! The model against the reference table.
 
-use hivtac_scene::paper::{Design, PinholeDistance};
+use hivtac_studies::paper_model::{Design, PinholeDistance};
 
 use crate::table::{self, largest_errors};
 

@@ -1,6 +1,6 @@
 //! The list of effects: what each is worth can be measured by switching it.
 
-use crate::{
+use hivtac_scene::{
     Contact, Discs, Format, Lens, Mounting, Options, Paint, Patch, Projection, Salt, Scene,
     SceneError, Shutter, Stiffness, Surface,
 };
@@ -25,7 +25,7 @@ pub enum Compare {
     /// What is found in its frames ([`Scene::frame`], at the times of a motion), through [`Frame::to_rgb565`] when its format
     /// is another.
     ///
-    /// [`Frame::to_rgb565`]: crate::Frame::to_rgb565
+    /// [`Frame::to_rgb565`]: hivtac_scene::Frame::to_rgb565
     Found,
     /// Its true centroids, which a picture of endless pixels would show.
     Truth,
@@ -164,7 +164,7 @@ fn mounting() -> Vec<Effect> {
 }
 
 fn pitch_um(scene: &Scene) -> f64 {
-    1000.0 * crate::FOCAL_LENGTH_MM / scene.camera().focal_px()
+    1000.0 * hivtac_scene::FOCAL_LENGTH_MM / scene.camera().focal_px()
 }
 
 fn light() -> Vec<Effect> {
@@ -253,7 +253,6 @@ fn sensor() -> Vec<Effect> {
         on("YUV422", "chroma shared by two pixels", |_, options| {
             options.format = Format::Yuv422;
         }),
-        #[cfg(feature = "jpeg")]
         on("JPEG", "quality 85", |_, options| {
             options.format = Format::Jpeg { quality: 85 };
         }),
@@ -264,7 +263,7 @@ fn sensor() -> Vec<Effect> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Preset;
+    use hivtac_scene::Preset;
     use std::collections::BTreeSet;
 
     #[test]

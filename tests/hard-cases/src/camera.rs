@@ -1,7 +1,7 @@
 //! What the camera does to a good film.
 
 use super::{Expected, HardCase};
-use crate::{
+use hivtac_scene::{
     Camera, Catch, Lens, MARKERS, Motion, Mounting, Options, Paint, Salt, Scene, Shutter, Vibration,
 };
 
@@ -188,13 +188,12 @@ pub(super) fn moving() -> Vec<HardCase> {
 }
 
 /// JPEG.
-#[cfg(feature = "jpeg")]
 pub(super) fn compressed() -> Vec<HardCase> {
     let case = |(quality, expected): (u8, _)| {
         let name = format!("jpeg-{quality}");
         let what = format!("JPEG of quality {quality}");
         HardCase::new(name, what, expected, move |_| Options {
-            format: crate::Format::Jpeg { quality },
+            format: hivtac_scene::Format::Jpeg { quality },
             ..Options::default()
         })
     };
@@ -206,16 +205,10 @@ pub(super) fn compressed() -> Vec<HardCase> {
     qualities.into_iter().map(case).collect()
 }
 
-/// JPEG is not built in.
-#[cfg(not(feature = "jpeg"))]
-pub(super) fn compressed() -> Vec<HardCase> {
-    Vec::new()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Load, Preset};
+    use hivtac_scene::{Load, Preset};
 
     #[test]
     fn markers_leave_the_frame_as_far_as_said() {
@@ -225,7 +218,7 @@ mod tests {
                 let case = cases.iter().find(|case| case.name == name).unwrap();
                 let scene = case.scene(preset, 320, 240, 1).unwrap();
                 let rest = scene.render_load(&Load::REST, 0).unwrap();
-                let seen = |markers: [Option<crate::MarkerTruth>; 4]| {
+                let seen = |markers: [Option<hivtac_scene::MarkerTruth>; 4]| {
                     markers[0].map_or(0.0, |marker| marker.visible)
                 };
                 [seen(rest.truth.markers), seen(scene.truth(0.0).markers)]

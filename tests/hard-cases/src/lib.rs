@@ -7,7 +7,7 @@ mod light;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::{Load, Motion, Options, Patch, Preset, Scene, SceneError};
+use hivtac_scene::{Load, Motion, Options, Patch, Preset, Scene, SceneError};
 
 /// A scene in which markers are hard to find.
 ///

@@ -22,12 +22,12 @@
 //! item's documentation says so; `docs/paper-model.md` collects it with numbers.
 //!
 //! ```
-//! use hivtac_scene::paper::{Design, PinholeDistance};
+//! use hivtac_studies::paper_model::{Design, PinholeDistance};
 //!
 //! let design = Design::<f64>::paper(PinholeDistance::Slant);
 //! let r = design.best_r(3.5, 3.5)?.expect("a maximum away from the centre");
 //! assert!((r - 0.2814).abs() < 1e-4);
-//! # Ok::<(), hivtac_scene::paper::OutOfDomain>(())
+//! # Ok::<(), hivtac_studies::paper_model::OutOfDomain>(())
 //! ```
 
 mod design;

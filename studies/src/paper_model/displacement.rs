@@ -57,11 +57,11 @@ pub fn stretched_projection_mm<T: Real>(
 /// A marker under a normal force, in the symbols of eqs. 15–17.
 ///
 /// ```
-/// use hivtac_scene::paper::NormalPress;
+/// use hivtac_studies::paper_model::NormalPress;
 ///
 /// let press = NormalPress { pm_mm: 5.257_f64, z_mm: 2.0, d_ph_mm: 10.0, epsilon_mm: 0.0 };
 /// assert!((press.disp_n_mm(2.1)? - 0.2045).abs() < 1e-4);
-/// # Ok::<(), hivtac_scene::paper::OutOfDomain>(())
+/// # Ok::<(), hivtac_studies::paper_model::OutOfDomain>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalPress<T> {
