@@ -10,7 +10,6 @@ use hivtac_calibration::dataset::Observation;
 use hivtac_calibration::errors::angle_deg;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_film::{Design, Film, Touch, markers};
 use hivtac_scene::Camera;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::force::Force;
@@ -18,6 +17,7 @@ use hivtac_sensing::markers::Marker;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::units::Px;
+use hivtac_shell::{Design, Film, Touch, markers};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -158,7 +158,7 @@ impl Touches {
 
 impl CentroidSource<'_> {
     /// How the images of markers move, px.
-    fn moved_px(&self, film: &Film, state: &hivtac_film::Equilibrium) -> Result<[[f64; 2]; 4]> {
+    fn moved_px(&self, film: &Film, state: &hivtac_shell::Equilibrium) -> Result<[[f64; 2]; 4]> {
         let rest = markers(film, &film.rest(), &self.camera);
         let there = markers(film, state, &self.camera);
         let moved = |k: usize| [0, 1].map(|i| there[k].seen_px[i] - rest[k].seen_px[i]);

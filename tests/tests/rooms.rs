@@ -163,7 +163,7 @@ fn the_demo_builds_no_training_and_no_solver() {
         );
     }
     assert!(
-        of("", "hivtac-film").contains("\nfaer"),
+        of("", "hivtac-shell").contains("\nfaer"),
         "the test can see the sparse solver"
     );
 }

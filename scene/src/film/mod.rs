@@ -1,7 +1,7 @@
 //! Where the film goes when it is pressed.
 //!
-//! The film is a nonlinear shell; its finite elements (`film/`) take more than half a second for one press. What a frame
-//! needs of it are tables in `data/`, made from full solutions by a command of `film/`.
+//! The film is a nonlinear shell; its finite elements (`shell/`) take more than half a second for one press. What a frame
+//! needs of it are tables in `data/`, made from full solutions by a command of `shell/`.
 
 mod disc_motion;
 mod field;
@@ -42,7 +42,7 @@ static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
     }
 });
 
-/// The film by its tables: markers within 0.1 px of the full solution at 320×240 (`film/README.md`); the film between them
+/// The film by its tables: markers within 0.1 px of the full solution at 320×240 (`shell/README.md`); the film between them
 /// roughly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {

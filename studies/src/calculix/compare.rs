@@ -1,8 +1,8 @@
 //! Two films under the same press, and what one makes of the other's markers.
 
 use anyhow::Result;
-use hivtac_film::{Contact, Design, Equilibrium, Film, Marker, markers};
 use hivtac_scene::Camera;
+use hivtac_shell::{Contact, Design, Equilibrium, Film, Marker, markers};
 
 /// Gauss–Newton steps at most, and how small they are (N, mm) at the end.
 const MAX_STEPS: usize = 20;
@@ -195,7 +195,7 @@ fn least_squares(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_film::paper_camera;
+    use hivtac_shell::paper_camera;
 
     fn coarse() -> Design {
         Design {

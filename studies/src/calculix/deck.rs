@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use hivtac_film::Design;
+use hivtac_shell::Design;
 
 use super::mesh::{Cut, Mesh};
 

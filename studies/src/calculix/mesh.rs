@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use hivtac_film::Design;
+use hivtac_shell::Design;
 
 /// How fast elements grow away from tip and posts, mm per mm.
 const GROWTH: f64 = 0.25;

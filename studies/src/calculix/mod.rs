@@ -1,4 +1,4 @@
-//! The film of `film/` beside the same film in CalculiX, under the same presses.
+//! The film of `shell/` beside the same film in CalculiX, under the same presses.
 
 mod compare;
 mod deck;
@@ -15,8 +15,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_film::{Design, Film, markers_on, paper_camera};
 use hivtac_scene::{Camera, MARKER_REST_MM};
+use hivtac_shell::{Design, Film, markers_on, paper_camera};
 
 use compare::{FilmObservation, Reading};
 use deck::Deck;

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use anyhow::{Context, Result};
-use hivtac_film::{Design, Film};
+use hivtac_shell::{Design, Film};
 
 use super::compare::{Difference, FilmObservation, difference, largest_and_rms};
 use super::{Compared, Solved, Varied};

@@ -114,7 +114,7 @@ fn row(line: &str) -> Result<(usize, [f64; 3])> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_film::Design;
+    use hivtac_shell::Design;
 
     /// Printed by CalculiX 2.20.
     const PRINTED: &str = "

@@ -13,8 +13,8 @@ pub use held::{Held, noise_of};
 pub use rows::{Errors, Off, Row};
 pub use unit::{Answer, Tared, TestedUnit};
 
-use hivtac_film::halton;
 use hivtac_scene::{Load, SceneError};
+use hivtac_shell::halton;
 
 /// Forces, mN.
 pub const FORCES_MN: [u32; 3] = [50, 100, 200];

@@ -141,7 +141,7 @@ fn reduced(load: &Load, camera: &Camera) -> Result<Answer> {
 }
 
 fn full(load: &Load, camera: &Camera) -> Result<Answer> {
-    use hivtac_film::{Design, Film, markers, press_load};
+    use hivtac_shell::{Design, Film, markers, press_load};
 
     let mut film = Film::new(&Design::default())?;
     let state = press_load(&mut film, load)?.state;

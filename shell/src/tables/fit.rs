@@ -3,7 +3,7 @@
 use faer::prelude::*;
 use hivtac_scene::film::reduced::{Axis, Pose, Terms};
 
-use crate::FilmError;
+use crate::ShellError;
 
 /// What differences of a value by size and by tilt count for beside the value itself.
 const SLOPES_COUNT: f64 = 0.05;
@@ -25,7 +25,7 @@ pub struct Known {
 ///
 /// # Errors
 /// When too little is known.
-pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, FilmError> {
+pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, ShellError> {
     let outputs = known.first().map_or(0, |one| one.values.len());
     let (mut rows, mut sides): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
     for one in known {
@@ -41,7 +41,7 @@ pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, FilmError> {
     }
     let count = terms.count();
     if rows.len() < count {
-        return Err(FilmError::Solver(format!(
+        return Err(ShellError::Solver(format!(
             "{} equations for {count} terms: solve for more loads",
             rows.len()
         )));
@@ -51,7 +51,7 @@ pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, FilmError> {
     let factors = matrix.col_piv_qr();
     let told = factors.thin_R();
     if told[(count - 1, count - 1)].abs() < LEAST_TOLD * told[(0, 0)].abs() {
-        return Err(FilmError::Solver(
+        return Err(ShellError::Solver(
             "the loads do not tell the terms apart: solve for more tilts".into(),
         ));
     }

@@ -5,7 +5,7 @@ use crate::newton::{Guide, Problem, Solution};
 use crate::point::{V3, dot, normal};
 use crate::shell::Shell;
 use crate::sparse::{COMPONENTS, Factors, Solver};
-use crate::{Design, FilmError};
+use crate::{Design, ShellError};
 
 /// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a press has F_z < 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ impl Film {
     ///
     /// # Errors
     /// When the design cannot be ([`Design::check`]), or memory runs out.
-    pub fn new(design: &Design) -> Result<Film, FilmError> {
+    pub fn new(design: &Design) -> Result<Film, ShellError> {
         design.check()?;
         let shell = design.shell();
         let solver = Solver::new(shell.pattern())?;
@@ -82,7 +82,7 @@ impl Film {
     ///
     /// # Errors
     /// When the tip would press on a post.
-    pub fn move_tip(&mut self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), FilmError> {
+    pub fn move_tip(&mut self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), ShellError> {
         let design = Design {
             tip_offset_mm: offset_mm,
             tip_radius_mm: radius_mm,
@@ -119,7 +119,7 @@ impl Film {
     ///
     /// # Errors
     /// When the contact's numbers are not finite, its direction is none, or no equilibrium is found.
-    pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, FilmError> {
+    pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, ShellError> {
         let (force, guides) = self.asked(contact)?;
         let guided: Vec<V3> = guides.iter().map(|(direction, _)| *direction).collect();
         let problem = Problem {
@@ -142,7 +142,7 @@ impl Film {
     ///
     /// # Errors
     /// When a touch cannot be, or no equilibrium is found.
-    pub fn press_all(&self, touches: &[Touch]) -> Result<Equilibrium, FilmError> {
+    pub fn press_all(&self, touches: &[Touch]) -> Result<Equilibrium, ShellError> {
         let (mut load, mut sum_n) = (vec![0.0; self.unknowns()], [0.0; 3]);
         for touch in touches {
             let force_n = finite("force", touch.force_n)?;
@@ -186,7 +186,7 @@ impl Film {
     }
 
     /// The force on the tip, and directions in which its travel is given (mm).
-    fn asked(&self, contact: Contact) -> Result<(V3, Vec<(V3, f64)>), FilmError> {
+    fn asked(&self, contact: Contact) -> Result<(V3, Vec<(V3, f64)>), ShellError> {
         match contact {
             Contact::Force(force) => finite("force", force).map(|force| (force, Vec::new())),
             Contact::Travel(travel) => {
@@ -234,10 +234,10 @@ pub struct Response {
 
 impl Film {
     /// The factored stiffness of a state.
-    pub(crate) fn factors_at(&self, state: &Equilibrium) -> Result<Factors, FilmError> {
+    pub(crate) fn factors_at(&self, state: &Equilibrium) -> Result<Factors, ShellError> {
         let at = self.shell.derivatives(&state.unknowns);
         let factors = self.solver.factor(self.shell.pattern(), &at.stiffness);
-        factors.ok_or_else(|| FilmError::Solver("the film is not stable".into()))
+        factors.ok_or_else(|| ShellError::Solver("the film is not stable".into()))
     }
 
     pub(crate) fn shell(&self) -> &Shell {
@@ -277,13 +277,13 @@ impl Film {
     ///
     /// # Errors
     /// When the stiffness is not positive definite: a force would not hold the film there.
-    pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], FilmError> {
+    pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], ShellError> {
         let load: Vec<Change> = Change::all().take(5).collect();
         let beside = Neighbours::of(&self.design);
         let answers = self.answers(&beside, state, &load)?;
         answers
             .try_into()
-            .map_err(|_| FilmError::Solver("five changes have five answers".into()))
+            .map_err(|_| ShellError::Solver("five changes have five answers".into()))
     }
 
     /// The state beside this one that a response foretells, `units` away; only its unknowns are changed.
@@ -375,21 +375,21 @@ fn tip_shares(shell: &Shell, design: &Design) -> Vec<f64> {
     shares
 }
 
-fn finite(what: &str, vector: V3) -> Result<V3, FilmError> {
+fn finite(what: &str, vector: V3) -> Result<V3, ShellError> {
     if vector.iter().all(|part| part.is_finite()) {
         return Ok(vector);
     }
-    Err(FilmError::Contact(format!(
+    Err(ShellError::Contact(format!(
         "{what} is {vector:?}: use finite numbers"
     )))
 }
 
-fn unit(vector: V3) -> Result<V3, FilmError> {
+fn unit(vector: V3) -> Result<V3, ShellError> {
     let length = dot(&vector, &vector).sqrt();
     if length > 0.0 && vector[2] < 0.0 {
         return Ok(vector.map(|part| part / length));
     }
-    Err(FilmError::Contact(format!(
+    Err(ShellError::Contact(format!(
         "direction is {vector:?}: a tip presses towards the camera, which is z < 0"
     )))
 }

@@ -6,7 +6,7 @@ mod symmetry;
 
 use hivtac_scene::film::reduced::{Kind, Tables};
 
-use crate::FilmError;
+use crate::ShellError;
 use crate::sweep::Solved;
 use fit::{nearest, splines};
 use known::Sweeps;
@@ -18,7 +18,7 @@ const SAME_PLACE_MM: f64 = 1e-9;
 ///
 /// # Errors
 /// When a place is missing in a sweep, or too few loads were solved there.
-pub fn tables(nominal: &[Solved], largest: &[Solved]) -> Result<Tables, FilmError> {
+pub fn tables(nominal: &[Solved], largest: &[Solved]) -> Result<Tables, ShellError> {
     let sweeps = Sweeps { nominal, largest };
     let mut coefficients = Vec::new();
     for kind in Kind::ALL {
@@ -28,7 +28,7 @@ pub fn tables(nominal: &[Solved], largest: &[Solved]) -> Result<Tables, FilmErro
 }
 
 /// A table's coefficients by node along y, node along x, output and term.
-fn of_kind(sweeps: &Sweeps, kind: Kind) -> Result<Vec<f64>, FilmError> {
+fn of_kind(sweeps: &Sweeps, kind: Kind) -> Result<Vec<f64>, ShellError> {
     let (axis, terms) = (kind.axis(), kind.terms());
     let mut rows = Vec::new();
     for y in axis.nodes() {

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::{Design, Film, FilmError};
+use crate::{Design, Film, ShellError};
 
 /// Runs `work` on each item, every thread with its own film; the results in the items' order.
 pub fn in_parallel<T: Sync, R: Send>(
@@ -10,10 +10,10 @@ pub fn in_parallel<T: Sync, R: Send>(
     items: &[T],
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
-    work: impl Fn(&mut Film, &T) -> Result<R, FilmError> + Sync,
-) -> Result<Vec<R>, FilmError> {
+    work: impl Fn(&mut Film, &T) -> Result<R, ShellError> + Sync,
+) -> Result<Vec<R>, ShellError> {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let worker = || -> Result<Vec<(usize, R)>, FilmError> {
+    let worker = || -> Result<Vec<(usize, R)>, ShellError> {
         let mut film = Film::new(design)?;
         let mut results = Vec::new();
         loop {
@@ -27,7 +27,7 @@ pub fn in_parallel<T: Sync, R: Send>(
     };
     let shares = std::thread::scope(|scope| {
         let handles: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(worker)).collect();
-        let stopped = || FilmError::Solver("a thread stopped".into());
+        let stopped = || ShellError::Solver("a thread stopped".into());
         let joined = handles
             .into_iter()
             .map(|handle| handle.join().map_err(|_| stopped())?);

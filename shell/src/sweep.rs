@@ -7,7 +7,7 @@ use hivtac_scene::{Camera, MARKERS};
 use crate::film::Response;
 use crate::path::Path;
 use crate::view::seen_motion;
-use crate::{Change, Contact, Equilibrium, Film, FilmError, Neighbours};
+use crate::{Change, Contact, Equilibrium, Film, Neighbours, ShellError};
 
 /// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where nothing moves.
 const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
@@ -45,7 +45,7 @@ pub fn solve_place(
     beside: &Neighbours,
     camera: &Camera,
     place_mm: [f64; 2],
-) -> Result<Vec<Solved>, FilmError> {
+) -> Result<Vec<Solved>, ShellError> {
     let radius_mm = film.design().tip_radius_mm;
     film.move_tip(place_mm, radius_mm)?;
     let at_rest = Pose {
@@ -86,7 +86,7 @@ fn look(
     camera: &Camera,
     pose: Pose,
     state: &Equilibrium,
-) -> Result<Solved, FilmError> {
+) -> Result<Solved, ShellError> {
     let changes: Vec<Change> = Change::all().collect();
     let answers = film.answers(beside, state, &changes)?;
     let half = film.design().material.thickness_mm / 2.0;

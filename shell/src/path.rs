@@ -1,6 +1,6 @@
 //! States found one after the other, and loads spread evenly.
 
-use crate::{Contact, Equilibrium, Film, FilmError};
+use crate::{Contact, Equilibrium, Film, ShellError};
 
 /// Known states that a start is foretold from.
 const FORETOLD_FROM: usize = 4;
@@ -19,7 +19,7 @@ impl Path {
         film: &Film,
         contact: Contact,
         place: f64,
-    ) -> Result<Equilibrium, FilmError> {
+    ) -> Result<Equilibrium, ShellError> {
         let latest = &self.0[self.0.len().saturating_sub(FORETOLD_FROM)..];
         let known: Vec<_> = latest.iter().map(|(at, state)| (*at, state)).collect();
         let last = &self.0[self.0.len() - 1].1;

@@ -8,7 +8,7 @@ use hivtac_scene::{Camera, Disc, Load, Preset, SceneError};
 
 use crate::parallel::in_parallel;
 use crate::path::halton;
-use crate::{Design, Film, FilmError, Loaded, press_load};
+use crate::{Design, Film, Loaded, ShellError, press_load};
 
 /// What is drawn: sizes of forces and radii evenly, tilts and places evenly over their areas.
 const FORCE_N: [f64; 2] = [0.002, 0.25];
@@ -40,8 +40,8 @@ pub fn check(
     loads: usize,
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
-) -> Result<Check, FilmError> {
-    let scene = |error: SceneError| FilmError::Scene(error.to_string());
+) -> Result<Check, ShellError> {
+    let scene = |error: SceneError| ShellError::Scene(error.to_string());
     let reduced = ReducedFilm::of(*unit).map_err(scene)?;
     let cases = (0..loads).map(|index| case(index, reach_mm, radii_mm));
     let cases = cases.collect::<Result<Vec<_>, _>>().map_err(scene)?;
@@ -73,11 +73,11 @@ fn errors(
     reduced: &ReducedFilm,
     load: &Load,
     camera: &Camera,
-) -> Result<(f64, [f64; 4]), FilmError> {
+) -> Result<(f64, [f64; 4]), ShellError> {
     let Loaded { state, .. } = press_load(film, load)?;
     reduced
         .check(load)
-        .map_err(|error| FilmError::Scene(error.to_string()))?;
+        .map_err(|error| ShellError::Scene(error.to_string()))?;
     let pressed = reduced.press(load);
     let distance = |disc: Disc| {
         let full = disc.centroid_px(|rest| film.displacement(&state, rest), camera);

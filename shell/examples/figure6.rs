@@ -1,12 +1,12 @@
 //! The paper's Figure 6 by the full solver: the film driven 10 mm by a normal and by a shear force.
 //!
-//! `cargo run --release -p hivtac-film --example figure6 -- docs/pictures`
+//! `cargo run --release -p hivtac-shell --example figure6 -- docs/pictures`
 
 use std::path::Path;
 use std::process::ExitCode;
 
-use hivtac_film::{Contact, Design, Equilibrium, Film, FilmError, paper_camera};
 use hivtac_scene::{Camera, MARKERS};
+use hivtac_shell::{Contact, Design, Equilibrium, Film, ShellError, paper_camera};
 
 /// How far the tip goes, mm, and in steps of how much.
 const TRAVEL_MM: f64 = 10.0;
@@ -71,7 +71,7 @@ fn driven(
     film: &Film,
     name: &str,
     way: impl Fn(f64) -> [f64; 3],
-) -> Result<Equilibrium, FilmError> {
+) -> Result<Equilibrium, ShellError> {
     let mut state = film.rest();
     let steps = (TRAVEL_MM / STEP_MM) as usize;
     for step in 0..=steps {

@@ -8,7 +8,7 @@ use super::SAME_PLACE_MM;
 use super::fit::Known;
 use super::symmetry::Mirror;
 use crate::sweep::{Moved, Solved};
-use crate::{Change, FilmError};
+use crate::{Change, ShellError};
 
 /// Full solutions with tips of two radii.
 pub struct Sweeps<'a> {
@@ -23,7 +23,7 @@ type Row = Vec<f64>;
 
 impl<'a> Sweeps<'a> {
     /// What is known of a table's outputs with the tip at a place: by every mirror in which a place that was solved lies there.
-    pub fn known(&self, kind: Kind, place_mm: [f64; 2]) -> Result<Vec<Known>, FilmError> {
+    pub fn known(&self, kind: Kind, place_mm: [f64; 2]) -> Result<Vec<Known>, ShellError> {
         let mut all = Vec::new();
         for mirror in Mirror::all() {
             for (k, solved) in self.nominal.iter().enumerate() {
@@ -34,7 +34,7 @@ impl<'a> Sweeps<'a> {
             }
         }
         if all.is_empty() {
-            return Err(FilmError::Solver(format!(
+            return Err(ShellError::Solver(format!(
                 "no solution has its tip at {place_mm:?} mm or a mirrored place: sweep the film anew"
             )));
         }
@@ -47,7 +47,7 @@ impl<'a> Sweeps<'a> {
         mirror: &Mirror,
         index: usize,
         all: &mut Vec<Known>,
-    ) -> Result<(), FilmError> {
+    ) -> Result<(), ShellError> {
         let solved = &self.nominal[index];
         let pose = mirror.pose(&solved.pose);
         match kind {

@@ -3,7 +3,7 @@
 use hivtac_scene::film::MAX_RATIO;
 use hivtac_scene::{Contact as Reading, Load};
 
-use crate::{Contact, Equilibrium, Film, FilmError};
+use crate::{Contact, Equilibrium, Film, ShellError};
 
 /// A sliding tip is found when friction ratio and direction are met to this, N.
 const TOLERANCE_N: f64 = 1e-6;
@@ -31,7 +31,7 @@ struct Slide<'a> {
 ///
 /// # Errors
 /// When the load cannot be, or no equilibrium is found.
-pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, FilmError> {
+pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, ShellError> {
     film.move_tip(load.offset_mm(), load.tip_radius_mm())?;
     if load.magnitude_n() == 0.0 {
         let state = film.rest();
@@ -77,7 +77,7 @@ fn stage(load: &Load, slid_mm: [f64; 2]) -> Contact {
 
 impl Slide<'_> {
     /// Broyden's method for how far the tip has slid.
-    fn find(mut self) -> Result<Loaded, FilmError> {
+    fn find(mut self) -> Result<Loaded, ShellError> {
         let [x, y, z] = self.state.force_n;
         let share = 1.0 - self.mu * -z / x.hypot(y);
         let mut slid = [0, 1].map(|c| share * self.state.tip_mm[c]);
@@ -105,14 +105,14 @@ impl Slide<'_> {
                 *row = [0, 1].map(|k| row[k] + left * step[k] / square);
             }
         }
-        Err(FilmError::NoEquilibrium {
+        Err(ShellError::NoEquilibrium {
             steps: MAX_STEPS,
             left_over_n: gap[0].abs().max(gap[1].abs()),
         })
     }
 
     /// What is missing of the friction ratio and of a slide along the sideways force, N.
-    fn gap(&mut self, slid: [f64; 2]) -> Result<[f64; 2], FilmError> {
+    fn gap(&mut self, slid: [f64; 2]) -> Result<[f64; 2], ShellError> {
         let [x, y] = self.load.offset_mm();
         let radius_mm = self.load.tip_radius_mm();
         self.film.move_tip([x + slid[0], y + slid[1]], radius_mm)?;
@@ -122,7 +122,7 @@ impl Slide<'_> {
         Ok([x.hypot(y) + self.mu * z, across])
     }
 
-    fn slopes(&mut self, slid: [f64; 2], gap: [f64; 2]) -> Result<[[f64; 2]; 2], FilmError> {
+    fn slopes(&mut self, slid: [f64; 2], gap: [f64; 2]) -> Result<[[f64; 2]; 2], ShellError> {
         let [x, y] = slid;
         let by_x = self.gap([x + SLOPE_STEP_MM, y])?;
         let by_y = self.gap([x, y + SLOPE_STEP_MM])?;

@@ -2,7 +2,7 @@
 
 use crate::film::Response;
 use crate::shell::Shell;
-use crate::{Design, Equilibrium, Film, FilmError};
+use crate::{Design, Equilibrium, Film, ShellError};
 
 /// Steps by which forces are differentiated: tip's place and radius, mm; thickness and posts' places, mm.
 const TIP_STEP_MM: f64 = 1e-3;
@@ -71,7 +71,7 @@ impl Film {
         beside: &Neighbours,
         state: &Equilibrium,
         changes: &[Change],
-    ) -> Result<Vec<Response>, FilmError> {
+    ) -> Result<Vec<Response>, ShellError> {
         let factors = self.factors_at(state)?;
         let mut sides = Vec::new();
         for &change in changes {

@@ -6,7 +6,7 @@
 //! one full step: they are linear), a step is shortened until the energy falls. Near the equilibrium the last factors serve
 //! again, which costs a fifth of a step, as long as each use brings the film ten times nearer.
 
-use crate::FilmError;
+use crate::ShellError;
 use crate::shell::{Derivatives, Shell};
 use crate::sparse::{Factors, Solver};
 
@@ -61,7 +61,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// When there is none within reach.
-    pub fn solve(&self, solver: &Solver, start: &[f64]) -> Result<Solution, FilmError> {
+    pub fn solve(&self, solver: &Solver, start: &[f64]) -> Result<Solution, ShellError> {
         let mut u = start.to_vec();
         let mut guide_n = vec![0.0; self.guides.len()];
         let mut left_over_n = f64::INFINITY;
@@ -102,7 +102,7 @@ impl Problem<'_> {
             advance(&mut u, &step.step, 1.0);
             guide_n = step.guide_n;
         }
-        Err(FilmError::NoEquilibrium {
+        Err(ShellError::NoEquilibrium {
             steps: MAX_STEPS,
             left_over_n,
         })
@@ -128,7 +128,7 @@ impl Problem<'_> {
         factors: &Factors,
         gradient: &[f64],
         missing: &[f64],
-    ) -> Result<Step, FilmError> {
+    ) -> Result<Step, ShellError> {
         let count = self.guides.len();
         let unknowns = self.load.len();
         let mut sides = self.left_over(gradient, &vec![0.0; count]);
@@ -152,7 +152,7 @@ impl Problem<'_> {
         step: &[f64],
         answers: &[&[f64]],
         missing: &[f64],
-    ) -> Result<Vec<f64>, FilmError> {
+    ) -> Result<Vec<f64>, ShellError> {
         let row = |guide: &Guide| -> Vec<f64> {
             let parts = answers.iter().map(|answer| inner(&guide.weights, answer));
             parts.collect()
@@ -161,11 +161,11 @@ impl Problem<'_> {
         let gaps = self.guides.iter().zip(missing);
         let side = gaps.map(|(guide, gap)| gap - inner(&guide.weights, step));
         solve_small(matrix, side.collect())
-            .ok_or_else(|| FilmError::Solver("the guides depend on each other".into()))
+            .ok_or_else(|| ShellError::Solver("the guides depend on each other".into()))
     }
 
     /// Factors of the stiffness, shifted if need be.
-    fn factors(&self, solver: &Solver, at: &Derivatives) -> Result<Factors, FilmError> {
+    fn factors(&self, solver: &Solver, at: &Derivatives) -> Result<Factors, ShellError> {
         let pattern = self.shell.pattern();
         if let Some(factors) = solver.factor(pattern, &at.stiffness) {
             return Ok(factors);
@@ -183,7 +183,7 @@ impl Problem<'_> {
             }
             shift *= 8.0;
         }
-        Err(FilmError::Solver("the stiffness has no factors".into()))
+        Err(ShellError::Solver("the stiffness has no factors".into()))
     }
 
     /// How much of the step to take: all of it, or the half, quarter … at which the energy falls most.

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use hivtac_scene::film::reduced::Unit;
 
-use crate::FilmError;
+use crate::ShellError;
 use crate::grid::Grid;
 use crate::point::Material;
 use crate::shell::{Shell, Spring};
@@ -100,7 +100,7 @@ impl Design {
     ///
     /// # Errors
     /// When a number is out of its range, or the tip would press on a post.
-    pub fn check(&self) -> Result<(), FilmError> {
+    pub fn check(&self) -> Result<(), ShellError> {
         let Design { material, .. } = self;
         positive("span", self.span_mm)?;
         positive("post radius", self.post_radius_mm)?;
@@ -127,7 +127,7 @@ impl Design {
         self.check_tip()
     }
 
-    fn check_tip(&self) -> Result<(), FilmError> {
+    fn check_tip(&self) -> Result<(), ShellError> {
         let free = self.span_mm / 2.0 - self.post_radius_mm - self.tip_radius_mm;
         for offset in self.tip_offset_mm {
             if !(-free..=free).contains(&offset) {
@@ -274,15 +274,15 @@ fn disc(
     (0..rings).flat_map(ring)
 }
 
-fn positive(what: &str, value: f64) -> Result<(), FilmError> {
+fn positive(what: &str, value: f64) -> Result<(), ShellError> {
     if value.is_finite() && value > 0.0 {
         return Ok(());
     }
     Err(refused(what, value, "more than 0"))
 }
 
-fn refused(what: &str, value: f64, bound: &str) -> FilmError {
-    FilmError::Design(format!("{what} is {value}: use a number {bound}"))
+fn refused(what: &str, value: f64, bound: &str) -> ShellError {
+    ShellError::Design(format!("{what} is {value}: use a number {bound}"))
 }
 
 #[cfg(test)]

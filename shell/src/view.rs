@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use hivtac_scene::film::DiscMotion;
 use hivtac_scene::{Camera, Disc, MARKERS, Preset};
 
-use crate::{Equilibrium, Film, FilmError};
+use crate::{Equilibrium, Film, ShellError};
 
 /// Rays of the points that a disc's motion is taken from.
 const RAYS: usize = 8;
@@ -28,8 +28,8 @@ pub struct Marker {
 ///
 /// # Errors
 /// Never, while that preset exists.
-pub fn paper_camera() -> Result<Camera, FilmError> {
-    Camera::new(Preset::Paper, 800, 600).map_err(|error| FilmError::Scene(error.to_string()))
+pub fn paper_camera() -> Result<Camera, ShellError> {
+    Camera::new(Preset::Paper, 800, 600).map_err(|error| ShellError::Scene(error.to_string()))
 }
 
 /// The four markers of a film in a state.

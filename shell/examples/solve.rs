@@ -1,12 +1,12 @@
 //! Presses the film once and prints what the tip, the markers and the camera make of it.
 //!
-//! `cargo run --release -p hivtac-film --example solve -- --force-n 0.1 --alpha-deg 5`
+//! `cargo run --release -p hivtac-shell --example solve -- --force-n 0.1 --alpha-deg 5`
 
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_film::{Design, Film, markers, paper_camera, press_load};
 use hivtac_scene::{Contact, Load, SceneError};
+use hivtac_shell::{Design, Film, markers, paper_camera, press_load};
 
 const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact force|stick|slip:0.6] [--offset-x-mm 0] \
 [--offset-y-mm 0] [--overhang-mm 0] [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1]";

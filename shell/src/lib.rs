@@ -31,7 +31,7 @@ mod view;
 pub use answers::{Change, Neighbours};
 pub use check::{Check, check};
 pub use design::Design;
-pub use error::FilmError;
+pub use error::ShellError;
 pub use film::{Contact, Equilibrium, Film, Touch};
 pub use load::{Loaded, press_load};
 pub use path::halton;

@@ -2,7 +2,7 @@ use std::fmt;
 
 /// Why a film cannot be made or pressed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum FilmError {
+pub enum ShellError {
     /// A dimension, a material or a mesh that cannot be.
     Design(String),
     /// A contact that cannot be.
@@ -20,20 +20,20 @@ pub enum FilmError {
     Scene(String),
 }
 
-impl fmt::Display for FilmError {
+impl fmt::Display for ShellError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            FilmError::Design(why) => write!(f, "film: {why}"),
-            FilmError::Contact(why) => write!(f, "contact: {why}"),
-            FilmError::NoEquilibrium { steps, left_over_n } => write!(
+            ShellError::Design(why) => write!(f, "film: {why}"),
+            ShellError::Contact(why) => write!(f, "contact: {why}"),
+            ShellError::NoEquilibrium { steps, left_over_n } => write!(
                 f,
                 "no equilibrium after {steps} steps ({left_over_n:.1e} N left over): press less, or start from a \
                  state nearby"
             ),
-            FilmError::Solver(why) => write!(f, "sparse solver: {why}"),
-            FilmError::Scene(why) => f.write_str(why),
+            ShellError::Solver(why) => write!(f, "sparse solver: {why}"),
+            ShellError::Scene(why) => f.write_str(why),
         }
     }
 }
 
-impl std::error::Error for FilmError {}
+impl std::error::Error for ShellError {}

@@ -1,6 +1,6 @@
 //! Makes the reduced film's tables and checks them against the full solution.
 //!
-//! `cargo run --release -p hivtac-film --example reduce -- scene/data`
+//! `cargo run --release -p hivtac-shell --example reduce -- scene/data`
 
 use std::error::Error;
 use std::fs::{File, OpenOptions};
@@ -10,12 +10,12 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use hivtac_film::parallel::in_parallel;
-use hivtac_film::sweep::{Solved, octant, solve_place};
-use hivtac_film::{Check, Design, FilmError, Neighbours, check, paper_camera, record, tables};
 use hivtac_scene::film::reduced::{
     Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit,
 };
+use hivtac_shell::parallel::in_parallel;
+use hivtac_shell::sweep::{Solved, octant, solve_place};
+use hivtac_shell::{Check, Design, Neighbours, ShellError, check, paper_camera, record, tables};
 
 const USAGE: &str = "reduce FOLDER [--check]
 Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are incomplete.
@@ -93,7 +93,7 @@ fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
             let written = file.lock().map(|mut file| file.write_all(&bytes));
             match written {
                 Ok(Ok(())) => Ok(()),
-                _ => Err(FilmError::Solver(format!(
+                _ => Err(ShellError::Solver(format!(
                     "{}: cannot be written",
                     path.display()
                 ))),

@@ -5,7 +5,7 @@ use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{MatMut, Side};
 
-use crate::FilmError;
+use crate::ShellError;
 use crate::spline::SUPPORT;
 
 /// Components of a displacement, and so unknowns of a coefficient.
@@ -140,9 +140,9 @@ impl Solver {
     ///
     /// # Errors
     /// When memory runs out.
-    pub fn new(pattern: &Pattern) -> Result<Solver, FilmError> {
+    pub fn new(pattern: &Pattern) -> Result<Solver, ShellError> {
         let order = SymbolicLlt::try_new(pattern.symbolic(), Side::Lower)
-            .map_err(|error| FilmError::Solver(error.to_string()))?;
+            .map_err(|error| ShellError::Solver(error.to_string()))?;
         Ok(Solver { order })
     }
 
