@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use hivtac_scene::film::Film;
+use hivtac_film::Film;
 use hivtac_scene::{Contact, Load, Preset, Scene, SceneError};
 
 /// Frames per measurement; the fastest of a few is printed, as others may use the machine.

@@ -3,7 +3,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::load::radians;
 use crate::{Lens, Mounting, Projection, SceneError};
 
 /// Focal length of the lens, mm.
@@ -161,6 +160,11 @@ impl Camera {
             Projection::Pinhole => libm::atan(part),
         }
     }
+}
+
+/// Degrees to radians.
+pub(crate) fn radians(degrees: f64) -> f64 {
+    degrees * (std::f64::consts::PI / 180.0)
 }
 
 /// The middle of `count` pixels whose first has its centre at 0.

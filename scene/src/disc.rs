@@ -2,18 +2,16 @@
 
 use std::f64::consts::PI;
 
+use hivtac_film::{MARKER_CENTRES_MM, MARKER_RADIUS_MM};
+
 use crate::Camera;
 
-/// Distance of the markers' centres from the film's middle along x and along y, mm.
-pub const MARKER_REST_MM: f64 = 3.717;
-/// Radius of a marker, mm (the paper punches 1 mm discs out of red tape).
-pub const MARKER_RADIUS_MM: f64 = 0.5;
 /// The markers by identity: 0 upper left, 1 upper right, 2 lower right, 3 lower left in the image.
 pub const MARKERS: [Disc; 4] = [
-    Disc::marker(-1.0, -1.0),
-    Disc::marker(1.0, -1.0),
-    Disc::marker(1.0, 1.0),
-    Disc::marker(-1.0, 1.0),
+    Disc::marker(MARKER_CENTRES_MM[0]),
+    Disc::marker(MARKER_CENTRES_MM[1]),
+    Disc::marker(MARKER_CENTRES_MM[2]),
+    Disc::marker(MARKER_CENTRES_MM[3]),
 ];
 
 /// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than 1e-4 px.
@@ -32,9 +30,10 @@ pub struct Disc {
 }
 
 impl Disc {
-    const fn marker(x: f64, y: f64) -> Disc {
+    /// A marker with its centre there, mm.
+    pub const fn marker(centre_mm: [f64; 2]) -> Disc {
         Disc {
-            centre_mm: [x * MARKER_REST_MM, y * MARKER_REST_MM],
+            centre_mm,
             radius_mm: MARKER_RADIUS_MM,
         }
     }
@@ -177,6 +176,7 @@ impl Outline {
 mod tests {
     use super::*;
     use crate::Preset;
+    use hivtac_film::MARKER_REST_MM;
 
     fn circle(centre: [f64; 2], radius: f64) -> Outline {
         Outline {

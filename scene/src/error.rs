@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use hivtac_film::FilmError;
+
 use crate::Motion;
 
 /// A scene, size, load or option that cannot be simulated. The message says what, where and what is possible.
@@ -20,10 +22,8 @@ pub enum SceneError {
         /// Rows asked for.
         height: u32,
     },
-    /// A load that is no number, pulls, or presses the film further than it can go.
-    Load(String),
-    /// Bytes do not hold a reduced film's tables.
-    Tables(String),
+    /// A load or a film that cannot be.
+    Film(FilmError),
     /// A scene file that is not one: the line, the key and what is possible.
     #[cfg(feature = "file")]
     File(String),
@@ -68,8 +68,7 @@ impl fmt::Display for SceneError {
                 f,
                 "frame size {width}×{height}: use a 4:3 size from 160×120 to 800×600, such as 320×240"
             ),
-            SceneError::Load(why) => write!(f, "load: {why}"),
-            SceneError::Tables(why) => write!(f, "film's tables: {why}"),
+            SceneError::Film(error) => error.fmt(f),
             #[cfg(feature = "file")]
             SceneError::File(why) => write!(f, "scene file: {why}"),
             #[cfg(feature = "file")]
@@ -83,3 +82,9 @@ impl fmt::Display for SceneError {
 }
 
 impl std::error::Error for SceneError {}
+
+impl From<FilmError> for SceneError {
+    fn from(error: FilmError) -> SceneError {
+        SceneError::Film(error)
+    }
+}

@@ -1,7 +1,7 @@
 //! The simulated HiVTac sensor: what presses the film, how the film gives, what the camera sees of it.
 //!
 //! ```text
-//! load → film → marker discs in space → fisheye → coverage of pixels → light → noise → pixels
+//! load → film (hivtac-film) → marker discs in space → fisheye → coverage of pixels → light → noise → pixels
 //! ```
 //!
 //! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure functions of scene, seed,
@@ -20,8 +20,6 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `load` | the force on the film and its convention |
-//! | [`film`] | where a point of the film goes under a load: tables made from finite elements |
 //! | `camera` | presets, equidistant fisheye |
 //! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |
 //! | `options` | what makes a frame hard, and its ranges |
@@ -40,14 +38,12 @@ mod error;
 mod exposure;
 #[cfg(feature = "file")]
 mod file;
-pub mod film;
 mod format;
 mod frame;
 #[cfg(feature = "jpeg")]
 mod jpeg;
 mod lens;
 mod light;
-mod load;
 mod mechanics;
 mod motion;
 mod noise;
@@ -57,15 +53,14 @@ mod scene;
 mod surface;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Preset};
-pub use disc::{Disc, MARKER_RADIUS_MM, MARKER_REST_MM, MARKERS};
+pub use disc::{Disc, MARKERS};
 pub use error::SceneError;
-pub use film::HALF_SIDE_MM;
 pub use format::Format;
 #[cfg(feature = "jpeg")]
 pub use format::JPEG_QUALITY;
 pub use frame::{Frame, MarkerTruth, Truth};
+pub use hivtac_film::{Contact, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM};
 pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
-pub use load::{Contact, Load};
 pub use mechanics::{Mechanics, Stiffness};
 pub use motion::{Catch, Drag, Grasp, Motion, Press, Vibration};
 pub use options::{Options, Salt};

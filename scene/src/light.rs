@@ -4,7 +4,7 @@
 //! The film is taken to fill the picture.
 
 use crate::camera::centre;
-use crate::load::radians;
+use crate::camera::radians;
 use crate::{Camera, Options, Paint, noise};
 
 /// Steps of one 8-bit level: channels are whole numbers of 1/64 level until they become pixels.

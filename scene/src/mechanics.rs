@@ -1,9 +1,9 @@
 //! The film as it is, or simplified: to see what each part of its answer is worth.
 
-use crate::film::DiscMotion;
-use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
-use crate::film::{Film, Pressed};
 use crate::{Contact, Load, SceneError};
+use hivtac_film::DiscMotion;
+use hivtac_film::reduced::{NOMINAL_RADIUS_MM, Unit};
+use hivtac_film::{Film, Pressed};
 
 /// What the scene takes of the film's answer to a load.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +76,7 @@ impl Mechanics {
     /// # Errors
     /// When the load is outside what the film's tables hold for.
     pub(crate) fn check(&self, film: &Film, load: &Load) -> Result<(), SceneError> {
-        film.check(&self.completed(load))
+        Ok(film.check(&self.completed(load))?)
     }
 
     /// A load with what it leaves open.

@@ -2,7 +2,6 @@
 
 use crate::coverage::Coverage;
 use crate::exposure::{Exposure, Image};
-use crate::film::Film;
 use crate::frame::Raster;
 use crate::light::{Light, STEPS};
 use crate::motion::Motion;
@@ -10,6 +9,7 @@ use crate::noise::{LOTS, Noise};
 use crate::{
     Camera, Disc, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Shutter, Truth,
 };
+use hivtac_film::Film;
 
 /// A simulated sensor and what presses it. Frames depend on nothing but the scene and the arguments.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Which surface of the film carries the markers.
 
-use crate::film::DiscMotion;
-use crate::film::Pressed;
+use hivtac_film::DiscMotion;
+use hivtac_film::Pressed;
 
 /// A surface of the film. Where the film tilts, one is aside of the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -46,7 +46,7 @@ fn middle(disc: DiscMotion) -> DiscMotion {
 mod tests {
     use super::*;
     use crate::Load;
-    use crate::film::Film;
+    use hivtac_film::Film;
 
     #[test]
     fn the_middle_surface_is_half_the_thickness_away() {

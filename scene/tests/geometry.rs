@@ -212,11 +212,11 @@ fn what_the_film_cannot_take_is_refused() {
     let too_much = press(1.0, 0.0, 0.0);
     assert!(matches!(
         scene.render_load(&too_much, 0),
-        Err(SceneError::Load(_))
+        Err(SceneError::Film(_))
     ));
     assert!(matches!(
         scene.with_load(too_much),
-        Err(SceneError::Load(_))
+        Err(SceneError::Film(_))
     ));
 }
 

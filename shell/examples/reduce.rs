@@ -1,6 +1,6 @@
 //! Makes the reduced film's tables and checks them against the full solution.
 //!
-//! `cargo run --release -p hivtac-shell --example reduce -- scene/data`
+//! `cargo run --release -p hivtac-shell --example reduce -- film/data`
 
 use std::error::Error;
 use std::fs::{File, OpenOptions};
@@ -10,9 +10,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use hivtac_scene::film::reduced::{
-    Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit,
-};
+use hivtac_film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::{Solved, octant, solve_place};
 use hivtac_shell::{Check, Design, Neighbours, ShellError, check, paper_camera, record, tables};

@@ -5,7 +5,7 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_scene::{Contact, Load, SceneError};
+use hivtac_film::{Contact, FilmError, Load};
 use hivtac_shell::{Design, Film, markers, paper_camera, press_load};
 
 const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact force|stick|slip:0.6] [--offset-x-mm 0] \
@@ -54,7 +54,7 @@ impl Request {
 
     fn set(&mut self, name: &str, value: &str) -> Result<(), String> {
         if name == "--contact" {
-            self.contact = value.parse().map_err(|why: SceneError| why.to_string())?;
+            self.contact = value.parse().map_err(|why: FilmError| why.to_string())?;
             return Ok(());
         }
         let slot = match name {
@@ -76,7 +76,7 @@ impl Request {
         Ok(())
     }
 
-    fn load(&self) -> Result<Load, SceneError> {
+    fn load(&self) -> Result<Load, FilmError> {
         Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg)?
             .with_contact(self.contact)?
             .with_offset_mm(self.offset_mm)?

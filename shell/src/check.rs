@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::film::reduced::Unit;
-use hivtac_scene::film::{Film as ReducedFilm, MAX_RATIO};
-use hivtac_scene::{Camera, Disc, Load, Preset, SceneError};
+use hivtac_film::reduced::Unit;
+use hivtac_film::{Film as ReducedFilm, FilmError, Load, MAX_RATIO};
+use hivtac_scene::{Camera, Disc, Preset};
 
 use crate::parallel::in_parallel;
 use crate::path::halton;
@@ -41,11 +41,10 @@ pub fn check(
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Check, ShellError> {
-    let scene = |error: SceneError| ShellError::Scene(error.to_string());
-    let reduced = ReducedFilm::of(*unit).map_err(scene)?;
+    let reduced = ReducedFilm::of(*unit)?;
     let cases = (0..loads).map(|index| case(index, reach_mm, radii_mm));
-    let cases = cases.collect::<Result<Vec<_>, _>>().map_err(scene)?;
-    let camera = Camera::new(Preset::Ov7725, 320, 240).map_err(scene)?;
+    let cases = cases.collect::<Result<Vec<_>, _>>()?;
+    let camera = Camera::new(Preset::Ov7725, 320, 240)?;
     let design = Design::of(unit);
     let errors = in_parallel(&design, &cases, threads, progress, |film, load| {
         errors(film, &reduced, load, &camera)
@@ -75,21 +74,20 @@ fn errors(
     camera: &Camera,
 ) -> Result<(f64, [f64; 4]), ShellError> {
     let Loaded { state, .. } = press_load(film, load)?;
-    reduced
-        .check(load)
-        .map_err(|error| ShellError::Scene(error.to_string()))?;
+    reduced.check(load)?;
     let pressed = reduced.press(load);
     let distance = |disc: Disc| {
         let full = disc.centroid_px(|rest| film.displacement(&state, rest), camera);
         let ours = disc.centroid_px(|rest| pressed.displacement(rest), camera);
         (full[0] - ours[0]).hypot(full[1] - ours[1])
     };
+    let discs = reduced.markers_mm().map(Disc::marker);
     let tip_mm = (0..3).map(|c| (pressed.tip_mm[c] - state.tip_mm[c]).powi(2));
-    Ok((tip_mm.sum::<f64>().sqrt(), reduced.markers().map(distance)))
+    Ok((tip_mm.sum::<f64>().sqrt(), discs.map(distance)))
 }
 
 /// A load of the stated domain, from a sequence that fills it evenly.
-fn case(index: usize, reach_mm: f64, radii_mm: [f64; 2]) -> Result<Load, SceneError> {
+fn case(index: usize, reach_mm: f64, radii_mm: [f64; 2]) -> Result<Load, FilmError> {
     let part = |base| halton(index + 1000, base);
     let between = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
     let size_n = between(FORCE_N, part(2));

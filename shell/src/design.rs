@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use hivtac_scene::film::reduced::Unit;
+use hivtac_film::reduced::Unit;
 
 use crate::ShellError;
 use crate::grid::Grid;

@@ -1,5 +1,8 @@
 use std::fmt;
 
+use hivtac_film::FilmError;
+use hivtac_scene::SceneError;
+
 /// Why a film cannot be made or pressed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShellError {
@@ -37,3 +40,15 @@ impl fmt::Display for ShellError {
 }
 
 impl std::error::Error for ShellError {}
+
+impl From<FilmError> for ShellError {
+    fn from(error: FilmError) -> ShellError {
+        ShellError::Scene(error.to_string())
+    }
+}
+
+impl From<SceneError> for ShellError {
+    fn from(error: SceneError) -> ShellError {
+        ShellError::Scene(error.to_string())
+    }
+}

@@ -1,7 +1,6 @@
 //! The film under the loads of a scene.
 
-use hivtac_scene::film::MAX_RATIO;
-use hivtac_scene::{Contact as Reading, Load};
+use hivtac_film::{Contact as Reading, Load, MAX_RATIO};
 
 use crate::{Contact, Equilibrium, Film, ShellError};
 

@@ -1,7 +1,7 @@
 //! Full solutions as a file keeps them: rows of numbers, so that a sweep of an hour can be broken off and gone on with.
 
-use hivtac_scene::film::DiscMotion;
-use hivtac_scene::film::reduced::Pose;
+use hivtac_film::DiscMotion;
+use hivtac_film::reduced::Pose;
 
 use crate::Change;
 use crate::sweep::{Moved, Solved};

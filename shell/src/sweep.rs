@@ -1,7 +1,7 @@
 //! What the reduced film is made from: full solutions for loads of many sizes, tilts and places, with their derivatives.
 
-use hivtac_scene::film::DiscMotion;
-use hivtac_scene::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
+use hivtac_film::DiscMotion;
+use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
 use hivtac_scene::{Camera, MARKERS};
 
 use crate::film::Response;

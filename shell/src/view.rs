@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::film::DiscMotion;
+use hivtac_film::DiscMotion;
 use hivtac_scene::{Camera, Disc, MARKERS, Preset};
 
 use crate::{Equilibrium, Film, ShellError};
@@ -29,7 +29,7 @@ pub struct Marker {
 /// # Errors
 /// Never, while that preset exists.
 pub fn paper_camera() -> Result<Camera, ShellError> {
-    Camera::new(Preset::Paper, 800, 600).map_err(|error| ShellError::Scene(error.to_string()))
+    Ok(Camera::new(Preset::Paper, 800, 600)?)
 }
 
 /// The four markers of a film in a state.
@@ -100,7 +100,7 @@ pub(crate) fn seen_motion(
 mod tests {
     use super::*;
     use crate::{Contact, Design};
-    use hivtac_scene::MARKER_REST_MM;
+    use hivtac_film::MARKER_REST_MM;
 
     fn film() -> Film {
         let design = Design {

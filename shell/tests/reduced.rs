@@ -2,9 +2,9 @@
 
 use std::sync::LazyLock;
 
-use hivtac_scene::film::Film as ReducedFilm;
-use hivtac_scene::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
-use hivtac_scene::{Camera, Contact, Load, Preset};
+use hivtac_film::Film as ReducedFilm;
+use hivtac_film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
+use hivtac_scene::{Camera, Contact, Disc, Load, Preset};
 use hivtac_shell::{Design, Film, check, press_load};
 
 /// How far the reduced film's markers may be off, px at 320×240 `ov7725`.
@@ -34,7 +34,12 @@ fn agree(unit: &Unit, loads: &[Load], most_px: f64) {
         for (a, b) in full.state.force_n.iter().zip(pressed.force_n) {
             assert!((a - b).abs() < 2e-3, "{load:?}: force {a} {b} N");
         }
-        for (id, disc) in reduced.markers().into_iter().enumerate() {
+        for (id, disc) in reduced
+            .markers_mm()
+            .map(Disc::marker)
+            .into_iter()
+            .enumerate()
+        {
             let [[x, y], [a, b]] = [
                 disc.centroid_px(|rest| film.displacement(&full.state, rest), &CAMERA),
                 disc.centroid_px(|rest| pressed.displacement(rest), &CAMERA),
@@ -93,7 +98,7 @@ fn labels_of_a_stage_are_the_full_solution() {
     agree(&Unit::default(), &loads, MOST_PX);
 }
 
-/// Independent loads of the whole domain: those of `reduce -- scene/data --check`.
+/// Independent loads of the whole domain: those of `reduce -- film/data --check`.
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn tables_are_the_full_solution_everywhere() {

@@ -46,7 +46,7 @@ impl Contacts {
         let normal = size / ratio.hypot(1.0);
         let vector = [normal * ratio * cos, normal * ratio * sin, -normal];
         let place = [0; 2].map(|_: u8| within(-self.place_mm, self.place_mm));
-        Load::from_vector(vector)?.with_offset_mm(place)
+        Ok(Load::from_vector(vector)?.with_offset_mm(place)?)
     }
 }
 

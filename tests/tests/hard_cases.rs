@@ -1,6 +1,6 @@
 //! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused for it.
 
-use hivtac_scene::film::{MAX_FORCE_N, MAX_LABEL_N};
+use hivtac_film::{MAX_FORCE_N, MAX_LABEL_N};
 use hivtac_scene::{Contact, Load};
 use hivtac_tests::hard::detect_in_all;
 use hivtac_tests::tared::{Detection, View, views};

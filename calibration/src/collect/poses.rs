@@ -13,7 +13,7 @@ use hivtac_host::stop;
 const LARGEST_DEG: f64 = 60.0;
 
 /// The farthest that a stage puts the tip from the film's middle along x and y, mm.
-const LARGEST_MM: f64 = hivtac_scene::film::MAX_PLACE_MM;
+const LARGEST_MM: f64 = hivtac_film::MAX_PLACE_MM;
 
 /// How the tip is set against the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,7 +1,7 @@
 //! Uncertainties that hold: widened until the errors on a data set lie within what they say.
 
 use anyhow::{Result, anyhow, ensure};
-use hivtac_scene::film::reduced::NOMINAL_RADIUS_MM;
+use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_sensing::model::Model;
 
 use super::{FilmModel, Noise};

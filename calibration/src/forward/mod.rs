@@ -11,7 +11,7 @@ mod unit;
 use std::sync::Mutex;
 
 use anyhow::{Result, anyhow, ensure};
-use hivtac_scene::film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
+use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_scene::{Camera, FILM_DISTANCE_MM, MARKER_REST_MM, MARKERS, Preset};
 use hivtac_sensing::forward::{self, Limits, Mounting, RestImage, Stiffness, Tolerance};
 use hivtac_sensing::model::{ForwardSpec, TableSpec};
@@ -278,7 +278,7 @@ fn rest_image(camera: &Camera) -> RestImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_scene::film::Film;
+    use hivtac_film::Film;
 
     fn film_model(unit: Option<OwnUnit>) -> FilmModel {
         FilmModel {

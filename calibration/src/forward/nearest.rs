@@ -1,7 +1,7 @@
 //! Sums of terms that are nearest to samples, and splines through nodes: plain loops, the same numbers on every machine.
 
 use anyhow::{Result, ensure};
-use hivtac_scene::film::reduced::Axis;
+use hivtac_film::reduced::Axis;
 
 /// What is told least of the terms is at least this part of what is told most.
 const LEAST_TOLD: f64 = 1e-9;

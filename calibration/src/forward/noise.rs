@@ -1,9 +1,9 @@
 //! How well markers are seen, from frames of presses whose force and place are known.
 
 use anyhow::{Context, Result, ensure};
+use hivtac_film::Film;
+use hivtac_film::reduced::{Pose, Unit};
 use hivtac_scene::MARKERS;
-use hivtac_scene::film::Film;
-use hivtac_scene::film::reduced::{Pose, Unit};
 
 use super::UnitSetup;
 use crate::dataset::{Dataset, Sample};

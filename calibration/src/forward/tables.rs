@@ -1,9 +1,9 @@
 //! The tables of a film run forwards, from the simulated sensor.
 
 use anyhow::Result;
-use hivtac_scene::film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
-use hivtac_scene::film::{Film, MAX_PLACE_MM};
-use hivtac_scene::{Camera, Load};
+use hivtac_film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
+use hivtac_film::{Film, MAX_PLACE_MM};
+use hivtac_scene::{Camera, Disc, Load};
 use hivtac_sensing::forward::MOST_TILTS;
 use hivtac_sensing::model::TableSpec;
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ impl UnitSetup<'_> {
 
     /// The same under a load that says its force.
     pub fn moved_by(&self, film: &Film, load: &Load, marker: usize) -> Result<[f64; 2]> {
-        let disc = film.markers()[marker];
+        let disc = Disc::marker(film.markers_mm()[marker]);
         let pressed = film.press(load);
         let there = disc.centroid_px(|rest| pressed.displacement(rest), self.camera);
         let here = disc.centroid_px(|_| [0.0; 3], self.camera);

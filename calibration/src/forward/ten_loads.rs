@@ -4,9 +4,9 @@
 use std::fmt;
 
 use anyhow::{Result, ensure};
-use hivtac_scene::film::Film;
-use hivtac_scene::film::reduced::{NOMINAL_RADIUS_MM, Pose};
-use hivtac_scene::{Camera, Load, Preset};
+use hivtac_film::Film;
+use hivtac_film::reduced::{NOMINAL_RADIUS_MM, Pose};
+use hivtac_scene::{Camera, Disc, Load, Preset};
 use hivtac_sensing::forward::{Column, Stiffness, solve};
 
 use super::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
@@ -267,7 +267,8 @@ impl Problem<'_> {
 
     /// Where a marker is seen at rest, focal lengths from the axis.
     fn at_rest(&self, film: &Film, marker: usize) -> [f64; 2] {
-        let [x, y] = film.markers()[marker].centroid_px(|_| [0.0; 3], &self.camera);
+        let disc = Disc::marker(film.markers_mm()[marker]);
+        let [x, y] = disc.centroid_px(|_| [0.0; 3], &self.camera);
         let middle =
             [self.camera.width(), self.camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
         [x - middle[0], y - middle[1]].map(|part| part / self.camera.focal_px())

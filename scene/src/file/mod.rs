@@ -27,7 +27,7 @@ fn located(text: &str, error: &SceneError) -> String {
         SceneError::Option { name, value, .. } => find(text, name, Some(*value)),
         SceneError::Size { .. } => find(text, "width", None).or(find(text, "height", None)),
         SceneError::Key { key, .. } => find(text, key, None),
-        SceneError::Load(_) => find(text, "load", None).or(find(text, "film", None)),
+        SceneError::Film(_) => find(text, "load", None).or(find(text, "film", None)),
         _ => None,
     };
     match place {

@@ -125,7 +125,7 @@ fn load(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
 /// A load by its pressure on the film (N, ≥ 0) and its pull along a direction in the film's plane (degrees from x
 /// towards y). What does not press does not pull.
 fn pressed_and_pulled(normal_n: f64, lateral_n: f64, direction_deg: f64) -> Load {
-    let (sin, cos) = libm::sincos(crate::load::radians(direction_deg));
+    let (sin, cos) = libm::sincos(crate::camera::radians(direction_deg));
     Load::from_vector([lateral_n * cos, lateral_n * sin, -normal_n]).unwrap_or(Load::REST)
 }
 
@@ -143,14 +143,14 @@ fn ramp(time_s: f64, rise_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Film;
+    use hivtac_film::Film;
 
     #[test]
     fn every_named_motion_begins_at_rest_moves_smoothly_and_suits_the_film() {
         for name in Motion::NAMES {
             let motion = Motion::named(name, 3).unwrap();
             assert_eq!(
-                motion.check(|load| Film::default().check(load)),
+                motion.check(|load| Ok(Film::default().check(load)?)),
                 Ok(()),
                 "{name}"
             );
@@ -193,15 +193,15 @@ mod tests {
             ..Press::default()
         };
         let error = Motion::Press(press)
-            .check(|load| Film::default().check(load))
+            .check(|load| Ok(Film::default().check(load)?))
             .unwrap_err();
-        assert!(matches!(error, SceneError::Load(_)), "{error}");
+        assert!(matches!(error, SceneError::Film(_)), "{error}");
         let press = Press {
             rise_s: f64::NAN,
             ..Press::default()
         };
         let error = Motion::Press(press)
-            .check(|load| Film::default().check(load))
+            .check(|load| Ok(Film::default().check(load)?))
             .unwrap_err()
             .to_string();
         assert!(error.contains("rise_s"), "{error}");

@@ -1,7 +1,7 @@
 //! Terms through samples, and splines through nodes.
 
 use faer::prelude::*;
-use hivtac_scene::film::reduced::{Axis, Pose, Terms};
+use hivtac_film::reduced::{Axis, Pose, Terms};
 
 use crate::ShellError;
 

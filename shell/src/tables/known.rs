@@ -1,6 +1,6 @@
 //! What full solutions tell of each table's outputs, seen so that a marker is in the corner (+, +).
 
-use hivtac_scene::film::reduced::{
+use hivtac_film::reduced::{
     Kind, LARGEST_RADIUS_MM, LARGEST_TILT, LINEAR_N, NOMINAL_RADIUS_MM, Pose, rho,
 };
 

@@ -4,7 +4,7 @@ mod fit;
 mod known;
 mod symmetry;
 
-use hivtac_scene::film::reduced::{Kind, Tables};
+use hivtac_film::reduced::{Kind, Tables};
 
 use crate::ShellError;
 use crate::sweep::Solved;

@@ -1,8 +1,8 @@
 //! The eight ways in which a square film looks like itself.
 
+use hivtac_film::DiscMotion;
+use hivtac_film::reduced::Pose;
 use hivtac_scene::MARKERS;
-use hivtac_scene::film::DiscMotion;
-use hivtac_scene::film::reduced::Pose;
 
 /// A mirror: v becomes `matrix`·v along the film.
 #[derive(Clone, Copy, Debug, PartialEq)]

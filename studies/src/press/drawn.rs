@@ -3,7 +3,7 @@
 use hivtac_calibration::forward::building::{
     FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS,
 };
-use hivtac_scene::film::reduced::Unit;
+use hivtac_film::reduced::Unit;
 use hivtac_scene::{Lens, Mechanics, Mounting, Options};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

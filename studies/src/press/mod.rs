@@ -13,7 +13,7 @@ pub use held::{Held, noise_of};
 pub use rows::{Errors, Off, Row};
 pub use unit::{Answer, Tared, TestedUnit};
 
-use hivtac_scene::{Load, SceneError};
+use hivtac_scene::{FilmError, Load};
 use hivtac_shell::halton;
 
 /// Forces, mN.
@@ -27,7 +27,7 @@ pub const ANGLE_DEG: f64 = 8.0;
 ///
 /// # Errors
 /// When the force is none.
-pub fn press(number: u32, force_n: f64, reach_mm: f64) -> Result<Load, SceneError> {
+pub fn press(number: u32, force_n: f64, reach_mm: f64) -> Result<Load, FilmError> {
     let part = |base| 2.0 * part(number, base) - 1.0;
     Load::from_angles(force_n, ANGLE_DEG * part(2), ANGLE_DEG * part(3))?
         .with_offset_mm([5, 7].map(|base| reach_mm * part(base)))
@@ -41,7 +41,7 @@ pub fn press_of_any(
     number: u32,
     [least_n, most_n]: [f64; 2],
     reach_mm: f64,
-) -> Result<Load, SceneError> {
+) -> Result<Load, FilmError> {
     let force_n = least_n + (most_n - least_n) * part(number, 11);
     press(number, force_n, reach_mm)
 }
@@ -56,7 +56,7 @@ pub fn tilted_press(
     force_n: f64,
     ratio: f64,
     reach_mm: f64,
-) -> Result<Load, SceneError> {
+) -> Result<Load, FilmError> {
     let (sin, cos) = (std::f64::consts::TAU * part(number, 2)).sin_cos();
     let normal_n = force_n / ratio.hypot(1.0);
     let vector_n = [normal_n * ratio * cos, normal_n * ratio * sin, -normal_n];

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use hivtac_scene::film::Film;
+use hivtac_film::Film;
 use hivtac_scene::{Camera, Contact, Load, MARKERS, Preset};
 use serde_json::{Value, json};
 

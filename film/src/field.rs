@@ -3,8 +3,7 @@
 //! It follows the tip by a share that depends on the place from it only, and what that leaves at the markers is spread
 //! around them. Close to a marker it moves as the marker does.
 
-use super::{HALF_SIDE_MM, Pressed};
-use crate::{MARKER_RADIUS_MM, MARKER_REST_MM};
+use crate::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed};
 
 /// Within this distance of a marker's centre the film moves as the marker does, mm: its rim as a polygon is inside.
 const OWN_MM: f64 = 1.05 * MARKER_RADIUS_MM;
@@ -109,8 +108,7 @@ fn length([x, y]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Film;
-    use crate::{Load, MARKERS};
+    use crate::{Film, Load, MARKER_CENTRES_MM};
 
     fn pressed() -> Pressed {
         let load = Load::from_angles(0.2, 8.0, -5.0).unwrap();
@@ -126,15 +124,15 @@ mod tests {
     #[test]
     fn markers_move_by_their_discs_and_the_tip_by_its_own() {
         let pressed = pressed();
-        for (disc, marker) in pressed.discs.iter().zip(MARKERS) {
-            close(displacement(&pressed, marker.centre_mm), disc.moved_mm, 0.0);
-            let [x, y] = marker.centre_mm;
+        for (disc, centre) in pressed.discs.iter().zip(MARKER_CENTRES_MM) {
+            close(displacement(&pressed, centre), disc.moved_mm, 0.0);
+            let [x, y] = centre;
             close(
                 displacement(&pressed, [x + 0.3, y - 0.4]),
                 disc.at([0.3, -0.4]),
                 1e-15,
             );
-            close(rough(&pressed, marker.centre_mm), disc.moved_mm, 1e-12);
+            close(rough(&pressed, centre), disc.moved_mm, 1e-12);
         }
         close(displacement(&pressed, [0.0; 2]), pressed.tip_mm, 1e-12);
     }

@@ -5,8 +5,8 @@ use super::pose::Pose;
 use super::table::Table;
 use super::terms::Terms;
 use super::unit::Unit;
-use crate::film::{DiscMotion, MAX_PLACE_MM};
-use crate::{MARKERS, SceneError};
+
+use crate::{DiscMotion, FilmError, MARKER_CENTRES_MM, MAX_PLACE_MM};
 
 /// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the marker is.
 const NODES_MM: [f64; 16] = [
@@ -111,7 +111,7 @@ impl Tables {
     ///
     /// # Errors
     /// When there are fewer or more of them.
-    pub fn from_bytes(mut bytes: &[u8]) -> Result<Tables, SceneError> {
+    pub fn from_bytes(mut bytes: &[u8]) -> Result<Tables, FilmError> {
         let mut tables = Vec::new();
         for kind in Kind::ALL {
             tables.push(Table::take(
@@ -123,7 +123,7 @@ impl Tables {
         }
         match (bytes, tables.try_into()) {
             ([], Ok(tables)) => Ok(Tables(tables)),
-            _ => Err(SceneError::Tables(format!(
+            _ => Err(FilmError::Tables(format!(
                 "{} bytes follow the last table: make the file anew",
                 bytes.len()
             ))),
@@ -149,7 +149,7 @@ impl Tables {
         let parts = unit.parts();
         let differs = parts != [0.0; UNIT_PARTS];
         std::array::from_fn(|k| {
-            let signs = MARKERS[k].centre_mm.map(f64::signum);
+            let signs = MARKER_CENTRES_MM[k].map(f64::signum);
             let here = pose.mirrored(signs);
             let own = differs.then(|| mirrored(parts, signs));
             let [x, y] = unit.markers_mm[k];

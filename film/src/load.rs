@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::SceneError;
-use crate::film::MAX_RATIO;
-use crate::film::reduced::NOMINAL_RADIUS_MM;
+use crate::FilmError;
+use crate::MAX_RATIO;
+use crate::reduced::NOMINAL_RADIUS_MM;
 
 /// What the label (α, β, |F|) of a load says of the tip. It decides how well anything can be measured: at 0.2 N a
 /// degree moves the markers by 0.2 px (`Force`) or 1.8 px (`Stick`) at 800×600.
@@ -29,10 +29,10 @@ pub enum Contact {
 }
 
 impl FromStr for Contact {
-    type Err = SceneError;
+    type Err = FilmError;
 
     /// `force`, `stick` or `slip:0.6`, the friction ratio.
-    fn from_str(text: &str) -> Result<Contact, SceneError> {
+    fn from_str(text: &str) -> Result<Contact, FilmError> {
         let contact = match (text, text.strip_prefix("slip:")) {
             ("force", _) => Some(Contact::Force),
             ("stick", _) => Some(Contact::Stick),
@@ -40,7 +40,7 @@ impl FromStr for Contact {
             _ => None,
         };
         let contact = contact.ok_or_else(|| {
-            SceneError::Load(format!("contact `{text}`: use force, stick or slip:0.6"))
+            FilmError::Load(format!("contact `{text}`: use force, stick or slip:0.6"))
         })?;
         contact.check()?;
         Ok(contact)
@@ -49,9 +49,9 @@ impl FromStr for Contact {
 
 #[cfg(feature = "file")]
 impl TryFrom<String> for Contact {
-    type Error = SceneError;
+    type Error = FilmError;
 
-    fn try_from(text: String) -> Result<Contact, SceneError> {
+    fn try_from(text: String) -> Result<Contact, FilmError> {
         text.parse()
     }
 }
@@ -69,10 +69,10 @@ impl fmt::Display for Contact {
 impl Contact {
     /// # Errors
     /// When the friction ratio is outside its range.
-    fn check(self) -> Result<(), SceneError> {
+    fn check(self) -> Result<(), FilmError> {
         match self {
             Contact::Slip { mu } if !(0.05..=MAX_RATIO).contains(&mu) => {
-                Err(SceneError::Load(format!(
+                Err(FilmError::Load(format!(
                     "the friction ratio is {mu}: use 0.05 to {MAX_RATIO}; what holds better sticks"
                 )))
             }
@@ -85,8 +85,8 @@ impl Contact {
 ///
 /// Film frame, right-handed: x right and y down in the image, z away from the camera, so that a press has F_z < 0.
 /// F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's (the paper's goniometer, Section 6).
-/// Whether the film can take it is the film's to say ([`crate::film::Film::check`]), and what force then really acts on
-/// it ([`crate::film::Pressed::force_n`]).
+/// Whether the film can take it is the film's to say ([`crate::Film::check`]), and what force then really acts on
+/// it ([`crate::Pressed::force_n`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     vector_n: [f64; 3],
@@ -114,11 +114,7 @@ impl Load {
     ///
     /// # Errors
     /// When a number is not finite, `magnitude_n` is negative or an angle is not between −90° and 90°.
-    pub fn from_angles(
-        magnitude_n: f64,
-        alpha_deg: f64,
-        beta_deg: f64,
-    ) -> Result<Load, SceneError> {
+    pub fn from_angles(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Result<Load, FilmError> {
         check_magnitude(magnitude_n)?;
         check_angle("α", alpha_deg)?;
         check_angle("β", beta_deg)?;
@@ -141,7 +137,7 @@ impl Load {
     ///
     /// # Errors
     /// When a component is not finite, or the force does not press (F_z ≥ 0).
-    pub fn from_vector(vector_n: [f64; 3]) -> Result<Load, SceneError> {
+    pub fn from_vector(vector_n: [f64; 3]) -> Result<Load, FilmError> {
         let [x, y, z] = vector_n;
         let magnitude_n = (x * x + y * y + z * z).sqrt();
         check_magnitude(magnitude_n)?;
@@ -149,7 +145,7 @@ impl Load {
             return Ok(Load::REST);
         }
         if z >= 0.0 {
-            return Err(SceneError::Load(format!(
+            return Err(FilmError::Load(format!(
                 "F_z is {z} N: a tip can only press, which is F_z < 0"
             )));
         }
@@ -166,7 +162,7 @@ impl Load {
     ///
     /// # Errors
     /// When the friction ratio is outside its range.
-    pub fn with_contact(self, contact: Contact) -> Result<Load, SceneError> {
+    pub fn with_contact(self, contact: Contact) -> Result<Load, FilmError> {
         contact.check()?;
         Ok(Load { contact, ..self })
     }
@@ -175,9 +171,9 @@ impl Load {
     ///
     /// # Errors
     /// When a number is not finite.
-    pub fn with_offset_mm(self, offset_mm: [f64; 2]) -> Result<Load, SceneError> {
+    pub fn with_offset_mm(self, offset_mm: [f64; 2]) -> Result<Load, FilmError> {
         if !offset_mm.iter().all(|part| part.is_finite()) {
-            return Err(SceneError::Load(format!(
+            return Err(FilmError::Load(format!(
                 "the tip's offset is {offset_mm:?} mm: use finite numbers"
             )));
         }
@@ -188,9 +184,9 @@ impl Load {
     ///
     /// # Errors
     /// When it is not finite.
-    pub fn with_tip_radius_mm(self, tip_radius_mm: f64) -> Result<Load, SceneError> {
+    pub fn with_tip_radius_mm(self, tip_radius_mm: f64) -> Result<Load, FilmError> {
         if !tip_radius_mm.is_finite() {
-            return Err(SceneError::Load(format!(
+            return Err(FilmError::Load(format!(
                 "the tip's radius is {tip_radius_mm} mm: use a finite number"
             )));
         }
@@ -201,7 +197,7 @@ impl Load {
     }
 
     /// The same load with what it leaves open, which is what every load begins with; both must be possible.
-    pub(crate) fn or(self, contact: Contact, offset_mm: [f64; 2], tip_radius_mm: f64) -> Load {
+    pub fn or(self, contact: Contact, offset_mm: [f64; 2], tip_radius_mm: f64) -> Load {
         let plain = self.contact == Contact::Force;
         let central = self.offset_mm == [0.0; 2];
         let nominal = self.tip_radius_mm == NOMINAL_RADIUS_MM;
@@ -254,26 +250,25 @@ impl Load {
     }
 }
 
-fn check_magnitude(magnitude_n: f64) -> Result<(), SceneError> {
+fn check_magnitude(magnitude_n: f64) -> Result<(), FilmError> {
     if magnitude_n.is_finite() && magnitude_n >= 0.0 {
         return Ok(());
     }
-    Err(SceneError::Load(format!(
+    Err(FilmError::Load(format!(
         "|F| is {magnitude_n} N: use a finite number of newtons, 0 or more"
     )))
 }
 
-fn check_angle(name: &str, degrees: f64) -> Result<(), SceneError> {
+fn check_angle(name: &str, degrees: f64) -> Result<(), FilmError> {
     if degrees > -90.0 && degrees < 90.0 {
         return Ok(());
     }
-    Err(SceneError::Load(format!(
+    Err(FilmError::Load(format!(
         "{name} is {degrees}°: use an angle between −90° and 90°"
     )))
 }
 
-/// Degrees to radians.
-pub(crate) fn radians(degrees: f64) -> f64 {
+fn radians(degrees: f64) -> f64 {
     degrees * (PI / 180.0)
 }
 

@@ -1,22 +1,12 @@
-//! Where the film goes when it is pressed.
-//!
-//! The film is a nonlinear shell; its finite elements (`shell/`) take more than half a second for one press. What a frame
-//! needs of it are tables in `data/`, made from full solutions by a command of `shell/`.
-
-mod disc_motion;
-mod field;
-mod label;
-pub mod reduced;
+//! The film of a unit under a load.
 
 use std::sync::{Arc, LazyLock};
 
-use crate::{Contact, Disc, Load, MARKERS, SceneError};
-use label::{Felt, Reached, Stage};
-use reduced::{
+use crate::label::{Felt, Reached, Stage};
+use crate::reduced::{
     LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit,
 };
-
-pub use disc_motion::DiscMotion;
+use crate::{Contact, DiscMotion, FilmError, Load, MARKER_CENTRES_MM, field};
 
 /// Half the distance between the posts that hold the film, in mm (the paper's a = 14 mm).
 pub const HALF_SIDE_MM: f64 = 14.0;
@@ -35,7 +25,7 @@ pub const MAX_OFFSET_MM: f64 = 0.25;
 
 /// The nominal film.
 static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
-    let tables = Tables::from_bytes(include_bytes!("../../data/film.bin"));
+    let tables = Tables::from_bytes(include_bytes!("../data/film.bin"));
     Film {
         tables: Arc::new(tables.expect("the committed tables are a film's")),
         unit: Unit::default(),
@@ -62,7 +52,7 @@ impl Film {
     ///
     /// # Errors
     /// When the unit is farther from the nominal one than the tables hold.
-    pub fn of(unit: Unit) -> Result<Film, SceneError> {
+    pub fn of(unit: Unit) -> Result<Film, FilmError> {
         unit.check()?;
         Ok(Film {
             unit,
@@ -74,10 +64,10 @@ impl Film {
     ///
     /// # Errors
     /// When the load is outside what the tables hold for.
-    pub fn check(&self, load: &Load) -> Result<(), SceneError> {
+    pub fn check(&self, load: &Load) -> Result<(), FilmError> {
         let radius = load.tip_radius_mm();
         if !(SMALLEST_RADIUS_MM..=LARGEST_RADIUS_MM).contains(&radius) {
-            return Err(SceneError::Load(format!(
+            return Err(FilmError::Load(format!(
                 "the tip's radius is {radius} mm: use {SMALLEST_RADIUS_MM} to {LARGEST_RADIUS_MM}"
             )));
         }
@@ -110,7 +100,7 @@ impl Film {
         if load.magnitude_n() == 0.0 {
             return Pressed {
                 touches_mm: load.offset_mm(),
-                centres_mm: self.centres_mm(),
+                centres_mm: self.markers_mm(),
                 ..Pressed::default()
             };
         }
@@ -126,7 +116,7 @@ impl Film {
             tip_mm: self.tables.tip_mm(&pose, load.tip_radius_mm()),
             force_n,
             touches_mm: pose.place_mm,
-            centres_mm: self.centres_mm(),
+            centres_mm: self.markers_mm(),
             discs: self.tables.discs(&pose, load.tip_radius_mm(), &self.unit),
         }
     }
@@ -158,14 +148,10 @@ impl Film {
         (pose, pose.direction().map(|part| magnitude_n * part))
     }
 
-    /// The markers at rest, by identity.
-    pub fn markers(&self) -> [Disc; 4] {
-        std::array::from_fn(|k| MARKERS[k].moved(self.unit.markers_mm[k]))
-    }
-
-    /// Where their centres are, mm.
-    fn centres_mm(&self) -> [[f64; 2]; 4] {
-        self.markers().map(|disc| disc.centre_mm)
+    /// Where the markers' centres are at rest, by identity, mm.
+    pub fn markers_mm(&self) -> [[f64; 2]; 4] {
+        let centre = |k: usize, c: usize| MARKER_CENTRES_MM[k][c] + self.unit.markers_mm[k][c];
+        std::array::from_fn(|k| [0, 1].map(|c| centre(k, c)))
     }
 }
 
@@ -207,7 +193,7 @@ impl Default for Pressed {
             tip_mm: [0.0; 3],
             force_n: [0.0; 3],
             touches_mm: [0.0; 2],
-            centres_mm: MARKERS.map(|disc| disc.centre_mm),
+            centres_mm: MARKER_CENTRES_MM,
             discs: [DiscMotion::default(); 4],
         }
     }
@@ -223,12 +209,12 @@ impl Pressed {
     }
 }
 
-fn within(what: &str, value: f64, most: f64, unit: &str) -> Result<(), SceneError> {
+fn within(what: &str, value: f64, most: f64, unit: &str) -> Result<(), FilmError> {
     // Angles come back from a vector with a rounding.
     if value <= most * (1.0 + 1e-9) {
         return Ok(());
     }
-    Err(SceneError::Load(format!(
+    Err(FilmError::Load(format!(
         "{what} is {value} {unit} and the film's tables hold up to {most}: press less, or straighter"
     )))
 }

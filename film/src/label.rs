@@ -1,7 +1,7 @@
 //! The force that a label of the paper's stage means: the tip moves the label's way, the film sticks to it or it slides over the
 //! film, and a gauge reads the force along the way.
 
-use super::reduced::{LARGEST_TILT, Pose};
+use crate::reduced::{LARGEST_TILT, Pose};
 
 /// The film as a tip on a stage feels it.
 pub trait Felt {

@@ -3,7 +3,7 @@
 use super::axis::{Axis, SPAN};
 use super::pose::Pose;
 use super::terms::{LANES, Terms, Values};
-use crate::SceneError;
+use crate::FilmError;
 
 /// Coefficients are kept in so many steps of the largest of their term and output.
 const STEPS: f64 = 32_767.0;
@@ -112,12 +112,12 @@ impl Table {
         terms: Terms,
         outputs: usize,
         bytes: &mut &[u8],
-    ) -> Result<Table, SceneError> {
+    ) -> Result<Table, FilmError> {
         let row = outputs * terms.count();
         let nodes = axis.nodes().len() * axis.nodes().len();
         let length = 4 * row + 2 * row * nodes;
         let Some((own, rest)) = bytes.split_at_checked(length) else {
-            return Err(SceneError::Tables(format!(
+            return Err(FilmError::Tables(format!(
                 "a table of {length} bytes is cut off after {}: make the file anew",
                 bytes.len()
             )));

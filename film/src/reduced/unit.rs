@@ -1,6 +1,6 @@
 //! How one film differs from the nominal one.
 
-use crate::SceneError;
+use crate::FilmError;
 
 /// A film as it was made: each part beside the nominal film's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ impl Default for Unit {
 
 impl Unit {
     /// How many times as stiff as the nominal film it is in bending and in stretching.
-    pub(in crate::film) fn bending_and_stretching(&self) -> [f64; 2] {
+    pub(crate) fn bending_and_stretching(&self) -> [f64; 2] {
         let Unit {
             stiffness: e,
             thickness: t,
@@ -46,7 +46,7 @@ impl Unit {
 
     /// # Errors
     /// When a part is outside its range.
-    pub fn check(&self) -> Result<(), SceneError> {
+    pub fn check(&self) -> Result<(), FilmError> {
         let parts = [
             ("the film's stiffness", self.stiffness, [0.5, 2.0]),
             ("the film's thickness", self.thickness, [0.7, 1.3]),
@@ -59,7 +59,7 @@ impl Unit {
         });
         for (what, value, [from, to]) in parts.into_iter().chain(places) {
             if !(from..=to).contains(&value) {
-                return Err(SceneError::Load(format!(
+                return Err(FilmError::Load(format!(
                     "{what} difference from the nominal film is {value}: use {from} to {to}"
                 )));
             }
