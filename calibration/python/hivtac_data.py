@@ -13,7 +13,8 @@ FORCE = ["fx_n", "fy_n", "fz_n"]
 def read(path):
     """(about, rows, rejected): the header's facts; accepted rows as dictionaries; counts by status.
 
-    Every value is a float, or None where there is none: the pose of a row that is in none of the paper's.
+    Every value is a float, or None where there is none: the pose of a row that is in none of the
+    paper's.
     """
     with open(path, newline="") as file:
         if not file.readline().startswith("# hivtac-dataset "):

@@ -1,4 +1,5 @@
-//! A quick check of a model file: frames that no training saw, through the whole pipeline, against the truth.
+//! A quick check of a model file: frames that no training saw, through the whole pipeline, against
+//! the truth.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -30,7 +31,8 @@ pub struct Report {
     pub rejected: BTreeMap<String, usize>,
 }
 
-/// Renders `samples` frames of random loads inside the model's calibrated range and lets the pipeline measure them.
+/// Renders `samples` frames of random loads inside the model's calibrated range and lets the
+/// pipeline measure them.
 ///
 /// # Errors
 /// When the bytes are no model, or the model is for conditions that cannot be rendered.
@@ -43,8 +45,8 @@ pub fn check(
     let model = Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
     ensure!(
         model.is_simulated(),
-        "the model was made from a unit's own data, and `check` renders frames of the simulated sensor: use `evaluate` with data of \
-         that unit"
+        "the model was made from a unit's own data, and `check` renders frames of the simulated \
+         sensor: use `evaluate` with data of that unit"
     );
     let recipe = recipe(&model, samples, seed)?;
     let scene = recipe.scene(0)?;
@@ -152,7 +154,8 @@ impl fmt::Display for Report {
         writeln!(f, "model                 {model}")?;
         writeln!(
             f,
-            "frames                simulated: the same simulated sensor as in training, other loads and noise"
+            "frames                simulated: the same simulated sensor as in training, other \
+             loads and noise"
         )?;
         writeln!(
             f,

@@ -20,8 +20,9 @@ pub struct Conditions {
     /// What a pixel is.
     #[serde(with = "names::pixel_format")]
     pub pixel_format: PixelFormat,
-    /// Threshold, as the model file has it: lowest and highest hue, saturation and value (OpenCV's 8-bit HSV; hue may wrap
-    /// through 0); the lowest Cr of YUV422 and zeros; the lowest and highest luma of mono and zeros.
+    /// Threshold, as the model file has it: lowest and highest hue, saturation and value (OpenCV's
+    /// 8-bit HSV; hue may wrap through 0); the lowest Cr of YUV422 and zeros; the lowest and
+    /// highest luma of mono and zeros.
     pub threshold: [u8; 6],
     /// 3×3 dilations of the mask.
     pub dilations: u8,
@@ -96,11 +97,12 @@ pub fn meaning(contact: Contact) -> &'static str {
     match contact {
         Contact::Force => "α, β and |F| are the force on the film",
         Contact::Stick => {
-            "α and β are the pressing direction of a tip that sticks to the film, |F| is the force along it"
+            "α and β are the pressing direction of a tip that sticks to the film, |F| is the force \
+             along it"
         }
         Contact::Slip { .. } => {
-            "α and β are the pressing direction of a tip that sticks to the film until it slips, |F| is the force \
-             along it"
+            "α and β are the pressing direction of a tip that sticks to the film until it slips, \
+             |F| is the force along it"
         }
     }
 }
@@ -115,7 +117,8 @@ impl From<CentroidEstimator> for CentroidName {
 }
 
 impl Conditions {
-    /// What the scene renders and the pipeline does by default, at a frame size and in a pixel format.
+    /// What the scene renders and the pipeline does by default, at a frame size and in a pixel
+    /// format.
     pub fn simulated(preset: Preset, width: u16, height: u16, pixel_format: PixelFormat) -> Self {
         Self {
             preset: preset.name().into(),

@@ -1,6 +1,7 @@
 //! How far forces are from the truth.
 
-/// Below this |F| the direction of a force is told separately (N; the paper's Section 7 does the same).
+/// Below this |F| the direction of a force is told separately (N; the paper's Section 7 does the
+/// same).
 pub const WEAK_N: f64 = 0.05;
 
 /// Sums of errors; forces in N, film frame.

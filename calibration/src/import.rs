@@ -12,11 +12,12 @@ use crate::network::{Arithmetic, INPUTS, Layer, Meaning, Network, Standardizatio
 /// The entry of the file's metadata that says what the outputs are.
 const MEANING: &str = "meaning";
 
-/// Reads a network. Its hidden layers' maxima are not known yet: [`Network::activation_maxima`] takes them from data.
+/// Reads a network. Its hidden layers' maxima are not known yet: [`Network::activation_maxima`]
+/// takes them from data.
 ///
 /// # Errors
-/// When the file cannot be read, is no safetensors file, or its tensors are no network with its scaling; names the
-/// tensor.
+/// When the file cannot be read, is no safetensors file, or its tensors are no network with its
+/// scaling; names the tensor.
 pub fn load(path: &Path) -> Result<Network> {
     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&bytes)
@@ -26,7 +27,8 @@ pub fn load(path: &Path) -> Result<Network> {
 /// The network in the bytes of a safetensors file.
 ///
 /// # Errors
-/// When they are no safetensors file, or its tensors are no network with its scaling; names the tensor.
+/// When they are no safetensors file, or its tensors are no network with its scaling; names the
+/// tensor.
 pub fn parse(bytes: &[u8]) -> Result<Network> {
     let tensors = SafeTensors::deserialize(bytes).context("not a safetensors file")?;
     let layers = layer_numbers(&tensors)?
@@ -54,7 +56,10 @@ fn meaning(bytes: &[u8]) -> Result<Meaning> {
         .as_ref()
         .and_then(|entries| entries.get(MEANING));
     let name = name.with_context(|| {
-        format!("the file's metadata has no `{MEANING}`: force-vector, angles-magnitude or force-and-place")
+        format!(
+            "the file's metadata has no `{MEANING}`: force-vector, angles-magnitude or \
+                 force-and-place"
+        )
     })?;
     serde_json::from_value(name.as_str().into())
         .with_context(|| format!("metadata `{MEANING}` is `{name}`"))

@@ -10,8 +10,8 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::range::Range;
 
-/// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to their
-/// limits.
+/// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to
+/// their limits.
 #[derive(Clone, Copy, Debug)]
 pub struct RandomLoads {
     /// The limits.
@@ -46,8 +46,8 @@ impl RandomLoads {
     }
 }
 
-/// The paper's poses (Section 6): α from −10° to 10°, β from −8° to 8°, in steps of 1°, with |F| uniform from nothing to
-/// its limit.
+/// The paper's poses (Section 6): α from −10° to 10°, β from −8° to 8°, in steps of 1°, with |F|
+/// uniform from nothing to its limit.
 #[derive(Clone, Copy, Debug)]
 pub struct PaperPoses {
     /// The largest |F|, N.
@@ -77,7 +77,8 @@ impl PaperPoses {
         (0..Self::COUNT).find(|&pose| Self::angles_deg(pose) == [alpha, beta])
     }
 
-    /// The poses that comparisons train on, and the fifth of all that they hold out, each in order; always the same.
+    /// The poses that comparisons train on, and the fifth of all that they hold out, each in order;
+    /// always the same.
     pub fn parts() -> &'static [Vec<usize>; 2] {
         static PARTS: LazyLock<[Vec<usize>; 2]> = LazyLock::new(|| {
             let mut poses: Vec<usize> = (0..PaperPoses::COUNT).collect();

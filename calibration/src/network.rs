@@ -22,8 +22,8 @@ pub enum Meaning {
     ForceVector,
     /// α and β in degrees, |F| in N (the paper's).
     AnglesMagnitude,
-    /// F_x, F_y, F_z in N, and p_x, p_y in mm: the point of the film that the tip is on, by where it
-    /// rests, film frame.
+    /// F_x, F_y, F_z in N, and p_x, p_y in mm: the point of the film that the tip is on, by where
+    /// it rests, film frame.
     ForceAndPlace,
 }
 
@@ -43,7 +43,8 @@ impl Meaning {
         self.chip_units().len()
     }
 
-    /// The outputs that mean this force (N), but for its place; a force without size has the angles 0.
+    /// The outputs that mean this force (N), but for its place; a force without size has the
+    /// angles 0.
     pub fn of_force(self, force_n: [f64; 3]) -> [f64; OUTPUTS] {
         let [x, y, z] = force_n;
         match self {
@@ -123,7 +124,8 @@ impl Layer {
 
 /// What is smaller is no deviation but the rounding of a mean.
 const NO_SIGMA: f64 = 1e-9;
-/// The σ of an answer that does not vary, in N or degrees: smaller than any use, and large enough for the chip's numbers.
+/// The σ of an answer that does not vary, in N or degrees: smaller than any use, and large enough
+/// for the chip's numbers.
 pub(crate) const CONSTANT_ANSWER: f64 = 1e-5;
 
 /// Mean and standard deviation, component by component.
@@ -136,8 +138,8 @@ pub struct Standardization {
 }
 
 impl Standardization {
-    /// Means and population standard deviations of a network's inputs. A component that does not vary gets σ = 1, so that
-    /// it standardizes to zero instead of dividing by zero.
+    /// Means and population standard deviations of a network's inputs. A component that does not
+    /// vary gets σ = 1, so that it standardizes to zero instead of dividing by zero.
     ///
     /// # Errors
     /// When `rows` is empty.
@@ -145,8 +147,8 @@ impl Standardization {
         Self::with(rows, 1.0)
     }
 
-    /// The same of its answers. One that does not vary gets next to no σ, so that whatever the network makes of it comes out
-    /// as the constant that it is.
+    /// The same of its answers. One that does not vary gets next to no σ, so that whatever the
+    /// network makes of it comes out as the constant that it is.
     ///
     /// # Errors
     /// When `rows` is empty.
@@ -208,7 +210,8 @@ pub struct Network {
     pub output: Standardization,
     /// For each hidden layer, the largest activation that the chip can carry (see `quantize`).
     pub activation_max: Vec<f64>,
-    /// Whether activations end there in floats, too, as units that were [split](Network::split) need it.
+    /// Whether activations end there in floats, too, as units that were [split](Network::split)
+    /// need it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub saturates: bool,
     /// The layers, in order.

@@ -1,4 +1,5 @@
-//! Plots as SVG: axes with numbers, lines and points. No text is taken from outside but through [`escaped`].
+//! Plots as SVG: axes with numbers, lines and points. No text is taken from outside but through
+//! [`escaped`].
 
 use std::fmt::Write;
 
@@ -177,8 +178,8 @@ impl Plot {
     /// The picture.
     pub fn to_svg(&self) -> String {
         let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" \
-             height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">\n\
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
+             width=\"{WIDTH}\" height=\"{HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\">\n\
              <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"white\"/>\n"
         );
         self.frame(&mut svg);
@@ -232,7 +233,8 @@ impl Plot {
             svg,
             "<path d=\"M{left} {top}V{floor}H{end}\" stroke=\"black\" fill=\"none\"/>\n\
              <text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n\
-             <text x=\"16\" y=\"{middle}\" text-anchor=\"middle\" transform=\"rotate(-90 16 {middle})\">{}</text>",
+             <text x=\"16\" y=\"{middle}\" text-anchor=\"middle\" transform=\"rotate(-90 16 \
+             {middle})\">{}</text>",
             (left + end) / 2.0,
             HEIGHT - 10.0,
             escaped(&self.x.label),

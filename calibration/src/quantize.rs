@@ -1,8 +1,9 @@
 //! Floats to the chip's integers (`docs/architecture.md`, model file).
 //!
-//! Weights become integers with a scale for each output (int8 and activations of seven bits, or int16 and twelve; the first
-//! layer and the last are always int16), biases the accumulator's unit, and what is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in a fixed order: the same
-//! weights give the same bytes on every machine.
+//! Weights become integers with a scale for each output (int8 and activations of seven bits, or
+//! int16 and twelve; the first layer and the last are always int16), biases the accumulator's unit,
+//! and what is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in
+//! a fixed order: the same weights give the same bytes on every machine.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::FEATURES;
@@ -26,8 +27,8 @@ const LAYER_MULTIPLIER_BITS: u32 = 31;
 const LARGEST_SHIFT: u8 = 62;
 /// Largest |accumulator|.
 const LARGEST_SUM: f64 = i32::MAX as f64;
-/// Largest input of the first layer, and of any other after int8 and after int16 arithmetic. Twelve bits of activation
-/// leave as many to weights at 512 inputs.
+/// Largest input of the first layer, and of any other after int8 and after int16 arithmetic. Twelve
+/// bits of activation leave as many to weights at 512 inputs.
 const LARGEST_INPUT: u16 = 1 << 15;
 const LARGEST_ACTIVATION8: u16 = MAX_ACTIVATION8;
 const LARGEST_ACTIVATION16: u16 = 4095;
@@ -134,8 +135,9 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
         // Its inputs have 16 bits, whatever the others have.
         width: WeightWidth::Int16,
     };
-    // What takes up a hidden layer, and its largest activation. The output layer has few rows only: int16 costs nothing there, and
-    // spares the last activations and the answer itself the coarse steps.
+    // What takes up a hidden layer, and its largest activation. The output layer has few rows only:
+    // int16 costs nothing there, and spares the last activations and the answer itself the coarse
+    // steps.
     let held = |layer: usize| match network.is_coarse(layer) {
         true => (WeightWidth::Int8, LARGEST_ACTIVATION8),
         false => (WeightWidth::Int16, LARGEST_ACTIVATION16),
@@ -227,8 +229,8 @@ fn quantize_layer(
     Ok(QuantizedLayer { spec, scales, step })
 }
 
-/// What one step of a row's weights stands for: as little as the width of a weight and the proof that no sum can
-/// overflow allow, each weight being up to half a step larger than it should.
+/// What one step of a row's weights stands for: as little as the width of a weight and the proof
+/// that no sum can overflow allow, each weight being up to half a step larger than it should.
 fn weight_scale(row: &[f32], bias: f64, form: &Form) -> f64 {
     let sizes = || row.iter().map(|&w| f64::from(w.abs()));
     let largest = sizes().fold(0.0, f64::max);
@@ -259,7 +261,8 @@ fn multiplier_and_shift(factor: f64, bits: u32) -> Result<(u32, u8)> {
         scaled *= 2.0;
         shift += 1;
     }
-    // What is too small even for 2^-62 rounds to nothing on the chip: the smallest multiplier does the same.
+    // What is too small even for 2^-62 rounds to nothing on the chip: the smallest multiplier does
+    // the same.
     Ok((scaled.round().max(1.0) as u32, shift))
 }
 

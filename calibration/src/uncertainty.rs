@@ -1,8 +1,10 @@
-//! What a model's uncertainties are: from the errors that it makes on frames that it was not made from.
+//! What a model's uncertainties are: from the errors that it makes on frames that it was not made
+//! from.
 //!
-//! Errors are larger for some forces than for others and have long tails: the noise of a centroid depends on its place in the
-//! pixel grid, and each session is a little wrong in its own way. So they are not averaged: over |F|, a table says below what
-//! some 96 of 100 errors lie, as the standard uncertainty of a normal distribution that has its 95 % bound there.
+//! Errors are larger for some forces than for others and have long tails: the noise of a centroid
+//! depends on its place in the pixel grid, and each session is a little wrong in its own way. So
+//! they are not averaged: over |F|, a table says below what some 96 of 100 errors lie, as the
+//! standard uncertainty of a normal distribution that has its 95 % bound there.
 
 use anyhow::{Result, ensure};
 use hivtac_sensing::model::Uncertainty as ChipUncertainty;
@@ -10,16 +12,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::errors::{angle_deg, norm};
 
-/// The 95 % bound of a direction over its standard uncertainty: √(−ln 0.05), for a root mean square over two dimensions.
+/// The 95 % bound of a direction over its standard uncertainty: √(−ln 0.05), for a root mean square
+/// over two dimensions.
 pub const DIRECTION_BOUND: f64 = 1.730_818_382_602_285_4;
 /// The 95 % bound of |F| over its standard uncertainty.
 pub const MAGNITUDE_BOUND: f64 = 1.959_963_984_540_054;
 
-/// The 95 % bound of a place over the standard uncertainty of each of its coordinates: √(−2 ln 0.05).
+/// The 95 % bound of a place over the standard uncertainty of each of its coordinates: √(−2 ln
+/// 0.05).
 pub const PLACE_BOUND: f64 = 2.447_746_830_680_816;
 
-/// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little more than they promise,
-/// for the sessions that come.
+/// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little
+/// more than they promise, for the sessions that come.
 const COVERED: f64 = 0.965;
 /// Rows around a knot, by weight, at the least.
 const FEWEST: f64 = 60.0;
@@ -104,8 +108,8 @@ impl Uncertainty {
     }
 }
 
-/// Below what [`COVERED`] of the errors near a force lie, rows weighted by how near they are; rows from farther away where
-/// there are few.
+/// Below what [`COVERED`] of the errors near a force lie, rows weighted by how near they are; rows
+/// from farther away where there are few.
 fn covering(misses: &[Miss], of: fn(&Miss) -> f64, force_n: f64, step_n: f64) -> f64 {
     let all = misses.len() as f64;
     let mut reach = step_n;
@@ -141,7 +145,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Errors whose spread changes with |F|, to all sides: across 1 mN at nothing and 3 mN at 0.2 N, along a tenth of it.
+    /// Errors whose spread changes with |F|, to all sides: across 1 mN at nothing and 3 mN at
+    /// 0.2 N, along a tenth of it.
     fn misses(count: usize) -> Vec<Miss> {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut miss = || {

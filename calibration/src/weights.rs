@@ -1,4 +1,5 @@
-//! The weights file: a trained network in floats, with all that the exporter needs to make a model file of it.
+//! The weights file: a trained network in floats, with all that the exporter needs to make a model
+//! file of it.
 
 use std::{fs, path::Path};
 
@@ -67,7 +68,8 @@ impl Weights {
     /// Reads and checks a weights file.
     ///
     /// # Errors
-    /// When it cannot be read, is not a weights file of this version, or its parts do not fit each other.
+    /// When it cannot be read, is not a weights file of this version, or its parts do not fit each
+    /// other.
     pub fn load(path: &Path) -> Result<Self> {
         let text =
             fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -106,7 +108,8 @@ impl Weights {
         self.check_numbers()
     }
 
-    /// The force (N) of features (px) that were taken from the same rest position, without the chip's rounding.
+    /// The force (N) of features (px) that were taken from the same rest position, without the
+    /// chip's rounding.
     pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
         self.network.force_n(features)
     }

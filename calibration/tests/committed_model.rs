@@ -1,5 +1,5 @@
-//! The model that firmware and host tool embed: the committed weights give it, byte for byte, and it is as good as
-//! `docs/calibration.md` says.
+//! The model that firmware and host tool embed: the committed weights give it, byte for byte, and
+//! it is as good as `docs/calibration.md` says.
 
 use std::fs;
 use std::path::PathBuf;
@@ -153,7 +153,8 @@ fn presses(each: usize, sessions: usize) -> Evaluation {
     Evaluation::of(&committed(), &dataset).unwrap()
 }
 
-/// A camera that is mounted otherwise cannot be told from dots that are glued otherwise: what is stated allows for both.
+/// A camera that is mounted otherwise cannot be told from dots that are glued otherwise: what is
+/// stated allows for both.
 #[test]
 fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
     let evaluation = presses(50, 40);

@@ -1,5 +1,6 @@
-//! Training, import and export at the extremes (`docs/numerics.md`). Those that measure print a row of that document's table:
-//! `cargo test --release -p hivtac-calibration --test numerics -- --nocapture`.
+//! Training, import and export at the extremes (`docs/numerics.md`). Those that measure print a row
+//! of that document's table: `cargo test --release -p hivtac-calibration --test numerics --
+//! --nocapture`.
 
 use std::collections::HashMap;
 
@@ -122,7 +123,8 @@ fn a_feature_that_never_varies_says_nothing() {
     );
 }
 
-/// A deviation below what a feature's step of 1/65,536 px can give is a mistake that has to be told, not a model.
+/// A deviation below what a feature's step of 1/65,536 px can give is a mistake that has to be
+/// told, not a model.
 #[test]
 fn deviations_are_exported_or_refused() {
     let network = |sigma: f64| {
@@ -208,7 +210,8 @@ fn one_sample_and_duplicates_train_to_what_they_say() {
     );
 }
 
-/// A safetensors file of a network whose first weight of the first layer, and whose bias, are as given.
+/// A safetensors file of a network whose first weight of the first layer, and whose bias, are as
+/// given.
 fn imported(weight: f64, bias: f64, sigma: f64) -> anyhow::Result<Network> {
     let layer = |inputs: usize, outputs: usize| {
         (0..inputs * outputs)
@@ -268,7 +271,8 @@ fn imported_numbers_that_are_none_are_refused() {
     }
 }
 
-/// A row of weights of which single precision holds only denormals, or nothing, is one of zeros, beside any bias.
+/// A row of weights of which single precision holds only denormals, or nothing, is one of zeros,
+/// beside any bias.
 #[test]
 fn denormal_weights_are_as_none() {
     let mut worst = 0.0_f64;

@@ -12,7 +12,8 @@ pub struct Edge {
 /// A finished band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Band {
-    /// Bands finished before it since boot, modulo 2³². Names its slot ([`Shape::slot`](crate::Shape::slot)).
+    /// Bands finished before it since boot, modulo 2³². Names its slot
+    /// ([`Shape::slot`](crate::Shape::slot)).
     pub sequence: u32,
     /// Bands of the same frame above it.
     pub index: u16,
@@ -47,8 +48,8 @@ pub enum Event {
         /// How.
         how: Ending,
     },
-    /// The camera was set up, wholly or otherwise than before. Its frames after number `from` up to `to` are accounted for
-    /// elsewhere.
+    /// The camera was set up, wholly or otherwise than before. Its frames after number `from` up to
+    /// `to` are accounted for elsewhere.
     Passed {
         /// The newest frame before; 0 when there was none.
         from: u32,

@@ -8,7 +8,8 @@ use crate::shape::Shape;
 pub enum Action {
     /// Nothing.
     None,
-    /// Scan this band, as the first of a frame when its index is 0; then call [`Follower::scanned`].
+    /// Scan this band, as the first of a frame when its index is 0; then call
+    /// [`Follower::scanned`].
     Scan(Band),
     /// Every band of a frame was scanned: finish it.
     Deliver(Delivery),
@@ -19,8 +20,8 @@ pub enum Action {
 pub struct Delivery {
     /// The edge that began it.
     pub edge: Edge,
-    /// A frame before it, and after the delivery before, was not delivered, or the frame delivered before turned out
-    /// to be too long.
+    /// A frame before it, and after the delivery before, was not delivered, or the frame delivered
+    /// before turned out to be too long.
     pub after_loss: bool,
     /// One of these was lost to an overrun.
     pub after_overrun: bool,
@@ -28,8 +29,8 @@ pub struct Delivery {
     pub after_restart: bool,
 }
 
-/// What became of frames. Each is counted once; the sum is the newest frame's number, without those accounted for
-/// elsewhere ([`Event::Passed`]), once its end is known.
+/// What became of frames. Each is counted once; the sum is the newest frame's number, without those
+/// accounted for elsewhere ([`Event::Passed`]), once its end is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Delivered, and not too long.
@@ -98,8 +99,8 @@ impl Follower {
         matches!(self.under, Under::Scanning { .. })
     }
 
-    /// Whether every band of a frame was scanned and its end is not yet known. When no event waits and nothing more has
-    /// come since its last band, it may be [delivered](Self::deliver) already.
+    /// Whether every band of a frame was scanned and its end is not yet known. When no event waits
+    /// and nothing more has come since its last band, it may be [delivered](Self::deliver) already.
     pub fn is_complete(&self) -> bool {
         matches!(self.under, Under::Scanning { next, .. } if next == self.shape.bands())
     }
@@ -128,8 +129,8 @@ impl Follower {
         }
     }
 
-    /// Delivers a [complete](Self::is_complete) frame before its end is known. Should it turn out to be too long, it
-    /// counts as such, and the next delivery says so.
+    /// Delivers a [complete](Self::is_complete) frame before its end is known. Should it turn out
+    /// to be too long, it counts as such, and the next delivery says so.
     pub fn deliver(&mut self) -> Action {
         match self.under {
             Under::Scanning { edge, next } if next == self.shape.bands() => {

@@ -1,12 +1,14 @@
-//! Which rows belong to which frame, when a camera is captured without a pause: the logic alone, without a register.
+//! Which rows belong to which frame, when a camera is captured without a pause: the logic alone,
+//! without a register.
 //!
-//! A frame is written by DMA as *bands* of some rows into a ring of *slots*, one band after the other, frame after
-//! frame. The [`Tracker`] runs in the interrupts: it steers the DMA from slot to slot, sees where frames begin and end,
-//! and brings everything back in step when a frame is broken. The [`Follower`] runs where frames are processed: it
-//! takes the tracker's [`Event`]s in order, says which bands to scan, and accounts for every frame exactly once.
+//! A frame is written by DMA as *bands* of some rows into a ring of *slots*, one band after the
+//! other, frame after frame. The [`Tracker`] runs in the interrupts: it steers the DMA from slot to
+//! slot, sees where frames begin and end, and brings everything back in step when a frame is
+//! broken. The [`Follower`] runs where frames are processed: it takes the tracker's [`Event`]s in
+//! order, says which bands to scan, and accounts for every frame exactly once.
 //!
-//! The two share no state but the events and one number, [`Tracker::finished`]. The camera never waits: a band that
-//! is not read in time is overwritten, which [`Shape::intact`] tells.
+//! The two share no state but the events and one number, [`Tracker::finished`]. The camera never
+//! waits: a band that is not read in time is overwritten, which [`Shape::intact`] tells.
 //!
 //! ```text
 //! DMA: band finished ─┐             events            ┌→ scan this band

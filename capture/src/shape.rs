@@ -11,8 +11,8 @@ impl Shape {
     /// Frames of `bands` bands, in a ring of `slots` slots.
     ///
     /// # Panics
-    /// Without a band, or when `slots` is no power of two of at least 4. Meant for constants, where a panic is a
-    /// build error.
+    /// Without a band, or when `slots` is no power of two of at least 4. Meant for constants, where
+    /// a panic is a build error.
     pub const fn new(bands: u16, slots: u16) -> Self {
         assert!(bands > 0, "a frame has at least one band");
         // Sequence numbers wrap at 2³², so that the ring must divide it. The DMA holds two slots.
@@ -30,11 +30,11 @@ impl Shape {
         (sequence % self.slots as u32) as u16
     }
 
-    /// Whether the band `sequence` was still whole at a moment *after which* [`Tracker::finished`] was read as
-    /// `finished`.
+    /// Whether the band `sequence` was still whole at a moment *after which* [`Tracker::finished`]
+    /// was read as `finished`.
     ///
-    /// The DMA writes band `finished`, or already the next one when its interrupt has not been handled yet. So the last
-    /// `slots − 2` finished bands are safe.
+    /// The DMA writes band `finished`, or already the next one when its interrupt has not been
+    /// handled yet. So the last `slots − 2` finished bands are safe.
     ///
     /// [`Tracker::finished`]: crate::Tracker::finished
     pub const fn intact(&self, sequence: u32, finished: u32) -> bool {

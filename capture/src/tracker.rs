@@ -5,8 +5,8 @@ use crate::shape::Shape;
 
 /// The camera interface and its double-buffered DMA, as the tracker needs them.
 pub trait Interface {
-    /// Stops everything, throws away what is under way, and begins again: the next frame that begins
-    /// goes to slot `first`, then to slot `second`.
+    /// Stops everything, throws away what is under way, and begins again: the next frame that
+    /// begins goes to slot `first`, then to slot `second`.
     fn restart(&mut self, first: u16, second: u16);
 
     /// Stops everything.
@@ -15,7 +15,8 @@ pub trait Interface {
     /// Whether the DMA has finished a band since this was asked last.
     fn take_finished(&mut self) -> bool;
 
-    /// Whether the DMA writes to the second of its two targets now; the first after a restart, then in turns.
+    /// Whether the DMA writes to the second of its two targets now; the first after a restart, then
+    /// in turns.
     fn writes_second(&self) -> bool;
 
     /// Makes `slot` the target that the DMA does not write to now: the next one.
@@ -28,7 +29,8 @@ pub trait Interface {
     fn newest_edge(&self) -> Edge;
 }
 
-/// Follows one camera. Its methods are called in interrupts of one priority, so that none interrupts another.
+/// Follows one camera. Its methods are called in interrupts of one priority, so that none
+/// interrupts another.
 #[derive(Debug)]
 pub struct Tracker {
     shape: Shape,

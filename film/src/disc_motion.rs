@@ -1,10 +1,11 @@
 //! How a small disc of the film moves.
 
-/// How the film around a marker moves: by `moved_mm + along_x · x + along_y · y` at (x, y) mm from its centre.
+/// How the film around a marker moves: by `moved_mm + along_x · x + along_y · y` at (x, y) mm from
+/// its centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DiscMotion {
-    /// Mean over the disc, mm, film frame. Its x and y put the centroid of the disc's image where the full solution
-    /// has it: within 0.002 mm of the mean.
+    /// Mean over the disc, mm, film frame. Its x and y put the centroid of the disc's image where
+    /// the full solution has it: within 0.002 mm of the mean.
     pub moved_mm: [f64; 3],
     /// Slope along x, mm per mm.
     pub along_x: [f64; 3],

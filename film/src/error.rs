@@ -5,7 +5,8 @@ use std::fmt;
 /// A load or a film that the tables do not hold. The message says what, where and what is possible.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FilmError {
-    /// A load that is no number, pulls, or presses the film further than it can go; a film that is too unlike the nominal one.
+    /// A load that is no number, pulls, or presses the film further than it can go; a film that is
+    /// too unlike the nominal one.
     Load(String),
     /// Bytes do not hold a film's tables.
     Tables(String),

@@ -1,11 +1,12 @@
 //! The film between tip, markers and posts, roughly.
 //!
-//! It follows the tip by a share that depends on the place from it only, and what that leaves at the markers is spread
-//! around them. Close to a marker it moves as the marker does.
+//! It follows the tip by a share that depends on the place from it only, and what that leaves at
+//! the markers is spread around them. Close to a marker it moves as the marker does.
 
 use crate::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed};
 
-/// Within this distance of a marker's centre the film moves as the marker does, mm: its rim as a polygon is inside.
+/// Within this distance of a marker's centre the film moves as the marker does, mm: its rim as a
+/// polygon is inside.
 const OWN_MM: f64 = 1.05 * MARKER_RADIUS_MM;
 /// Beyond this one, as tip and markers together say, mm.
 const OTHERS_MM: f64 = 2.0;
@@ -62,8 +63,9 @@ fn from_tip(pressed: &Pressed, place: [f64; 2]) -> [f64; 2] {
     })
 }
 
-/// The part of the tip's depth that a place takes under a straight press, from the full solution at 0.02 and 0.25 N
-/// (within 0.03): 1 at the tip, 0.70 and 0.67 at the markers, 0.36 and 0.39 in the middle of an edge, 0 at the posts.
+/// The part of the tip's depth that a place takes under a straight press, from the full solution at
+/// 0.02 and 0.25 N (within 0.03): 1 at the tip, 0.70 and 0.67 at the markers, 0.36 and 0.39 in the
+/// middle of an edge, 0 at the posts.
 fn share(place: [f64; 2]) -> f64 {
     let [a, b] = place.map(|part| part / HALF_SIDE_MM);
     let (r, corner) = (length([a, b]), a * a * b * b);
@@ -71,7 +73,8 @@ fn share(place: [f64; 2]) -> f64 {
     (along - 0.883 * corner + 0.3006 * corner * r * r).max(0.0)
 }
 
-/// Each marker's part: all of it at the marker itself, nothing at the others, at the tip and at the film's border.
+/// Each marker's part: all of it at the marker itself, nothing at the others, at the tip and at the
+/// film's border.
 fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
     let near = |from: [f64; 2]| length([place[0] - from[0], place[1] - from[1]]);
     // From the markers outward it falls to nothing at the border.

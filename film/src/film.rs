@@ -32,8 +32,8 @@ static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
     }
 });
 
-/// The film by its tables: markers within 0.1 px of the full solution at 320×240 (`shell/README.md`); the film between them
-/// roughly.
+/// The film by its tables: markers within 0.1 px of the full solution at 320×240
+/// (`shell/README.md`); the film between them roughly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     tables: Arc<Tables>,
@@ -95,7 +95,8 @@ impl Film {
         within("|F|", load.magnitude_n(), MAX_LABEL_N, "N")
     }
 
-    /// The film under a load that [`Film::check`] accepts. Under another one it stays at the tables' limit.
+    /// The film under a load that [`Film::check`] accepts. Under another one it stays at the
+    /// tables' limit.
     pub fn press(&self, load: &Load) -> Pressed {
         if load.magnitude_n() == 0.0 {
             return Pressed {
@@ -178,7 +179,8 @@ pub struct Pressed {
     pub tip_mm: [f64; 3],
     /// The tip's force on the film, N.
     pub force_n: [f64; 3],
-    /// Which point of the film the tip is on, by where it rests, mm: a tip that slides leaves the load's offset.
+    /// Which point of the film the tip is on, by where it rests, mm: a tip that slides leaves the
+    /// load's offset.
     pub touches_mm: [f64; 2],
     /// Where the markers' centres rest, by identity, mm.
     pub centres_mm: [[f64; 2]; 4],
@@ -202,8 +204,9 @@ impl Default for Pressed {
 impl Pressed {
     /// Where the point of the film's camera side that rests at (x, y) mm moves, mm, film frame.
     ///
-    /// On a marker this is the marker's own motion; elsewhere an interpolation between tip, markers and posts that is
-    /// off the full solution by up to 0.4 mm at 0.25 N: good for a thing that distracts, not for one that measures.
+    /// On a marker this is the marker's own motion; elsewhere an interpolation between tip, markers
+    /// and posts that is off the full solution by up to 0.4 mm at 0.25 N: good for a thing that
+    /// distracts, not for one that measures.
     pub fn displacement(&self, rest_mm: [f64; 2]) -> [f64; 3] {
         field::displacement(self, rest_mm)
     }
@@ -215,7 +218,8 @@ fn within(what: &str, value: f64, most: f64, unit: &str) -> Result<(), FilmError
         return Ok(());
     }
     Err(FilmError::Load(format!(
-        "{what} is {value} {unit} and the film's tables hold up to {most}: press less, or straighter"
+        "{what} is {value} {unit} and the film's tables hold up to {most}: press less, or \
+         straighter"
     )))
 }
 

@@ -1,5 +1,5 @@
-//! The force that a label of the paper's stage means: the tip moves the label's way, the film sticks to it or it slides over the
-//! film, and a gauge reads the force along the way.
+//! The force that a label of the paper's stage means: the tip moves the label's way, the film
+//! sticks to it or it slides over the film, and a gauge reads the force along the way.
 
 use crate::reduced::{LARGEST_TILT, Pose};
 
@@ -20,7 +20,8 @@ pub struct Stage {
     pub force_n: f64,
     /// Where the tip first touches the film, mm.
     pub offset_mm: [f64; 2],
-    /// The largest tangential force in parts of the normal one, up to 0.8: beyond it the tip slides.
+    /// The largest tangential force in parts of the normal one, up to 0.8: beyond it the tip
+    /// slides.
     pub friction: f64,
 }
 
@@ -49,7 +50,8 @@ impl Stage {
         if steep <= steepest {
             return self.reached(film, tilt, [0.0; 2]);
         }
-        // It slides along the tangential force: unknown are that direction and how far, in parts of the depth.
+        // It slides along the tangential force: unknown are that direction and how far, in parts of
+        // the depth.
         let [x, y] = self.tangents;
         let along = |turn: f64| {
             let (sin, cos) = libm::sincos(turn);

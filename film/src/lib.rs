@@ -1,10 +1,12 @@
 //! The film of a HiVTac sensor: from a load to where tip and markers go, for every frame.
 //!
-//! The film is a nonlinear shell; its finite elements (`shell/`) take more than half a second for one press. What a frame
-//! needs of it are tables in `data/`, made from full solutions by a command of `shell/`.
+//! The film is a nonlinear shell; its finite elements (`shell/`) take more than half a second for
+//! one press. What a frame needs of it are tables in `data/`, made from full solutions by a command
+//! of `shell/`.
 //!
-//! The same bits on every machine: transcendental functions come from `libm` only, and nothing is fused. Frame and units
-//! as in `docs/architecture.md`: x right and y down in the image, z away from the camera; mm, N.
+//! The same bits on every machine: transcendental functions come from `libm` only, and nothing is
+//! fused. Frame and units as in `docs/architecture.md`: x right and y down in the image, z away
+//! from the camera; mm, N.
 //!
 //! | file | subject |
 //! |---|---|

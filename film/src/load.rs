@@ -8,8 +8,9 @@ use crate::FilmError;
 use crate::MAX_RATIO;
 use crate::reduced::NOMINAL_RADIUS_MM;
 
-/// What the label (α, β, |F|) of a load says of the tip. It decides how well anything can be measured: at 0.2 N a
-/// degree moves the markers by 0.2 px (`Force`) or 1.8 px (`Stick`) at 800×600.
+/// What the label (α, β, |F|) of a load says of the tip. It decides how well anything can be
+/// measured: at 0.2 N a degree moves the markers by 0.2 px (`Force`) or 1.8 px (`Stick`) at
+/// 800×600.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(try_from = "String"))]
@@ -17,11 +18,13 @@ pub enum Contact {
     /// The force on the film has that direction and size; the tip goes where the film lets it.
     #[default]
     Force,
-    /// The tip moves in that direction and the film sticks to it, up to a friction ratio of 0.8; |F| is the force along
-    /// it, as a gauge on the paper's stage reads it. The force on the film is tilted more than the travel.
+    /// The tip moves in that direction and the film sticks to it, up to a friction ratio of 0.8;
+    /// |F| is the force along it, as a gauge on the paper's stage reads it. The force on the film
+    /// is tilted more than the travel.
     Stick,
-    /// As `Stick`, until the sideways force is μ times the normal one (in the film's frame). Then the tip slides over
-    /// the film the way it is moved, and the sideways force stays μ times the normal one.
+    /// As `Stick`, until the sideways force is μ times the normal one (in the film's frame). Then
+    /// the tip slides over the film the way it is moved, and the sideways force stays μ times the
+    /// normal one.
     Slip {
         /// The friction ratio, 0.05 to 0.8.
         mu: f64,
@@ -83,10 +86,10 @@ impl Contact {
 
 /// What presses on the film: a labelled force in newtons, what its label means and where it acts.
 ///
-/// Film frame, right-handed: x right and y down in the image, z away from the camera, so that a press has F_z < 0.
-/// F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's (the paper's goniometer, Section 6).
-/// Whether the film can take it is the film's to say ([`crate::Film::check`]), and what force then really acts on
-/// it ([`crate::Pressed::force_n`]).
+/// Film frame, right-handed: x right and y down in the image, z away from the camera, so that a
+/// press has F_z < 0. F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's (the
+/// paper's goniometer, Section 6). Whether the film can take it is the film's to say
+/// ([`crate::Film::check`]), and what force then really acts on it ([`crate::Pressed::force_n`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     vector_n: [f64; 3],
@@ -113,7 +116,8 @@ impl Load {
     /// A force by size (N, ≥ 0) and direction (degrees, between −90 and 90).
     ///
     /// # Errors
-    /// When a number is not finite, `magnitude_n` is negative or an angle is not between −90° and 90°.
+    /// When a number is not finite, `magnitude_n` is negative or an angle is not between −90° and
+    /// 90°.
     pub fn from_angles(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Result<Load, FilmError> {
         check_magnitude(magnitude_n)?;
         check_angle("α", alpha_deg)?;
@@ -196,7 +200,8 @@ impl Load {
         })
     }
 
-    /// The same load with what it leaves open, which is what every load begins with; both must be possible.
+    /// The same load with what it leaves open, which is what every load begins with; both must be
+    /// possible.
     pub fn or(self, contact: Contact, offset_mm: [f64; 2], tip_radius_mm: f64) -> Load {
         let plain = self.contact == Contact::Force;
         let central = self.offset_mm == [0.0; 2];
@@ -228,8 +233,8 @@ impl Load {
         self.tip_radius_mm
     }
 
-    /// (F_x, F_y, F_z) in N, as the label says: the force on the film in the reading [`Contact::Force`], otherwise |F|
-    /// along the tip's way.
+    /// (F_x, F_y, F_z) in N, as the label says: the force on the film in the reading
+    /// [`Contact::Force`], otherwise |F| along the tip's way.
     pub fn vector_n(&self) -> [f64; 3] {
         self.vector_n
     }

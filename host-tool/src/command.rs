@@ -42,8 +42,8 @@ pub fn threshold(
     let made_for = hello.model.map(|model| from_wire(model.threshold));
     if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
         note(&format!(
-            "hivtac: samples have markers but no force (model_mismatch): the device's model was made for {}; \
-             `hivtac threshold --model` goes back to that",
+            "hivtac: samples have markers but no force (model_mismatch): the device's model was \
+             made for {}; `hivtac threshold --model` goes back to that",
             text(&made_for)
         ));
     }

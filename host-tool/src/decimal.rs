@@ -4,7 +4,8 @@ use serde::{Serialize, Serializer};
 use serde_json::value::RawValue;
 use std::fmt;
 
-/// An integer in units of 10^−`DECIMALS`, printed with all its decimals: `Decimal::<3>(-50)` is `-0.050`.
+/// An integer in units of 10^−`DECIMALS`, printed with all its decimals: `Decimal::<3>(-50)` is
+/// `-0.050`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decimal<const DECIMALS: u32>(pub i64);
 

@@ -1,4 +1,5 @@
-//! The one error type of the tool: what went wrong, where, what to do, and the exit code it ends with.
+//! The one error type of the tool: what went wrong, where, what to do, and the exit code it ends
+//! with.
 
 use std::fmt;
 

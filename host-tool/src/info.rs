@@ -166,7 +166,8 @@ fn stats_lines(stats: &Stats) -> [String; 4] {
             stats.usb_dropped, stats.host_frames_rejected
         ),
         format!(
-            "time       up {:.3} s; last frame took {} µs, its sample was ready {} µs after the middle of its exposure",
+            "time       up {:.3} s; last frame took {} µs, its sample was ready {} µs after the \
+             middle of its exposure",
             stats.uptime_us as f64 / 1e6,
             stats.processing_us,
             stats.latency_us

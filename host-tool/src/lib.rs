@@ -1,5 +1,6 @@
-//! A conversation with a HiVTac sensor, for programs on the host: where it is ([`port`]), what is said ([`link`]), how it
-//! fails ([`failure`]), what its thresholds say ([`threshold`]), and how a program is interrupted ([`stop`]).
+//! A conversation with a HiVTac sensor, for programs on the host: where it is ([`port`]), what is
+//! said ([`link`]), how it fails ([`failure`]), what its thresholds say ([`threshold`]), and how a
+//! program is interrupted ([`stop`]).
 
 pub mod failure;
 pub mod link;

@@ -184,7 +184,8 @@ fn json_row(row: &Row) -> String {
 
 /// A JSON object without a line end.
 pub fn to_json(value: &impl Serialize) -> String {
-    // Only maps with odd keys and failing `Serialize` implementations give an error; there are none here.
+    // Only maps with odd keys and failing `Serialize` implementations give an error; there are none
+    // here.
     serde_json::to_string(value).expect("plain data becomes JSON")
 }
 

@@ -12,8 +12,8 @@ use hivtac_wire::version::HelloPrefix;
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
-/// Time after the first hello until the second; doubles with each that is not answered, so that a device that still boots
-/// finds few of them in the line.
+/// Time after the first hello until the second; doubles with each that is not answered, so that a
+/// device that still boots finds few of them in the line.
 const HELLO_AGAIN: Duration = Duration::from_millis(250);
 /// Longest time between two hellos.
 const HELLO_AT_LEAST_EVERY: Duration = Duration::from_secs(2);
@@ -63,7 +63,8 @@ impl Link {
             while let Some(message) = self.receive(next)? {
                 // Anything else is left over from an earlier conversation.
                 if let DeviceMessage::Hello(hello) = message {
-                    // The decoder stands between two frames here; what it rejected so far does not count.
+                    // The decoder stands between two frames here; what it rejected so far does not
+                    // count.
                     self.decoder = Decoder::new();
                     return Ok(hello);
                 }
@@ -168,8 +169,8 @@ impl Link {
     fn foreign(&self, device: HelloPrefix) -> Failure {
         let host = HelloPrefix::OURS;
         let message = format!(
-            "the device at {} speaks protocol {} (schema {:#018x}), this tool protocol {} (schema {:#018x}); \
-             use the hivtac and the firmware of one release",
+            "the device at {} speaks protocol {} (schema {:#018x}), this tool protocol {} (schema \
+             {:#018x}); use the hivtac and the firmware of one release",
             self.name, device.protocol, device.schema, host.protocol, host.schema
         );
         Failure::new(Kind::Version, message)
@@ -186,7 +187,8 @@ impl Link {
     /// Sends a command and waits for its reply; other messages that come first go to `other`.
     ///
     /// # Errors
-    /// [`Kind::Refused`] when the answer is not `Done` or there is none within `patience`; those of [`Link::receive`].
+    /// [`Kind::Refused`] when the answer is not `Done` or there is none within `patience`; those of
+    /// [`Link::receive`].
     pub fn request(
         &mut self,
         request: Request,
@@ -245,10 +247,12 @@ fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::Unsupported => "its camera does not send that pixel format; choose another",
         Outcome::Busy => "it is busy with the same thing; try again later",
         Outcome::NotAtRest => {
-            "the markers are not where a film at rest has them; take away what touches it, and check the film's distance"
+            "the markers are not where a film at rest has them; take away what touches it, and \
+             check the film's distance"
         }
         Outcome::NoGoodFrames => {
-            "not enough good frames came in time; does the camera see all four markers? (hivtac monitor)"
+            "not enough good frames came in time; does the camera see all four markers? (hivtac \
+             monitor)"
         }
     };
     Err(refused(format!("the device refused \"{what}\": {why}")))

@@ -64,10 +64,12 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=256))]
         frames: u16,
     },
-    /// Set which pixels a marker may have, and with that the camera's pixel format, until the device restarts
+    /// Set which pixels a marker may have, and with that the camera's pixel format, until the
+    /// device restarts
     ///
-    /// There are forces only with the threshold that the device's model was made for; markers there are all the same, as
-    /// `hivtac-calibrate collect` needs them. Another pixel format forgets the tare.
+    /// There are forces only with the threshold that the device's model was made for; markers there
+    /// are all the same, as `hivtac-calibrate collect` needs them. Another pixel format forgets the
+    /// tare.
     Threshold {
         #[command(flatten)]
         device: Device,
@@ -83,9 +85,10 @@ enum Command {
     },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
-    /// PNG, JPEG or PPM, up to 800 × 800 px. Eight bits a channel are rounded to RGB565, which is what the sensor's
-    /// camera delivers. There is a force only when size, preset and threshold are those of the model; the status says so
-    /// otherwise, and blobs, markers and features are there all the same.
+    /// PNG, JPEG or PPM, up to 800 × 800 px. Eight bits a channel are rounded to RGB565, which is
+    /// what the sensor's camera delivers. There is a force only when size, preset and threshold are
+    /// those of the model; the status says so otherwise, and blobs, markers and features are there
+    /// all the same.
     Sense(SenseArguments),
 }
 
@@ -108,7 +111,8 @@ impl Device {
 #[derive(Args)]
 #[group(required = true, multiple = false)]
 struct WantedThreshold {
-    /// RGB565; inclusive bounds in OpenCV's 8-bit HSV: hue 0–179 (h0 > h1 wraps), saturation and value 0–255
+    /// RGB565; inclusive bounds in OpenCV's 8-bit HSV: hue 0–179 (h0 > h1 wraps), saturation and
+    /// value 0–255
     #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
     hsv: Option<HsvBox>,
     /// YUV422; lowest Cr, 0–255
@@ -160,7 +164,8 @@ struct SenseArguments {
     /// Pictures
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<String>,
-    /// Lens and pixels; the model's when not given. Other sizes than the preset's scale its focal length
+    /// Lens and pixels; the model's when not given. Other sizes than the preset's scale its focal
+    /// length
     #[arg(long, value_name = "paper|ov7725", value_parser = preset)]
     preset: Option<Preset>,
     /// Colours of a marker, as in `hivtac threshold --hsv`; the model's when not given

@@ -36,8 +36,8 @@ pub struct Options {
     pub truth: Option<String>,
 }
 
-/// Shows samples until the frames or the time are over, the reader is gone, or something fails; then the summary: on
-/// standard output for a person, on standard error beside JSON and CSV.
+/// Shows samples until the frames or the time are over, the reader is gone, or something fails;
+/// then the summary: on standard output for a person, on standard error beside JSON and CSV.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let mut monitor = Monitor::new(options)?;
     let result = monitor.watch();
@@ -79,7 +79,8 @@ impl Silence {
         if !std::mem::replace(&mut self.told, true) {
             let seconds = SILENCE.as_secs();
             note(&format!(
-                "hivtac: no sample for {seconds} s, but the device answers; does the camera run? (waiting)"
+                "hivtac: no sample for {seconds} s, but the device answers; does the camera run? \
+                 (waiting)"
             ));
         }
         self.since = Instant::now();
@@ -222,8 +223,8 @@ impl<'o> Monitor<'o> {
         Ok(End::Enough)
     }
 
-    /// Finds out whether the device still knows of this conversation. Behind a TCP port it may have been unplugged or
-    /// restarted without the port closing.
+    /// Finds out whether the device still knows of this conversation. Behind a TCP port it may have
+    /// been unplugged or restarted without the port closing.
     fn probe(&mut self, link: &mut Link) -> Result<Option<End>, Failure> {
         match self.request(link, Request::GetInfo, self.options.patience) {
             Err(failure) if failure.kind == Kind::Refused => {
@@ -280,7 +281,8 @@ impl<'o> Monitor<'o> {
         self.end().is_some_and(|end| Instant::now() >= end)
     }
 
-    /// Stops the device and fetches its last counters; it is no failure when that does not work any more.
+    /// Stops the device and fetches its last counters; it is no failure when that does not work any
+    /// more.
     fn say_goodbye(&mut self, link: &mut Link) {
         let ignore_samples = |stats: &mut Tally, message| {
             if let DeviceMessage::Stats(last) = message {

@@ -12,7 +12,8 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// Longest wait for a TCP connection.
 const TCP_PATIENCE: Duration = Duration::from_secs(2);
 
-/// A byte stream whose reads and writes give up after [`PATIENCE`] with an error of kind `TimedOut` or `WouldBlock`.
+/// A byte stream whose reads and writes give up after [`PATIENCE`] with an error of kind `TimedOut`
+/// or `WouldBlock`.
 pub trait Port: Read + Write {}
 impl<T: Read + Write> Port for T {}
 
@@ -118,7 +119,8 @@ fn describe(port: &SerialPortInfo) -> String {
 }
 
 fn open_tty(name: &str) -> Result<(Box<dyn Port>, String), Failure> {
-    // The baud rate means nothing to the device; some drivers want one. DTR tells it that a host is there.
+    // The baud rate means nothing to the device; some drivers want one. DTR tells it that a host is
+    // there.
     let port = serialport::new(name, 115_200)
         .timeout(PATIENCE)
         .dtr_on_open(true)

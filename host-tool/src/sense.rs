@@ -36,7 +36,8 @@ pub struct Options {
     pub json: bool,
 }
 
-/// Prints what it finds in each picture. A picture that cannot be used is named, and the others are still looked at.
+/// Prints what it finds in each picture. A picture that cannot be used is named, and the others are
+/// still looked at.
 pub fn run(options: &Options) -> Result<(), Failure> {
     let file = options.model.as_deref().map(read_model).transpose()?;
     let name = options.model.as_deref().unwrap_or("the built-in model");
@@ -107,14 +108,16 @@ impl<'a> Bench<'a> {
             if tare.size != (picture.width, picture.height) {
                 let (width, height) = tare.size;
                 return Err(failure(format!(
-                    "the picture {path} has {} × {} px, but the tare's has {width} × {height} px; use pictures of one size",
+                    "the picture {path} has {} × {} px, but the tare's has {width} × {height} px; \
+                     use pictures of one size",
                     picture.width, picture.height
                 )));
             }
             if !tare.rest.fits(&sensor.settings().geometry) {
                 return Err(failure(format!(
-                    "the tare's picture does not show a film at rest for {path}: its markers are more than 15 % nearer \
-                     to or farther from their centre than the preset has them; use a picture without a press, or another --preset"
+                    "the tare's picture does not show a film at rest for {path}: its markers are \
+                     more than 15 % nearer to or farther from their centre than the preset has \
+                     them; use a picture without a press, or another --preset"
                 )));
             }
             sensor.set_tare(Some(tare.rest));
@@ -143,7 +146,8 @@ impl<'a> Bench<'a> {
                 size: (picture.width, picture.height),
             }),
             None => Err(failure(format!(
-                "the tare picture {path} does not show the four markers ({}); look at it with `hivtac sense {path}`",
+                "the tare picture {path} does not show the four markers ({}); look at it with \
+                 `hivtac sense {path}`",
                 status.join(" ")
             ))),
         }
@@ -158,8 +162,8 @@ impl<'a> Bench<'a> {
         Ok(sensor)
     }
 
-    /// The model's conditions as far as nothing else is said; a picture of another size is taken as one by the same
-    /// preset, its focal length scaled with it.
+    /// The model's conditions as far as nothing else is said; a picture of another size is taken as
+    /// one by the same preset, its focal length scaled with it.
     fn settings(&self, picture: &Picture) -> Settings {
         let mut settings = Settings::of_model(&self.model, ByteOrder::Native);
         let conditions = &self.model.conditions;

@@ -1,4 +1,5 @@
-//! What a monitor saw in all: frames shown, received and lost by cause, and the error against the truth.
+//! What a monitor saw in all: frames shown, received and lost by cause, and the error against the
+//! truth.
 
 use crate::truth::Truth;
 use hivtac_wire::decoder::Rejected;
@@ -20,14 +21,16 @@ pub struct Tally {
     rejected: Rejected,
     device: DeviceCounts,
     without_force: u64,
-    /// Of those without a force, how many had each "no force" bit, by its place in [`Status::NAMES`].
+    /// Of those without a force, how many had each "no force" bit, by its place in
+    /// [`Status::NAMES`].
     reasons: BTreeMap<usize, u64>,
     errors: Errors,
     reconnections: u64,
 }
 
 impl Tally {
-    /// Connected again: frames that passed meanwhile were not sent, so it says nothing that they are missing.
+    /// Connected again: frames that passed meanwhile were not sent, so it says nothing that they
+    /// are missing.
     pub fn connected_again(&mut self) {
         self.reconnections += 1;
         self.gaps.away = true;
@@ -115,8 +118,8 @@ impl Tally {
             bytes,
         } = self.rejected;
         let mut line = format!(
-            "lost: {} samples on the way (gaps in the sequence), {} frames not processed (gaps in the frame number); \
-             rejected here: {} messages, {bytes} bytes",
+            "lost: {} samples on the way (gaps in the sequence), {} frames not processed (gaps in \
+             the frame number); rejected here: {} messages, {bytes} bytes",
             self.gaps.samples,
             self.gaps.frames,
             self.rejected.frames()
@@ -244,10 +247,10 @@ impl fmt::Display for DeviceCounts {
         ] = self.grown;
         write!(
             f,
-            "device: {exposed} frames exposed, {processed} processed; dropped: busy {busy}, overrun {overrun}, \
-             size {size}, set-up {setup}, USB {usb}; camera timeouts {timeouts}, \
-             restarts {restarts}, overruns {overruns}; commands rejected {rejected}; last frame took {} µs, its sample was ready {} µs after the middle of \
-             its exposure",
+            "device: {exposed} frames exposed, {processed} processed; dropped: busy {busy}, \
+             overrun {overrun}, size {size}, set-up {setup}, USB {usb}; camera timeouts \
+             {timeouts}, restarts {restarts}, overruns {overruns}; commands rejected {rejected}; \
+             last frame took {} µs, its sample was ready {} µs after the middle of its exposure",
             last.processing_us, last.latency_us
         )
     }
@@ -332,7 +335,8 @@ impl Errors {
     }
 }
 
-/// Angle between two vectors, degrees, well conditioned everywhere; `None` when one of them has no direction.
+/// Angle between two vectors, degrees, well conditioned everywhere; `None` when one of them has no
+/// direction.
 fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
     let cross = [

@@ -13,7 +13,8 @@ const PATIENCE: Duration = Duration::from_millis(300);
 /// Time between two looks at a file that grows.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
-/// One line of the log. A line without a force, as of a test picture, is that of a frame without a truth.
+/// One line of the log. A line without a force, as of a test picture, is that of a frame without a
+/// truth.
 #[derive(Deserialize)]
 struct Line {
     /// Frame number, as in the samples.
@@ -85,7 +86,8 @@ impl TruthFile {
         })
     }
 
-    /// The truth of a frame and forgets it; waits a little for its line to be written. `None` when it does not come.
+    /// The truth of a frame and forgets it; waits a little for its line to be written. `None` when
+    /// it does not come.
     pub fn take(&mut self, frame: u32) -> Result<Option<Truth>, Failure> {
         let end = Instant::now() + PATIENCE;
         loop {

@@ -1,7 +1,8 @@
 //! The board's wiring: which pins carry the camera's power, clock and signals, and what USB needs.
 //!
-//! WeAct MiniSTM32H743 with an OV7725: XCLK from MCO1 on PA8, camera power on PA7 (low is on), SCCB on PB8 and PB9,
-//! D0–D7 on PC6 PC7 PE0 PE1 PE4 PD3 PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB on PA11 and PA12, 25 MHz crystal.
+//! WeAct MiniSTM32H743 with an OV7725: XCLK from MCO1 on PA8, camera power on PA7 (low is on), SCCB
+//! on PB8 and PB9, D0–D7 on PC6 PC7 PE0 PE1 PE4 PD3 PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB
+//! on PA11 and PA12, 25 MHz crystal.
 
 use rigless::device::{Level, RegisterFile};
 use rigless::mcu::Mcu;

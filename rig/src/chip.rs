@@ -161,7 +161,12 @@ impl Chip {
         if wiring != self.wiring {
             if wiring.hclk_hz > self.revision.fastest_bus_hz() {
                 let (hclk, revision) = (wiring.hclk_hz, self.revision);
-                self.rules.broken(|| format!("RCC: HCLK is {hclk} Hz, too fast for silicon revision {revision:?} (DS12110)"));
+                self.rules.broken(|| {
+                    format!(
+                        "RCC: HCLK is {hclk} Hz, too fast for silicon \
+                    revision {revision:?} (DS12110)"
+                    )
+                });
             }
             if wiring.led && !self.wiring.led {
                 self.led_flashes_ns.push(at.0);

@@ -1,8 +1,9 @@
 //! DMA buffers must lie where the chip's DMA controllers can reach.
 //!
-//! RM0433 table 3: DMA1 and DMA2 reach the peripherals, AXI SRAM, SRAM1 to SRAM4, backup SRAM and flash, but neither
-//! ITCM nor DTCM. Silicon ends such a transfer with a transfer error; here it ends the run with a message that names
-//! the stream and the address, whether or not a byte was to move.
+//! RM0433 table 3: DMA1 and DMA2 reach the peripherals, AXI SRAM, SRAM1 to SRAM4, backup SRAM and
+//! flash, but neither ITCM nor DTCM. Silicon ends such a transfer with a transfer error; here it
+//! ends the run with a message that names the stream and the address, whether or not a byte was to
+//! move.
 
 use rigless::device::RegisterFile;
 
@@ -42,8 +43,8 @@ pub fn enabled_stream(address: u64, value: u64) -> Option<Stream> {
     })
 }
 
-/// Notes a breach when a stream's memory addresses are out of reach. `registers` are those of its controller; `control`
-/// is what was written to its control register.
+/// Notes a breach when a stream's memory addresses are out of reach. `registers` are those of its
+/// controller; `control` is what was written to its control register.
 pub fn check(stream: Stream, control: u64, registers: &[(u64, u64)], rules: &Rules) {
     let at = |offset: u64| {
         let offset = FIRST_STREAM + stream.number * STREAM + offset;
@@ -62,8 +63,9 @@ pub fn check(stream: Stream, control: u64, registers: &[(u64, u64)], rules: &Rul
             let Stream { controller, number } = stream;
             rules.broken(|| {
                 format!(
-                    "{controller} stream {number} is enabled with {register} = {address:#010x}, which is in {memory}: \
-                     DMA1 and DMA2 cannot reach it (RM0433 table 3). Put the buffer into AXI SRAM or SRAM1 to SRAM3"
+                    "{controller} stream {number} is enabled with {register} = {address:#010x}, \
+                     which is in {memory}: DMA1 and DMA2 cannot reach it (RM0433 table 3). Put the \
+                     buffer into AXI SRAM or SRAM1 to SRAM3"
                 )
             });
         }

@@ -1,9 +1,9 @@
 //! Peripherals that the firmware never clocked need not hear of DMA requests.
 //!
-//! The emulator tells every change of a request line to every timer, converter and serial interface of the part, and
-//! each of them searches its wiring. At several changes per DMA word that is most of the time a frame takes. A
-//! peripheral whose clock has not been enabled since reset holds nothing and answers nothing, so it is left out. Once
-//! enabled it is told everything, for good.
+//! The emulator tells every change of a request line to every timer, converter and serial interface
+//! of the part, and each of them searches its wiring. At several changes per DMA word that is most
+//! of the time a frame takes. A peripheral whose clock has not been enabled since reset holds
+//! nothing and answers nothing, so it is left out. Once enabled it is told everything, for good.
 
 use rigless::soc::Bus;
 use rigless::soc::stm32h743::generated::rcc::Register;
@@ -63,7 +63,8 @@ impl Dormant {
         }
     }
 
-    /// Whether the peripheral in a slot was never clocked. Asked before every access and event of the slot.
+    /// Whether the peripheral in a slot was never clocked. Asked before every access and event of
+    /// the slot.
     pub fn sleeps(&mut self, slot: usize, bus: &Bus) -> bool {
         if slot == self.rcc {
             // The write, if it is one, lands after this.

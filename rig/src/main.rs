@@ -21,16 +21,16 @@ use hivtac_rig::truth::TruthLog;
 
 /// Runs the firmware on an emulated STM32H743 with a simulated camera and a USB host.
 ///
-/// Prints `ready tcp=ADDRESS pty=PATH` once the serial port is there. Ends at a limit, on SIGTERM or Ctrl-C, or, with
-/// --exit-on-hangup, when the client leaves. Exit code 0 when the run ended so, 1 when it could not be done or the
-/// firmware broke a rule of the chip, 2 for wrong arguments.
+/// Prints `ready tcp=ADDRESS pty=PATH` once the serial port is there. Ends at a limit, on SIGTERM
+/// or Ctrl-C, or, with --exit-on-hangup, when the client leaves. Exit code 0 when the run ended so,
+/// 1 when it could not be done or the firmware broke a rule of the chip, 2 for wrong arguments.
 #[derive(Parser, Debug)]
 #[command(name = "hivtac-rig", version)]
 struct Arguments {
     /// The firmware, as it is flashed.
     elf: PathBuf,
-    /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or test-picture; or a scene file
-    /// (FILE.toml), which has seed and preset of its own.
+    /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or
+    /// test-picture; or a scene file (FILE.toml), which has seed and preset of its own.
     #[arg(long, default_value = "demo")]
     scene: String,
     /// Decides the noise, where the demo starts, and what the camera's data sheets leave open.

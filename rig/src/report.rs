@@ -138,7 +138,8 @@ impl Report {
             .wall_per_frame_s()
             .map_or(String::new(), |s| format!(" ({s:.3} s per frame)"));
         format!(
-            "{:.3} s of virtual time in {:.1} s{per_frame}; {} exposures, {} frames captured, {} overruns; {} bytes over USB, {} resets",
+            "{:.3} s of virtual time in {:.1} s{per_frame}; {} exposures, {} frames captured, {} \
+             overruns; {} bytes over USB, {} resets",
             self.virtual_ns as f64 / 1e9,
             self.wall.as_secs_f64(),
             self.exposures,

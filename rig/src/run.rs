@@ -33,7 +33,8 @@ pub const INSTRUCTIONS_PER_SECOND: u64 = 400_000_000;
 const LOOK_NS: u64 = 1_000_000;
 /// How long a run goes on after its client left, before it waits for the next one, ns.
 const LINGER_NS: u64 = 100_000_000;
-/// How long after a change of clocks or pins they are watched, ns: oscillators and loops take up to 2.1 ms.
+/// How long after a change of clocks or pins they are watched, ns: oscillators and loops take up to
+/// 2.1 ms.
 const SETTLING_NS: u64 = 10_000_000;
 
 /// Who uses the serial port.
@@ -165,7 +166,8 @@ fn load(path: &Path) -> anyhow::Result<Image> {
     let magic = std::fs::read(path).with_context(|| format!("firmware {}", path.display()))?;
     if !magic.starts_with(b"\x7FELF") {
         bail!(
-            "firmware {}: not an ELF file; build one with `cargo build --release -p hivtac-firmware --target thumbv7em-none-eabihf`",
+            "firmware {}: not an ELF file; build one with `cargo build --release -p \
+             hivtac-firmware --target thumbv7em-none-eabihf`",
             path.display()
         );
     }
@@ -293,7 +295,8 @@ impl Conductor {
         }
     }
 
-    /// Gives the client its turn, and holds the run up as long as it has to wait. Answers whether the run goes on.
+    /// Gives the client its turn, and holds the run up as long as it has to wait. Answers whether
+    /// the run goes on.
     fn serve_client(&mut self, now: u64) -> bool {
         while !self.interrupt.load(Ordering::Relaxed) {
             self.client = self.look_for_client(now);

@@ -1,4 +1,5 @@
-//! A scripted host: what it does, and when, in virtual time. With it a run is the same bytes every time.
+//! A scripted host: what it does, and when, in virtual time. With it a run is the same bytes every
+//! time.
 //!
 //! One action per line, `MS ACTION`, times in milliseconds (fractions allowed) in any order:
 //!

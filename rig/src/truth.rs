@@ -1,4 +1,5 @@
-//! The truth log: one JSON object per exposure, for whoever compares it with what the firmware says.
+//! The truth log: one JSON object per exposure, for whoever compares it with what the firmware
+//! says.
 
 use std::fs::File;
 use std::io::Write;
@@ -18,7 +19,8 @@ pub struct TruthLog {
 /// One exposure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposed {
-    /// Ends of VSYNC pulses since the camera's first register reset after the microcontroller's reset; the first one is
+    /// Ends of VSYNC pulses since the camera's first register reset after the microcontroller's
+    /// reset; the first one is
     /// 1. Zero before that.
     pub frame: u64,
     /// Ends of VSYNC pulses since the run began: what the scene's noise depends on.

@@ -53,7 +53,8 @@ fn end(mut child: Child) -> (Option<i32>, String) {
     (child.wait().unwrap().code(), error)
 }
 
-/// Says hello again and again, as a client does that does not know when the device listens, until it answers.
+/// Says hello again and again, as a client does that does not know when the device listens, until
+/// it answers.
 fn greet(port: &mut (impl Read + Write)) -> DeviceMessage {
     let mut decoder = Decoder::<DEVICE_FRAME_LIMIT>::new();
     let began = Instant::now();

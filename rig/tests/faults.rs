@@ -81,8 +81,8 @@ fn a_silent_camera_is_restarted() {
     run.assert_times();
 }
 
-/// The DMA loses the bus for a millisecond, amid a frame's rows and not between two frames: the frame is dropped, counted,
-/// and the next sample says so.
+/// The DMA loses the bus for a millisecond, amid a frame's rows and not between two frames: the
+/// frame is dropped, counted, and the next sample says so.
 #[test]
 fn an_overrun_costs_a_frame_and_is_told() {
     let run = Setup::new(firmware(), 300).fault("dcmi-overrun@240").run();
@@ -131,8 +131,8 @@ fn a_short_frame_costs_itself_and_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
-/// The camera sends rows after the last one: the frame counts as too long, whether it was measured by then or, on a slow
-/// core, not yet; the next sample says so. That one is whole.
+/// The camera sends rows after the last one: the frame counts as too long, whether it was measured
+/// by then or, on a slow core, not yet; the next sample says so. That one is whole.
 #[test]
 fn a_long_frame_is_told_and_costs_no_other() {
     let run = Setup::new(firmware(), 300).fault("frame-long@230").run();
@@ -148,8 +148,8 @@ fn a_long_frame_is_told_and_costs_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
-/// The host leaves the port open and does not read: samples are dropped and counted, the camera goes on, and the
-/// stream is in step again at once.
+/// The host leaves the port open and does not read: samples are dropped and counted, the camera
+/// goes on, and the stream is in step again at once.
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
     let run = Setup::new(firmware(), 600)
@@ -172,7 +172,8 @@ fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
     assert!(gaps >= 1, "the loss shows in the sequence numbers");
 }
 
-/// The cable is pulled and put back: a new enumeration, a new conversation, frame numbers that went on.
+/// The cable is pulled and put back: a new enumeration, a new conversation, frame numbers that went
+/// on.
 #[test]
 fn a_pulled_cable_is_survived() {
     let ms = HELLO_MS;

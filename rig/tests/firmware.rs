@@ -62,7 +62,8 @@ fn frames_back_to_back_are_all_measured() {
     assert_eq!(run.missing_frames(), Vec::<u32>::new());
     assert_eq!(run.frames_after_a_loss(), Vec::<u32>::new());
     let (stats, dcmi) = (run.stats(), run.report.dcmi);
-    // All frames that began before the first captured one passed during the camera's set-up; one is under way.
+    // All frames that began before the first captured one passed during the camera's set-up; one is
+    // under way.
     let whole = stats.frames_exposed - stats.dropped_setup - 1;
     assert!(stats.frames_processed.abs_diff(whole) <= 1, "{stats:?}");
     // All words of every frame that has ended, and some of the one under way, or all.

@@ -1,5 +1,6 @@
-//! Another pixel format while frames are streamed: no frame is read as what it is not, the ones that pass meanwhile are
-//! counted, and the way back leads to the very forces that there would have been.
+//! Another pixel format while frames are streamed: no frame is read as what it is not, the ones
+//! that pass meanwhile are counted, and the way back leads to the very forces that there would have
+//! been.
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! What a program must not do ends the run with a message. The programs here are a few instructions that write
-//! registers, in an ELF made on the spot.
+//! What a program must not do ends the run with a message. The programs here are a few instructions
+//! that write registers, in an ELF made on the spot.
 
 use std::num::NonZeroU64;
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Firmware with a seeded bug must fail, each in its own way: that is what shows that the rig would notice.
+//! Firmware with a seeded bug must fail, each in its own way: that is what shows that the rig would
+//! notice.
 
 mod common;
 
@@ -6,7 +7,8 @@ use common::{Setup, bug};
 use hivtac_rig::usb_host::Port;
 use hivtac_wire::status::Status;
 
-/// DMAMUX connects another request: nobody empties the FIFO, so every frame overruns at its fifth word.
+/// DMAMUX connects another request: nobody empties the FIFO, so every frame overruns at its fifth
+/// word.
 #[test]
 fn a_wrong_dmamux_request_overruns_every_frame() {
     let run = Setup::new(bug("bug-dmamux-request"), 280).run();
@@ -32,7 +34,8 @@ fn wrong_polarities_give_frames_of_the_wrong_size() {
     );
 }
 
-/// The camera's format register stays at YUV: frames of the right size, without a red marker in them.
+/// The camera's format register stays at YUV: frames of the right size, without a red marker in
+/// them.
 #[test]
 fn a_wrong_camera_register_leaves_no_markers() {
     let run = Setup::new(bug("bug-camera-register"), 280).run();

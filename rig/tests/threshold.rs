@@ -1,5 +1,5 @@
-//! A new threshold while frames are streamed: its table is made in place, the frames that pass meanwhile are counted, and
-//! none is of two thresholds.
+//! A new threshold while frames are streamed: its table is made in place, the frames that pass
+//! meanwhile are counted, and none is of two thresholds.
 
 mod common;
 
@@ -33,7 +33,8 @@ fn no_frame_is_of_two_thresholds_and_those_that_pass_are_counted() {
             panic!("{ms} ms: {:?}", run.answers(ASKED));
         };
         let samples = run.samples();
-        // With the markers' red every frame has a force; without it nothing is seen. Half of both would be something else.
+        // With the markers' red every frame has a force; without it nothing is seen. Half of both
+        // would be something else.
         let is_old = |sample: &&&Sample| !sample.status.contains(Status::MODEL_MISMATCH);
         let old = samples.iter().take_while(is_old).count();
         assert_eq!(old, before, "{ms} ms");

@@ -1,4 +1,5 @@
-//! Frames rendered per second, and what the film costs of one, on one core: `cargo run --release -p hivtac-scene --example speed`.
+//! Frames rendered per second, and what the film costs of one, on one core:
+//! `cargo run --release -p hivtac-scene --example speed`.
 
 use std::time::Instant;
 

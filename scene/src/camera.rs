@@ -63,9 +63,10 @@ impl FromStr for Preset {
 
 /// Lens and picture: where a point in space is seen.
 ///
-/// Usually an equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z), ρ the distance from the optical
-/// axis and Z the *axial* distance from the pinhole. The paper's eq. 15 means this Z; its eq. 23 puts the slant
-/// distance √(ρ² + Z²) in its place, which is not a ray's angle.
+/// Usually an equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z), ρ the
+/// distance from the optical axis and Z the *axial* distance from the pinhole. The paper's eq. 15
+/// means this Z; its eq. 23 puts the slant distance √(ρ² + Z²) in its place, which is not a ray's
+/// angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     preset: Preset,
@@ -132,7 +133,8 @@ impl Camera {
         self.focal_px
     }
 
-    /// Where the point (x, y, z) mm of the film frame is seen, px. z > −10 mm: in front of the pinhole.
+    /// Where the point (x, y, z) mm of the film frame is seen, px. z > −10 mm: in front of the
+    /// pinhole.
     pub fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let rho = (x * x + y * y).sqrt();
         if rho == 0.0 {

@@ -5,9 +5,9 @@ use crate::exposure::Image;
 
 /// A grid of pixels around a polygon, with the covered part (0 to 1) of each.
 ///
-/// Each edge adds, to every pixel on its right, the signed height that it spans in that pixel's row; summed along
-/// the row, the edges of a closed polygon leave exactly the covered area. A pixel (x, y) is the unit square around
-/// its centre (x, y).
+/// Each edge adds, to every pixel on its right, the signed height that it spans in that pixel's
+/// row; summed along the row, the edges of a closed polygon leave exactly the covered area. A pixel
+/// (x, y) is the unit square around its centre (x, y).
 pub(crate) struct Coverage {
     /// Column and row of the grid's first pixel; may lie outside the frame.
     left: i64,
@@ -37,8 +37,9 @@ impl Coverage {
         Coverage::mean(&clipped, image.blur_px)
     }
 
-    /// The mean coverage by polygons of finite corners, clockwise on the screen: one, or several during an exposure.
-    /// Blurred by a Gaussian of standard deviation `blur_px` ≥ 0 along x and along y.
+    /// The mean coverage by polygons of finite corners, clockwise on the screen: one, or several
+    /// during an exposure. Blurred by a Gaussian of standard deviation `blur_px` ≥ 0 along x and
+    /// along y.
     fn mean(outlines: &[Outline], blur_px: f64) -> Coverage {
         let margin = (3.0 * blur_px).ceil() as i64;
         let mut grid = Coverage::around(outlines, margin);
@@ -59,8 +60,8 @@ impl Coverage {
         grid
     }
 
-    /// An empty grid that holds the polygons and a margin, with one spare column that takes what the last edges leave
-    /// over.
+    /// An empty grid that holds the polygons and a margin, with one spare column that takes what
+    /// the last edges leave over.
     fn around(outlines: &[Outline], margin: i64) -> Coverage {
         let start = ([0.0; 2], [0.0; 2]);
         let outlines = outlines
@@ -84,7 +85,8 @@ impl Coverage {
         }
     }
 
-    /// Convolves the grid with a bell along its rows, then along its columns. Outside the grid nothing is covered.
+    /// Convolves the grid with a bell along its rows, then along its columns. Outside the grid
+    /// nothing is covered.
     fn blur(&mut self, bell: &[f64]) {
         let columns = self.columns;
         let rows = self.parts.len() / columns;
@@ -107,7 +109,8 @@ impl Coverage {
         if y0 == y1 {
             return;
         }
-        // Edges downwards lie on the right of a clockwise polygon: what is on their right is outside.
+        // Edges downwards lie on the right of a clockwise polygon: what is on their right is
+        // outside.
         let (sign, [xa, ya], [xb, yb]) = match y0 < y1 {
             true => (-weight, [x0, y0], [x1, y1]),
             false => (weight, [x1, y1], [x0, y0]),
@@ -138,7 +141,8 @@ impl Coverage {
             } else {
                 1.0
             };
-            // What lies right of the piece within this pixel, and what is left over for all pixels after it.
+            // What lies right of the piece within this pixel, and what is left over for all pixels
+            // after it.
             let to_its_left = (left + right) / 2.0 - column as f64;
             cells[column] += height * part * (1.0 - to_its_left);
             cells[column + 1] += height * part * to_its_left;

@@ -14,7 +14,8 @@ pub const MARKERS: [Disc; 4] = [
     Disc::marker(MARKER_CENTRES_MM[3]),
 ];
 
-/// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than 1e-4 px.
+/// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than
+/// 1e-4 px.
 const CORNERS: u32 = 48;
 /// Discs of a smaller radius, mm, make do with fewer corners: they are specks of a few pixels.
 const SPECK_RADIUS_MM: f64 = 0.15;
@@ -46,7 +47,8 @@ impl Disc {
         }
     }
 
-    /// The centroid of the disc's image, px, on a film that moves its points (mm) by `displacement`.
+    /// The centroid of the disc's image, px, on a film that moves its points (mm) by
+    /// `displacement`.
     pub fn centroid_px(
         &self,
         displacement: impl Fn([f64; 2]) -> [f64; 3],
@@ -55,8 +57,8 @@ impl Disc {
         self.image(displacement, camera).area_and_centroid().1
     }
 
-    /// The disc's image on a film that moves its points (mm) by `displacement`: the image of its rim, not of its
-    /// centre.
+    /// The disc's image on a film that moves its points (mm) by `displacement`: the image of its
+    /// rim, not of its centre.
     pub(crate) fn image(
         &self,
         displacement: impl Fn([f64; 2]) -> [f64; 3],
@@ -120,7 +122,8 @@ impl Outline {
         self.area_and_centroid().0
     }
 
-    /// Area in px² and its centroid in px. There must be corners; without an area the centroid is no number.
+    /// Area in px² and its centroid in px. There must be corners; without an area the centroid is
+    /// no number.
     pub(crate) fn area_and_centroid(&self) -> (f64, [f64; 2]) {
         // Moments about a corner, so that no digits are lost far from the origin.
         let [ox, oy] = self.corners[0];
@@ -136,7 +139,8 @@ impl Outline {
         (twice_area / 2.0, centroid)
     }
 
-    /// The part of it inside a frame with a margin around it, px; without corners where there is none.
+    /// The part of it inside a frame with a margin around it, px; without corners where there is
+    /// none.
     pub(crate) fn clipped(&self, width: u32, height: u32, margin: f64) -> Outline {
         let before = 0.5 + margin;
         let right = f64::from(width) - 0.5 + margin;
@@ -203,8 +207,9 @@ mod tests {
         assert!(outside.corners.is_empty());
     }
 
-    /// Centroid of a resting disc's image on the diagonal, mm from the axis, by a sum over the disc: every part of
-    /// the film counts by the area of its image, r·r′/ρ with r = f·arctan(ρ / D).
+    /// Centroid of a resting disc's image on the diagonal, mm from the axis, by a sum over the
+    /// disc: every part of the film counts by the area of its image, r·r′/ρ with r = f·arctan(ρ /
+    /// D).
     fn centroid_radius_mm(centre_mm: f64, radius_mm: f64) -> f64 {
         const N: i32 = 400;
         let at = |i: i32| (f64::from(i) + 0.5) / f64::from(N) * radius_mm;

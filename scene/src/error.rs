@@ -6,7 +6,8 @@ use hivtac_film::FilmError;
 
 use crate::Motion;
 
-/// A scene, size, load or option that cannot be simulated. The message says what, where and what is possible.
+/// A scene, size, load or option that cannot be simulated. The message says what, where and what is
+/// possible.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneError {
     /// No scene of this name.
@@ -66,7 +67,8 @@ impl fmt::Display for SceneError {
             }
             SceneError::Size { width, height } => write!(
                 f,
-                "frame size {width}×{height}: use a 4:3 size from 160×120 to 800×600, such as 320×240"
+                "frame size {width}×{height}: use a 4:3 size from 160×120 to 800×600, such as \
+                 320×240"
             ),
             SceneError::Film(error) => error.fmt(f),
             #[cfg(feature = "file")]

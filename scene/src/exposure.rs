@@ -1,4 +1,5 @@
-//! The images that discs leave in one frame: where they are while their rows are exposed, and how sharp.
+//! The images that discs leave in one frame: where they are while their rows are exposed, and how
+//! sharp.
 
 use crate::camera::centre;
 use crate::disc::Outline;

@@ -1,7 +1,7 @@
 //! Pixel formats: how the camera codes what it sees.
 //!
-//! Colours of YUV422 and JPEG follow BT.601 in full range, 0 to 255 in all three numbers, as JFIF has it and as
-//! OmniVision's sensors send when their output range is set to 00–FF:
+//! Colours of YUV422 and JPEG follow BT.601 in full range, 0 to 255 in all three numbers, as JFIF
+//! has it and as OmniVision's sensors send when their output range is set to 00–FF:
 //!
 //! ```text
 //! Y  = 0.299 R + 0.587 G + 0.114 B
@@ -21,15 +21,18 @@ pub enum Format {
     /// One `u16` per pixel: red in bits 15–11, green in 10–5, blue in 4–0.
     #[default]
     Rgb565,
-    /// YUYV, one `u16` per pixel as two bytes of the bus lie in little-endian memory: luma in the low byte, chroma in
-    /// the high byte, Cb in even columns and Cr in odd ones; both are the mean of the pair. Read as a little-endian
-    /// `u32`, a pair has its Cr in the top byte. A marker's Cr is 191, the film's 132.
+    /// YUYV, one `u16` per pixel as two bytes of the bus lie in little-endian memory: luma in the
+    /// low byte, chroma in the high byte, Cb in even columns and Cr in odd ones; both are the mean
+    /// of the pair. Read as a little-endian `u32`, a pair has its Cr in the top byte. A marker's Cr
+    /// is 191, the film's 132.
     Yuv422,
-    /// One byte per pixel: a monochrome sensor behind a green filter, or in green light, so that red markers are *dark*:
-    /// 36 against the film's 141. (Without the filter red tape has half of the film's luma, behind a red one all of it.)
+    /// One byte per pixel: a monochrome sensor behind a green filter, or in green light, so that
+    /// red markers are *dark*: 36 against the film's 141. (Without the filter red tape has half of
+    /// the film's luma, behind a red one all of it.)
     Mono,
-    /// The picture compressed and decompressed again, then coded as [`Format::Rgb565`]: what a computer works on that
-    /// has a JPEG camera, as the paper's was. Chroma has half the resolution each way.
+    /// The picture compressed and decompressed again, then coded as [`Format::Rgb565`]: what a
+    /// computer works on that has a JPEG camera, as the paper's was. Chroma has half the resolution
+    /// each way.
     #[cfg(feature = "jpeg")]
     Jpeg {
         /// 1 to 100, as the Independent JPEG Group counts; cameras use 70 to 95.

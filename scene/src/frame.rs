@@ -14,7 +14,8 @@ pub struct Frame {
     pub height: u32,
     /// How its pixels are coded.
     pub format: Format,
-    /// Row by row, `width · height` of them, coded as [`Format`] says, in native order; none in [`Format::Mono`].
+    /// Row by row, `width · height` of them, coded as [`Format`] says, in native order; none in
+    /// [`Format::Mono`].
     pub pixels: Vec<u16>,
     /// Row by row, `width · height` of them, in [`Format::Mono`]; otherwise none.
     pub mono: Vec<u8>,
@@ -50,7 +51,8 @@ impl Raster {
 pub struct Truth {
     /// The load as it is labelled: what a stage and its gauge say.
     pub force: Load,
-    /// The tip's force on the film, N: the label's in the contact reading `force`, another one otherwise.
+    /// The tip's force on the film, N: the label's in the contact reading `force`, another one
+    /// otherwise.
     pub on_film_n: [f64; 3],
     /// Where the tip went, mm, film frame.
     pub tip_mm: [f64; 3],
@@ -64,7 +66,8 @@ pub struct Truth {
 /// What is true of one marker's image. Patches over it are not taken off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkerTruth {
-    /// Centroid of the disc's whole image in this frame, as its shutter exposes it, px; the centre of pixel (0, 0) is the origin.
+    /// Centroid of the disc's whole image in this frame, as its shutter exposes it, px; the centre
+    /// of pixel (0, 0) is the origin.
     pub centroid_px: [f64; 2],
     /// Area of the disc's whole image, px².
     pub area_px2: f64,
@@ -83,7 +86,8 @@ impl Frame {
         self.mono.chunks_exact(self.width as usize)
     }
 
-    /// The frame as 16-bit words: [`Self::pixels`], or two pixels of [`Self::mono`] in each, the left one below.
+    /// The frame as 16-bit words: [`Self::pixels`], or two pixels of [`Self::mono`] in each, the
+    /// left one below.
     pub fn words(&self) -> Cow<'_, [u16]> {
         if self.format == Format::Mono {
             let (pairs, _) = self.mono.as_chunks();
@@ -92,8 +96,8 @@ impl Frame {
         Cow::Borrowed(&self.pixels)
     }
 
-    /// The picture in 8-bit red, green and blue, three bytes per pixel, row by row, whatever its format. RGB565 is
-    /// widened by repeating the upper bits of a channel.
+    /// The picture in 8-bit red, green and blue, three bytes per pixel, row by row, whatever its
+    /// format. RGB565 is widened by repeating the upper bits of a channel.
     pub fn to_rgb888(&self) -> Vec<u8> {
         match self.format {
             Format::Mono => self.mono.iter().flat_map(|&grey| [grey; 3]).collect(),
@@ -109,7 +113,8 @@ impl Frame {
         }
     }
 
-    /// The picture in RGB565, whatever its format: [`Self::pixels`] where they are that, otherwise the nearest codes.
+    /// The picture in RGB565, whatever its format: [`Self::pixels`] where they are that, otherwise
+    /// the nearest codes.
     pub fn to_rgb565(&self) -> Cow<'_, [u16]> {
         if matches!(self.format, Format::Yuv422 | Format::Mono) {
             let levels = self.to_rgb888();

@@ -1,5 +1,5 @@
-//! A picture through JPEG and back, the same bytes on every machine: both crates transform in integers, the encoder
-//! without its `simd`, the decoder told not to use any.
+//! A picture through JPEG and back, the same bytes on every machine: both crates transform in
+//! integers, the encoder without its `simd`, the decoder told not to use any.
 
 use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, SamplingFactor};
 use zune_jpeg::JpegDecoder;

@@ -14,10 +14,11 @@ pub struct Lens {
     pub discs: Discs,
     /// Pixel pitch at this frame size, 1 to 50 µm; `None` is the preset's.
     pub pitch_um: Option<f64>,
-    /// Standard deviation of the blur that every point has, 0 to 20 px: the lens's faults and a wrong focus.
+    /// Standard deviation of the blur that every point has, 0 to 20 px: the lens's faults and a
+    /// wrong focus.
     pub blur_px: f64,
-    /// Diameter of the entrance pupil, 0 to 2.1 mm: 2.1 mm divided by the F-number. It blurs what is nearer or farther
-    /// than [`Self::focus_mm`]; 0 blurs nothing.
+    /// Diameter of the entrance pupil, 0 to 2.1 mm: 2.1 mm divided by the F-number. It blurs what
+    /// is nearer or farther than [`Self::focus_mm`]; 0 blurs nothing.
     pub aperture_mm: f64,
     /// The distance from the pinhole along the axis that is in focus, 1 to 1000 mm.
     pub focus_mm: f64,
@@ -53,7 +54,8 @@ pub enum Discs {
     /// The image of all its points.
     #[default]
     Whole,
-    /// The same shape, but with its centroid at the image of the disc's centre: what a calculation with points sees.
+    /// The same shape, but with its centroid at the image of the disc's centre: what a calculation
+    /// with points sees.
     ByCentre,
 }
 
@@ -64,23 +66,25 @@ pub enum Discs {
 pub struct Mounting {
     /// Shift of the whole picture (the optical centre), px, within ±200.
     pub shift_px: [f64; 2],
-    /// Rotation of the picture about the optical axis, degrees, within ±45; positive turns x towards y.
+    /// Rotation of the picture about the optical axis, degrees, within ±45; positive turns x
+    /// towards y.
     pub roll_deg: f64,
 }
 
-/// When which row is exposed. Brightness is [`crate::Options::gain`]'s alone: cameras make up for the time.
+/// When which row is exposed. Brightness is [`crate::Options::gain`]'s alone: cameras make up for
+/// the time.
 ///
-/// A frame's time is the middle of the exposure of its middle row. Each disc is imaged at the time of the row in which
-/// it is seen, all of it at once: a marker is 13 to 32 rows high, and what moves it by a pixel within a few
-/// rows' time would tear the film.
+/// A frame's time is the middle of the exposure of its middle row. Each disc is imaged at the time
+/// of the row in which it is seen, all of it at once: a marker is 13 to 32 rows high, and what
+/// moves it by a pixel within a few rows' time would tear the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Shutter {
     /// How long each row is exposed, 0 to 1 s: what moves meanwhile is smeared.
     pub exposure_s: f64,
-    /// How much later a row below the last one would be exposed than the first, 0 to 0.1 s; 0 is a global shutter.
-    /// The OV7725 rolls: 5.5 ms for its 240 rows at 156 frames per second.
+    /// How much later a row below the last one would be exposed than the first, 0 to 0.1 s; 0 is a
+    /// global shutter. The OV7725 rolls: 5.5 ms for its 240 rows at 156 frames per second.
     pub readout_s: f64,
 }
 
@@ -108,10 +112,12 @@ impl Lens {
         within("focus_mm", self.focus_mm, [1.0, 1000.0])
     }
 
-    /// Standard deviation of the blur of a point at an axial distance in mm, by a lens of a focal length in px.
+    /// Standard deviation of the blur of a point at an axial distance in mm, by a lens of a focal
+    /// length in px.
     ///
-    /// Through a pupil of diameter A, a point at distance Z is a disc of angular diameter A·|1/Z − 1/Z₀| when Z₀ is in
-    /// focus; along each direction a uniform disc has a quarter of its diameter for standard deviation. At most 20 px.
+    /// Through a pupil of diameter A, a point at distance Z is a disc of angular diameter A·|1/Z −
+    /// 1/Z₀| when Z₀ is in focus; along each direction a uniform disc has a quarter of its diameter
+    /// for standard deviation. At most 20 px.
     pub(crate) fn blur_px_at(&self, distance_mm: f64, focal_px: f64) -> f64 {
         let vergence = (1.0 / distance_mm.max(0.1) - 1.0 / self.focus_mm).abs();
         let defocus_px = focal_px * self.aperture_mm * vergence / 4.0;
@@ -137,8 +143,8 @@ impl Shutter {
         within("readout_s", self.readout_s, [0.0, 0.1])
     }
 
-    /// The moments of the exposure of a row, s from the frame's time; `below` is its distance from the middle row as a
-    /// part of the frame's height.
+    /// The moments of the exposure of a row, s from the frame's time; `below` is its distance from
+    /// the middle row as a part of the frame's height.
     pub(crate) fn instants(&self, below: f64) -> impl Iterator<Item = f64> {
         let count = if self.exposure_s > 0.0 { INSTANTS } else { 1 };
         let (middle_s, exposure_s) = (below * self.readout_s, self.exposure_s);

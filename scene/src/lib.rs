@@ -1,12 +1,14 @@
-//! The simulated HiVTac sensor: what presses the film, how the film gives, what the camera sees of it.
+//! The simulated HiVTac sensor: what presses the film, how the film gives, what the camera sees of
+//! it.
 //!
 //! ```text
 //! load → film (hivtac-film) → marker discs in space → fisheye → coverage of pixels → light → noise → pixels
 //! ```
 //!
-//! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure functions of scene, seed,
-//! frame number and load, and the same bytes on every machine: transcendental functions come from `libm` only,
-//! nothing is fused, and the noise generator is the crate's own.
+//! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure
+//! functions of scene, seed, frame number and load, and the same bytes on every machine:
+//! transcendental functions come from `libm` only, nothing is fused, and the noise generator is the
+//! crate's own.
 //!
 //! ```
 //! use hivtac_scene::{Preset, Scene};

@@ -1,7 +1,7 @@
 //! Colours and the light they are seen in.
 //!
-//! Channels are proportional to the light (no gamma), so that a pixel half covered is half way between two colours.
-//! The film is taken to fill the picture.
+//! Channels are proportional to the light (no gamma), so that a pixel half covered is half way
+//! between two colours. The film is taken to fill the picture.
 
 use crate::camera::centre;
 use crate::camera::radians;
@@ -11,9 +11,11 @@ use crate::{Camera, Options, Paint, noise};
 pub(crate) const STEPS: f64 = 64.0;
 /// The brightest channel, in steps.
 pub(crate) const WHITE: i32 = 255 * 64;
-/// The film, a translucent, slightly warm grey: saturation 37 of 255, far below the red threshold's 100.
+/// The film, a translucent, slightly warm grey: saturation 37 of 255, far below the red
+/// threshold's 100.
 const FILM_COLOUR: [f64; 3] = [150.0, 141.0, 128.0];
-/// Red tape: hue 179, saturation 197 of 255, and a value that meets the threshold's 45 at a gain of about 0.3.
+/// Red tape: hue 179, saturation 197 of 255, and a value that meets the threshold's 45 at a gain of
+/// about 0.3.
 const RED_COLOUR: [f64; 3] = [160.0, 36.0, 40.0];
 /// A lamp's reflection: white even in dim light.
 const GLARE_COLOUR: [f64; 3] = [2000.0; 3];
@@ -80,7 +82,8 @@ impl Light {
         })
     }
 
-    /// A paint in the light of a brightness, in steps, at most white: a camera clips what is too bright.
+    /// A paint in the light of a brightness, in steps, at most white: a camera clips what is too
+    /// bright.
     fn seen(&self, paint: Paint, brightness: f64) -> [f64; 3] {
         let colour = paint.colour();
         std::array::from_fn(|c| {
@@ -119,7 +122,8 @@ fn brightness(camera: &Camera, options: &Options, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-/// Light at a pixel: gain, gradient across the picture, falloff with the square of the angle off the axis.
+/// Light at a pixel: gain, gradient across the picture, falloff with the square of the angle off
+/// the axis.
 fn brightness_at(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
     let across = |v: f64, count: u32| (v - centre(count)) / centre(count);
     let slope = options.gradient[0] * across(x, camera.width())

@@ -14,16 +14,18 @@ pub struct Mechanics {
     pub surface: crate::Surface,
     /// How far it gives for how much force.
     pub stiffness: Stiffness,
-    /// Whether a tilted force moves it sideways; without, |F| presses straight, whatever its direction.
+    /// Whether a tilted force moves it sideways; without, |F| presses straight, whatever its
+    /// direction.
     pub lateral: bool,
     /// How it differs from the nominal film.
     pub unit: Unit,
     /// What the labels of loads mean that do not say so themselves.
     pub contact: Contact,
-    /// Where the tip of loads first touches that do not say so themselves, mm from the middle, within ±5 (±0.25
-    /// where it sticks or slides).
+    /// Where the tip of loads first touches that do not say so themselves, mm from the middle,
+    /// within ±5 (±0.25 where it sticks or slides).
     pub offset_mm: [f64; 2],
-    /// Radius of the disc over which the tip of loads spreads their force that do not say so themselves, mm, 0.25 to 2.
+    /// Radius of the disc over which the tip of loads spreads their force that do not say so
+    /// themselves, mm, 0.25 to 2.
     pub tip_radius_mm: f64,
 }
 

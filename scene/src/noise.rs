@@ -1,8 +1,9 @@
 //! Sensor noise, the same on every machine.
 //!
-//! Counter-based: the noise of a pixel depends on seed, frame number and pixel index alone. A 64-bit hash
-//! (SplitMix64's output function over a Weyl sequence) gives 12 bits per channel, and each picks a quantile of the
-//! normal distribution from a table: |z| ≤ 3.7, standard deviation within 0.1 % of the one asked for.
+//! Counter-based: the noise of a pixel depends on seed, frame number and pixel index alone. A
+//! 64-bit hash (SplitMix64's output function over a Weyl sequence) gives 12 bits per channel, and
+//! each picks a quantile of the normal distribution from a table: |z| ≤ 3.7, standard deviation
+//! within 0.1 % of the one asked for.
 
 use std::sync::LazyLock;
 
@@ -14,7 +15,8 @@ const WEYL: u64 = 0x9e37_79b9_7f4a_7c15;
 /// How many values the number beside a pixel's noise has.
 pub(crate) const LOTS: u32 = 1 << 28;
 
-/// The middle quantiles of as many equal parts of the standard normal distribution; made once, as that takes a while.
+/// The middle quantiles of as many equal parts of the standard normal distribution; made once, as
+/// that takes a while.
 static UNIT: LazyLock<Vec<f64>> = LazyLock::new(|| {
     let middle = |i: usize| (i as f64 + 0.5) / QUANTILES as f64;
     (0..QUANTILES).map(|i| normal_quantile(middle(i))).collect()
@@ -37,8 +39,8 @@ impl Noise {
         }
     }
 
-    /// The noise of one frame, pixel by pixel: three channels each, in steps, and a number below [`LOTS`] that is
-    /// independent of them.
+    /// The noise of one frame, pixel by pixel: three channels each, in steps, and a number below
+    /// [`LOTS`] that is independent of them.
     pub(crate) fn of_frame(&self, number: u64) -> impl Iterator<Item = ([i32; 3], u32)> {
         let mut state = mix(mix(self.seed).wrapping_add(number.wrapping_mul(WEYL)));
         let table: &[i16; QUANTILES] = self.table[..].try_into().expect("built with this length");

@@ -8,21 +8,23 @@ use crate::{Paint, Specks};
 pub struct Options {
     /// How the camera codes its pixels.
     pub format: Format,
-    /// Brightness of the whole picture, 0 to 4; 1 is nominal. At about 0.3 the default threshold starts to eat the
-    /// markers.
+    /// Brightness of the whole picture, 0 to 4; 1 is nominal. At about 0.3 the default threshold
+    /// starts to eat the markers.
     pub gain: f64,
-    /// Change of brightness from the picture's middle to its right and lower edge, −1 to 1 each: (0.6, 0) is 160 %
-    /// at the right edge and 40 % at the left.
+    /// Change of brightness from the picture's middle to its right and lower edge, −1 to 1 each:
+    /// (0.6, 0) is 160 % at the right edge and 40 % at the left.
     pub gradient: [f64; 2],
-    /// The part of the light that is lost 75° off the optical axis, 0 to 1; it grows with the square of the angle. A
-    /// usual lens loses 0.3, which no centroid shows.
+    /// The part of the light that is lost 75° off the optical axis, 0 to 1; it grows with the
+    /// square of the angle. A usual lens loses 0.3, which no centroid shows.
     pub falloff: f64,
-    /// Veiling light on the whole picture, 0 to 255 levels at a gain of 1: stray light that washes out colours.
+    /// Veiling light on the whole picture, 0 to 255 levels at a gain of 1: stray light that washes
+    /// out colours.
     pub haze: f64,
-    /// Gain of red, green and blue, 0 to 4 each: (1, 1, 1) is the balance that makes the film nearly grey.
+    /// Gain of red, green and blue, 0 to 4 each: (1, 1, 1) is the balance that makes the film
+    /// nearly grey.
     pub white_balance: [f64; 3],
-    /// Standard deviation of a fixed pattern of brightness from pixel to pixel, 0 to 0.5 of the brightness: the film's
-    /// grain and the sensor's uneven pixels.
+    /// Standard deviation of a fixed pattern of brightness from pixel to pixel, 0 to 0.5 of the
+    /// brightness: the film's grain and the sensor's uneven pixels.
     pub texture: f64,
     /// Standard deviation of the noise of each channel, 0 to 64 of 255 levels.
     pub noise: f64,
@@ -38,7 +40,8 @@ pub struct Options {
     pub patches: Vec<Patch>,
     /// Red specks all over the film, under the markers.
     pub specks: Specks,
-    /// Side of the squares of a checkerboard of film and markers' red in the whole picture, 0 to 400 px; 0 is none.
+    /// Side of the squares of a checkerboard of film and markers' red in the whole picture, 0 to
+    /// 400 px; 0 is none.
     pub checkerboard_px: u32,
     /// What the lens does with a point.
     pub lens: Lens,

@@ -11,7 +11,8 @@ use crate::{
 };
 use hivtac_film::Film;
 
-/// A simulated sensor and what presses it. Frames depend on nothing but the scene and the arguments.
+/// A simulated sensor and what presses it. Frames depend on nothing but the scene and the
+/// arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     film: Film,
@@ -25,17 +26,18 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene by name, with default options, at a frame size (4:3, 160×120 to 800×600). The seed decides the noise,
-    /// and where `demo` starts.
+    /// A scene by name, with default options, at a frame size (4:3, 160×120 to 800×600). The seed
+    /// decides the noise, and where `demo` starts.
     ///
     /// - `rest`: nothing presses.
     /// - `static`: 0.1 N at α = 4°, β = −3°.
-    /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F| 0.02–0.2 N, |α| ≤ 8°,
-    ///   |β| ≤ 6°.
-    /// - `sweep`: |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then at α = ±8°, then at β = ±6°.
-    /// - `press`, `drag`, `grasp`, `catch`, `vibration`: after a tenth of a second of rest, what [`Press`](crate::Press),
-    ///   [`Drag`](crate::Drag), [`Grasp`](crate::Grasp), [`Catch`](crate::Catch) and
-    ///   [`Vibration`](crate::Vibration) are by default.
+    /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F|
+    ///   0.02–0.2 N, |α| ≤ 8°, |β| ≤ 6°.
+    /// - `sweep`: |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then at α = ±8°, then
+    ///   at β = ±6°.
+    /// - `press`, `drag`, `grasp`, `catch`, `vibration`: after a tenth of a second of rest, what
+    ///   [`Press`](crate::Press), [`Drag`](crate::Drag), [`Grasp`](crate::Grasp),
+    ///   [`Catch`](crate::Catch) and [`Vibration`](crate::Vibration) are by default.
     ///
     /// # Errors
     /// When there is no scene of that name or the size is another.
@@ -71,7 +73,8 @@ impl Scene {
     /// The same scene with something else that presses.
     ///
     /// # Errors
-    /// When a parameter is outside its range, or the film cannot take a load within the motion's first ten seconds.
+    /// When a parameter is outside its range, or the film cannot take a load within the motion's
+    /// first ten seconds.
     pub fn with_motion(mut self, motion: Motion) -> Result<Scene, SceneError> {
         self.try_motion(&motion)?;
         self.motion = motion;

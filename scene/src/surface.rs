@@ -58,7 +58,8 @@ mod tests {
             [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
         };
         assert_eq!(apart(0.0), [0.0; 3], "nothing tilts at rest");
-        // Marker 1, right and above: the film rises outwards there, so that its normal leans to the middle.
+        // Marker 1, right and above: the film rises outwards there, so that its normal leans to the
+        // middle.
         let [x, y, z] = apart(0.2);
         assert!(x < -0.05 && y > 0.05, "{x} {y}");
         let length = (x * x + y * y + (z + 0.25) * (z + 0.25)).sqrt();

@@ -49,7 +49,8 @@ fn at_rest_markers_are_where_the_lens_puts_them() {
         let rho = MARKER_REST_MM * 2.0_f64.sqrt();
         let of_centre = scene.camera().focal_px() * libm::atan(rho / FILM_DISTANCE_MM);
         for marker in centroids(scene, Load::REST) {
-            // A disc's centroid is a little nearer than its centre's image, and the more pixels the more.
+            // A disc's centroid is a little nearer than its centre's image, and the more pixels the
+            // more.
             let nearer = (of_centre - radius(marker)) / scene.camera().focal_px();
             assert!((0.0007..0.0010).contains(&nearer), "{nearer} focal lengths");
         }
@@ -165,7 +166,8 @@ fn truth_says_what_is_missing_cut_or_gone() {
         },
         ..Options::default()
     };
-    // At 0.2 N markers are 91 px from the middle: the upper and the lower border each cut two of them.
+    // At 0.2 N markers are 91 px from the middle: the upper and the lower border each cut two of
+    // them.
     let cut = |down| under(shifted([0.0, down]), press(0.2, 0.0, 0.0)).map(|m| m.unwrap().visible);
     let is_cut = |parts: [f64; 4]| parts.map(|part| (0.1..0.9).contains(&part));
     assert_eq!(is_cut(cut(-24.0)), [true, true, false, false]);

@@ -1,4 +1,5 @@
-//! What the pictures show: discs where the truth says, colours that the default threshold tells apart.
+//! What the pictures show: discs where the truth says, colours that the default threshold tells
+//! apart.
 
 use hivtac_scene::{Format, Frame, Load, Options, Paint, Patch, Preset, Scene};
 
@@ -49,8 +50,8 @@ fn loads() -> Vec<Load> {
         .collect()
 }
 
-/// Neither noise, which the truth does not know, nor falloff, which shifts the weight (and shifts the border between
-/// two codes of RGB565 across a disc).
+/// Neither noise, which the truth does not know, nor falloff, which shifts the weight (and shifts
+/// the border between two codes of RGB565 across a disc).
 fn clear() -> Options {
     Options {
         noise: 0.0,
@@ -59,8 +60,8 @@ fn clear() -> Options {
     }
 }
 
-/// The largest distance of a rendered marker's redness-weighted centroid from the truth, px. Each marker is told
-/// from the film by the difference from the frame without markers.
+/// The largest distance of a rendered marker's redness-weighted centroid from the truth, px. Each
+/// marker is told from the film by the difference from the frame without markers.
 fn worst_centroid_error(preset: Preset, size: (u32, u32), options: &Options) -> f64 {
     let bare = Options {
         missing: [true; 4],

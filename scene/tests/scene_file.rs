@@ -162,7 +162,8 @@ fn errors_name_line_key_value_and_what_is_possible() {
             &["line 2, marks.missing", "0 to 3"],
         ),
         (
-            "[[marks.patch]]\nradius_mm = 0.5\ncentre_mm = [1, 1]\npaint = \"red\"\n[[marks.patch]]\nradius_mm = 0\ncentre_mm = [1, 1]\npaint = \"red\"",
+            "[[marks.patch]]\nradius_mm = 0.5\ncentre_mm = [1, 1]\npaint = \
+             \"red\"\n[[marks.patch]]\nradius_mm = 0\ncentre_mm = [1, 1]\npaint = \"red\"",
             &["line 6, marks.patch.radius_mm", "0.01 to 10"],
         ),
         (

@@ -1,10 +1,11 @@
 //! The angle of a vector in integers, by a table and a division.
 //!
-//! Against exact arithmetic, over every input, [`atan2`] is off by at most 0.51 m° (0.5 of it is the rounding to whole m°);
-//! the tests assert it.
+//! Against exact arithmetic, over every input, [`atan2`] is off by at most 0.51 m° (0.5 of it is
+//! the rounding to whole m°); the tests assert it.
 //!
-//! With a ≥ b ≥ 0 and k the whole number nearest to 64·b/a, atan(b/a) = atan(k/64) + atan z with z = (64·b − k·a)/(64·a + k·b).
-//! |z| ≤ 1/127, so that z − z³/3 is short of atan z by at most z⁵/5 < 10⁻¹¹. Numbers of 31 bits lose less than 10⁻⁹.
+//! With a ≥ b ≥ 0 and k the whole number nearest to 64·b/a, atan(b/a) = atan(k/64) + atan z with
+//! z = (64·b − k·a)/(64·a + k·b). |z| ≤ 1/127, so that z − z³/3 is short of atan z by at most z⁵/5
+//! < 10⁻¹¹. Numbers of 31 bits lose less than 10⁻⁹.
 
 use crate::{division::Divisor, units::MilliDegrees};
 
@@ -111,7 +112,8 @@ fn normalized(parts: [u64; 2]) -> [u32; 2] {
     })
 }
 
-/// atan(`small` / `large`) in m° · 2¹⁴, for 2³⁰ ≤ `large` < 2³¹ and `small` ≤ `large`; 0 for (0, 0).
+/// atan(`small` / `large`) in m° · 2¹⁴, for 2³⁰ ≤ `large` < 2³¹ and `small` ≤ `large`; 0 for (0,
+/// 0).
 fn first_octant(small: u32, large: u32) -> u32 {
     let step = ((small + (large >> 7)) / (large >> 6).max(1)).min(64);
     let ahead = 64 * i64::from(small) - i64::from(step) * i64::from(large);

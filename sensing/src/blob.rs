@@ -6,9 +6,9 @@ use crate::{moments::Moments, runs::Run, tables::Weights};
 
 /// The moments of one blob, in whole pixels.
 ///
-/// They are exact for every frame of at most 800 × 800 pixels, the largest that the scanner takes. There, columns and
-/// rows are at most 799 and a blob has at most 640,000 pixels: Σx³ ≤ 640,000 · 799³ < 2⁴⁹. A weight is at most 127:
-/// Σw ≤ 640,000 · 127 < 2²⁷ and Σw·x ≤ 2²⁷ · 799 < 2³⁷.
+/// They are exact for every frame of at most 800 × 800 pixels, the largest that the scanner takes.
+/// There, columns and rows are at most 799 and a blob has at most 640,000 pixels: Σx³ ≤ 640,000 ·
+/// 799³ < 2⁴⁹. A weight is at most 127: Σw ≤ 640,000 · 127 < 2²⁷ and Σw·x ≤ 2²⁷ · 799 < 2³⁷.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Blob {
     /// Number of pixels.
@@ -33,7 +33,8 @@ pub struct Blob {
     pub sum_xyy: u64,
     /// Σy³.
     pub sum_yyy: u64,
-    /// Σw, w being a pixel's weight ([`Pixels::weight`](crate::tables::Pixels::weight)); 0 when nothing is weighed.
+    /// Σw, w being a pixel's weight ([`Pixels::weight`](crate::tables::Pixels::weight)); 0 when
+    /// nothing is weighed.
     pub weight: u32,
     /// Σw·x.
     pub weight_x: u64,
@@ -50,7 +51,8 @@ pub struct Blob {
 }
 
 impl Blob {
-    /// The blob of one run in row `y`, with columns and row below 800, and its weights. All of it passed.
+    /// The blob of one run in row `y`, with columns and row below 800, and its weights. All of it
+    /// passed.
     #[cfg(test)]
     pub(crate) fn of_run(run: Run, y: u16, weights: Weights) -> Blob {
         let mut moments = Moments::of_run(run, y);
@@ -82,8 +84,8 @@ impl Blob {
         self.y1 = self.y1.max(other.y1);
     }
 
-    /// The centroid (x, y), each rounded to the nearest step of Q16.16: off by at most 1/131,072 px.
-    /// Σx · 2¹⁶ ≤ 640,000 · 799 · 2¹⁶ < 2⁴⁵.
+    /// The centroid (x, y), each rounded to the nearest step of Q16.16: off by at most
+    /// 1/131,072 px. Σx · 2¹⁶ ≤ 640,000 · 799 · 2¹⁶ < 2⁴⁵.
     pub fn centroid(&self) -> (Px, Px) {
         let area = Divisor::new(self.area);
         let mean = |sum| mean(sum, self.area.max(1), &area);

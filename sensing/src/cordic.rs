@@ -1,6 +1,7 @@
 //! Sine and cosine of an angle in integers, by rotation in ever smaller steps (CORDIC).
 //!
-//! Against exact arithmetic, over every input, [`sin_cos`] is off by at most 4 · 2⁻³⁰; the tests assert it.
+//! Against exact arithmetic, over every input, [`sin_cos`] is off by at most 4 · 2⁻³⁰; the tests
+//! assert it.
 
 use crate::units::MilliDegrees;
 

@@ -1,10 +1,10 @@
 //! 3×3 dilation, zero to three times, as rows come in.
 //!
-//! n dilations by 3×3 are one by a square of 2n + 1: the last 2n + 1 rows one over the other, then along the row. As with
-//! OpenCV's default border, what lies outside the frame counts as unset.
+//! n dilations by 3×3 are one by a square of 2n + 1: the last 2n + 1 rows one over the other, then
+//! along the row. As with OpenCV's default border, what lies outside the frame counts as unset.
 //!
-//! Most rows of a frame are empty, and most words of the others: rows come several at a time, and what is looked at again are the
-//! words near one that is set in any of them.
+//! Most rows of a frame are empty, and most words of the others: rows come several at a time, and
+//! what is looked at again are the words near one that is set in any of them.
 
 #[cfg(armv7em)]
 use crate::kernels::dilate_edges;
@@ -66,8 +66,8 @@ impl Dilation {
         self.radius
     }
 
-    /// Where the next `rows` ≤ [`MAX_ROWS`] rows are to be written, all of their words, before they are
-    /// [looked at](Self::look). Bits beyond the width must be unset.
+    /// Where the next `rows` ≤ [`MAX_ROWS`] rows are to be written, all of their words, before they
+    /// are [looked at](Self::look). Bits beyond the width must be unset.
     #[inline(always)]
     pub fn incoming(&mut self, rows: usize) -> &mut [u32] {
         let kept = self.kept();
@@ -106,8 +106,8 @@ impl Dilation {
         (self.set_rows >> i) & ((2 << self.kept_rows()) - 1) == 0
     }
 
-    /// The edges of a dilated row: for row `i` of those that were written, the row [`radius`](Self::radius) rows above it.
-    /// `near` is [that](Self::near) of all of them.
+    /// The edges of a dilated row: for row `i` of those that were written, the row
+    /// [`radius`](Self::radius) rows above it. `near` is [that](Self::near) of all of them.
     #[inline(always)]
     pub fn edges(&self, i: usize, near: &Near, edges: &mut Edges) {
         #[cfg(armv7em)]
@@ -147,8 +147,8 @@ impl Dilation {
         edges.end(32 * self.words as u16);
     }
 
-    /// How many pixels of a run of the dilated row of [`edges`](Self::edges) at `i` were set before, from its first column to
-    /// the one behind its last.
+    /// How many pixels of a run of the dilated row of [`edges`](Self::edges) at `i` were set
+    /// before, from its first column to the one behind its last.
     #[inline(always)]
     pub fn passed(&self, i: usize, [x0, end]: [u16; 2]) -> u32 {
         let first = (i + usize::from(self.radius)) * self.words + usize::from(x0 / 32);
@@ -176,7 +176,8 @@ impl Dilation {
         words.iter().zip((0..end).step_by(32)).map(inside).sum()
     }
 
-    /// The words in which dilated rows may have set bits: from the first to before the last that is next to an occupied one.
+    /// The words in which dilated rows may have set bits: from the first to before the last that is
+    /// next to an occupied one.
     pub fn near(&self) -> Near {
         let first = self.occupied.trailing_zeros() as usize;
         let end = 32 - self.occupied.leading_zeros() as usize;
@@ -253,7 +254,8 @@ mod tests {
     const WIDTH: u16 = 75;
     const HEIGHT: usize = 40;
 
-    /// A mask and the same after one, two and three dilations by OpenCV (`tests/opencv/reference.py`).
+    /// A mask and the same after one, two and three dilations by OpenCV
+    /// (`tests/opencv/reference.py`).
     const OPENCV: &[u8; 4 * HEIGHT * 12] = include_bytes!("../tests/opencv/dilated.bits");
 
     fn opencv(dilations: u8) -> Vec<[u32; 3]> {

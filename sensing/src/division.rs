@@ -1,9 +1,10 @@
-//! Quotients of 64 bits from 32-bit instructions, several times as fast on a Cortex-M as the compiler's library: exact ones,
-//! and such as are good enough for what is compared with a limit.
+//! Quotients of 64 bits from 32-bit instructions, several times as fast on a Cortex-M as the
+//! compiler's library: exact ones, and such as are good enough for what is compared with a limit.
 //!
-//! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, two words divided by d take two products and two
-//! corrections (Möller and Granlund, *Improved division by invariant integers*, 2011, Algorithm 4). v itself takes two
-//! divisions of 32 bits and is made once for all that is divided by d.
+//! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, two words divided by d take
+//! two products and two corrections (Möller and Granlund, *Improved division by invariant
+//! integers*, 2011, Algorithm 4). v itself takes two divisions of 32 bits and is made once for all
+//! that is divided by d.
 
 /// A divisor, for any number of dividends.
 #[derive(Clone, Copy, Debug)]
@@ -71,8 +72,8 @@ impl Divisor {
     }
 }
 
-/// One over a number, to 2⁻²⁷ of it: for what is only compared with a limit. It is made in half the cycles of a [`Divisor`],
-/// and multiplied with in a third.
+/// One over a number, to 2⁻²⁷ of it: for what is only compared with a limit. It is made in half the
+/// cycles of a [`Divisor`], and multiplied with in a third.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reciprocal {
     /// 2⁶¹ / the divisor, shifted until its highest bit is set: 2²⁹ to 2³⁰.

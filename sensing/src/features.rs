@@ -19,7 +19,8 @@ pub struct Features {
 }
 
 impl Features {
-    /// The features of four markers. The centre rounds half up to 1/65,536 px, the area to 1/65,536 px².
+    /// The features of four markers. The centre rounds half up to 1/65,536 px, the area to
+    /// 1/65,536 px².
     pub fn of_markers(markers: &[Marker; 4]) -> Features {
         let centroids = markers.map(|marker| (marker.x, marker.y));
         let (left, right) = extent(centroids.map(|c| c.0));

@@ -10,7 +10,8 @@ use crate::{
 /// Weight of a pixel at a threshold: half covered.
 const AT_THRESHOLD: i16 = 64;
 
-/// Reads rows of the format of a [`Threshold`]; those of RGB565 through a table `T`, which else is not used.
+/// Reads rows of the format of a [`Threshold`]; those of RGB565 through a table `T`, which else is
+/// not used.
 #[derive(Clone, Debug)]
 pub struct Formats<T> {
     table: T,
@@ -82,17 +83,18 @@ impl<T: Table> Pixels for Formats<T> {
     }
 }
 
-/// YUV422 in the order Y0 Cb Y1 Cr: a `u16` a pixel, luma below. A pair of pixels belongs to a marker when their Cr is
-/// at least the threshold. A pixel's weight grows by two for each level of Cr, from 64 at the threshold.
+/// YUV422 in the order Y0 Cb Y1 Cr: a `u16` a pixel, luma below. A pair of pixels belongs to a
+/// marker when their Cr is at least the threshold. A pixel's weight grows by two for each level of
+/// Cr, from 64 at the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Yuv422 {
     /// Lowest Cr of a marker.
     pub cr_low: u8,
 }
 
-/// Mono: two pixels a `u16`, the left one below. A pixel belongs to a marker when its luma lies within the limits, both
-/// included. Its weight grows by 5/4 for each level that it lies inside the nearer limit, from 64 there; a limit of 0
-/// or 255 is none.
+/// Mono: two pixels a `u16`, the left one below. A pixel belongs to a marker when its luma lies
+/// within the limits, both included. Its weight grows by 5/4 for each level that it lies inside the
+/// nearer limit, from 64 there; a limit of 0 or 255 is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Mono {
     /// Lowest luma of a marker.
@@ -107,8 +109,9 @@ impl Yuv422 {
 }
 
 impl Mono {
-    /// Half way between markers and film where markers are dark: red ones have a luma of 36 in green light or behind a green
-    /// filter, and the film 141. (In white light they are hardly darker than the film.)
+    /// Half way between markers and film where markers are dark: red ones have a luma of 36 in
+    /// green light or behind a green filter, and the film 141. (In white light they are hardly
+    /// darker than the film.)
     pub const DARK: Mono = Mono { low: 0, high: 88 };
 }
 
@@ -134,8 +137,9 @@ impl Pixels for Yuv422 {
         })
     }
 
-    /// Of whole pairs: a dilation reaches into every other pair by one pixel only, and half of its Cr would draw the
-    /// centroid aside. No two runs of a dilated row share a pair, as a pair passes the threshold as a whole.
+    /// Of whole pairs: a dilation reaches into every other pair by one pixel only, and half of its
+    /// Cr would draw the centroid aside. No two runs of a dilated row share a pair, as a pair
+    /// passes the threshold as a whole.
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let columns = run.x0 & !1..=run.x1 | 1;
         columns.fold(Weights::NONE, |sums, x| {
@@ -161,7 +165,8 @@ impl Mono {
 }
 
 impl Pixels for Mono {
-    /// Rows have an even width: a `u16` holds two pixels, and a last one alone would leave a half that is none.
+    /// Rows have an even width: a `u16` holds two pixels, and a last one alone would leave a half
+    /// that is none.
     fn row_length(&self, width: u16) -> usize {
         PixelFormat::Mono.row_length(width)
     }

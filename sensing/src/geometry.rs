@@ -53,9 +53,11 @@ impl Preset {
     }
 }
 
-/// 6/(5π) in Q32: a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6) wide.
+/// 6/(5π) in Q32: a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6)
+/// wide.
 const DIAGONAL_TO_FOCAL_Q32: u64 = 1_640_556_661;
-/// 2.1 mm / (640 · 6 µm) in Q16: an OV7725 frame's width to its focal length, both in pixels. Exact.
+/// 2.1 mm / (640 · 6 µm) in Q16: an OV7725 frame's width to its focal length, both in pixels.
+/// Exact.
 const OV7725_WIDTH_TO_FOCAL_Q16: i32 = 35_840;
 
 /// A metre: nothing here is larger.
@@ -66,8 +68,8 @@ const RADIAN: i64 = 57_296;
 const QUARTER_PI_Q30: i64 = 843_314_857;
 
 impl Geometry {
-    /// Markers 1 mm across at (±3.717, ±3.717) mm on a film 10 mm away, seen by `preset` in frames of `width` × `height`
-    /// pixels (each 1–800).
+    /// Markers 1 mm across at (±3.717, ±3.717) mm on a film 10 mm away, seen by `preset` in frames
+    /// of `width` × `height` pixels (each 1–800).
     pub const fn preset(preset: Preset, width: u16, height: u16) -> Geometry {
         let focal = match preset {
             Preset::Paper => paper_focal(width as u64, height as u64),
@@ -88,7 +90,8 @@ impl Geometry {
         (half_span(self.width), half_span(self.height))
     }
 
-    /// Whether all measures are positive and none is beyond a metre, and the markers do not cover each other.
+    /// Whether all measures are positive and none is beyond a metre, and the markers do not cover
+    /// each other.
     pub const fn is_sound(&self) -> bool {
         let diameter = self.marker_diameter.0;
         let radius = self.marker_radius.0;
@@ -100,7 +103,8 @@ impl Geometry {
             && self.film_distance.0 <= LARGEST_MEASURE.0
     }
 
-    /// Area of a marker's image at rest, px, rounded down, when the mask adds `edge` to its diameters.
+    /// Area of a marker's image at rest, px, rounded down, when the mask adds `edge` to its
+    /// diameters.
     pub fn rest_area(&self, edge: Px) -> u32 {
         let across = self.across(self.rest_distance());
         let along = self.along_flat(self.rest_distance());
@@ -118,14 +122,15 @@ impl Geometry {
         saturated(i64::from(self.focal.0) * i64::from(theta.0) / RADIAN)
     }
 
-    /// Diameter, across the radius, of the image of a marker at `distance` from the axis: distance·d/R. A lens that is
-    /// symmetric about its axis shows a circle about the axis as a circle, so this holds for any lens and any
-    /// height or tilt of the film.
+    /// Diameter, across the radius, of the image of a marker at `distance` from the axis:
+    /// distance·d/R. A lens that is symmetric about its axis shows a circle about the axis as a
+    /// circle, so this holds for any lens and any height or tilt of the film.
     pub fn across(&self, distance: Px) -> Px {
         Across::of(self).at(distance)
     }
 
-    /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with θ = distance/f.
+    /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with
+    /// θ = distance/f.
     pub fn along_flat(&self, distance: Px) -> Px {
         let theta = i64::from(distance.0) * RADIAN / i64::from(self.focal.0.max(1));
         let theta = theta.clamp(1, 90_000);

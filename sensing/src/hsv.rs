@@ -1,8 +1,8 @@
 //! OpenCV's 8-bit HSV of an RGB565 pixel, in integers.
 //!
-//! `cv2.cvtColor(…, COLOR_RGB2HSV)` on 8-bit pictures multiplies by tables of rounded reciprocals with
-//! twelve fractional bits. The same products are made here, so that the result is the same for every pixel;
-//! `tests/opencv.rs` holds all 65,536 of them against OpenCV's own output.
+//! `cv2.cvtColor(…, COLOR_RGB2HSV)` on 8-bit pictures multiplies by tables of rounded reciprocals
+//! with twelve fractional bits. The same products are made here, so that the result is the same for
+//! every pixel; `tests/opencv.rs` holds all 65,536 of them against OpenCV's own output.
 
 /// Fractional bits of OpenCV's reciprocals.
 const SHIFT: u32 = 12;
@@ -52,8 +52,8 @@ impl Hsv {
     }
 }
 
-/// Hue in units of 1/180 turn: the position within the third around the largest channel. Where two are largest, both
-/// thirds give the same hue.
+/// Hue in units of 1/180 turn: the position within the third around the largest channel. Where two
+/// are largest, both thirds give the same hue.
 fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
     let [r, g, b] = [i32::from(red), i32::from(green), i32::from(blue)];
     let sixths = match value {
@@ -66,8 +66,8 @@ fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
     (if hue < 0 { hue + 180 } else { hue }) as u8
 }
 
-/// `scale / divisor` with [`SHIFT`] fractional bits, rounded to nearest (no quotient with a divisor below 256 is a
-/// tie); 0 for a divisor of 0.
+/// `scale / divisor` with [`SHIFT`] fractional bits, rounded to nearest (no quotient with a divisor
+/// below 256 is a tie); 0 for a divisor of 0.
 const fn reciprocal(scale: i32, divisor: i32) -> i32 {
     if divisor == 0 {
         return 0;

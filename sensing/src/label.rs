@@ -1,12 +1,14 @@
 //! 8-connected labelling of runs in one pass over the rows, in fixed storage.
 //!
-//! Every run of the row before carries a *label*: the index of a slot in which its blob is summed up. A run of the current
-//! row takes the label of a run that it touches, and joins the labels of all that it touches; one that touches none
-//! opens a slot. At the end of the row, labels that it did not touch are finished: their blobs are kept
-//! if large enough, and their slots are free again, as are those of joined labels.
+//! Every run of the row before carries a *label*: the index of a slot in which its blob is summed
+//! up. A run of the current row takes the label of a run that it touches, and joins the labels of
+//! all that it touches; one that touches none opens a slot. At the end of the row, labels that it
+//! did not touch are finished: their blobs are kept if large enough, and their slots are free
+//! again, as are those of joined labels.
 //!
-//! Slots never run out: those in use belong to distinct runs of the row before, or to runs of the current one that touch none of
-//! these. Seen along the row, all of them are disjoint and not even adjacent, so that there are at most ⌈width / 2⌉.
+//! Slots never run out: those in use belong to distinct runs of the row before, or to runs of the
+//! current one that touch none of these. Seen along the row, all of them are disjoint and not even
+//! adjacent, so that there are at most ⌈width / 2⌉.
 
 use heapless::Vec;
 
@@ -77,7 +79,8 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         }
     }
 
-    /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped. After a row with which it has more than `max_runs` runs, nothing more of it is taken.
+    /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped. After a row with
+    /// which it has more than `max_runs` runs, nothing more of it is taken.
     pub fn begin(&mut self, min_area: u32, max_runs: u32) {
         self.rows[self.last].edges.clear();
         self.forest.clear();
@@ -89,8 +92,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed = false;
     }
 
-    /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i` and with `near`. Rows come in order, from 0 to at most 799; empty ones may be
-    /// left out while the labeller is [idle](Self::is_idle). Gives the number of the row's pixels that were set before dilation.
+    /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i` and with `near`. Rows come
+    /// in order, from 0 to at most 799; empty ones may be left out while the labeller is
+    /// [idle](Self::is_idle). Gives the number of the row's pixels that were set before dilation.
     pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize, near: &Near) -> u32 {
         self.last = 1 - self.last;
         let (before, current) = last_two(&mut self.rows, self.last);
@@ -155,8 +159,8 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed
     }
 
-    /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it. `passed` says how many pixels of a run
-    /// were set before dilation.
+    /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.
+    /// `passed` says how many pixels of a run were set before dilation.
     fn label_row(&mut self, y: u16, mut passed: impl FnMut([u16; 2]) -> u32) {
         let (before, current) = last_two(&mut self.rows, self.last);
         let (above, above_labels) = (before.edges.runs(), &before.labels);
@@ -199,7 +203,8 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.finish_untouched(y);
     }
 
-    /// Frees the labels of the row before the last, `y`, that were joined to others, and those that it did not touch.
+    /// Frees the labels of the row before the last, `y`, that were joined to others, and those that
+    /// it did not touch.
     fn finish_untouched(&mut self, y: u16) {
         let Row { edges, labels } = &self.rows[1 - self.last];
         for &label in &labels[..edges.runs().len()] {
@@ -224,9 +229,9 @@ fn last_two(rows: &mut [Row; 2], last: usize) -> (&mut Row, &mut Row) {
     if last == 0 { (b, a) } else { (a, b) }
 }
 
-/// Labels the runs of the row `y` of the frame when each touches just one of those above, and each of these just one of them: the
-/// usual case. Otherwise does nothing and gives false. `passed` says how many pixels of a run were set
-/// before dilation.
+/// Labels the runs of the row `y` of the frame when each touches just one of those above, and each
+/// of these just one of them: the usual case. Otherwise does nothing and gives false. `passed` says
+/// how many pixels of a run were set before dilation.
 #[inline(always)]
 fn continue_blobs(
     [above, runs]: [&[[u16; 2]]; 2],

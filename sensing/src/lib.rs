@@ -1,4 +1,5 @@
-//! Pixels to force: the `no_std`, allocation-free pipeline of the HiVTac sensor, in integers but for [`forward`].
+//! Pixels to force: the `no_std`, allocation-free pipeline of the HiVTac sensor, in integers but
+//! for [`forward`].
 //!
 //! ```text
 //! rows ─threshold→ bit rows ─dilate→ runs ─label→ blobs (moments)

@@ -1,12 +1,14 @@
-//! The moments of a blob while its runs come in: multiples of them, as they cost the fewest instructions for each run.
+//! The moments of a blob while its runs come in: multiples of them, as they cost the fewest
+//! instructions for each run.
 
 use crate::{blob::Blob, runs::Run, tables::Weights};
 
-/// Moments over the runs of a blob, each of n pixels in row y with c = x0 + x1. Exact within 800 × 800 pixels:
+/// Moments over the runs of a blob, each of n pixels in row y with c = x0 + x1. Exact within 800 ×
+/// 800 pixels:
 ///
 /// - Σx of a run is n·c / 2, Σx² is n·(3c² + n² − 1) / 12, and Σx³ is n·c·(c² + n² − 1) / 8.
-/// - Of one run these fit `u32` as they are multiplied here, before a power of y: c ≤ 1599 − n, so that n·c < 2²⁰ and
-///   n·(3c² + n² − 1) < 2³¹; and so does n·y < 2²⁰.
+/// - Of one run these fit `u32` as they are multiplied here, before a power of y: c ≤ 1599 − n, so
+///   that n·c < 2²⁰ and n·(3c² + n² − 1) < 2³¹; and so does n·y < 2²⁰.
 /// - Of a blob, twelve times Σx²·y is the largest: less than 12 · 2⁴⁹.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {

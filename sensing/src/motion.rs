@@ -44,8 +44,8 @@ impl Motion {
         self.before = seen.copied();
     }
 
-    /// Markers as they were while the middle row of a frame of so many rows was exposed; `None` when
-    /// they were where they are seen, or nothing tells.
+    /// Markers as they were while the middle row of a frame of so many rows was exposed; `None`
+    /// when they were where they are seen, or nothing tells.
     pub fn at_the_middle(&self, seen: &[Marker; 4], rows: u16) -> Option<[Marker; 4]> {
         let (lines, before) = (self.lines?, self.before.as_ref()?);
         let mut moved = *seen;

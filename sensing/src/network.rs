@@ -3,10 +3,11 @@
 //! Every number is an integer and every rescaling rounds once, half up:
 //! `rescale(a, m, s) = (a·m + 2^(s−1)) >> s`.
 //!
-//! 1. Input: `x_i = sat16(rescale(f_i − tare_i + rest_i − mean_i, m_i, s_i))`. The difference is limited to
-//!    ±(2³⁸ − 1) first, which no two frames of up to 800 × 800 px exceed; with m < 2²⁴ the product stays below 2⁶².
-//! 2. Hidden layer: `acc_j = bias_j + Σ w_ji·x_i`, `a_j = clamp(rescale(acc_j, m_j, s_j), 0, A)` with the layer's largest
-//!    activation A.
+//! 1. Input: `x_i = sat16(rescale(f_i − tare_i + rest_i − mean_i, m_i, s_i))`. The difference is
+//!    limited to ±(2³⁸ − 1) first, which no two frames of up to 800 × 800 px exceed; with m < 2²⁴
+//!    the product stays below 2⁶².
+//! 2. Hidden layer: `acc_j = bias_j + Σ w_ji·x_i`, `a_j = clamp(rescale(acc_j, m_j, s_j), 0, A)`
+//!    with the layer's largest activation A.
 //! 3. Output layer: `y_j = sat32(rescale(acc_j, m_j, s_j))`.
 //!
 //! [`Model::parse`] has proven that `acc_j` fits `i32`; with m < 2³¹ the product stays below 2⁶².
@@ -322,7 +323,8 @@ mod tests {
                 let model = Model::parse(&bytes).unwrap();
                 let far = (extreme(a, area_a), extreme(b, area_b));
                 let found = Network::new().run(&model, &far.0, &far.1);
-                // The reference does not saturate the difference itself; that only matters beyond ±2⁶³.
+                // The reference does not saturate the difference itself; that only matters beyond
+                // ±2⁶³.
                 if area_a != i64::MIN && area_b != i64::MIN {
                     assert_eq!(outputs(&model, &found), reference(&spec, &far.0, &far.1));
                 }

@@ -1,4 +1,5 @@
-//! Pictures of discs, for tests: drawn without light or noise, so that what a test asserts is exact.
+//! Pictures of discs, for tests: drawn without light or noise, so that what a test asserts is
+//! exact.
 
 use crate::{
     geometry::Geometry,

@@ -1,15 +1,17 @@
 //! The network's one rounding: `rescale(a, m, s) = (a·m + 2^(s−1)) >> s`, exact, halves up.
 //!
-//! A Cortex-M gives the high word of a product in one instruction. With s ≥ 33 that word is all that counts: the rounding
-//! is a multiple of 2³², leaves the low word as it is, and that falls away in the shift. What is left,
-//! (high + 2^(s−33)) >> (s − 32), is ((high >> (s − 33)) + 1) >> 1, which cannot overflow.
+//! A Cortex-M gives the high word of a product in one instruction. With s ≥ 33 that word is all
+//! that counts: the rounding is a multiple of 2³², leaves the low word as it is, and that falls
+//! away in the shift. What is left, (high + 2^(s−33)) >> (s − 32), is ((high >> (s − 33)) + 1) >>
+//! 1, which cannot overflow.
 
 /// Largest difference of features that enters the rescaling.
 const LARGEST_DIFFERENCE: i64 = (1 << 38) - 1;
 /// Bits that an input's multiplier, below 2²⁴, lacks to 2³¹.
 const SPARE_BITS: u32 = 7;
 
-/// sat16(rescale(value, m, s)) with m < 2²⁴ and s of 1 to 62. The value is limited to ±(2³⁸ − 1) first.
+/// sat16(rescale(value, m, s)) with m < 2²⁴ and s of 1 to 62. The value is limited to ±(2³⁸ − 1)
+/// first.
 pub fn rescale_input(value: i64, multiplier: u32, shift: u8) -> i16 {
     match i32::try_from(value) {
         Ok(value) => rescale_small_input(value, multiplier, shift),
@@ -61,7 +63,8 @@ fn rescale_large_sum(sum: i32, multiplier: u32, shift: u8) -> i32 {
     rescale(sum.into(), multiplier, shift).clamp(i32::MIN.into(), i32::MAX.into()) as i32
 }
 
-/// value · multiplier / 2^shift, rounded once, half up. `shift` is 1 to 62 and the product within ±2⁶².
+/// value · multiplier / 2^shift, rounded once, half up. `shift` is 1 to 62 and the product within
+/// ±2⁶².
 fn rescale(value: i64, multiplier: u32, shift: u8) -> i64 {
     (value * i64::from(multiplier) + (1 << (shift - 1))) >> shift
 }

@@ -1,10 +1,12 @@
-//! Square roots of 64 bits from 32-bit instructions: exact, and several times as fast on a Cortex-M as the compiler's library.
+//! Square roots of 64 bits from 32-bit instructions: exact, and several times as fast on a Cortex-M
+//! as the compiler's library.
 //!
-//! Heron's rule from a root of eight bits: a root that is off by e becomes one that is off by e²/2√n. In units of the last
-//! place an error of at most 1 of 8 bits becomes at most 1 of 16, and that one at most 1 of 32; each quotient that is
-//! rounded down takes up to 1 off.
+//! Heron's rule from a root of eight bits: a root that is off by e becomes one that is off by
+//! e²/2√n. In units of the last place an error of at most 1 of 8 bits becomes at most 1 of 16, and
+//! that one at most 1 of 32; each quotient that is rounded down takes up to 1 off.
 
-/// √(256·m + 128) for m of 64 to 255, rounded to nearest: off the roots of 256·m to 256·m + 255 by at most 1.
+/// √(256·m + 128) for m of 64 to 255, rounded to nearest: off the roots of 256·m to 256·m + 255 by
+/// at most 1.
 const EIGHT_BITS: [u8; 192] = {
     let mut roots = [0; 192];
     let mut at = 0;
@@ -37,7 +39,8 @@ pub fn root(square: u64) -> u32 {
     corrected(estimate, scaled) >> (shift / 2)
 }
 
-/// √`square` from 16 bits: off by at most 2⁻¹⁵ of it, and rounded down to a whole number. A third of what [`root`] takes.
+/// √`square` from 16 bits: off by at most 2⁻¹⁵ of it, and rounded down to a whole number. A third
+/// of what [`root`] takes.
 #[inline(never)]
 pub fn rough_root(square: u64) -> u32 {
     if square == 0 {
@@ -57,8 +60,8 @@ fn sixteen_bits(high: u32) -> u32 {
     (eight << 7) + (high >> 9) / eight
 }
 
-/// The root of a square of 2⁶² or more from one that is off by at most 1. The least root is 2³¹; what passes 2³² − 1
-/// wraps and is set right.
+/// The root of a square of 2⁶² or more from one that is off by at most 1. The least root is 2³¹;
+/// what passes 2³² − 1 wraps and is set right.
 fn corrected(estimate: u32, square: u64) -> u32 {
     let estimate = if estimate < 1 << 30 {
         u32::MAX

@@ -11,11 +11,11 @@ pub struct Run {
     pub x1: u16,
 }
 
-/// Calls `visit` with each edge of a word whose first column is `column`: where a bit differs from the one before it. `open` says
-/// whether the bit before the word is set.
+/// Calls `visit` with each edge of a word whose first column is `column`: where a bit differs from
+/// the one before it. `open` says whether the bit before the word is set.
 ///
-/// Edges are the set bits of `word ^ (word << 1)`: the first columns of runs and of gaps in turn. A word without an edge costs
-/// one test, whether it is empty or full.
+/// Edges are the set bits of `word ^ (word << 1)`: the first columns of runs and of gaps in turn. A
+/// word without an edge costs one test, whether it is empty or full.
 #[inline(always)]
 pub fn for_each_edge(column: u16, word: u32, open: bool, mut visit: impl FnMut(u16)) {
     let mut edges = word ^ (word << 1 | u32::from(open));
@@ -26,7 +26,8 @@ pub fn for_each_edge(column: u16, word: u32, open: bool, mut visit: impl FnMut(u
 }
 
 #[cfg(test)]
-/// Calls `visit` with each run of a row of mask words, from left to right. A row of w pixels has at most ⌈w / 2⌉.
+/// Calls `visit` with each run of a row of mask words, from left to right. A row of w pixels has at
+/// most ⌈w / 2⌉.
 pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
     let mut open = None;
     let mut column = 0;
@@ -68,15 +69,17 @@ impl Edges {
         self.count = 0;
     }
 
-    /// Takes the word whose first column is `column`. Words come from left to right; those that are left out must be empty, and
-    /// must not come right after one whose last bit is set. Edges beyond the widest row are left out.
+    /// Takes the word whose first column is `column`. Words come from left to right; those that are
+    /// left out must be empty, and must not come right after one whose last bit is set. Edges
+    /// beyond the widest row are left out.
     #[inline(always)]
     pub fn take(&mut self, column: u16, word: u32) {
         let open = !self.count.is_multiple_of(2);
         for_each_edge(column, word, open, |x| self.push(x));
     }
 
-    /// Takes all edges but for one at the row's end from `find`, which writes them and says how many.
+    /// Takes all edges but for one at the row's end from `find`, which writes them and says how
+    /// many.
     #[cfg(armv7em)]
     pub fn fill(&mut self, find: impl FnOnce(&mut [u16; MAX_WIDTH as usize]) -> usize) {
         self.count = find(&mut self.columns).min(self.columns.len());

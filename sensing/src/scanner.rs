@@ -30,7 +30,8 @@ pub struct ScanSettings {
     pub min_area: u32,
     /// Whether the pixels of blobs are weighed: their weighted centroids are wanted.
     pub weighted: bool,
-    /// A frame of more runs is not looked at to its end: [`Status::BLOB_OVERFLOW`]. It bounds the time that noise takes.
+    /// A frame of more runs is not looked at to its end: [`Status::BLOB_OVERFLOW`]. It bounds the
+    /// time that noise takes.
     pub max_runs: u32,
 }
 
@@ -91,27 +92,31 @@ impl ScanSettings {
 /// What one frame gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scan<'a> {
-    /// The blobs of at least the minimum area, ordered by their lowest row, then by where they begin in it.
+    /// The blobs of at least the minimum area, ordered by their lowest row, then by where they
+    /// begin in it.
     pub blobs: &'a [Blob],
-    /// Pixels that passed the threshold, before dilation; of a frame of too many runs, as far as it was looked at.
+    /// Pixels that passed the threshold, before dilation; of a frame of too many runs, as far as it
+    /// was looked at.
     pub set_pixels: u32,
-    /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width, [`Status::BLOB_OVERFLOW`] when
-    /// there were more than `BLOBS` blobs or [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
+    /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width,
+    /// [`Status::BLOB_OVERFLOW`] when there were more than `BLOBS` blobs or
+    /// [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
     pub status: Status,
 }
 
 /// Scans frames row by row and keeps up to `BLOBS` blobs of each.
 ///
-/// For each frame: [`begin`](Self::begin), [`push_rows`](Self::push_rows) with all rows from the top, one or more at
-/// a time as they arrive, and [`finish`](Self::finish). It holds a few rows of mask and of pixels and the sums of the
-/// blobs that the current row may still touch: below 68 KiB with 64 blobs, whatever the height, and 112 bytes for each
-/// blob more.
+/// For each frame: [`begin`](Self::begin), [`push_rows`](Self::push_rows) with all rows from the
+/// top, one or more at a time as they arrive, and [`finish`](Self::finish). It holds a few rows of
+/// mask and of pixels and the sums of the blobs that the current row may still touch: below 68 KiB
+/// with 64 blobs, whatever the height, and 112 bytes for each blob more.
 #[derive(Clone, Debug)]
 pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
     dilation: Dilation,
     labels: Labeller<BLOBS>,
-    /// The pixels of rows that the dilation still holds, when they are weighed and may not stay where they are.
+    /// The pixels of rows that the dilation still holds, when they are weighed and may not stay
+    /// where they are.
     history: History,
     /// Rows taken so far.
     rows_in: u16,
@@ -162,8 +167,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         Ok(())
     }
 
-    /// Takes the next row of pixels, as they lie in memory. A row of another length, or one too many, is left out and
-    /// makes the frame incomplete.
+    /// Takes the next row of pixels, as they lie in memory. A row of another length, or one too
+    /// many, is left out and makes the frame incomplete.
     pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
         let length = pixels.row_length(self.settings.width);
         if row.len() == length {
@@ -174,17 +179,20 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// Takes the next rows of pixels, as they lie in memory one after the other. What is no whole row, or too many,
-    /// is left out and makes the frame incomplete. The more rows at a time, the less each of them costs.
+    /// Takes the next rows of pixels, as they lie in memory one after the other. What is no whole
+    /// row, or too many, is left out and makes the frame incomplete. The more rows at a time, the
+    /// less each of them costs.
     ///
-    /// Where pixels are weighed, as many rows as there are dilations are copied, as the next ones may need them.
+    /// Where pixels are weighed, as many rows as there are dilations are copied, as the next ones
+    /// may need them.
     pub fn push_rows(&mut self, pixels: &impl Pixels, rows: &[u16]) {
         self.push_whole(pixels, &[], rows, Stay::Gone);
     }
 
-    /// The same without copying: the rows that came last are still in memory when the next ones come, and are then `above`:
-    /// all of the frame, or at least as many as there are dilations, one after the other. With fewer, a frame whose pixels
-    /// are weighed becomes incomplete where one of them would have been needed.
+    /// The same without copying: the rows that came last are still in memory when the next ones
+    /// come, and are then `above`: all of the frame, or at least as many as there are dilations,
+    /// one after the other. With fewer, a frame whose pixels are weighed becomes incomplete where
+    /// one of them would have been needed.
     pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
         self.push_whole(pixels, above, rows, Stay::Here);
     }
@@ -236,8 +244,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Its pixels are unknown,
-    /// so that nothing of it is weighed. Otherwise as [`push_row`](Self::push_row).
+    /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Its
+    /// pixels are unknown, so that nothing of it is weighed. Otherwise as
+    /// [`push_row`](Self::push_row).
     pub fn push_mask_row(&mut self, words: &[u32]) {
         if self.room() == 0 || words.len() != words_of(self.settings.width) {
             self.status |= Status::FRAME_INCOMPLETE;
@@ -251,8 +260,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.take(&(), &Band::WITHOUT_PIXELS, 1);
     }
 
-    /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no successful `begin`
-    /// since the last `finish`), it repeats the last result.
+    /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no
+    /// successful `begin` since the last `finish`), it repeats the last result.
     pub fn finish(&mut self, pixels: &impl Pixels) -> Scan<'_> {
         if self.active {
             self.active = false;
@@ -265,7 +274,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// The blobs that are complete: after [`finish`](Self::finish) all of the frame, as in [`Scan::blobs`].
+    /// The blobs that are complete: after [`finish`](Self::finish) all of the frame, as in
+    /// [`Scan::blobs`].
     pub fn blobs(&self) -> &[Blob] {
         self.labels.kept()
     }

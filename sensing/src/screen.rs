@@ -1,4 +1,5 @@
-//! A table for processors with wide registers: most words of a mask are found empty without looking a pixel up.
+//! A table for processors with wide registers: most words of a mask are found empty without looking
+//! a pixel up.
 
 use crate::{
     tables::{ByteTable, Pixels, Table},
@@ -10,9 +11,10 @@ const WORD: usize = 32;
 /// Keeps sums of the screen above zero: more than any channel.
 const OFFSET: u16 = 64;
 
-/// A [`ByteTable`] behind a *screen*: a condition that every accepted colour meets, made of a few operations without
-/// branches or look-ups, which compilers turn into vector code. A word in which no pixel meets it is empty; in others the
-/// table decides on those that do. The masks are the table's, bit for bit.
+/// A [`ByteTable`] behind a *screen*: a condition that every accepted colour meets, made of a few
+/// operations without branches or look-ups, which compilers turn into vector code. A word in which
+/// no pixel meets it is empty; in others the table decides on those that do. The masks are the
+/// table's, bit for bit.
 ///
 /// The microcontroller has no such registers, and is better served by the tables alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,7 +94,8 @@ impl ScreenedTable {
 fn candidates(pixels: &[u16; WORD], excess: impl Fn(u16) -> u16) -> u32 {
     let flags = pixels.map(|raw| u8::from(excess(raw) != 0));
     let (eights, _) = flags.as_chunks::<8>();
-    // Flag i, in bit 8·i, moves to bit 56 + i by the factor's bit 56 − 7·i; no two terms meet, so nothing carries.
+    // Flag i, in bit 8·i, moves to bit 56 + i by the factor's bit 56 − 7·i; no two terms meet, so
+    // nothing carries.
     let packed = |eight: &[u8; 8]| {
         let bits = u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
         bits as u32
@@ -110,8 +113,8 @@ enum Channel {
     Blue,
 }
 
-/// c − ⌊c / 2^shift⌋ is above the larger of the other two channels by more than a limit: c, in 5 bits as all of
-/// them, stands out.
+/// c − ⌊c / 2^shift⌋ is above the larger of the other two channels by more than a limit: c, in 5
+/// bits as all of them, stands out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Screen {
     /// The channel that stands out.
@@ -156,7 +159,8 @@ impl Screen {
     /// With the largest limit that all accepted colours exceed.
     fn fitted(self, table: &ByteTable) -> Screen {
         let accepted = (0..=u16::MAX).filter(|raw| table.accepts(*raw));
-        // With a limit of zero the excess is OFFSET more than the difference, and never cut off at zero.
+        // With a limit of zero the excess is OFFSET more than the difference, and never cut off at
+        // zero.
         let least = accepted.map(|raw| self.excess(raw)).min();
         Screen {
             limit: least.map_or(2 * OFFSET, |least| least - 1),

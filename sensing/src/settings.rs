@@ -9,8 +9,9 @@ use crate::{
 };
 use core::fmt;
 
-/// Pixels of a frame for each run that it may have. Four markers have a run for about a thousand; this leaves room for
-/// 2,000 specks at 800 × 600, and bounds what a frame of noise costs: three times a usual one.
+/// Pixels of a frame for each run that it may have. Four markers have a run for about a thousand;
+/// this leaves room for 2,000 specks at 800 × 600, and bounds what a frame of noise costs: three
+/// times a usual one.
 const PIXELS_PER_RUN: u32 = 64;
 /// Runs that any frame may have.
 const FEWEST_RUNS: u32 = 64;
@@ -46,8 +47,8 @@ pub enum SettingsError {
 }
 
 impl Settings {
-    /// The project's usual settings for a geometry: red markers, one dilation, and no blob smaller than a quarter of
-    /// a marker at rest.
+    /// The project's usual settings for a geometry: red markers, one dilation, and no blob smaller
+    /// than a quarter of a marker at rest.
     pub fn usual(geometry: Geometry, byte_order: ByteOrder) -> Settings {
         Settings {
             geometry,
@@ -126,8 +127,8 @@ impl fmt::Display for SettingsError {
                 format.name()
             ),
             SettingsError::Geometry => f.write_str(
-                "the focal length and all measures of markers and film must be positive and at most a metre, \
-                 and a marker no wider than its distance from the axis",
+                "the focal length and all measures of markers and film must be positive and at \
+                 most a metre, and a marker no wider than its distance from the axis",
             ),
         }
     }

@@ -16,8 +16,8 @@ pub trait Pixels {
     /// `u16`s of a row of `width` pixels.
     fn row_length(&self, width: u16) -> usize;
 
-    /// Thresholds a row: bit i of word w is pixel 32·w + i. `mask` has ⌈pixels / 32⌉ words; bits beyond the row
-    /// become unset.
+    /// Thresholds a row: bit i of word w is pixel 32·w + i. `mask` has ⌈pixels / 32⌉ words; bits
+    /// beyond the row become unset.
     fn mask_row(&self, row: &[u16], mask: &mut [u32]);
 
     /// Thresholds several rows of `width` pixels, which lie one after the other. `mask` has
@@ -33,7 +33,8 @@ pub trait Pixels {
         }
     }
 
-    /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the row.
+    /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the
+    /// row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
 
     /// The weights of the pixels of a run, summed.
@@ -64,8 +65,8 @@ pub trait Table: Pixels {
     /// A table that accepts nothing, to be [`set`](Self::set) later: for a `static`.
     const CLOSED: Self;
 
-    /// Compiles a box into this table, in place. It takes a few million instructions: once per setting, never per
-    /// frame.
+    /// Compiles a box into this table, in place. It takes a few million instructions: once per
+    /// setting, never per frame.
     ///
     /// # Errors
     /// Those of [`HsvBox::check`]; the table is then unchanged.
@@ -80,7 +81,8 @@ pub const FULL_WEIGHT: u8 = 127;
 
 /// Sums of weights over the pixels of one run.
 ///
-/// With weights of at most 127 and columns below 800 they fit `u32`: Σw·x ≤ 127 · 800 · 799 / 2 < 2²⁶.
+/// With weights of at most 127 and columns below 800 they fit `u32`: Σw·x ≤ 127 · 800 · 799 / 2 <
+/// 2²⁶.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Weights {
     /// Σw.
@@ -102,14 +104,15 @@ impl Weights {
     }
 }
 
-/// How red a pixel (red in bits 15–11) is: ⌊80·(2r − g − b)/r⌋ − 28 of 8-bit channels, from 0 to [`FULL_WEIGHT`]; 0
-/// for greys, and without red.
+/// How red a pixel (red in bits 15–11) is: ⌊80·(2r − g − b)/r⌋ − 28 of 8-bit channels, from 0 to
+/// [`FULL_WEIGHT`]; 0 for greys, and without red.
 ///
-/// Where film and marker are equally bright in red, as grey film and red tape are, (2r − g − b)/r grows linearly with
-/// the part of a pixel that the marker covers. Being a ratio, it does not depend on the light, so that a gradient of
-/// it does not shift centroids as it does with weights by a difference; 28 takes away what a slightly warm film
-/// has of it. Measured on rendered frames, root mean square error of centroids, QVGA and 800×600: 0.017 and 0.015 px;
-/// under a gradient of 60 %, 0.020 and 0.023 px. With r − (g + b)/2 it is 0.030 and 0.035 px, and 0.10 and 0.14 px
+/// Where film and marker are equally bright in red, as grey film and red tape are, (2r − g − b)/r
+/// grows linearly with the part of a pixel that the marker covers. Being a ratio, it does not
+/// depend on the light, so that a gradient of it does not shift centroids as it does with weights
+/// by a difference; 28 takes away what a slightly warm film has of it. Measured on rendered frames,
+/// root mean square error of centroids, QVGA and 800×600: 0.017 and 0.015 px; under a gradient of
+/// 60 %, 0.020 and 0.023 px. With r − (g + b)/2 it is 0.030 and 0.035 px, and 0.10 and 0.14 px
 /// under the gradient; with the mask alone 0.10 and 0.046 px.
 pub const fn redness(pixel: u16) -> u8 {
     let [red, green, blue] = rgb888(pixel);
@@ -128,8 +131,8 @@ pub const fn redness(pixel: u16) -> u8 {
     }
 }
 
-/// One byte per `u16` as it lies in memory: bit 0 is set where its colour lies in the box, bits 1–7 are its
-/// [`redness`]. 64 KiB.
+/// One byte per `u16` as it lies in memory: bit 0 is set where its colour lies in the box, bits 1–7
+/// are its [`redness`]. 64 KiB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ByteTable {
     bytes: [u8; 65_536],

@@ -9,7 +9,8 @@ use crate::{
 /// Most frames in a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
 
-/// Sums up good frames until there are enough. All sums are exact; each mean is rounded once, half up.
+/// Sums up good frames until there are enough. All sums are exact; each mean is rounded once, half
+/// up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TareBuilder {
     wanted: u16,
@@ -31,8 +32,8 @@ impl TareBuilder {
         (1..=MAX_FRAMES).contains(&frames).then_some(empty)
     }
 
-    /// Takes the markers and features of a good frame. Gives the rest position once there were enough, and from
-    /// then on the same again.
+    /// Takes the markers and features of a good frame. Gives the rest position once there were
+    /// enough, and from then on the same again.
     pub fn add(&mut self, markers: &[Marker; 4], features: &Features) -> Option<Rest> {
         if self.taken < self.wanted {
             self.taken += 1;

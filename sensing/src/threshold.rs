@@ -1,4 +1,5 @@
-//! Thresholds: which pixels a marker may have, for each pixel format. `tables` compiles an HSV box to a look-up table.
+//! Thresholds: which pixels a marker may have, for each pixel format. `tables` compiles an HSV box
+//! to a look-up table.
 
 use crate::{
     formats::{Mono, Yuv422},
@@ -69,11 +70,12 @@ impl Threshold {
         }
     }
 
-    /// Of its six numbers, as files have them: those of [`HsvBox::limits`]; a least Cr and zeros; or lowest and highest
-    /// luma and zeros.
+    /// Of its six numbers, as files have them: those of [`HsvBox::limits`]; a least Cr and zeros;
+    /// or lowest and highest luma and zeros.
     ///
     /// # Errors
-    /// Those of [`check`](Self::check), or a number that is not zero though the format has none there.
+    /// Those of [`check`](Self::check), or a number that is not zero though the format has none
+    /// there.
     pub const fn of_limits(
         format: PixelFormat,
         limits: [u8; 6],
@@ -290,7 +292,8 @@ impl core::error::Error for ThresholdError {}
 pub enum ByteOrder {
     /// The `u16` is the pixel: red in bits 15–11.
     Native,
-    /// The bytes are swapped: what DCMI leaves in memory from a camera that sends the high byte first.
+    /// The bytes are swapped: what DCMI leaves in memory from a camera that sends the high byte
+    /// first.
     Swapped,
 }
 

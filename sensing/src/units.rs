@@ -2,7 +2,8 @@
 
 use core::ops::{Add, Sub};
 
-/// A pixel coordinate or distance in Q16.16: 65,536 steps a pixel. The centre of pixel (0, 0) is the origin.
+/// A pixel coordinate or distance in Q16.16: 65,536 steps a pixel. The centre of pixel (0, 0) is
+/// the origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Px(pub i32);
 

@@ -107,8 +107,9 @@ fn picture(
         .filter_map(|at| seen(film, state, *at, &camera));
     let seen: Vec<Arrow> = seen.collect();
     let mut svg = String::from(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 1060 500\" font-family=\"sans-serif\" \
-         font-size=\"13\">\n<rect width=\"1060\" height=\"500\" fill=\"white\"/>\n",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 1060 500\" \
+         font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"1060\" height=\"500\" \
+         fill=\"white\"/>\n",
     );
     svg += &label(
         [LEFT, 22.0],
@@ -187,7 +188,8 @@ fn camera_panel(camera: &Camera, arrows: &[Arrow], points: usize) -> String {
     let mut svg = label(
         [RIGHT, TOP - 12.0],
         &format!(
-            "motion in the picture, 800×600, to scale: at most {largest:.0} px; {} of {points} points are outside",
+            "motion in the picture, 800×600, to scale: at most {largest:.0} px; {} of {points} \
+             points are outside",
             points - stay.len()
         ),
     );
@@ -229,14 +231,15 @@ fn shaft([[ax, ay], [bx, by]]: [[f64; 2]; 2], strength: f64) -> String {
     let ([lx, ly], [rx, ry]) = (wing(1.0), wing(-1.0));
     let pale = (200.0 * (1.0 - strength)).round();
     format!(
-        "<path d=\"M{ax:.1} {ay:.1}L{bx:.1} {by:.1}M{lx:.1} {ly:.1}L{bx:.1} {by:.1}L{rx:.1} {ry:.1}\" fill=\"none\" \
-         stroke=\"rgb(215,{pale},{pale})\"/>\n"
+        "<path d=\"M{ax:.1} {ay:.1}L{bx:.1} {by:.1}M{lx:.1} {ly:.1}L{bx:.1} {by:.1}L{rx:.1} \
+         {ry:.1}\" fill=\"none\" stroke=\"rgb(215,{pale},{pale})\"/>\n"
     )
 }
 
 fn frame(left: f64, width: f64, height: f64) -> String {
     format!(
-        "<rect x=\"{left}\" y=\"{TOP}\" width=\"{width}\" height=\"{height}\" fill=\"none\" stroke=\"black\"/>\n"
+        "<rect x=\"{left}\" y=\"{TOP}\" width=\"{width}\" height=\"{height}\" fill=\"none\" \
+         stroke=\"black\"/>\n"
     )
 }
 

@@ -16,13 +16,14 @@ use hivtac_shell::sweep::{Solved, octant, solve_place};
 use hivtac_shell::{Check, Design, Neighbours, ShellError, check, paper_camera, record, tables};
 
 const USAGE: &str = "reduce FOLDER [--check]
-Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are incomplete.
+Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are \
+incomplete.
 --check: hold the film that is built in against the full solution instead";
 
 /// Loads of a check.
 const LOADS: usize = 100;
-/// How far from the middle they are, mm, and the tips' radii, mm: anywhere, where a sensor is calibrated, and with other
-/// tips.
+/// How far from the middle they are, mm, and the tips' radii, mm: anywhere, where a sensor is
+/// calibrated, and with other tips.
 const DOMAINS_MM: [(f64, [f64; 2]); 4] = [
     (5.0, [NOMINAL_RADIUS_MM; 2]),
     (4.0, [NOMINAL_RADIUS_MM; 2]),
@@ -63,7 +64,8 @@ fn reduce(folder: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// All solutions under a tip of a radius at the places of a table: those of its file, and the rest, which are added to it.
+/// All solutions under a tip of a radius at the places of a table: those of its file, and the rest,
+/// which are added to it.
 fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
     let path = PathBuf::from(format!("target/film-{radius_mm}.bin"));
     let known = read(&path)?;
@@ -137,8 +139,8 @@ fn look() -> Result<(), Box<dyn Error>> {
         } = found;
         let [from, to] = radii_mm;
         println!(
-            "{loads} loads within ±{reach_mm} mm, tips of {from} to {to} mm: rms {rms_px:.4} px, at most \
-             {worst_px:.3} px; the tip within {worst_tip_mm:.3} mm"
+            "{loads} loads within ±{reach_mm} mm, tips of {from} to {to} mm: rms {rms_px:.4} px, \
+             at most {worst_px:.3} px; the tip within {worst_tip_mm:.3} mm"
         );
         if let Some(load) = found.worst_at {
             println!("  the largest at {load:?}");

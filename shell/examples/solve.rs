@@ -8,8 +8,9 @@ use std::time::Instant;
 use hivtac_film::{Contact, FilmError, Load};
 use hivtac_shell::{Design, Film, markers, paper_camera, press_load};
 
-const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact force|stick|slip:0.6] [--offset-x-mm 0] \
-[--offset-y-mm 0] [--overhang-mm 0] [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1]";
+const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact \
+                     force|stick|slip:0.6] [--offset-x-mm 0] [--offset-y-mm 0] [--overhang-mm 0] \
+                     [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1]";
 
 /// What to press, and how.
 struct Request {

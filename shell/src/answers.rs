@@ -4,7 +4,8 @@ use crate::film::Response;
 use crate::shell::Shell;
 use crate::{Design, Equilibrium, Film, ShellError};
 
-/// Steps by which forces are differentiated: tip's place and radius, mm; thickness and posts' places, mm.
+/// Steps by which forces are differentiated: tip's place and radius, mm; thickness and posts'
+/// places, mm.
 const TIP_STEP_MM: f64 = 1e-3;
 const THICKNESS_STEP_MM: f64 = 1e-4;
 const POST_STEP_MM: f64 = 2e-2;

@@ -28,8 +28,9 @@ pub struct Check {
     pub worst_tip_mm: f64,
 }
 
-/// Holds the reduced film against the full solution of a unit at so many random loads: |F| to 0.25 N, tangential
-/// over normal to 0.8, places within ±`reach_mm`, the tip's radius within the given ones, mm.
+/// Holds the reduced film against the full solution of a unit at so many random loads: |F| to
+/// 0.25 N, tangential over normal to 0.8, places within ±`reach_mm`, the tip's radius within the
+/// given ones, mm.
 ///
 /// # Errors
 /// When the film cannot be made or an equilibrium is not found.

@@ -16,12 +16,13 @@ const POST_POINTS: usize = 20;
 /// Rings and rays of the points on which a tip presses.
 const TIP_RINGS: usize = 10;
 const TIP_RAYS: usize = 32;
-/// How far from the middle a tip may press where cells are small, mm: a tip of half a millimetre anywhere within ±5 mm, or a
-/// larger one a little nearer.
+/// How far from the middle a tip may press where cells are small, mm: a tip of half a millimetre
+/// anywhere within ±5 mm, or a larger one a little nearer.
 const TIP_REACH_MM: f64 = 5.5;
 /// How fast cells grow away from posts and tip, mm per mm.
 const GROWTH: f64 = 0.25;
-/// Cells at fineness 1, mm: under the tip, at a post (where the film's grip ends within 0.2 mm), and anywhere.
+/// Cells at fineness 1, mm: under the tip, at a post (where the film's grip ends within 0.2 mm),
+/// and anywhere.
 const TIP_CELL_MM: f64 = 0.5;
 const POST_CELL_MM: f64 = 0.35;
 const LARGEST_CELL_MM: f64 = 1.6;
@@ -34,18 +35,20 @@ pub const MOST_POST_SHIFT_MM: f64 = 1.0;
 pub struct Design {
     /// Distance between neighbouring posts' centres, > 0 (the paper's 28).
     pub span_mm: f64,
-    /// How far the film reaches beyond the posts' centres, ≥ 0 (0: the paper's model; 6: its 40 × 40 mm cut).
+    /// How far the film reaches beyond the posts' centres, ≥ 0 (0: the paper's model; 6: its 40 ×
+    /// 40 mm cut).
     pub overhang_mm: f64,
     /// What it is made of.
     pub material: Material,
     /// Radius of the discs around the posts' centres on which the film is held, > 0.
     pub post_radius_mm: f64,
-    /// How far each post is off its place, in the order of the markers' identities; the film is cut as if none were. Within
-    /// ±[`MOST_POST_SHIFT_MM`].
+    /// How far each post is off its place, in the order of the markers' identities; the film is cut
+    /// as if none were. Within ±[`MOST_POST_SHIFT_MM`].
     pub post_shift_mm: [[f64; 2]; 4],
-    /// How stiffly a post holds the film, N/mm per mm², > 0. The film slips by √(membrane stiffness / grip) at a
-    /// post's rim: 0.18 mm at the default 20, as if the post were that much smaller. A rubber film that is clamped on
-    /// both faces gives by shear through its thickness, about 12 G/t = 8 N/mm³: the default is no softer than that.
+    /// How stiffly a post holds the film, N/mm per mm², > 0. The film slips by √(membrane stiffness
+    /// / grip) at a post's rim: 0.18 mm at the default 20, as if the post were that much smaller. A
+    /// rubber film that is clamped on both faces gives by shear through its thickness, about 12
+    /// G/t = 8 N/mm³: the default is no softer than that.
     pub post_grip_n_per_mm3: f64,
     /// Radius of the disc over which the tip spreads its force, > 0; by (1 − r²/R²)².
     pub tip_radius_mm: f64,
@@ -170,8 +173,9 @@ impl Design {
             .collect()
     }
 
-    /// The points of the film on posts, mm at rest, with their areas in mm²: Gauss's over the angle whose sine is x, and along the chord
-    /// there. They follow a post that is shifted, and the film's edge cuts them, without a jump.
+    /// The points of the film on posts, mm at rest, with their areas in mm²: Gauss's over the angle
+    /// whose sine is x, and along the chord there. They follow a post that is shifted, and the
+    /// film's edge cuts them, without a jump.
     pub fn post_points(&self) -> Vec<([f64; 2], f64)> {
         let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
         let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];
@@ -215,7 +219,8 @@ impl Design {
         left.chain([0.0]).chain(half.iter().copied()).collect()
     }
 
-    /// The wanted size of a cell `at` mm from the middle: small wherever a tip may press, and at the posts.
+    /// The wanted size of a cell `at` mm from the middle: small wherever a tip may press, and at
+    /// the posts.
     fn cell_mm(&self, at: f64) -> f64 {
         let tip = TIP_CELL_MM + GROWTH * (at - TIP_REACH_MM).max(0.0);
         let outside = (at - self.span_mm / 2.0).abs() - self.post_radius_mm;

@@ -30,8 +30,8 @@ impl fmt::Display for ShellError {
             ShellError::Contact(why) => write!(f, "contact: {why}"),
             ShellError::NoEquilibrium { steps, left_over_n } => write!(
                 f,
-                "no equilibrium after {steps} steps ({left_over_n:.1e} N left over): press less, or start from a \
-                 state nearby"
+                "no equilibrium after {steps} steps ({left_over_n:.1e} N left over): press less, \
+                 or start from a state nearby"
             ),
             ShellError::Solver(why) => write!(f, "sparse solver: {why}"),
             ShellError::Scene(why) => f.write_str(why),

@@ -7,21 +7,23 @@ use crate::shell::Shell;
 use crate::sparse::{COMPONENTS, Factors, Solver};
 use crate::{Design, ShellError};
 
-/// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a press has F_z < 0).
+/// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a
+/// press has F_z < 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
     /// It presses with this force (N) and goes where the film lets it: the `force` reading.
     Force([f64; 3]),
     /// It goes this far (mm) with the film stuck to it, whatever the force.
     Travel([f64; 3]),
-    /// It moves along a direction (of any length) with the film stuck to it, until the force along that direction
-    /// is `force_n`, as a gauge on a stage reads it: the `stick` reading.
+    /// It moves along a direction (of any length) with the film stuck to it, until the force along
+    /// that direction is `force_n`, as a gauge on a stage reads it: the `stick` reading.
     Stick {
         /// Where the tip moves; its third part < 0.
         direction: [f64; 3],
         /// The force along it, N.
         force_n: f64,
-        /// How far the tip has slid over the film from where its way began, mm: the film lags behind it by so much.
+        /// How far the tip has slid over the film from where its way began, mm: the film lags
+        /// behind it by so much.
         slid_mm: [f64; 2],
     },
 }
@@ -115,10 +117,12 @@ impl Film {
         }
     }
 
-    /// The film under a contact, found from the state `start` (of this film; the nearer, the quicker).
+    /// The film under a contact, found from the state `start` (of this film; the nearer, the
+    /// quicker).
     ///
     /// # Errors
-    /// When the contact's numbers are not finite, its direction is none, or no equilibrium is found.
+    /// When the contact's numbers are not finite, its direction is none, or no equilibrium is
+    /// found.
     pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, ShellError> {
         let (force, guides) = self.asked(contact)?;
         let guided: Vec<V3> = guides.iter().map(|(direction, _)| *direction).collect();
@@ -167,8 +171,8 @@ impl Film {
         Ok(self.equilibrium(solution, sum_n, &[]))
     }
 
-    /// How the camera-side surface point that rests at (x, y) mm moves, mm: half the thickness below the middle
-    /// surface, along its normal.
+    /// How the camera-side surface point that rests at (x, y) mm moves, mm: half the thickness
+    /// below the middle surface, along its normal.
     pub fn displacement(&self, state: &Equilibrium, rest_mm: [f64; 2]) -> [f64; 3] {
         self.surface(state, rest_mm, self.design.material.thickness_mm / 2.0)
     }
@@ -272,8 +276,8 @@ impl Film {
         weighted(shares, force)
     }
 
-    /// How a state answers to one more newton along x, y and z, and to a tip that touches the film one millimetre farther
-    /// along x and y with the force kept: its derivatives.
+    /// How a state answers to one more newton along x, y and z, and to a tip that touches the film
+    /// one millimetre farther along x and y with the force kept: its derivatives.
     ///
     /// # Errors
     /// When the stiffness is not positive definite: a force would not hold the film there.
@@ -286,7 +290,8 @@ impl Film {
             .map_err(|_| ShellError::Solver("five changes have five answers".into()))
     }
 
-    /// The state beside this one that a response foretells, `units` away; only its unknowns are changed.
+    /// The state beside this one that a response foretells, `units` away; only its unknowns are
+    /// changed.
     pub fn beside(&self, state: &Equilibrium, response: &Response, units: f64) -> Equilibrium {
         let mut there = state.clone();
         for (u, part) in there.unknowns.iter_mut().zip(&response.unknowns) {
@@ -327,8 +332,8 @@ impl Equilibrium {
         &self.unknowns
     }
 
-    /// The state at a place of a path that the polynomial through some known states of it foretells: a start for
-    /// [`Film::press`]. `None` of none.
+    /// The state at a place of a path that the polynomial through some known states of it
+    /// foretells: a start for [`Film::press`]. `None` of none.
     pub fn foretold(path: &[(f64, &Equilibrium)], at: f64) -> Option<Equilibrium> {
         let mut state = (*path.last()?.1).clone();
         state.unknowns.fill(0.0);

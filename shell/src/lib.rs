@@ -1,6 +1,7 @@
 //! The film of a HiVTac sensor as a geometrically nonlinear shell, by finite elements.
 //!
-//! Frame and units as in `docs/architecture.md`: x right and y down in the image, z away from the camera; mm, N, MPa.
+//! Frame and units as in `docs/architecture.md`: x right and y down in the image, z away from the
+//! camera; mm, N, MPa.
 
 #![expect(
     clippy::needless_range_loop,

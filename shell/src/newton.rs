@@ -1,10 +1,11 @@
 //! Equilibrium by Newton's method.
 //!
-//! Finds the displacements where the energy less the loads' work is stationary, on the set where each guided sum of
-//! unknowns has its target. Every step solves the linearized problem by Cholesky's factors, with the guides by their
-//! Schur complement; a stiffness that is not positive definite is shifted until it is. Once the guides are met (after
-//! one full step: they are linear), a step is shortened until the energy falls. Near the equilibrium the last factors serve
-//! again, which costs a fifth of a step, as long as each use brings the film ten times nearer.
+//! Finds the displacements where the energy less the loads' work is stationary, on the set where
+//! each guided sum of unknowns has its target. Every step solves the linearized problem by
+//! Cholesky's factors, with the guides by their Schur complement; a stiffness that is not positive
+//! definite is shifted until it is. Once the guides are met (after one full step: they are linear),
+//! a step is shortened until the energy falls. Near the equilibrium the last factors serve again,
+//! which costs a fifth of a step, as long as each use brings the film ten times nearer.
 
 use crate::ShellError;
 use crate::shell::{Derivatives, Shell};
@@ -186,7 +187,8 @@ impl Problem<'_> {
         Err(ShellError::Solver("the stiffness has no factors".into()))
     }
 
-    /// How much of the step to take: all of it, or the half, quarter … at which the energy falls most.
+    /// How much of the step to take: all of it, or the half, quarter … at which the energy falls
+    /// most.
     fn length(&self, u: &[f64], at: &Derivatives, step: &[f64]) -> f64 {
         let here = at.energy - inner(&self.load, u);
         let slope = inner(&at.gradient, step) - inner(&self.load, step);

@@ -4,9 +4,10 @@
 //!
 //! ψ = ½ Eᵀ A E + ½ Kᵀ D K,
 //!
-//! E = (ε₁₁, ε₂₂, 2ε₁₂) with Green's membrane strain ε = (a_α·a_β − δ_αβ)/2, K = (κ₁₁, κ₂₂, 2κ₁₂) with the curvature
-//! κ_αβ = x,αβ · n of a film that rests flat, and the St Venant–Kirchhoff plane-stress law
-//! A = E t/(1−ν²) · [1 ν 0; ν 1 0; 0 0 (1−ν)/2], D = A t²/12. Nothing is linearized.
+//! E = (ε₁₁, ε₂₂, 2ε₁₂) with Green's membrane strain ε = (a_α·a_β − δ_αβ)/2, K = (κ₁₁, κ₂₂, 2κ₁₂)
+//! with the curvature κ_αβ = x,αβ · n of a film that rests flat, and the St Venant–Kirchhoff
+//! plane-stress law A = E t/(1−ν²) · [1 ν 0; ν 1 0; 0 0 (1−ν)/2], D = A t²/12. Nothing is
+//! linearized.
 
 /// A vector in space.
 pub type V3 = [f64; 3];
@@ -178,7 +179,8 @@ impl Surface {
         self.add_turning(blocks, x, &pull);
     }
 
-    /// Adds the second derivative of pull · n by (a₁, a₂), of S/J with S = pull · (a₁ × a₂) and J = |a₁ × a₂|.
+    /// Adds the second derivative of pull · n by (a₁, a₂), of S/J with S = pull · (a₁ × a₂) and J =
+    /// |a₁ × a₂|.
     fn add_turning(&self, blocks: &mut Blocks, [a1, a2, ..]: &Point, pull: &V3) {
         let (j, n) = (self.area, &self.normal);
         let s_over_j = dot(pull, n);

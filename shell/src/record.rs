@@ -1,4 +1,5 @@
-//! Full solutions as a file keeps them: rows of numbers, so that a sweep of an hour can be broken off and gone on with.
+//! Full solutions as a file keeps them: rows of numbers, so that a sweep of an hour can be broken
+//! off and gone on with.
 
 use hivtac_film::DiscMotion;
 use hivtac_film::reduced::Pose;

@@ -23,7 +23,8 @@ type Samples = [(f64, Basis); GAUSS];
 
 /// A film on springs: the sum of Koiter's energy over the cells and of what holds the film.
 ///
-/// Displacements are given by coefficients: unknown 3 · k + c is component c of coefficient k, in mm.
+/// Displacements are given by coefficients: unknown 3 · k + c is component c of coefficient k, in
+/// mm.
 pub struct Shell {
     grid: Grid,
     laws: Laws,
@@ -283,7 +284,8 @@ fn slopes(x: &Basis, y: &Basis) -> [Slopes; LOCAL] {
     })
 }
 
-/// The surface's vectors at a point: those of the film at rest, plus the displacement's derivatives.
+/// The surface's vectors at a point: those of the film at rest, plus the displacement's
+/// derivatives.
 fn surface(slopes: &[Slopes; LOCAL], local: &[V3; LOCAL]) -> Point {
     let mut x = [
         [1.0, 0.0, 0.0],

@@ -14,8 +14,8 @@ const REACH: usize = SUPPORT - 1;
 
 /// Which unknowns of a grid of coefficients meet in the energy: lower triangle, by columns.
 ///
-/// Coefficient (i, j) has index j · columns + i, and its component c the unknown 3 · index + c. Two coefficients meet
-/// when neither i nor j differ by more than 3.
+/// Coefficient (i, j) has index j · columns + i, and its component c the unknown 3 · index + c. Two
+/// coefficients meet when neither i nor j differ by more than 3.
 pub struct Pattern {
     columns: usize,
     rows: usize,
@@ -146,7 +146,8 @@ impl Solver {
         Ok(Solver { order })
     }
 
-    /// Cholesky's factors of the matrix with these entries; `None` when it is not positive definite.
+    /// Cholesky's factors of the matrix with these entries; `None` when it is not positive
+    /// definite.
     pub fn factor(&self, pattern: &Pattern, values: &[f64]) -> Option<Factors> {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
         let factors = Llt::try_new_with_symbolic(self.order.clone(), matrix, Side::Lower).ok()?;

@@ -9,8 +9,8 @@ pub type Basis = [[f64; SUPPORT]; 3];
 
 /// C²-continuous cubic B-splines over spans of any lengths.
 ///
-/// The end knots are repeated, so that the first and last coefficients are the values at the ends. `spans + 3`
-/// functions; span s carries functions s to s + 3.
+/// The end knots are repeated, so that the first and last coefficients are the values at the ends.
+/// `spans + 3` functions; span s carries functions s to s + 3.
 #[derive(Clone, Debug)]
 pub struct Axis {
     knots: Vec<f64>,
@@ -83,7 +83,8 @@ impl Axis {
         values
     }
 
-    /// From functions (or their derivatives) of one degree less to derivatives of those of `degree`.
+    /// From functions (or their derivatives) of one degree less to derivatives of those of
+    /// `degree`.
     fn derivative(&self, span: usize, degree: usize, lower: &[f64; SUPPORT]) -> [f64; SUPPORT] {
         let first = span + DEGREE - degree;
         let mut values = [0.0; SUPPORT];

@@ -1,4 +1,5 @@
-//! What the reduced film is made from: full solutions for loads of many sizes, tilts and places, with their derivatives.
+//! What the reduced film is made from: full solutions for loads of many sizes, tilts and places,
+//! with their derivatives.
 
 use hivtac_film::DiscMotion;
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
@@ -9,7 +10,8 @@ use crate::path::Path;
 use crate::view::seen_motion;
 use crate::{Change, Contact, Equilibrium, Film, Neighbours, ShellError};
 
-/// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where nothing moves.
+/// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where
+/// nothing moves.
 const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
 /// Rings of tilts: radius in parts of the largest, and the turn of the first of their four, °.
 const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];
@@ -139,7 +141,8 @@ fn answered_by(
     }
 }
 
-/// Places of the tip that, mirrored, are everywhere on a grid: 0 ≤ y ≤ x of `knots_mm`, which begin at 0.
+/// Places of the tip that, mirrored, are everywhere on a grid: 0 ≤ y ≤ x of `knots_mm`, which begin
+/// at 0.
 pub fn octant(knots_mm: &[f64]) -> Vec<[f64; 2]> {
     let below = |(i, &x): (usize, &f64)| {
         let ys = knots_mm[..=i].iter();

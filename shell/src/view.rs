@@ -9,7 +9,8 @@ use crate::{Equilibrium, Film, ShellError};
 
 /// Rays of the points that a disc's motion is taken from.
 const RAYS: usize = 8;
-/// Their rings, in parts of the radius: Gauss's two points for sums over a disc, each half of its area.
+/// Their rings, in parts of the radius: Gauss's two points for sums over a disc, each half of its
+/// area.
 const RINGS: [f64; 2] = [0.459_700_843_380_983_1, 0.888_073_833_977_115_3];
 
 /// What discs are moved by to find how much a pixel is, mm.
@@ -37,7 +38,8 @@ pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4]
     markers_on(|rest| film.displacement(state, rest), camera)
 }
 
-/// The four markers of a film whose camera side moves so: from a place at rest to its displacement, mm.
+/// The four markers of a film whose camera side moves so: from a place at rest to its displacement,
+/// mm.
 pub fn markers_on(moved: impl Fn([f64; 2]) -> [f64; 3], camera: &Camera) -> [Marker; 4] {
     MARKERS.map(|disc| Marker {
         moved_mm: disc_motion(&moved, &disc).moved_mm,
@@ -45,7 +47,8 @@ pub fn markers_on(moved: impl Fn([f64; 2]) -> [f64; 3], camera: &Camera) -> [Mar
     })
 }
 
-/// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u · (x, y)).
+/// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u ·
+/// (x, y)).
 fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion {
     let mut motion = DiscMotion::default();
     let [cx, cy] = disc.centre_mm;
@@ -65,9 +68,9 @@ fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion 
     motion
 }
 
-/// The affine map nearest to the displacement over a disc, moved along the film so that the camera sees its disc's centroid
-/// where it sees that of the film's: where the film is curved within a disc, the centroid is some hundredths of a pixel off
-/// the nearest affine map's.
+/// The affine map nearest to the displacement over a disc, moved along the film so that the camera
+/// sees its disc's centroid where it sees that of the film's: where the film is curved within a
+/// disc, the centroid is some hundredths of a pixel off the nearest affine map's.
 pub(crate) fn seen_motion(
     film: impl Fn([f64; 2]) -> [f64; 3],
     disc: &Disc,
@@ -142,7 +145,8 @@ mod tests {
         assert!(slight > 4.0 * full && full > 0.0, "{slight} {full}");
     }
 
-    /// Of a deep press in front of the post that the tip is pushed towards, where the film is most curved.
+    /// Of a deep press in front of the post that the tip is pushed towards, where the film is most
+    /// curved.
     #[test]
     fn affine_discs_are_seen_where_the_films_are() {
         let (film, camera) = (film(), paper_camera().unwrap());

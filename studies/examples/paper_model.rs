@@ -1,7 +1,9 @@
-//! The paper's analytic model in numbers: `cargo run --release -p hivtac-studies --example paper_model`.
+//! The paper's analytic model in numbers: `cargo run --release -p hivtac-studies --example
+//! paper_model`.
 //!
-//! Prints the mean of R* in each reading of the paper, where disp_N peaks, and the errors of the model in `f64` and
-//! `f32` against the reference table. With `--figure8 FILE` it also writes Figure 8 as an SVG picture.
+//! Prints the mean of R* in each reading of the paper, where disp_N peaks, and the errors of the
+//! model in `f64` and `f32` against the reference table. With `--figure8 FILE` it also writes
+//! Figure 8 as an SVG picture.
 
 #[path = "../tests/paper_reference/picture.rs"]
 mod picture;
@@ -110,7 +112,8 @@ fn print_errors(rows: &[table::Row]) {
 
 fn print_second_line(rows: &[table::Row]) {
     println!(
-        "\nlargest relative error of disp_N in f32 with ε = 0, by its second line and as computed here\n"
+        "\nlargest relative error of disp_N in f32 with ε = 0, by its second line and as computed \
+         here\n"
     );
     println!("{:>10} {:>12} {:>9}", "z, mm", "second line", "here");
     for exponent in -6..=0 {

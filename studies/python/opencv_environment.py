@@ -1,4 +1,5 @@
-"""Prints the path of a Python that has OpenCV, in a virtual environment of its own; makes it when it is not there.
+"""Prints the path of a Python that has OpenCV, in a virtual environment of its own; makes it when
+it is not there.
 
     python3 opencv_environment.py FOLDER
 """

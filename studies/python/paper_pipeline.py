@@ -1,7 +1,8 @@
 """The paper's image processing (Section 5) in OpenCV: HSV, threshold, dilation, contours, moments.
 
-As a program it reads frames of RGB565, little-endian, from standard input, `python paper_pipeline.py COLUMNS ROWS`, and for
-each writes a line of JSON: [[x, y, area], …] of the four largest contours, in px. Without OpenCV it ends with an error.
+As a program it reads frames of RGB565, little-endian, from standard input,
+`python paper_pipeline.py COLUMNS ROWS`, and for each writes a line of JSON: [[x, y, area], …] of
+the four largest contours, in px. Without OpenCV it ends with an error.
 """
 
 import json
@@ -14,7 +15,8 @@ import numpy as np
 LOW = (np.array([0, 100, 45]), np.array([10, 255, 255]))
 HIGH = (np.array([170, 100, 45]), np.array([179, 255, 255]))
 SQUARE = np.ones((3, 3), np.uint8)
-# Of thousands of contours only the longest can be markers: moments of the others would measure Python.
+# Of thousands of contours only the longest can be markers: moments of the others would measure
+# Python.
 CANDIDATES = 8
 
 

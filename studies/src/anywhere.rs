@@ -17,7 +17,8 @@ use crate::press::{FORCES_MN, Held, REACH_MM, TestedUnit, press};
 /// The weights file of the sensor that tells places.
 pub const WEIGHTS: &str = "calibration/models/default.weights";
 
-/// Press anywhere within ±4 mm on the simulated sensor and hold the errors against the Cramér–Rao bound.
+/// Press anywhere within ±4 mm on the simulated sensor and hold the errors against the Cramér–Rao
+/// bound.
 #[derive(Args)]
 pub struct Anywhere {
     /// A weights file of a network that tells places, with its film.
@@ -50,8 +51,9 @@ impl Anywhere {
             return Ok(());
         }
         let mut text = String::from(
-            "| steps | force | direction, rms | \\|F\\|, rms | place, rms | times the bound: direction, \\|F\\|, place | \
-             within the stated 95 %: direction, \\|F\\|, place | refused |\n|--:|--:|--:|--:|--:|---|---|--:|\n",
+            "| steps | force | direction, rms | \\|F\\|, rms | place, rms | times the bound: \
+             direction, \\|F\\|, place | within the stated 95 %: direction, \\|F\\|, place | \
+             refused |\n|--:|--:|--:|--:|--:|---|---|--:|\n",
         );
         for steps in 0..=hivtac_sensing::forward::MOST_STEPS {
             for held in self.held(&weights, Some(steps))? {

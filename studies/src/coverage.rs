@@ -267,8 +267,8 @@ impl Part {
         let [angle, size, far] = self.rms;
         let [by_angle, by_size, by_far] = self.bounds;
         format!(
-            "| {:.digits$}–{:.digits$} | {direction:.1}, {force:.1}, {place:.1} % | {angle:.2}° | {size:.3} mN | {far:.1} µm | \
-             {by_angle:.2}, {by_size:.2}, {by_far:.2} |\n",
+            "| {:.digits$}–{:.digits$} | {direction:.1}, {force:.1}, {place:.1} % | {angle:.2}° | \
+             {size:.3} mN | {far:.1} µm | {by_angle:.2}, {by_size:.2}, {by_far:.2} |\n",
             self.from, self.to,
         )
     }
@@ -284,8 +284,8 @@ impl Tenths {
             ..
         } = self;
         let mut text = format!(
-            "\n## {units}\n\n{presses} presses with a force, {refused} without, {hidden} more with a marker out of the \
-             picture or beyond the simulated film.\n"
+            "\n## {units}\n\n{presses} presses with a force, {refused} without, {hidden} more with \
+             a marker out of the picture or beyond the simulated film.\n"
         );
         for (name, parts, digits) in [
             ("\\|F\\|, mN", &self.by_force_mn, 0),
@@ -294,8 +294,8 @@ impl Tenths {
             let honest = parts.iter().filter(|part| part.is_honest()).count();
             write!(
                 text,
-                "\n| {name} | within the stated 95 %: direction, \\|F\\|, place | direction, rms | \\|F\\|, rms | place, rms | \
-                 times the bound |\n|---|---|--:|--:|--:|---|\n{}\n\
+                "\n| {name} | within the stated 95 %: direction, \\|F\\|, place | direction, rms | \
+                 \\|F\\|, rms | place, rms | times the bound |\n|---|---|--:|--:|--:|---|\n{}\n\
                  All three within {} to {} % in {honest} of {} parts.\n",
                 parts
                     .iter()

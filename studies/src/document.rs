@@ -5,7 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-/// Puts a text into a document, between its lines `<!-- NAME: begin … -->` and `<!-- NAME: end -->`.
+/// Puts a text into a document, between its lines `<!-- NAME: begin … -->` and
+/// `<!-- NAME: end -->`.
 ///
 /// # Errors
 /// When the document cannot be read or written, or has no such lines.

@@ -67,8 +67,9 @@ impl Large {
             return Ok(());
         }
         let mut text = String::from(
-            "| force | direction, rms | \\|F\\|, rms | place, rms | times the bound: direction, \\|F\\|, place | \
-             within the stated 95 %: direction, \\|F\\|, place | refused |\n|--:|--:|--:|--:|---|---|--:|\n",
+            "| force | direction, rms | \\|F\\|, rms | place, rms | times the bound: direction, \
+             \\|F\\|, place | within the stated 95 %: direction, \\|F\\|, place | refused \
+             |\n|--:|--:|--:|--:|---|---|--:|\n",
         );
         for held in &rows {
             writeln!(

@@ -1,5 +1,5 @@
-//! `hivtac-studies`: what only proves or compares: the project's numbers beside what is possible, on units drawn at random, and
-//! beside programs that nobody here wrote.
+//! `hivtac-studies`: what only proves or compares: the project's numbers beside what is possible,
+//! on units drawn at random, and beside programs that nobody here wrote.
 
 mod anywhere;
 mod calculix;

@@ -51,8 +51,9 @@ pub fn write(path: &Path, columns: usize, maps: &[Map]) -> Result<()> {
     let [across, down] = [LEFT + SIDE + BETWEEN, TOP + SIDE + BELOW];
     let (width, height) = (columns * across, maps.len().div_ceil(columns) * down);
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
-         font-size=\"11\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" \
+         font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"{width}\" height=\"{height}\" \
+         fill=\"#ffffff\"/>\n"
     );
     for (number, map) in maps.iter().enumerate() {
         let (x, y) = (
@@ -126,8 +127,8 @@ fn frame(svg: &mut String) -> Result<()> {
     let at = |mm: f64| (mm + FARTHEST_MM) * px_per_mm + CELL as f64 / 2.0;
     writeln!(
         svg,
-        "<rect x=\"{0:.1}\" y=\"{0:.1}\" width=\"{1:.1}\" height=\"{1:.1}\" fill=\"none\" stroke=\"#000000\" \
-         stroke-dasharray=\"3 3\"/>",
+        "<rect x=\"{0:.1}\" y=\"{0:.1}\" width=\"{1:.1}\" height=\"{1:.1}\" fill=\"none\" \
+         stroke=\"#000000\" stroke-dasharray=\"3 3\"/>",
         at(-CALIBRATED_MM),
         2.0 * CALIBRATED_MM * px_per_mm
     )?;

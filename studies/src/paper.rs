@@ -92,7 +92,8 @@ impl Paper {
             return Ok(());
         }
         let mut text = String::from(
-            "| pipeline | force | direction, rms | \\|F\\|, rms | place, rms | frames |\n|---|--:|--:|--:|--:|--:|\n",
+            "| pipeline | force | direction, rms | \\|F\\|, rms | place, rms | frames \
+             |\n|---|--:|--:|--:|--:|--:|\n",
         );
         text.extend(rows.iter().map(Row::line));
         let refused = |all: &[Judged]| all.iter().filter(|one| one.found.is_none()).count();

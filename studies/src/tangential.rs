@@ -66,8 +66,9 @@ impl Tangential {
             return Ok(());
         }
         let mut text = String::from(
-            "| tangential over normal | force | direction, rms | \\|F\\|, rms | place, rms | times the bound: direction, \\|F\\|, place \
-             | within the stated 95 %: direction, \\|F\\|, place | refused |\n|--:|--:|--:|--:|--:|---|---|--:|\n",
+            "| tangential over normal | force | direction, rms | \\|F\\|, rms | place, rms | times \
+             the bound: direction, \\|F\\|, place | within the stated 95 %: direction, \\|F\\|, \
+             place | refused |\n|--:|--:|--:|--:|--:|---|---|--:|\n",
         );
         text.extend(rows.iter().map(Tilted::line));
         print!("{text}");

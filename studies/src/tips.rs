@@ -80,11 +80,12 @@ impl Tips {
         }
         let mut text = String::from(
             "| within | tip's radius | force | direction, rms | \\|F\\|, rms | place, rms | \
-             within the stated 95 %: direction, \\|F\\|, place | `unexplained` |\n|--:|--:|--:|--:|--:|--:|---|--:|\n",
+             within the stated 95 %: direction, \\|F\\|, place | `unexplained` \
+             |\n|--:|--:|--:|--:|--:|--:|---|--:|\n",
         );
         text.extend(rows.iter().map(Pressed::line));
-        text += "\n| the bound at | force | radius known: direction, \\|F\\|, place | a sixth unknown: direction, \\|F\\|, place | \
-                 radius |\n|--:|--:|---|---|--:|\n";
+        text += "\n| the bound at | force | radius known: direction, \\|F\\|, place | a sixth \
+                 unknown: direction, \\|F\\|, place | radius |\n|--:|--:|---|---|--:|\n";
         for radius_mm in SIXTH_MM {
             for force_mn in FORCES_MN {
                 text += &self.sixth(&model, radius_mm, force_mn)?;
@@ -174,7 +175,8 @@ impl Pressed {
         let known = match self.errors.count {
             0 => " – | – | – | – |".to_owned(),
             _ => format!(
-                " {direction_deg:.2}° | {magnitude_mn:.2} mN | {place_um:.0} µm | {direction:.0}, {force:.0}, {place:.0} % |"
+                " {direction_deg:.2}° | {magnitude_mn:.2} mN | {place_um:.0} µm | {direction:.0}, \
+                 {force:.0}, {place:.0} % |"
             ),
         };
         let refused = self.errors.refused - self.unexplained;

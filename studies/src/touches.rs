@@ -125,8 +125,9 @@ impl Touches {
             return Ok(());
         }
         let mut text = String::from(
-            "| press | `unexplained` | \\|F\\| less the sum's | direction beside the sum's | place beside their middle | \
-             stated σ: direction, \\|F\\|, place |\n|---|--:|--:|--:|--:|---|\n",
+            "| press | `unexplained` | \\|F\\| less the sum's | direction beside the sum's | place \
+             beside their middle | stated σ: direction, \\|F\\|, place \
+             |\n|---|--:|--:|--:|--:|---|\n",
         );
         text.extend(rows.iter().map(Outcome::line));
         print!("{text}");
@@ -240,7 +241,8 @@ impl Outcome {
         };
         let [direction, force, place] = found.sigma;
         format!(
-            "{before} {:+.1} mN | {:.1}° | {:.2} mm | {direction:.2}°, {force:.2} mN, {place:.3} mm |\n",
+            "{before} {:+.1} mN | {:.1}° | {:.2} mm | {direction:.2}°, {force:.2} mN, {place:.3} \
+             mm |\n",
             found.magnitude_mn, found.direction_deg, found.place_mm
         )
     }
@@ -263,7 +265,8 @@ fn pairs() -> Vec<Press> {
                 };
                 presses.push(Press {
                     name: format!(
-                        "two tips, {:.0} and {:.0} mN, {apart_mm} mm apart at {way_deg}° around ({x}, {y})",
+                        "two tips, {:.0} and {:.0} mN, {apart_mm} mm apart at {way_deg}° around \
+                         ({x}, {y})",
                         1e3 * part * PAIR_N,
                         1e3 * (1.0 - part) * PAIR_N
                     ),

@@ -37,7 +37,8 @@ const FRAMES: u64 = 4;
 /// Standard deviations of its gauge, N, and of its stage's zero, mm.
 const GAUGE_N: f64 = 1e-3;
 const STAGE_MM: f64 = 0.1;
-/// What a calibrated unit shall be within: direction, degrees, |F|, mN, place, µm, root mean squares.
+/// What a calibrated unit shall be within: direction, degrees, |F|, mN, place, µm, root mean
+/// squares.
 const GOOD: [f64; 3] = [0.45, 1.0, 30.0];
 
 /// Draw units as people build them; measure them with a tare alone, and after ten loads.
@@ -209,8 +210,9 @@ fn all(units: &[ByForce], force: usize) -> Errors {
 
 fn table(name: &str, units: &[ByForce]) -> Result<String> {
     let mut text = format!(
-        "\n{} units with {name}:\n\n| force | direction, rms | \\|F\\|, rms | place, rms | within the stated 95 %: direction, \\|F\\|, \
-         place | frames with a force | units within 0.45°, 1 mN and 30 µm |\n|--:|--:|--:|--:|---|--:|--:|\n",
+        "\n{} units with {name}:\n\n| force | direction, rms | \\|F\\|, rms | place, rms | within \
+         the stated 95 %: direction, \\|F\\|, place | frames with a force | units within 0.45°, 1 \
+         mN and 30 µm |\n|--:|--:|--:|--:|---|--:|--:|\n",
         units.len()
     );
     for (k, force_mn) in FORCES_MN.into_iter().enumerate() {
@@ -223,8 +225,8 @@ fn table(name: &str, units: &[ByForce]) -> Result<String> {
         };
         writeln!(
             text,
-            "| {force_mn} mN | {direction:.2}° | {force:.2} mN | {place:.0} µm | {by_direction:.1}, {by_force:.1}, {by_place:.1} % | \
-             {} of {} | {} |",
+            "| {force_mn} mN | {direction:.2}° | {force:.2} mN | {place:.0} µm | \
+             {by_direction:.1}, {by_force:.1}, {by_place:.1} % | {} of {} | {} |",
             errors.count,
             errors.count + errors.refused,
             units.iter().filter(good).count(),

@@ -108,8 +108,9 @@ impl Unseen {
         }
         maps::write(&self.picture, 2, &panels(&maps))?;
         let mut text = String::from(
-            "| force | refused, of displacements that matter | displaced unseen: median, most | direction then: median, most | \
-             \\|F\\|: median, most | place: median, most | the most at |\n|--:|--:|--:|--:|--:|--:|---|\n",
+            "| force | refused, of displacements that matter | displaced unseen: median, most | \
+             direction then: median, most | \\|F\\|: median, most | place: median, most | the most \
+             at |\n|--:|--:|--:|--:|--:|--:|---|\n",
         );
         text.extend(rows.iter().map(Row::line));
         print!("{text}");
@@ -226,8 +227,9 @@ impl Row {
             at_mm: [x, y],
         } = self;
         format!(
-            "| {force_mn} mN | {refused:.1} % | {off} px, {most_off} px | {angle:.2}°, {most_angle:.1}° | \
-             {size:.2} mN, {most_size:.1} mN | {far:.3} mm, {farthest:.2} mm | ({x}, {y}) mm |\n"
+            "| {force_mn} mN | {refused:.1} % | {off} px, {most_off} px | {angle:.2}°, \
+             {most_angle:.1}° | {size:.2} mN, {most_size:.1} mN | {far:.3} mm, {farthest:.2} mm | \
+             ({x}, {y}) mm |\n"
         )
     }
 }

@@ -225,7 +225,8 @@ fn effects_are_a_table_in_three_forms() {
     let sizes: Vec<f64> = sizes.map(|rms| rms.unwrap_or(f64::INFINITY)).collect();
     assert!(sizes.is_sorted_by(|a, b| a >= b), "{sizes:?}");
 
-    let document = "before\n<!-- effects ov7725 320x240: begin -->\n<!-- effects ov7725 320x240: end -->\nafter\n";
+    let document = "before\n<!-- effects ov7725 320x240: begin -->\n<!-- effects ov7725 320x240: \
+                    end -->\nafter\n";
     fs::write(here.join("a.md"), document).unwrap();
     stdout(&run(here, &[&few[..], &["--document", "a.md"]].concat()));
     let written = fs::read_to_string(here.join("a.md")).unwrap();

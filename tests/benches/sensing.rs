@@ -1,5 +1,5 @@
-//! `cargo bench --package hivtac-tests`: throughput of the sensing's stages on this computer, so that a regression shows
-//! without an emulator.
+//! `cargo bench --package hivtac-tests`: throughput of the sensing's stages on this computer, so
+//! that a regression shows without an emulator.
 
 use std::hint::black_box;
 

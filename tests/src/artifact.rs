@@ -1,4 +1,5 @@
-//! The programs that the tests run. `cargo xtask test` builds them and names them in environment variables.
+//! The programs that the tests run. `cargo xtask test` builds them and names them in environment
+//! variables.
 
 use std::{env, path::PathBuf};
 

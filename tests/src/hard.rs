@@ -32,9 +32,9 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// How far a marker may be from the truth here, px. Under four-fold noise 1. Beyond QVGA, compression may move markers by
-    /// 0.05 px more than usual: what it does to a pattern is no more than what a press does.
-    /// Limits are wider for a tip that sticks or slips: 0.15 px more.
+    /// How far a marker may be from the truth here, px. Under four-fold noise 1. Beyond QVGA,
+    /// compression may move markers by 0.05 px more than usual: what it does to a pattern is no
+    /// more than what a press does. Limits are wider for a tip that sticks or slips: 0.15 px more.
     pub fn tolerance_px(&self) -> f64 {
         let width = self.view.size[0];
         let case = self.case.tolerance_px(width);
@@ -50,8 +50,8 @@ impl Outcome {
             && (self.worst_px > self.tolerance_px() || self.case.expected == Expected::Rejected)
     }
 
-    /// Whether markers that are plain to see were refused in most frames. Dim ones are not in YUV422, whose chroma fades with
-    /// the light.
+    /// Whether markers that are plain to see were refused in most frames. Dim ones are not in
+    /// YUV422, whose chroma fades with the light.
     pub fn is_overlooked(&self) -> bool {
         let dim = ["gain-", "one-sided-"];
         let dim = dim.iter().any(|name| self.case.name.starts_with(name));
@@ -75,8 +75,8 @@ impl Outcome {
     }
 }
 
-/// Looks at every hard case that the view's camera can take, under every load of the catalogue, `repeats` frames each; at as
-/// many moments where things move.
+/// Looks at every hard case that the view's camera can take, under every load of the catalogue,
+/// `repeats` frames each; at as many moments where things move.
 ///
 /// # Errors
 /// When the frame size is not one.

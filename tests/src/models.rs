@@ -53,7 +53,8 @@ pub fn rest() -> Features {
     }))
 }
 
-/// The file of a model with these layer widths (first 11, last as many as there are outputs), for QVGA frames of the default preset.
+/// The file of a model with these layer widths (first 11, last as many as there are outputs), for
+/// QVGA frames of the default preset.
 pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> Vec<u8> {
     encoded(&spec(qvga(), qvga_rest(), widths, weights, output, seed))
 }
@@ -72,8 +73,8 @@ pub fn weighted_file(
     encoded(&spec)
 }
 
-/// A model of int8 weights with these layer widths, for frames of another geometry and pixel format, with the rest position
-/// that they show to this estimator.
+/// A model of int8 weights with these layer widths, for frames of another geometry and pixel
+/// format, with the rest position that they show to this estimator.
 pub fn file_for(
     geometry: Geometry,
     format: PixelFormat,
@@ -108,7 +109,8 @@ pub fn file_read_so(
     encoded(&spec)
 }
 
-/// The committed model that tells forces and places anywhere, with so many steps from its network's answer.
+/// The committed model that tells forces and places anywhere, with so many steps from its network's
+/// answer.
 pub fn anywhere(steps: u8) -> Vec<u8> {
     let file = include_bytes!("../../calibration/models/default.hvtm");
     with_steps(file, steps).expect("the committed model takes steps")
@@ -261,8 +263,9 @@ fn layer(widths: &[u16], last: bool, weights: Weights, random: &mut Random) -> L
     }
 }
 
-/// Keeps activations within their range and outputs within a newton for most inputs: a sum has about √inputs · 70 · 4096
-/// as its size in the first layer, √inputs · 70 · 60 in others, and more with wider numbers.
+/// Keeps activations within their range and outputs within a newton for most inputs: a sum has
+/// about √inputs · 70 · 4096 as its size in the first layer, √inputs · 70 · 60 in others, and more
+/// with wider numbers.
 fn shift(first: bool, last: bool, largest_weight: i64, activation: i64) -> u8 {
     let usual = match (first, last) {
         (true, false) => 40,

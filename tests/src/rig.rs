@@ -14,7 +14,8 @@ use tempfile::TempDir;
 
 use crate::artifact;
 
-/// How long anything may take here: the emulator runs at about a tenth of real time, and tests share the processors.
+/// How long anything may take here: the emulator runs at about a tenth of real time, and tests
+/// share the processors.
 const PATIENCE: Duration = Duration::from_secs(240);
 
 /// A running rig with its logs. Killed when it is dropped.
@@ -27,8 +28,8 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Starts the rig (`HIVTAC_RIG`) with the firmware (`HIVTAC_ELF`) and further options. It runs while a client
-    /// holds its port.
+    /// Starts the rig (`HIVTAC_RIG`) with the firmware (`HIVTAC_ELF`) and further options. It runs
+    /// while a client holds its port.
     ///
     /// # Errors
     /// When it does not get ready.
@@ -153,8 +154,8 @@ pub struct ToolOutput {
     pub err: String,
 }
 
-/// Runs the host tool (`HIVTAC_TOOL`) on a rig's port until it ends. It waits up to 40 s for an answer: the emulated
-/// board boots slower than a real one.
+/// Runs the host tool (`HIVTAC_TOOL`) on a rig's port until it ends. It waits up to 40 s for an
+/// answer: the emulated board boots slower than a real one.
 ///
 /// # Errors
 /// When it cannot be started, or does not end.

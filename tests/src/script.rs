@@ -9,7 +9,8 @@ use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
 
 use crate::golden::Kind;
 
-/// A script that is being written. Frames use the threshold and the model that were set before them.
+/// A script that is being written. Frames use the threshold and the model that were set before
+/// them.
 #[derive(Clone, Debug)]
 pub struct Script {
     bytes: Vec<u8>,
@@ -60,7 +61,8 @@ impl Script {
         self.push_threshold(threshold.into(), order, 4)
     }
 
-    /// The same; from here on the pixels of scans are weighed, and so are those of frames sensed without a model.
+    /// The same; from here on the pixels of scans are weighed, and so are those of frames sensed
+    /// without a model.
     pub fn weighted_threshold(
         &mut self,
         threshold: impl Into<Threshold>,
@@ -79,7 +81,8 @@ impl Script {
         self
     }
 
-    /// Scans a frame of `width` columns into blobs. Pixels of RGB565 have red in bits 15–11, whatever the byte order.
+    /// Scans a frame of `width` columns into blobs. Pixels of RGB565 have red in bits 15–11,
+    /// whatever the byte order.
     pub fn scan(&mut self, width: u16, pixels: &[u16], dilations: u8, min_area: u8) -> &mut Script {
         self.bytes.push(Kind::Scan as u8);
         self.put(&[width, self.rows(width, pixels)]);
@@ -88,7 +91,8 @@ impl Script {
         self
     }
 
-    /// Runs frames of one size, `width` columns each, through the whole pipeline. Pixels as in [`scan`](Self::scan).
+    /// Runs frames of one size, `width` columns each, through the whole pipeline. Pixels as in
+    /// [`scan`](Self::scan).
     pub fn sense(&mut self, width: u16, frames: &[&[u16]]) -> &mut Script {
         let height = frames.first().map_or(0, |pixels| self.rows(width, pixels));
         let count = u16::try_from(frames.len()).expect("at most 65,535 frames");

@@ -1,5 +1,5 @@
-//! Rendered frames, measured by the pipeline with a model that knows nothing of forces: where it finds the markers, and
-//! whether it would trust them with a force.
+//! Rendered frames, measured by the pipeline with a model that knows nothing of forces: where it
+//! finds the markers, and whether it would trust them with a force.
 
 use std::boxed::Box;
 use std::vec::Vec;
@@ -45,7 +45,8 @@ pub struct View {
 pub enum Detection {
     /// A force would be given.
     Trusted {
-        /// The largest distance of a marker from its true place, px; infinite when there is no such marker.
+        /// The largest distance of a marker from its true place, px; infinite when there is no such
+        /// marker.
         worst_px: f64,
         /// The distance of the markers' mean from the true one, px.
         mean_px: f64,
@@ -54,7 +55,8 @@ pub enum Detection {
     Refused(Status),
 }
 
-/// A sensor that was tared on the nominal scene at rest. Its model is for such frames and such a contact.
+/// A sensor that was tared on the nominal scene at rest. Its model is for such frames and such a
+/// contact.
 pub struct TaredSensor {
     sensor: Box<Sensor<'static>>,
 }
@@ -86,9 +88,9 @@ impl View {
         contact: Contact::Force,
     };
 
-    /// How far a marker may be from the truth, px: 0.3 up to QVGA, 0.15 at 800×600, linear between them. Binary centroids
-    /// are themselves off by up to 0.35 px at QVGA and 0.25 px at 800×600 on nominal frames, so that 0.15 px
-    /// more are allowed to them.
+    /// How far a marker may be from the truth, px: 0.3 up to QVGA, 0.15 at 800×600, linear between
+    /// them. Binary centroids are themselves off by up to 0.35 px at QVGA and 0.25 px at 800×600 on
+    /// nominal frames, so that 0.15 px more are allowed to them.
     pub fn tolerance_px(&self) -> f64 {
         let part = (f64::from(self.size[0]) - 320.0) / (800.0 - 320.0);
         let weighted = 0.3 - 0.15 * part.clamp(0.0, 1.0);
@@ -108,8 +110,8 @@ impl View {
         Ok(self.pressed(scene)?)
     }
 
-    /// A scene in which loads press in this view's way and whose camera sends this view's format; a JPEG camera's pictures become
-    /// RGB565, and are left as they are.
+    /// A scene in which loads press in this view's way and whose camera sends this view's format; a
+    /// JPEG camera's pictures become RGB565, and are left as they are.
     ///
     /// # Errors
     /// When the film cannot take the scene's own load so.
@@ -130,7 +132,8 @@ impl View {
         })
     }
 
-    /// Whether this view's camera can take the frames of a scene: of JPEG only where it sends RGB565.
+    /// Whether this view's camera can take the frames of a scene: of JPEG only where it sends
+    /// RGB565.
     pub fn takes(&self, scene: &Scene) -> bool {
         self.format == PixelFormat::Rgb565 || scene.options().format == self.sent()
     }

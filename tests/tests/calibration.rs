@@ -1,5 +1,6 @@
-//! A unit is calibrated against a gauge, from its first frame to its own model: the firmware in the rig, pressed by a scene, and
-//! a gauge with a clock of its own that shows what the scene's tip pressed.
+//! A unit is calibrated against a gauge, from its first frame to its own model: the firmware in the
+//! rig, pressed by a scene, and a gauge with a clock of its own that shows what the scene's tip
+//! pressed.
 
 use std::fs;
 use std::io::Write;
@@ -18,7 +19,8 @@ const PRESSES: [[f64; 3]; 5] = [
     [0.200, 6.0, 5.0],
 ];
 
-/// Runs `hivtac-calibrate` (`HIVTAC_CALIBRATE`) with lines on its standard input; its standard output.
+/// Runs `hivtac-calibrate` (`HIVTAC_CALIBRATE`) with lines on its standard input; its standard
+/// output.
 fn calibrate(here: &Path, arguments: &[&str], lines: &str) -> String {
     let mut child = Command::new(artifact::named_by("HIVTAC_CALIBRATE"))
         .current_dir(here)
@@ -47,7 +49,8 @@ fn calibrate(here: &Path, arguments: &[&str], lines: &str) -> String {
 fn press(here: &Path, number: usize, [force_n, alpha, beta]: [f64; 3]) {
     let scene = here.join("press.toml");
     let text = format!(
-        "seed = {number}\n[load]\nmotion = \"press\"\n[load.press]\nforce_n = {force_n}\nalpha_deg = {alpha:?}\nbeta_deg = {beta:?}\n\
+        "seed = {number}\n[load]\nmotion = \"press\"\n[load.press]\nforce_n = {force_n}\nalpha_deg \
+         = {alpha:?}\nbeta_deg = {beta:?}\n\
          start_s = 0.8\nrise_s = 0.35\nhold_s = 0.4\nfall_s = 0.35\n"
     );
     fs::write(&scene, text).unwrap();

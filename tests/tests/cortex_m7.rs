@@ -12,7 +12,8 @@ use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu;
 use hivtac_tests::script::{Script, features};
 
-/// Runs a script on both and compares what they print, byte for byte. Gives the text for further checks.
+/// Runs a script on both and compares what they print, byte for byte. Gives the text for further
+/// checks.
 fn same_on_both(script: &Script) -> String {
     let host = qemu::run_on_host(script).unwrap();
     let emulated = qemu::run(script).unwrap();
@@ -177,7 +178,8 @@ fn other_formats_pass_the_same_thresholds() {
                 .map(|(low, high)| Threshold::Mono(Mono { low, high })),
         );
     let mut script = Script::new();
-    // Every byte in every place of a word of pixels, then anything; rows with whole words of the mask and with parts.
+    // Every byte in every place of a word of pixels, then anything; rows with whole words of the
+    // mask and with parts.
     let places = (0..4).flat_map(|place| (0..256_u32).map(move |byte| byte << (8 * place)));
     let every: Vec<u16> = places
         .chain((0..256).map(|byte| byte * 0x0101_0101))

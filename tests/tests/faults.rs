@@ -1,4 +1,5 @@
-//! Faults of the rig, seen through the host tool: each ends in its documented status or counter, and passes.
+//! Faults of the rig, seen through the host tool: each ends in its documented status or counter,
+//! and passes.
 
 use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
 use serde_json::Value;

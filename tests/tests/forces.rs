@@ -1,5 +1,5 @@
-//! The firmware in the rig gives, through the host tool, the very forces that the sensing gives on this computer for the
-//! frames that the camera has shown.
+//! The firmware in the rig gives, through the host tool, the very forces that the sensing gives on
+//! this computer for the frames that the camera has shown.
 
 use std::collections::HashMap;
 use std::fs;
@@ -199,14 +199,15 @@ fn forces_and_mismatches(lines: &[Value]) -> (usize, usize) {
     )
 }
 
-/// Whether all lines have forces by their own model but the first, of which nobody knows how fast the
-/// markers moved while it was exposed.
+/// Whether all lines have forces by their own model but the first, of which nobody knows how fast
+/// the markers moved while it was exposed.
 fn forces_but_one(lines: &[Value]) -> bool {
     let (forces, mismatches) = forces_and_mismatches(lines);
     mismatches == 0 && lines[1..].iter().all(|line| line["force"].is_object()) && forces > 0
 }
 
-/// Firmware with a model for YUV422 begins in that format, leaves it for RGB565 on command, and comes back to it.
+/// Firmware with a model for YUV422 begins in that format, leaves it for RGB565 on command, and
+/// comes back to it.
 #[test]
 fn the_pixel_format_is_chosen_while_frames_are_measured() {
     const FRAMES: usize = 5;

@@ -1,4 +1,5 @@
-//! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused for it.
+//! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused
+//! for it.
 
 use hivtac_film::{MAX_FORCE_N, MAX_LABEL_N};
 use hivtac_scene::{Contact, Load};
@@ -50,8 +51,8 @@ fn hard_cases_are_right_or_refused_where_the_tip_slips() {
     hold(&views(SLIP, &[[320, 240], [800, 600]]), 2);
 }
 
-/// Presses over the whole range in a sequence that fills it evenly: |F| to 0.25 N, or the largest label of a stage, α to ±12°, β to ±10°, the tip up to
-/// 0.25 mm off the middle.
+/// Presses over the whole range in a sequence that fills it evenly: |F| to 0.25 N, or the largest
+/// label of a stage, α to ±12°, β to ±10°, the tip up to 0.25 mm off the middle.
 fn honest_load(contact: Contact, index: usize) -> Load {
     let most_n = match contact {
         Contact::Force => MAX_FORCE_N,

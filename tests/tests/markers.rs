@@ -1,11 +1,13 @@
-//! What the marker rules let through on rendered frames: every honest frame, and no false one beyond a bound.
+//! What the marker rules let through on rendered frames: every honest frame, and no false one
+//! beyond a bound.
 
 use hivtac_scene::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;
 use hivtac_sensing::threshold::PixelFormat;
 use hivtac_tests::tared::{Detection, ESTIMATORS, TaredSensor, View};
 
-/// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small spot on its edge.
+/// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small
+/// spot on its edge.
 const COVERED_WEIGHTED: f64 = 0.3;
 const COVERED_BINARY: f64 = 0.6;
 /// Of one on which something red grows: a disc of its own size beneath.
@@ -38,7 +40,8 @@ fn press(newtons: f64) -> Load {
     Load::from_vector([0.0, 0.0, -newtons]).unwrap()
 }
 
-/// How far the markers are off, px: the worst of them, and their mean. `None` when there may be no force.
+/// How far the markers are off, px: the worst of them, and their mean. `None` when there may be no
+/// force.
 fn trusted(sensor: &mut TaredSensor, frame: &Frame) -> Option<(f64, f64)> {
     match sensor.detect(frame) {
         Detection::Trusted { worst_px, mean_px } => Some((worst_px, mean_px)),

@@ -133,7 +133,8 @@ fn a_force_that_changes_is_measured_as_one_that_stays() {
                     refused,
                 } = e;
                 format!(
-                    "{mean_deg:.2}°, {most_deg:.1}° at most; {magnitude_mn:.2} mN; {refused} refused"
+                    "{mean_deg:.2}°, {most_deg:.1}° at most; {magnitude_mn:.2} mN; {refused} \
+                     refused"
                 )
             };
             println!(

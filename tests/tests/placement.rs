@@ -1,4 +1,5 @@
-//! Where the firmware's code and data lie, read from the very ELF that is flashed: what `memory.x` promises.
+//! Where the firmware's code and data lie, read from the very ELF that is flashed: what `memory.x`
+//! promises.
 
 use std::fs;
 use std::ops::Range;

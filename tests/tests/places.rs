@@ -1,4 +1,5 @@
-//! Honest contacts anywhere get a force from a model that tells places, and few of them from one that does not.
+//! Honest contacts anywhere get a force from a model that tells places, and few of them from one
+//! that does not.
 
 use hivtac_scene::{Contact, Preset, Scene};
 use hivtac_sensing::model::CentroidEstimator;

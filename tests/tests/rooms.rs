@@ -1,4 +1,5 @@
-//! Each of the project's packages depends only on those that the table of rooms in `docs/architecture.md` allows.
+//! Each of the project's packages depends only on those that the table of rooms in
+//! `docs/architecture.md` allows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::env;
@@ -67,7 +68,8 @@ fn room(line: &str) -> Option<Room> {
     })
 }
 
-/// The project's packages: name, folder from the root, and the folders of the project that it depends on.
+/// The project's packages: name, folder from the root, and the folders of the project that it
+/// depends on.
 fn packages() -> BTreeMap<String, (String, BTreeSet<String>)> {
     let mut packages = BTreeMap::new();
     for workspace in WORKSPACES {

@@ -1,5 +1,5 @@
-//! The film run forwards, by the committed model: it finds the contact that moves the markers so, refuses what none does, and
-//! survives anything.
+//! The film run forwards, by the committed model: it finds the contact that moves the markers so,
+//! refuses what none does, and survives anything.
 
 use hivtac_sensing::force::{Force, Resting};
 use hivtac_sensing::forward::{Forward, Markers, Pose, STEPS_AT_MOST};
@@ -45,7 +45,8 @@ fn answer(model: &Model<'_>, markers: &[Marker; 4], guess: [i32; 5]) -> (Force, 
     resting.force(forward, &model.range, markers, &output)
 }
 
-/// From guesses that are a millimetre and a fifth of the force off, and from the middle of the film.
+/// From guesses that are a millimetre and a fifth of the force off, and from the middle of the
+/// film.
 #[test]
 fn the_contact_is_found_from_bad_guesses() {
     let file = models::anywhere(1);
@@ -146,7 +147,8 @@ fn a_bad_guess_takes_more_steps() {
     }
 }
 
-/// One marker half a pixel off is no contact; half of that under the tip may be one, and then it is said how uncertain it is.
+/// One marker half a pixel off is no contact; half of that under the tip may be one, and then it is
+/// said how uncertain it is.
 #[test]
 fn a_marker_that_is_off_is_refused() {
     let file = models::anywhere(1);

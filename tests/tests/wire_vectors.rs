@@ -1,5 +1,6 @@
-//! Golden vectors of the wire format: `tests/vectors/wire.json`, made by an implementation that shares nothing with
-//! the Rust one, equals what `hivtac-wire` writes and reads, and what `docs/wire.md` quotes.
+//! Golden vectors of the wire format: `tests/vectors/wire.json`, made by an implementation that
+//! shares nothing with the Rust one, equals what `hivtac-wire` writes and reads, and what
+//! `docs/wire.md` quotes.
 
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};

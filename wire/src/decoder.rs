@@ -8,7 +8,8 @@ use crate::version::HelloPrefix;
 pub enum Received<M> {
     /// A message of this protocol version.
     Message(M),
-    /// A hello of another protocol version or schema. Nothing else of such a peer can be understood.
+    /// A hello of another protocol version or schema. Nothing else of such a peer can be
+    /// understood.
     ForeignHello(HelloPrefix),
 }
 
@@ -21,7 +22,8 @@ pub struct Rejected {
     pub cobs: u32,
     /// Frames with a wrong checksum, or too short to have one.
     pub crc: u32,
-    /// Frames with a right checksum around something that is no message: unknown variant, bad string, too short.
+    /// Frames with a right checksum around something that is no message: unknown variant, bad
+    /// string, too short.
     pub body: u32,
     /// Frames with a right checksum and bytes after the message.
     pub trailing: u32,
@@ -46,8 +48,9 @@ enum Reject {
     Trailing,
 }
 
-/// Cuts a byte stream at zero bytes and decodes what lies between. After any garbage it is in step again at the
-/// next zero byte. Empty frames are ignored: a sender may insert zero bytes between frames at will.
+/// Cuts a byte stream at zero bytes and decodes what lies between. After any garbage it is in step
+/// again at the next zero byte. Empty frames are ignored: a sender may insert zero bytes between
+/// frames at will.
 ///
 /// `N`: longest frame it accepts, closing zero not counted;
 /// [`DEVICE_FRAME_LIMIT`](crate::frame::DEVICE_FRAME_LIMIT) on a host,
@@ -89,8 +92,8 @@ impl<const N: usize> Decoder<N> {
         self.rejected
     }
 
-    /// Takes bytes off the front of `bytes` up to and including the end of the next message, which it returns,
-    /// or all of them. Call it until `bytes` is empty and it returns `None`.
+    /// Takes bytes off the front of `bytes` up to and including the end of the next message, which
+    /// it returns, or all of them. Call it until `bytes` is empty and it returns `None`.
     pub fn feed<M: Message>(&mut self, bytes: &mut &[u8]) -> Option<Received<M>> {
         while let Some((&byte, rest)) = bytes.split_first() {
             *bytes = rest;
@@ -121,7 +124,8 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// Forgets a frame that has begun, for when the connection was lost; counts its bytes as thrown away.
+    /// Forgets a frame that has begun, for when the connection was lost; counts its bytes as thrown
+    /// away.
     pub fn reset(&mut self) {
         let length = core::mem::take(&mut self.length);
         self.count_bytes(length);

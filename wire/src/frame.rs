@@ -1,4 +1,5 @@
-//! Framing, the sending side: one message into one frame, `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
+//! Framing, the sending side: one message into one frame,
+//! `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
 
 use crate::message::{DeviceMessage, HostMessage};
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -29,14 +30,15 @@ pub const MAX_SAMPLE_FRAME: usize = frame_length(MAX_SAMPLE_BODY);
 /// Longest frame from the host in this protocol version, closing zero included.
 pub const MAX_HOST_FRAME: usize = frame_length(MAX_HOST_BODY);
 
-/// No protocol version has longer frames from the device. A host's decoder holds this much, so that it can
-/// name the version of any device.
+/// No protocol version has longer frames from the device. A host's decoder holds this much, so that
+/// it can name the version of any device.
 pub const DEVICE_FRAME_LIMIT: usize = 256;
 
 /// No protocol version has longer frames from the host. A device's decoder holds this much.
 pub const HOST_FRAME_LIMIT: usize = 64;
 
-/// Bytes of the frame around a body: checksum, one COBS byte for each 254 bytes begun, closing zero.
+/// Bytes of the frame around a body: checksum, one COBS byte for each 254 bytes begun, closing
+/// zero.
 const fn frame_length(body: usize) -> usize {
     let content = body + CRC_BYTES;
     content + 1 + content / 254 + 1

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 /// Raised on every incompatible change of this file.
 pub const PROTOCOL_VERSION: u16 = 2;
 
-/// What the device sends. `Hello` stays variant 0 and keeps its first two fields for ever, so that any two
-/// versions can name each other in an error.
+/// What the device sends. `Hello` stays variant 0 and keeps its first two fields for ever, so that
+/// any two versions can name each other in an error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum DeviceMessage {
     /// Answer to a [`HostMessage::Hello`] and to [`Request::GetInfo`].
@@ -168,8 +168,8 @@ impl HsvBox {
 pub struct Sample {
     /// Counts the samples that were produced; a gap is a sample lost on the way to the host.
     pub sequence: u32,
-    /// Counts VSYNC edges since the camera was set up; a gap while streaming is a frame that was not
-    /// processed.
+    /// Counts VSYNC edges since the camera was set up; a gap while streaming is a frame that was
+    /// not processed.
     pub frame: u32,
     /// Device time of the middle of the frame's exposure, when the force is true, µs since boot.
     pub time_us: u64,
@@ -296,9 +296,11 @@ pub enum Request {
     Start,
     /// Stop streaming.
     Stop,
-    /// Set the threshold and its pixel format. Answered when it holds; until then the one before does.
+    /// Set the threshold and its pixel format. Answered when it holds; until then the one before
+    /// does.
     SetThreshold(Threshold),
-    /// Take the mean of the next `frames` good frames (1–256) as the rest position. Answered when done.
+    /// Take the mean of the next `frames` good frames (1–256) as the rest position. Answered when
+    /// done.
     Tare {
         /// How many frames to average.
         frames: u16,
@@ -329,7 +331,8 @@ pub enum Outcome {
     Busy,
     /// Tare gave up: not enough good frames arrived in time.
     NoGoodFrames,
-    /// Refused: the markers are not where a film at rest has them. Something presses it, or the sensor is built otherwise.
+    /// Refused: the markers are not where a film at rest has them. Something presses it, or the
+    /// sensor is built otherwise.
     NotAtRest,
     /// Refused: this device's camera does not send that pixel format.
     Unsupported,

@@ -91,8 +91,9 @@ proptest! {
         prop_assert_eq!(decoder.rejected().frames(), 1);
     }
 
-    /// In the content a flipped bit is one wrong bit, which CRC-32 always finds; in COBS' code bytes it moves zeros,
-    /// and in the closing zero it joins two frames: garbled content that passes a CRC-32 once in 2³².
+    /// In the content a flipped bit is one wrong bit, which CRC-32 always finds; in COBS' code
+    /// bytes it moves zeros, and in the closing zero it joins two frames: garbled content that
+    /// passes a CRC-32 once in 2³².
     #[test]
     fn a_flipped_bit_never_gives_a_wrong_message(
         message in any_device_message(),

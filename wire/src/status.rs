@@ -22,7 +22,8 @@ bits! {
     MARKERS_MISSING = 0, "markers_missing";
     /// More than one reading of the blobs as four markers is plausible, or none is: no force.
     MARKERS_AMBIGUOUS = 1, "markers_ambiguous";
-    /// More blobs than the fixed storage holds, or more runs than noise is given time for: no force.
+    /// More blobs than the fixed storage holds, or more runs than noise is given time for: no
+    /// force.
     BLOB_OVERFLOW = 2, "blob_overflow";
     /// Areas or shapes of the four markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
@@ -49,7 +50,8 @@ bits! {
     NOT_CALIBRATED = 13, "not_calibrated";
     /// There is no usable model: no force.
     MODEL_MISSING = 14, "model_missing";
-    /// The model was made for another frame size, format, threshold or centroid estimator: no force.
+    /// The model was made for another frame size, format, threshold or centroid estimator: no
+    /// force.
     MODEL_MISMATCH = 15, "model_mismatch";
     /// Something touches the film: |F| is at least 2 mN and three times its standard uncertainty.
     CONTACT = 16, "contact";

@@ -1,12 +1,13 @@
-//! Which protocol a peer speaks: version number, schema hash, and the part of a hello that never changes.
+//! Which protocol a peer speaks: version number, schema hash, and the part of a hello that never
+//! changes.
 
 use crate::message::{DeviceMessage, HostHello, HostMessage, PROTOCOL_VERSION};
 use postcard_schema::key::hash::fnv1a64::hash_ty_path;
 use serde::Deserialize;
 
-/// Changes when any message changes: FNV-1a over names and types of all fields and variants of both message
-/// enums, in order (`postcard-schema`). It does not see the capacity of strings and the meaning of status bits:
-/// a change of those raises [`PROTOCOL_VERSION`].
+/// Changes when any message changes: FNV-1a over names and types of all fields and variants of both
+/// message enums, in order (`postcard-schema`). It does not see the capacity of strings and the
+/// meaning of status bits: a change of those raises [`PROTOCOL_VERSION`].
 pub const SCHEMA_HASH: u64 =
     u64::from_le_bytes(hash_ty_path::<(DeviceMessage, HostMessage)>("hivtac"));
 

@@ -1,8 +1,9 @@
 //! How far the gauge's clock is from the sensor's.
 //!
-//! The markers' mean radius rises with |F|, but not in proportion. So for every lag a cubic of the radius is fitted to what
-//! the gauge said then, and its correlation with the gauge's force is taken: at the right lag it is nearly one, and what
-//! the cubic leaves is the residual. Lags are tried on a grid, the best one is refined between its steps.
+//! The markers' mean radius rises with |F|, but not in proportion. So for every lag a cubic of the
+//! radius is fitted to what the gauge said then, and its correlation with the gauge's force is
+//! taken: at the right lag it is nearly one, and what the cubic leaves is the residual. Lags are
+//! tried on a grid, the best one is refined between its steps.
 
 use anyhow::{Result, bail, ensure};
 use rayon::prelude::*;
@@ -99,8 +100,8 @@ pub fn align(frames: &[RadiusSample], gauge: Joined<'_>, search: Search) -> Resu
         .min_by(|&a, &b| residual(a).total_cmp(&residual(b)))
     else {
         bail!(
-            "the gauge has readings for too few of the frames at any lag from {low:.1} to {high:.1} s: did both record at the \
-             same time?"
+            "the gauge has readings for too few of the frames at any lag from {low:.1} to \
+             {high:.1} s: did both record at the same time?"
         );
     };
     let hill = hill(best, steps, residual);
@@ -140,13 +141,14 @@ fn convincing(found: &Alignment, at_an_end: bool) -> Result<()> {
     );
     ensure!(
         found.spread_n >= LEAST_SPREAD_N,
-        "the gauge's force hardly changes (standard deviation {spread:.2} mN): press and release while recording"
+        "the gauge's force hardly changes (standard deviation {spread:.2} mN): press and release \
+         while recording"
     );
     ensure!(
         found.correlation >= LEAST_CORRELATION,
-        "no lag fits: at the best one, {:.3} s, force and markers correlate by {:.3} only (at least {LEAST_CORRELATION}), and \
-         {residual:.1} mN of {spread:.1} mN are left: are gauge and sensor of the same recording, and does nothing but the \
-         gauge's tip touch the film?",
+        "no lag fits: at the best one, {:.3} s, force and markers correlate by {:.3} only (at \
+         least {LEAST_CORRELATION}), and {residual:.1} mN of {spread:.1} mN are left: are gauge \
+         and sensor of the same recording, and does nothing but the gauge's tip touch the film?",
         found.lag_s,
         found.correlation
     );
@@ -158,7 +160,8 @@ fn convincing(found: &Alignment, at_an_end: bool) -> Result<()> {
     );
     ensure!(
         next >= LEAST_CONTRAST * residual,
-        "more than one lag fits: {residual:.1} mN are left at {:.3} s and {next:.1} mN at another: press in an irregular rhythm",
+        "more than one lag fits: {residual:.1} mN are left at {:.3} s and {next:.1} mN at another: \
+         press in an irregular rhythm",
         found.lag_s
     );
     Ok(())
@@ -276,7 +279,8 @@ impl Fit {
         }
     }
 
-    /// What is left in parts of the spread; all of it where the force does not rise with the radius.
+    /// What is left in parts of the spread; all of it where the force does not rise with the
+    /// radius.
     fn relative(&self) -> f64 {
         if self.rises && self.spread_n > 0.0 {
             self.residual_n / self.spread_n

@@ -20,7 +20,8 @@ use crate::range::Range;
 pub enum Gauge {
     /// In the recording, on the computer's clock.
     AtThePort,
-    /// In files of the gauge's own, on its own clock: one for all runs with poses, or one for each of them, in order.
+    /// In files of the gauge's own, on its own clock: one for all runs with poses, or one for each
+    /// of them, in order.
     Files(Vec<Series>),
 }
 
@@ -116,7 +117,8 @@ fn at_the_port(
     }
     ensure!(
         series.readings() > 1,
-        "no gauge was heard ({} lines): name the file that it recorded with --gauge, or record with --gauge-port",
+        "no gauge was heard ({} lines): name the file that it recorded with --gauge, or record \
+         with --gauge-port",
         series.bad.values().sum::<usize>()
     );
     let times = on_the_computers_clock(kept);
@@ -128,8 +130,9 @@ fn at_the_port(
     Ok((series, alignment, times))
 }
 
-/// When the frames were exposed on the computer's clock, but for a constant: the sensor's clock has no jitter, the
-/// computer's is the gauge's. The median of their difference over the neighbours joins both.
+/// When the frames were exposed on the computer's clock, but for a constant: the sensor's clock has
+/// no jitter, the computer's is the gauge's. The median of their difference over the neighbours
+/// joins both.
 fn on_the_computers_clock(kept: &[&Kept]) -> Vec<f64> {
     let device = |kept: &Kept| kept.device_us as f64 / 1e6;
     let late: Vec<f64> = kept.iter().map(|kept| kept.host_s - device(kept)).collect();

@@ -7,7 +7,8 @@
 //! | `gauge.csv` | every line of a gauge at a serial port, as it came |
 //! | `takes.csv` | the takes that were finished |
 //!
-//! Every line is written at once, so that an interruption costs at most the line under way, which the next run removes.
+//! Every line is written at once, so that an interruption costs at most the line under way, which
+//! the next run removes.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Write};
@@ -140,7 +141,8 @@ fn pair(numbers: Option<[f64; 2]>) -> String {
     numbers.map_or(",".to_owned(), |[a, b]| format!("{a},{b}"))
 }
 
-/// The names of the bits that forbid a force; a missing or another model says nothing about the markers.
+/// The names of the bits that forbid a force; a missing or another model says nothing about the
+/// markers.
 fn reasons(status: Status) -> String {
     let markers =
         Status(Status::NO_FORCE.0 & !(Status::MODEL_MISSING | Status::MODEL_MISMATCH).0 & status.0);
@@ -184,8 +186,8 @@ fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
                 .with_context(|| format!("{} is damaged", path.display()))?;
             ensure!(
                 before == *conditions,
-                "this recording is of another unit, or of the same one set otherwise: {} says {text}, the sensor {}; use another \
-                 folder, or set it as before",
+                "this recording is of another unit, or of the same one set otherwise: {} says \
+                 {text}, the sensor {}; use another folder, or set it as before",
                 path.display(),
                 serde_json::to_string(conditions)?
             );
@@ -245,7 +247,8 @@ pub struct Kept {
     pub device_us: u64,
     /// The pose, or nothing for the untouched film.
     pub pose: Option<Pose>,
-    /// The markers' (x, y) in 1/65,536 px and area in px, or the status names that say why there are none.
+    /// The markers' (x, y) in 1/65,536 px and area in px, or the status names that say why there
+    /// are none.
     pub seen: Result<[[i64; 3]; 4], String>,
 }
 
@@ -260,7 +263,8 @@ impl Recording {
     /// Reads a folder.
     ///
     /// # Errors
-    /// When it is no recording, or a file of it is damaged; names the line. A last line that was cut is left out.
+    /// When it is no recording, or a file of it is damaged; names the line. A last line that was
+    /// cut is left out.
     pub fn read(path: &Path) -> Result<Self> {
         let unit = path.join(UNIT);
         let text = fs::read_to_string(&unit).with_context(|| {

@@ -6,8 +6,9 @@
 //! +0.123N    -0.123 N    0.123    123.4mN    12.5 gf    +0.123NTO
 //! ```
 //!
-//! The letters after the unit are those of common gauges: `T` or `C` for the present force (`P`: a held peak, which is no
-//! reading of now), then `O`, `H` or `L` for how it compares with the gauge's own limits (`E`: overload).
+//! The letters after the unit are those of common gauges: `T` or `C` for the present force (`P`: a
+//! held peak, which is no reading of now), then `O`, `H` or `L` for how it compares with the
+//! gauge's own limits (`E`: overload).
 
 use anyhow::{Result, bail};
 
@@ -51,7 +52,8 @@ impl Bad {
     }
 }
 
-/// The force (N, with the gauge's sign) that a line says. `usual` is taken where the line names no unit.
+/// The force (N, with the gauge's sign) that a line says. `usual` is taken where the line names no
+/// unit.
 ///
 /// # Errors
 /// Why the line is not to be used.
@@ -196,7 +198,8 @@ mod tests {
         }
 
         #[test]
-        fn what_a_gauge_writes_is_read(steps in -99_999_i32..=99_999, letters in "(N|NTO|NTL|mN| N)?") {
+        fn what_a_gauge_writes_is_read(steps in -99_999_i32..=99_999, letters in "(N|NTO|NTL|mN| \
+            N)?") {
             let value = f64::from(steps) / 1e3;
             let unit = if letters == "mN" { 1e-3 } else { 1.0 };
             let found = read(&format!("{value:+.3}{letters}")).unwrap();

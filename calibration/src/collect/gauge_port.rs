@@ -21,7 +21,8 @@ pub struct GaugeArgs {
     /// Its baud rate.
     #[arg(long, default_value_t = 19_200, requires = "gauge_port")]
     pub gauge_baud: u32,
-    /// For a gauge that only answers: what it is asked with, again and again (`\r` and `\n` as in C).
+    /// For a gauge that only answers: what it is asked with, again and again (`\r` and `\n` as in
+    /// C).
     #[arg(long, value_name = "TEXT", requires = "gauge_port")]
     pub gauge_ask: Option<String>,
 }
@@ -58,7 +59,12 @@ impl GaugePort {
         let port = serialport::new(name, args.gauge_baud)
             .timeout(PATIENCE)
             .open()
-            .with_context(|| format!("cannot open the gauge at {name}: is it plugged in, and used by no other program?"))?;
+            .with_context(|| {
+                format!(
+                    "cannot open the gauge at {name}: is it plugged in, and used \
+                                      by no other program?"
+                )
+            })?;
         let (end, readings) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
         let listener = Listener {
             port,

@@ -4,8 +4,8 @@ use super::assemble::Loaded;
 
 /// A stretch lasts at least so long, s.
 const SHORTEST_S: f64 = 0.3;
-/// Within it the force strays no farther than this from its mean: in parts of it, and in standard deviations of the
-/// gauge's noise.
+/// Within it the force strays no farther than this from its mean: in parts of it, and in standard
+/// deviations of the gauge's noise.
 const STRAY: f64 = 0.02;
 const STRAY_SIGMAS: f64 = 4.0;
 /// Nor less than this, N.

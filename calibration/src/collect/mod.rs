@@ -6,7 +6,8 @@
 //! person ─poses────────────────┘
 //! ```
 //!
-//! Recording only keeps what comes ([`folder`]); clocks are aligned afterwards, and as often as wanted.
+//! Recording only keeps what comes ([`folder`]); clocks are aligned afterwards, and as often as
+//! wanted.
 
 pub mod align;
 pub mod assemble;
@@ -33,12 +34,13 @@ use series::Series;
 /// Calibration data from a real unit.
 #[derive(Debug, clap::Subcommand)]
 pub enum CollectCommand {
-    /// Record the sensor's samples, the gauge's lines and the poses into a folder. Ctrl-C loses nothing; the same command
-    /// goes on.
+    /// Record the sensor's samples, the gauge's lines and the poses into a folder. Ctrl-C loses
+    /// nothing; the same command goes on.
     Record(record::RecordArgs),
     /// Align the clocks of a recording and write its data set.
     Align(AlignArgs),
-    /// Write what a gauge with a clock of its own would have recorded of a rig's run, to try all this without a gauge.
+    /// Write what a gauge with a clock of its own would have recorded of a rig's run, to try all
+    /// this without a gauge.
     SimulateGauge(simulated::SimulateArgs),
 }
 
@@ -48,15 +50,17 @@ pub struct AlignArgs {
     /// The folder that was recorded into.
     #[arg(long, value_name = "FOLDER")]
     recording: PathBuf,
-    /// What the gauge recorded by itself: a line for each reading, seconds and force. One file for all runs, or repeated, one
-    /// for each run with a pose, in order. Without it, what `record` heard of the gauge.
+    /// What the gauge recorded by itself: a line for each reading, seconds and force. One file for
+    /// all runs, or repeated, one for each run with a pose, in order. Without it, what `record`
+    /// heard of the gauge.
     #[arg(long, value_name = "FILE")]
     gauge: Vec<PathBuf>,
     /// The unit of readings that name none.
     #[arg(long, default_value = "N")]
     gauge_unit: Unit,
-    /// What the poses' angles say: `force` (the direction of the force, as of a weight that hangs), or the pressing direction of
-    /// a tip that sticks (`stick`) or slips from a friction ratio on (`slip:0.6`).
+    /// What the poses' angles say: `force` (the direction of the force, as of a weight that hangs),
+    /// or the pressing direction of a tip that sticks (`stick`) or slips from a friction ratio on
+    /// (`slip:0.6`).
     #[arg(long, default_value = "force")]
     contact: Contact,
     /// Take only stretches in which the force was held, each as one load: for `unit`.

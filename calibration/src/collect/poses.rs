@@ -34,8 +34,9 @@ impl fmt::Display for Pose {
     }
 }
 
-/// Reads a list of poses: α and β in degrees, then x and y of the tip in mm where it is not in the middle; separated by comma,
-/// semicolon, tab or space. Empty lines, lines that begin with `#`, and a first line of names are passed over.
+/// Reads a list of poses: α and β in degrees, then x and y of the tip in mm where it is not in the
+/// middle; separated by comma, semicolon, tab or space. Empty lines, lines that begin with `#`, and
+/// a first line of names are passed over.
 ///
 /// # Errors
 /// When it cannot be read, or a line is no pose; names the line.
@@ -60,8 +61,8 @@ pub fn load(path: &Path) -> Result<Vec<Pose>> {
 /// # Errors
 /// When the text is neither two nor four such numbers of a press.
 pub fn parse(text: &str) -> Result<Pose> {
-    const WRITE: &str = "write α and β in degrees, such as `4, -3`, and where the tip is not in the middle x and y in mm, such as \
-                         `4, -3, 2.5, 0`";
+    const WRITE: &str = "write α and β in degrees, such as `4, -3`, and where the tip is not in \
+                         the middle x and y in mm, such as `4, -3, 2.5, 0`";
     let parts: Option<Vec<f64>> = text
         .split([',', ';', '\t', ' '])
         .filter(|part| !part.is_empty())

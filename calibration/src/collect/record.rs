@@ -19,14 +19,15 @@ pub struct RecordArgs {
     /// The folder to record into; an interrupted recording goes on.
     #[arg(long, value_name = "FOLDER")]
     pub into: PathBuf,
-    /// Port of the sensor: serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given.
+    /// Port of the sensor: serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when
+    /// not given.
     #[arg(long, value_name = "PORT")]
     pub port: Option<String>,
     /// Longest wait for the sensor's answers and for its next frame, s.
     #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = seconds)]
     pub timeout: f64,
-    /// A list of poses, one a line: α and β in degrees, and x and y of the tip in mm where it is not in the middle. Without one they
-    /// are typed.
+    /// A list of poses, one a line: α and β in degrees, and x and y of the tip in mm where it is
+    /// not in the middle. Without one they are typed.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
     /// Length of a take, s of the sensor's clock.
@@ -110,7 +111,8 @@ impl Recorder {
         let rest = self.take(None, args.rest_seconds)?;
         ensure!(
             rest.good >= FEWEST_AT_REST,
-            "{} of {} frames of the untouched film show the four markers: at least {FEWEST_AT_REST} are needed (see `hivtac monitor`)",
+            "{} of {} frames of the untouched film show the four markers: at least \
+             {FEWEST_AT_REST} are needed (see `hivtac monitor`)",
             rest.good,
             rest.samples
         );
@@ -140,8 +142,9 @@ impl Recorder {
 
     fn typed_pose(&self) -> Result<Option<Pose>> {
         loop {
-            let question = "Set a pose and type α and β in degrees, such as `4, -3`, and where the tip is not in the middle its x and y in mm, \
-                 such as `4, -3, 2.5, 0` (`done` to end).";
+            let question = "Set a pose and type α and β in degrees, such as `4, -3`, and where the \
+                            tip is not in the middle its x and y in mm, such as `4, -3, 2.5, 0` \
+                            (`done` to end).";
             match self.person.ask(question)?.as_deref() {
                 None | Some("done") => return Ok(None),
                 Some(text) => match poses::parse(text) {

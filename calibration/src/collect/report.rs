@@ -50,7 +50,8 @@ impl Report {
     pub fn sentence(&self) -> String {
         let worst = |of: fn(&RunReport) -> f64| self.runs.iter().map(of).fold(0.0, f64::max);
         format!(
-            "measured with a force gauge, {} run(s); gauge noise up to {:.2} mN, clocks aligned with residuals up to {:.2} mN",
+            "measured with a force gauge, {} run(s); gauge noise up to {:.2} mN, clocks aligned \
+             with residuals up to {:.2} mN",
             self.runs.len(),
             1e3 * worst(|run| run.noise_n),
             1e3 * worst(|run| run.alignment.residual_n)
@@ -70,8 +71,8 @@ impl fmt::Display for RunReport {
         } = self.alignment;
         writeln!(
             f,
-            "run {}: the gauge's clock is {lag_s:+.4} s ahead ({:+.0} ppm); correlation {correlation:.4}, residual {:.2} mN \
-             (next best lag {:.2} mN)",
+            "run {}: the gauge's clock is {lag_s:+.4} s ahead ({:+.0} ppm); correlation \
+             {correlation:.4}, residual {:.2} mN (next best lag {:.2} mN)",
             self.run,
             1e6 * drift,
             1e3 * residual_n,
@@ -86,8 +87,8 @@ impl fmt::Display for RunReport {
         )?;
         write!(
             f,
-            "  {} frames at rest, {} under a force; left out: {} without contact, {} without a gauge reading, {} while the gauge \
-             pulled, {} not held",
+            "  {} frames at rest, {} under a force; left out: {} without contact, {} without a \
+             gauge reading, {} while the gauge pulled, {} not held",
             self.at_rest,
             self.pressed,
             self.no_contact,

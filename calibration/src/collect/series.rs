@@ -7,7 +7,8 @@ use anyhow::{Context, Result, ensure};
 
 use super::gauge::{Bad, Unit, reading};
 
-/// Readings of a gauge on its own clock. Where a line was bad, the readings around it are not joined.
+/// Readings of a gauge on its own clock. Where a line was bad, the readings around it are not
+/// joined.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// (time in s, force in N); `None` for a bad line. Times rise.
@@ -40,8 +41,9 @@ impl Series {
         }
     }
 
-    /// Reads a gauge's file: one line a reading, time in s and reading, separated by comma, semicolon or tab. Empty lines,
-    /// lines that begin with `#`, and one line of column names at the top are passed over.
+    /// Reads a gauge's file: one line a reading, time in s and reading, separated by comma,
+    /// semicolon or tab. Empty lines, lines that begin with `#`, and one line of column names at
+    /// the top are passed over.
     ///
     /// # Errors
     /// When it cannot be read, or has no readings.
@@ -52,7 +54,8 @@ impl Series {
         let (readings, bad) = (series.readings(), series.bad.values().sum::<usize>());
         ensure!(
             readings >= 2,
-            "{} has {readings} readings and {bad} other lines: each line must be `seconds,reading`, such as `12.34,+0.123N`",
+            "{} has {readings} readings and {bad} other lines: each line must be \
+             `seconds,reading`, such as `12.34,+0.123N`",
             path.display()
         );
         Ok(series)
@@ -128,7 +131,8 @@ pub struct Joined<'a> {
 }
 
 impl Joined<'_> {
-    /// The force at a time (N), when the readings on both sides are good and near enough to each other.
+    /// The force at a time (N), when the readings on both sides are good and near enough to each
+    /// other.
     pub fn at(&self, time_s: f64) -> Option<f64> {
         let after = self.points.partition_point(|p| p.0 < time_s);
         let (t1, f1) = *self.points.get(after)?;
@@ -147,7 +151,8 @@ mod tests {
 
     #[test]
     fn a_file_is_read_with_its_faults_counted() {
-        let text = "time;force\n# made by hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n0.25;0.5N\nx;1\n0.5;1..2N\n0.6\n";
+        let text = "time;force\n# made by \
+                    hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n0.25;0.5N\nx;1\n0.5;1..2N\n0.6\n";
         let series = Series::parse(text, Unit::NEWTON);
         assert_eq!(series.readings(), 3);
         let counts: Vec<_> = series.bad.iter().map(|(why, n)| (*why, *n)).collect();

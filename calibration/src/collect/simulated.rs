@@ -1,4 +1,5 @@
-//! What a gauge would have said of a simulated press: for tests, and to try a calibration without a gauge.
+//! What a gauge would have said of a simulated press: for tests, and to try a calibration without a
+//! gauge.
 
 use std::fmt::Write;
 use std::fs;
@@ -92,7 +93,8 @@ impl SimulateArgs {
 }
 
 impl SimulatedGauge {
-    /// The gauge's file for a force in time, (s, N), between whose points it is taken to be straight.
+    /// The gauge's file for a force in time, (s, N), between whose points it is taken to be
+    /// straight.
     ///
     /// # Errors
     /// When there are no two points, or the gauge has no rate.

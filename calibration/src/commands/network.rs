@@ -63,7 +63,8 @@ fn print_errors(what: &str, errors: &Errors) {
         format!(", RMSE of the place {:.0} µm along x and y each", mm * 1e3)
     });
     println!(
-        "{what}: {} rows, mean direction error {:.3}° ({:.3}° from {} mN up), RMSE of |F| {:.3} mN{}",
+        "{what}: {} rows, mean direction error {:.3}° ({:.3}° from {} mN up), RMSE of |F| {:.3} \
+         mN{}",
         errors.count(),
         errors.mean_direction_deg(),
         errors.mean_strong_direction_deg(),

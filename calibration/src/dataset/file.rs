@@ -1,7 +1,8 @@
 //! Data sets as files: CSV, one row a frame, under comment lines that say what it is.
 //!
-//! The first line names the format, the second holds [`About`] as JSON; both begin with `#`. Features are written as
-//! exact decimals, so that reading gives the very integers that the pipeline produced.
+//! The first line names the format, the second holds [`About`] as JSON; both begin with `#`.
+//! Features are written as exact decimals, so that reading gives the very integers that the
+//! pipeline produced.
 
 use std::fs;
 use std::num::ParseIntError;

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use super::detector::{Pool, Sensing};
 use super::{Dataset, Recipe, Row};
 
-/// Renders the frames of a recipe on all cores and looks at each with the pipeline. `progress` is called once for
-/// each frame, from any thread.
+/// Renders the frames of a recipe on all cores and looks at each with the pipeline. `progress` is
+/// called once for each frame, from any thread.
 ///
 /// # Errors
 /// When the recipe asks for what the scene or the pipeline cannot do.
@@ -165,7 +165,8 @@ mod tests {
         assert!(middle.rows.iter().all(|row| row.tip_mm.is_none()));
     }
 
-    /// The label is the tip's way: a tip that sticks moves the markers much further sideways than a force so tilted.
+    /// The label is the tip's way: a tip that sticks moves the markers much further sideways than a
+    /// force so tilted.
     #[test]
     fn labels_mean_what_the_contact_reading_says() {
         let shift = |contact: Contact| {

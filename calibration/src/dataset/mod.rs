@@ -68,11 +68,11 @@ pub struct Place {
 pub struct Row {
     /// Where it stands.
     pub place: Place,
-    /// The force as it is labelled, N, film frame: the force on the film in the contact reading `force`, otherwise |F| along
-    /// the pressing direction.
+    /// The force as it is labelled, N, film frame: the force on the film in the contact reading
+    /// `force`, otherwise |F| along the pressing direction.
     pub force_n: [f64; 3],
-    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None` without
-    /// a force, and where nobody knows.
+    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None`
+    /// without a force, and where nobody knows.
     pub tip_mm: Option<[f64; 2]>,
     /// What was seen, or the status names that say why nothing was.
     pub seen: Result<Observation, String>,
@@ -156,7 +156,8 @@ impl Dataset {
         self.session_rest(0)
     }
 
-    /// Rewrites every session's features as if it had the first one's rest position: what a tare does on the chip.
+    /// Rewrites every session's features as if it had the first one's rest position: what a tare
+    /// does on the chip.
     ///
     /// # Errors
     /// When a session has no accepted row without force.
@@ -179,7 +180,8 @@ impl Dataset {
         Ok(self)
     }
 
-    /// The rest position of a session: the mean of its accepted rows without force, rounded half up.
+    /// The rest position of a session: the mean of its accepted rows without force, rounded half
+    /// up.
     ///
     /// # Errors
     /// When there is no such row.

@@ -31,11 +31,13 @@ impl Target {
     }
 }
 
-/// Writes the data set of a recipe to a file, block by block, and reads it back. What an interrupted run left there is
-/// kept: the file ends up the same. `progress` is told the number of rows that are done, from any thread.
+/// Writes the data set of a recipe to a file, block by block, and reads it back. What an
+/// interrupted run left there is kept: the file ends up the same. `progress` is told the number of
+/// rows that are done, from any thread.
 ///
 /// # Errors
-/// When the file is another data set or cannot be written, or the recipe asks for what the scene cannot do.
+/// When the file is another data set or cannot be written, or the recipe asks for what the scene
+/// cannot do.
 pub fn generate_file(
     recipe: &Recipe,
     path: &Path,
@@ -46,7 +48,8 @@ pub fn generate_file(
     Dataset::load(path)
 }
 
-/// The same with detectors of its own, for the same frames: each has its file, and says in `files` what its rows are.
+/// The same with detectors of its own, for the same frames: each has its file, and says in `files`
+/// what its rows are.
 ///
 /// # Errors
 /// As [`generate_file`], and when detectors cannot be opened or are not as many as files.

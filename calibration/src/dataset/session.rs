@@ -18,9 +18,9 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Session 0 is the nominal one. The others: the picture up to 1 % of its width off and turned by
-    /// up to 1°, the light up to 20 % off and up to 20 % uneven, the focus up to 1/500 of the width
-    /// wrong (0.64 px at QVGA).
+    /// Session 0 is the nominal one. The others: the picture up to 1 % of its width off and turned
+    /// by up to 1°, the light up to 20 % off and up to 20 % uneven, the focus up to 1/500 of the
+    /// width wrong (0.64 px at QVGA).
     pub fn numbered(session: usize, seed: u64) -> Self {
         if session == 0 {
             return Self::default();

@@ -28,7 +28,8 @@ pub struct Covered {
     pub error: f64,
 }
 
-/// The coverage of each tenth of the frames, from the weakest forces to the strongest; none when there are fewer than ten.
+/// The coverage of each tenth of the frames, from the weakest forces to the strongest; none when
+/// there are fewer than ten.
 pub fn coverage(frames: &[Judged]) -> Vec<Coverage> {
     let mut sorted: Vec<&Judged> = frames.iter().collect();
     sorted.sort_by(|a, b| norm(a.truth).total_cmp(&norm(b.truth)));

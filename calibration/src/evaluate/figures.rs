@@ -90,7 +90,8 @@ fn colour(part: f64) -> String {
     format!("#{:02x}{:02x}{:02x}", pale(r), pale(g), pale(b))
 }
 
-/// Figure 12 d–f: how often which average error of a pose is found, or without poses which error of a frame.
+/// Figure 12 d–f: how often which average error of a pose is found, or without poses which error of
+/// a frame.
 pub(super) fn histograms(values: &[[f64; 3]], of: &str) -> Vec<String> {
     let one = |(i, (name, unit, scale)): (usize, &(&str, &str, f64))| {
         let mut sizes: Vec<f64> = values.iter().map(|v| (scale * v[i]).abs()).collect();

@@ -60,7 +60,8 @@ impl Evaluation {
     /// tared.
     ///
     /// # Errors
-    /// When the bytes are no model, it is for other conditions than the data's, or there is no such row.
+    /// When the bytes are no model, it is for other conditions than the data's, or there is no such
+    /// row.
     pub fn of(model: &[u8], dataset: &Dataset) -> Result<Self> {
         let model =
             Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
@@ -94,8 +95,8 @@ impl Evaluation {
     }
 }
 
-/// The answers to all rows, each session tared on its own frames without force; those that the chip sends without a force are
-/// counted by status.
+/// The answers to all rows, each session tared on its own frames without force; those that the chip
+/// sends without a force are counted by status.
 fn judge(
     model: &Model<'_>,
     dataset: &Dataset,

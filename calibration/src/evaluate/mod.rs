@@ -1,4 +1,5 @@
-//! What a model makes of a data set: the paper's figures and numbers (Section 7.1), with confidence intervals.
+//! What a model makes of a data set: the paper's figures and numbers (Section 7.1), with confidence
+//! intervals.
 
 mod coverage;
 mod figures;

@@ -68,8 +68,8 @@ pub(super) fn errors(frame: &Judged) -> [f64; 3] {
 }
 
 impl Numbers {
-    /// Of frames; `None` when there are none. Frames of a pose are resampled together, because they share what is wrong
-    /// there; without poses each frame is by itself.
+    /// Of frames; `None` when there are none. Frames of a pose are resampled together, because they
+    /// share what is wrong there; without poses each frame is by itself.
     pub fn of<'a>(frames: impl Iterator<Item = &'a Judged>, seed: u64) -> Option<Self> {
         let mut groups: BTreeMap<usize, [f64; SUMS]> = BTreeMap::new();
         let (mut count, mut direction_worst_deg, mut force_worst_n) = (0, 0.0_f64, 0.0_f64);
@@ -150,7 +150,8 @@ pub struct PoseNumbers {
     pub poses: usize,
     /// Largest |average error| of α, β (degrees), |F| (N).
     pub worst: [f64; 3],
-    /// Part of the poses whose average error of α is within 0.5°, of β within 0.5°, of |F| within 10 and 30 mN.
+    /// Part of the poses whose average error of α is within 0.5°, of β within 0.5°, of |F| within
+    /// 10 and 30 mN.
     pub within: [f64; 4],
 }
 
@@ -229,7 +230,8 @@ mod tests {
         assert!(Numbers::of([].iter(), 1).is_none() && PoseNumbers::of(&BTreeMap::new()).is_none());
     }
 
-    /// The mean of 400 uniform numbers strays by 0.0144: the interval must be about 2 · 1.96 times that wide.
+    /// The mean of 400 uniform numbers strays by 0.0144: the interval must be about 2 · 1.96 times
+    /// that wide.
     #[test]
     fn intervals_are_as_wide_as_theory_says() {
         let mut random = ChaCha8Rng::seed_from_u64(8);

@@ -34,8 +34,8 @@ pub struct PlaceErrors {
     pub within: f64,
 }
 
-/// The numbers by distance from the middle, from [`WEAK_N`] up, and by size of the force; parts without
-/// a frame are left out, and so are all when no place is known.
+/// The numbers by distance from the middle, from [`WEAK_N`] up, and by size of the force; parts
+/// without a frame are left out, and so are all when no place is known.
 pub fn by_place(frames: &[Judged]) -> Vec<PlaceNumbers> {
     let known = || frames.iter().filter_map(|f| Some((f, f.tip_mm?)));
     let weak = WEAK_N * 1e3;

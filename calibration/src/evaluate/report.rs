@@ -12,7 +12,8 @@ use crate::errors::{WEAK_N, norm};
 use crate::plot::escaped;
 
 const STYLE: &str = "body{font-family:sans-serif;max-width:1320px;margin:1em auto;padding:0 1em}\
-table{border-collapse:collapse;margin:1em 0}td,th{border:1px solid #bbb;padding:.3em .7em;text-align:right}\
+table{border-collapse:collapse;margin:1em 0}td,th{border:1px solid #bbb;padding:.3em \
+.7em;text-align:right}\
 td:first-child,th:first-child{text-align:left}svg{max-width:32%;height:auto}small{color:#555}";
 
 /// The seed of the resamples.
@@ -44,7 +45,8 @@ impl Evaluation {
         format!(
             "Simulated frames ({}), contact reading `{}` ({}), all rows of a data set of its own. \
              Nothing here was measured on a real sensor, and the \
-             paper's numbers hold its gauge, its stage and its film's hysteresis, too: they are beside ours, not below.",
+             paper's numbers hold its gauge, its stage and its film's hysteresis, too: they are \
+             beside ours, not below.",
             self.frames,
             self.contact,
             meaning(self.contact)
@@ -55,7 +57,8 @@ impl Evaluation {
     pub fn to_html(&self) -> String {
         let averages = by_pose(&self.judged);
         let mut html = format!(
-            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style>\
+            "<!doctype html><html lang=\"en\"><meta \
+             charset=\"utf-8\"><title>{0}</title><style>{STYLE}</style>\
              <h1>{0}</h1><p>{1}</p>\n",
             escaped(&self.model),
             escaped(&self.sentence())
@@ -114,8 +117,9 @@ impl Evaluation {
             .collect();
         let _ = writeln!(
             html,
-            "</table><p>{rejected} frames of the data set were rejected and count nowhere. {} <small>In brackets: 95 % \
-             intervals by resampling poses, or frames where there are no poses.</small></p>",
+            "</table><p>{rejected} frames of the data set were rejected and count nowhere. {} \
+             <small>In brackets: 95 % intervals by resampling poses, or frames where there are no \
+             poses.</small></p>",
             escaped(&why.join(", "))
         );
     }
@@ -162,16 +166,20 @@ fn cell(text: Option<String>) -> String {
 /// How often direction and size lie within the 95 % bounds that come with them.
 fn push_coverage(html: &mut String, frames: &[Judged]) {
     html.push_str(
-        "<h2>Are the stated uncertainties honest?</h2><table><tr><th>|F|, mN (a tenth of the frames each)</th>\
-         <th>direction within its stated 95 % bound, %</th><th>median bound, °</th><th>median error, °</th>\
-         <th>|F| within its stated 95 % bound, %</th><th>median bound, mN</th><th>median error, mN</th></tr>\n",
+        "<h2>Are the stated uncertainties honest?</h2><table><tr><th>|F|, mN (a tenth of the \
+         frames each)</th>\
+         <th>direction within its stated 95 % bound, %</th><th>median bound, °</th><th>median \
+         error, °</th>\
+         <th>|F| within its stated 95 % bound, %</th><th>median bound, mN</th><th>median error, \
+         mN</th></tr>\n",
     );
     for part in coverage(frames) {
         let [low, high] = part.force_n.map(|n| n * 1e3);
         let (direction, magnitude) = (part.direction, part.magnitude);
         let _ = writeln!(
             html,
-            "<tr><td>{low:.1} to {high:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.3}</td><td>{:.1}</td><td>{:.3}</td>\
+            "<tr><td>{low:.1} to \
+             {high:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.3}</td><td>{:.1}</td><td>{:.3}</td>\
              <td>{:.3}</td></tr>",
             direction.within * 100.0,
             direction.bound,
@@ -288,8 +296,8 @@ impl fmt::Display for Evaluation {
         }
         writeln!(
             f,
-            "within the stated 95 % bound, by tenths of the frames from weak to strong (in brackets: median bound over \
-             median error):"
+            "within the stated 95 % bound, by tenths of the frames from weak to strong (in \
+             brackets: median bound over median error):"
         )?;
         for part in coverage(&self.judged) {
             let [low, high] = part.force_n.map(|n| n * 1e3);

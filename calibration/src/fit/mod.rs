@@ -1,4 +1,5 @@
-//! From a data set to a weights file: split, fit, and measure what the chip makes of it on what was held out.
+//! From a data set to a weights file: split, fit, and measure what the chip makes of it on what was
+//! held out.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_sensing::features::Features;
@@ -19,8 +20,9 @@ const WITHIN_POSE: &str = "within-pose";
 /// The fewest accepted rows to train on.
 const FEWEST_ROWS: usize = 20;
 
-/// A fitted model, with its errors on the rows that were held out and lie inside the calibrated range. Its uncertainties are
-/// from all that were held out, so that they are known up to the range's end.
+/// A fitted model, with its errors on the rows that were held out and lie inside the calibrated
+/// range. Its uncertainties are from all that were held out, so that they are known up to the
+/// range's end.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// Ready to be saved or exported.
@@ -33,7 +35,8 @@ pub struct Fit {
 
 type Rows<'a> = Vec<Sample<'a>>;
 
-/// Trains on nine tenths of the accepted rows of a data set, its sessions tared, and measures on the rest.
+/// Trains on nine tenths of the accepted rows of a data set, its sessions tared, and measures on
+/// the rest.
 ///
 /// # Errors
 /// When the data set has too few accepted rows or none at rest, or training fails.
@@ -66,13 +69,13 @@ fn parts(dataset: &Dataset, seed: u64) -> Result<(Rows<'_>, Rows<'_>)> {
     Ok((training, held_out))
 }
 
-/// How far a data set that knows places goes beyond what is calibrated with it: forces a tenth, places
-/// a twentieth.
+/// How far a data set that knows places goes beyond what is calibrated with it: forces a tenth,
+/// places a twentieth.
 const BEYOND: f64 = 1.1;
 const PLACE_BEYOND: f64 = 1.05;
 
-/// What a model made from such a data set is calibrated for: the paper's range, or where the tip may be
-/// anywhere, what the data set fills.
+/// What a model made from such a data set is calibrated for: the paper's range, or where the tip
+/// may be anywhere, what the data set fills.
 fn calibrated(about: &About) -> Range {
     if !about.range.knows_places() {
         return Range::default();
@@ -120,7 +123,8 @@ fn finished(
     measured(weights, &tare, rows)
 }
 
-/// Measures a model on rows that it was not made from: its errors, and from these its uncertainties.
+/// Measures a model on rows that it was not made from: its errors, and from these its
+/// uncertainties.
 fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fit> {
     let answers = quantized_answers(&weights, tare, rows)?;
     let misses: Vec<Miss> = answers

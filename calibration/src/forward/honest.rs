@@ -12,10 +12,12 @@ use crate::quantize::export;
 use crate::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use crate::weights::Weights;
 
-/// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little more than they promise.
+/// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little
+/// more than they promise.
 const COVERED: f64 = 0.96;
 
-/// What a row's uncertainties would have to be at the least for its errors to lie within their bounds.
+/// What a row's uncertainties would have to be at the least for its errors to lie within their
+/// bounds.
 struct Needed {
     /// Times what they are: of the direction.
     direction: f64,
@@ -26,8 +28,9 @@ struct Needed {
 }
 
 impl Weights {
-    /// These weights with the nominal film run forwards beside the network, in so many Gauss–Newton steps, 0–3. The noise of
-    /// markers is that of a data set of presses anywhere, widened until 96 of 100 errors on it lie within their bounds.
+    /// These weights with the nominal film run forwards beside the network, in so many Gauss–Newton
+    /// steps, 0–3. The noise of markers is that of a data set of presses anywhere, widened until 96
+    /// of 100 errors on it lie within their bounds.
     ///
     /// # Errors
     /// When the network tells no place, or the data set has too few presses of known places.

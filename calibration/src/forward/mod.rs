@@ -1,4 +1,5 @@
-//! The film run forwards, from what is known of a unit: a few numbers in a weights file, tables in a model file.
+//! The film run forwards, from what is known of a unit: a few numbers in a weights file, tables in
+//! a model file.
 
 pub mod building;
 mod honest;
@@ -29,17 +30,19 @@ pub struct FilmModel {
     pub steps: u8,
     /// The tip's radius, mm.
     pub tip_radius_mm: f64,
-    /// What a tare takes for the rest position less where markers 0–3 rest, px: what the pixel grid does there.
+    /// What a tare takes for the rest position less where markers 0–3 rest, px: what the pixel grid
+    /// does there.
     pub rest_px: [[f64; 2]; 4],
-    /// Standard uncertainty of a marker in a frame, px, when it is as large as at rest: away from the pattern's middle, and
-    /// across that.
+    /// Standard uncertainty of a marker in a frame, px, when it is as large as at rest: away from
+    /// the pattern's middle, and across that.
     pub noise_px: [f64; 2],
     /// How many times that it is when the marker is four times as large.
     pub noise_at_four_areas: [f64; 2],
     /// How far the unit that it was made on may differ from what the file says of it.
     #[serde(default)]
     pub own: ToleranceOf,
-    /// The unit; without it the film is the nominal one, and the rest picture tells the markers' places.
+    /// The unit; without it the film is the nominal one, and the rest picture tells the markers'
+    /// places.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<OwnUnit>,
 }
@@ -54,9 +57,9 @@ pub struct ToleranceOf {
     pub stiffness: f64,
 }
 
-/// Those of units that somebody built and did not calibrate, for dots 0.15 mm off, a camera rolled by 2° and 2 % longer, a film
-/// 20 % stiffer and 10 % thicker, posts 0.3 mm off and a tip of 0.25 to 1 mm: `hivtac-studies units` finds that 95 of 100 errors
-/// lie within their bounds then.
+/// Those of units that somebody built and did not calibrate, for dots 0.15 mm off, a camera rolled
+/// by 2° and 2 % longer, a film 20 % stiffer and 10 % thicker, posts 0.3 mm off and a tip of 0.25
+/// to 1 mm: `hivtac-studies units` finds that 95 of 100 errors lie within their bounds then.
 const OTHER_UNITS: ToleranceOf = ToleranceOf {
     shape: 0.03,
     stiffness: 0.2,
@@ -124,7 +127,8 @@ impl OwnUnit {
 }
 
 impl FilmModel {
-    /// The nominal film, for units of which nothing is known: tolerances as `hivtac-studies units` finds them.
+    /// The nominal film, for units of which nothing is known: tolerances as `hivtac-studies units`
+    /// finds them.
     pub fn nominal(steps: u8, noise: &Noise) -> Self {
         Self {
             steps,
@@ -323,7 +327,8 @@ mod tests {
         })
     }
 
-    /// How far what the chip predicts is from the simulated film, px at 320×240: root mean square and largest.
+    /// How far what the chip predicts is from the simulated film, px at 320×240: root mean square
+    /// and largest.
     fn off_px(model: &FilmModel) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
         let setup = UnitSetup {
@@ -366,8 +371,8 @@ mod tests {
         }
     }
 
-    /// Where the tip is right beside a marker that is glued beside its place, steps between the places
-    /// of the tables' tip are coarse, and it is some tenths of a pixel.
+    /// Where the tip is right beside a marker that is glued beside its place, steps between the
+    /// places of the tables' tip are coarse, and it is some tenths of a pixel.
     #[test]
     fn the_chip_predicts_what_a_units_own_film_does() {
         let [rms, worst] = off_px(&film_model(Some(own_unit())));

@@ -1,4 +1,5 @@
-//! Sums of terms that are nearest to samples, and splines through nodes: plain loops, the same numbers on every machine.
+//! Sums of terms that are nearest to samples, and splines through nodes: plain loops, the same
+//! numbers on every machine.
 
 use anyhow::{Result, ensure};
 use hivtac_film::reduced::Axis;
@@ -68,7 +69,8 @@ impl Nearest {
     }
 }
 
-/// The coefficients of splines through rows of numbers at an axis' nodes along y and, within, along x.
+/// The coefficients of splines through rows of numbers at an axis' nodes along y and, within, along
+/// x.
 pub fn splines(axis: &Axis, rows: &[Vec<Vec<f64>>]) -> Result<Vec<Vec<Vec<f64>>>> {
     let through = Nearest::new(&collocation(axis))?;
     Ok(turned(&through, &turned(&through, rows)))

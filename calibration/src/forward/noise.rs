@@ -18,7 +18,8 @@ const FEWEST: usize = 200;
 pub struct Noise {
     /// What a tare takes for the rest position less where markers 0–3 rest, px.
     pub rest_px: [[f64; 2]; 4],
-    /// Standard uncertainty of a marker as large as at rest, px: away from the pattern's middle, and across that.
+    /// Standard uncertainty of a marker as large as at rest, px: away from the pattern's middle,
+    /// and across that.
     pub at_rest_px: [f64; 2],
     /// How many times that when it is four times as large.
     pub at_four_areas: [f64; 2],

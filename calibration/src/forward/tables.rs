@@ -10,7 +10,8 @@ use rayon::prelude::*;
 
 use super::nearest::{Nearest, splines};
 
-/// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the marker is.
+/// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the
+/// marker is.
 const NODES_MM: [f64; 16] = [
     -5.0, -3.8, -2.5, -1.4, 0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0,
 ];
@@ -97,7 +98,8 @@ impl UnitSetup<'_> {
         })
     }
 
-    /// What gluing it beside its place along x and along y does to that, per mm, when the tip is as far beside its own.
+    /// What gluing it beside its place along x and along y does to that, per mm, when the tip is as
+    /// far beside its own.
     pub fn beside_table(&self) -> Result<TableSpec> {
         let even = UnitSetup {
             unit: self.even(),
@@ -129,7 +131,8 @@ impl UnitSetup<'_> {
         })
     }
 
-    /// What the unit's markers do beside what the first two tables say: x and y of markers 0–3, by what these say of a pose.
+    /// What the unit's markers do beside what the first two tables say: x and y of markers 0–3, by
+    /// what these say of a pose.
     pub fn own_table(&self, told: impl Fn(&Pose) -> [f64; 8] + Sync) -> Result<TableSpec> {
         let film = self.film(self.unit.markers_mm)?;
         table(&OWN_NODES_MM, OWN_TERMS, |pose| {

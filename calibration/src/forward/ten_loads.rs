@@ -1,5 +1,5 @@
-//! A unit's film and camera from a handful of known loads: least squares over the few numbers in which units differ, each drawn to
-//! its nominal value as strongly as building tolerances say.
+//! A unit's film and camera from a handful of known loads: least squares over the few numbers in
+//! which units differ, each drawn to its nominal value as strongly as building tolerances say.
 
 use std::fmt;
 
@@ -48,7 +48,8 @@ enum Number {
     Post(usize, usize),
     /// A marker's, mm.
     Marker(usize, usize),
-    /// How far the camera is rolled, degrees; ln of its focal length over the nominal one; where the axis is, px.
+    /// How far the camera is rolled, degrees; ln of its focal length over the nominal one; where
+    /// the axis is, px.
     Roll,
     Focal,
     Middle(usize),
@@ -127,7 +128,8 @@ struct Problem<'a> {
 /// Fits a unit to its rest position and to loads, from several starts.
 ///
 /// # Errors
-/// When there are too few loads, or no start ends where the markers are explained: then something is not as it was said to be.
+/// When there are too few loads, or no start ends where the markers are explained: then something
+/// is not as it was said to be.
 pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Result<Fit> {
     ensure!(
         loads.len() >= 4,
@@ -152,8 +154,8 @@ pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Resul
     let chi_square = square / (8 * loads.len() + 8) as f64;
     ensure!(
         chi_square <= TRUSTED,
-        "no unit explains these loads (χ² {chi_square:.1} over its degrees of freedom): check the forces, their directions and the \
-         tip's places"
+        "no unit explains these loads (χ² {chi_square:.1} over its degrees of freedom): check the \
+         forces, their directions and the tip's places"
     );
     problem.fitted(&found, chi_square)
 }
@@ -330,7 +332,8 @@ impl Problem<'_> {
         residuals.iter().chain(parts).map(|part| part * part).sum()
     }
 
-    /// The covariance of the numbers, in parts of their standard deviations before, and the step to where they explain most.
+    /// The covariance of the numbers, in parts of their standard deviations before, and the step to
+    /// where they explain most.
     fn solve(&self, parts: &[f64], residuals: &[f64]) -> Result<(Vec<Vec<f64>>, Vec<f64>)> {
         let mut columns = Vec::new();
         for k in 0..parts.len() {
@@ -387,7 +390,8 @@ const TRIED_MM: [[f64; 2]; 5] = [
     [2.0, -3.0],
 ];
 
-/// Sums of squares of what loads would be off by: their direction, rad, |F|, in parts of it, and place, mm.
+/// Sums of squares of what loads would be off by: their direction, rad, |F|, in parts of it, and
+/// place, mm.
 #[derive(Default)]
 struct Off {
     direction: f64,
@@ -405,8 +409,8 @@ impl Off {
 }
 
 impl Problem<'_> {
-    /// How far loads would be off by what the fit leaves open, beside how far they would be by a displacement of the markers that is
-    /// wrong by a part of itself.
+    /// How far loads would be off by what the fit leaves open, beside how far they would be by a
+    /// displacement of the markers that is wrong by a part of itself.
     fn tolerance(&self, parts: &[f64], covariance: &[Vec<f64>]) -> Result<ToleranceOf> {
         let spread = cholesky(covariance.to_vec())?;
         let tried = self.tried(parts)?;
@@ -552,7 +556,8 @@ impl Number {
     }
 }
 
-/// The factor L of a symmetric matrix L·Lᵀ that is positive definite; what is above its diagonal means nothing.
+/// The factor L of a symmetric matrix L·Lᵀ that is positive definite; what is above its diagonal
+/// means nothing.
 fn cholesky(mut matrix: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
     let count = matrix.len();
     for i in 0..count {

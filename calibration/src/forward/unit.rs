@@ -6,15 +6,18 @@ use super::{Bench, FilmModel, Fit, KnownLoad, fit};
 use crate::dataset::{Dataset, Observation};
 use crate::weights::{Rest, Weights};
 
-/// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is left of noise.
+/// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
+/// left of noise.
 const MEAN_PX: f64 = 0.009;
 /// More loads than this tell nothing that fewer do not, and take long.
 const MOST_LOADS: usize = 40;
 
 impl Weights {
-    /// These weights for the unit that a data set shows: its rest position, and its film and camera as its loads tell them.
+    /// These weights for the unit that a data set shows: its rest position, and its film and camera
+    /// as its loads tell them.
     ///
-    /// `gauge_n` and `stage_mm` are the standard uncertainties of the loads' |F|, N, and of the stage's zero, mm.
+    /// `gauge_n` and `stage_mm` are the standard uncertainties of the loads' |F|, N, and of the
+    /// stage's zero, mm.
     ///
     /// # Errors
     /// When the data set has other conditions, or as with [`Self::fitted`].

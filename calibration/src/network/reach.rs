@@ -4,19 +4,21 @@ use super::{Arithmetic, INPUTS, Network};
 
 /// How much a unit that hardly speaks is scaled up at most.
 const MOST_STRETCHED: f64 = 32.0;
-/// What split units reach beyond the largest activation of the data, as a part of it: it costs them next to no steps, and other
-/// rows may go a little further.
+/// What split units reach beyond the largest activation of the data, as a part of it: it costs them
+/// next to no steps, and other rows may go a little further.
 const HEADROOM: f64 = 1.0 / 32.0;
 
 impl Network {
-    /// Whether the chip holds a hidden layer's activations in seven bits: those between layers of int8 weights.
+    /// Whether the chip holds a hidden layer's activations in seven bits: those between layers of
+    /// int8 weights.
     pub(crate) fn is_coarse(&self, layer: usize) -> bool {
         self.arithmetic != Arithmetic::Int16 && layer + 2 < self.layers.len()
     }
 
-    /// Scales each unit of the hidden layers, and what takes it up, such that all of a layer reach as far over `rows`: the
-    /// network is the same, and each unit has all steps of an activation (Nagel et al. 2019, "Data-Free Quantization Through Weight
-    /// Equalization and Bias Correction").
+    /// Scales each unit of the hidden layers, and what takes it up, such that all of a layer reach
+    /// as far over `rows`: the network is the same, and each unit has all steps of an activation
+    /// (Nagel et al. 2019, "Data-Free Quantization Through Weight Equalization and Bias
+    /// Correction").
     pub fn equalize(&mut self, rows: &[[f64; INPUTS]]) {
         for i in 0..self.layers.len().saturating_sub(1) {
             let maxima = self.unit_maxima(i + 1, rows).swap_remove(i);
@@ -35,10 +37,11 @@ impl Network {
         }
     }
 
-    /// Replaces each unit of the layers whose activations have seven bits by `parts` units, one for each part of its reach:
-    /// silent below its part, saturated above it. Their sum is the unit, so the network is the same as far as `activation_max`
-    /// tells; but a step of an activation is as many times finer, and only one part of each unit is rounded at a time.
-    /// One part leaves everything as it is.
+    /// Replaces each unit of the layers whose activations have seven bits by `parts` units, one for
+    /// each part of its reach: silent below its part, saturated above it. Their sum is the unit, so
+    /// the network is the same as far as `activation_max` tells; but a step of an activation is as
+    /// many times finer, and only one part of each unit is rounded at a time. One part leaves
+    /// everything as it is.
     pub fn split(&mut self, parts: usize) {
         if parts <= 1 {
             return;
@@ -76,8 +79,8 @@ impl Network {
         maxima
     }
 
-    /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so that a layer
-    /// that never fires can still be scaled.
+    /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so
+    /// that a layer that never fires can still be scaled.
     pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
         let of_layer = |units: Vec<f64>| units.into_iter().fold(1e-6, f64::max);
         let hidden = self.layers.len().saturating_sub(1);
@@ -153,7 +156,8 @@ mod tests {
         let finer = before.activation_max[0] / network.activation_max[0];
         assert!((3.8..4.0).contains(&finer), "{finer}");
         assert_eq!(network.activation_max[1], before.activation_max[1]);
-        // Of each unit one part at most is neither silent nor saturated, and going on keeps what saturates.
+        // Of each unit one part at most is neither silent nor saturated, and going on keeps what
+        // saturates.
         let limit = network.activation_max[0];
         for row in rows() {
             let parts = network.activations(0, &network.input.forward(&row));

@@ -1,4 +1,5 @@
-//! Adam (Kingma and Ba 2014), with the constants of its paper, and weight decay beside it (Loshchilov and Hutter 2017).
+//! Adam (Kingma and Ba 2014), with the constants of its paper, and weight decay beside it
+//! (Loshchilov and Hutter 2017).
 
 use super::mlp::{Dense, Mlp};
 

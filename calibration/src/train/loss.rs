@@ -1,5 +1,5 @@
-//! What training makes small: the mean square of what is off, standardized; where directions are asked for, weighed across
-//! the force by how much of a direction it is.
+//! What training makes small: the mean square of what is off, standardized; where directions are
+//! asked for, weighed across the force by how much of a direction it is.
 
 use super::Samples;
 use crate::errors::norm;
@@ -42,8 +42,8 @@ impl Across {
     }
 }
 
-/// The mean loss of these rows, and its gradient by the outputs; outputs and targets lie component by component, the
-/// force's first. What a place is off by counts the same in each row.
+/// The mean loss of these rows, and its gradient by the outputs; outputs and targets lie component
+/// by component, the force's first. What a place is off by counts the same in each row.
 pub(super) fn loss(
     outputs: &[f32],
     targets: &[f32],
@@ -86,7 +86,8 @@ mod tests {
         assert_eq!(gradient, [2.0, 0.0, -4.0].map(|x: f32| x / 3.0));
     }
 
-    /// Across a force of half the size counts twice as much, along it the same, and without a force all ways are across.
+    /// Across a force of half the size counts twice as much, along it the same, and without a force
+    /// all ways are across.
     #[test]
     fn weak_forces_count_more_across_and_the_same_along() {
         let data = samples(vec![[0.0, 0.0, -0.1], [0.0, 0.0, -0.05], [0.0; 3]]);

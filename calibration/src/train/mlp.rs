@@ -1,6 +1,7 @@
 //! Layers with ReLU between them: forward, and backward by the chain rule.
 //!
-//! Values of a batch lie feature by feature, so that a feature's values for all rows are neighbours.
+//! Values of a batch lie feature by feature, so that a feature's values for all rows are
+//! neighbours.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -156,7 +157,8 @@ mod tests {
         outputs.iter().map(|&y| f64::from(y).powi(2) / 2.0).sum()
     }
 
-    /// Central differences in single precision: steps large enough to be seen, small enough not to cross a kink often.
+    /// Central differences in single precision: steps large enough to be seen, small enough not to
+    /// cross a kink often.
     #[test]
     fn the_gradient_is_that_of_differences() {
         let mut random = ChaCha8Rng::seed_from_u64(3);

@@ -1,7 +1,7 @@
 //! Training: first in floats, then with the chip's own integers in the forward pass.
 //!
-//! Written by hand, because networks this small are: three products of matrices a layer and Adam. It gives the same bits
-//! on every machine.
+//! Written by hand, because networks this small are: three products of matrices a layer and Adam.
+//! It gives the same bits on every machine.
 
 mod adam;
 mod loss;
@@ -43,8 +43,8 @@ pub struct Progress {
     pub epochs: usize,
     /// Whether the chip's rounding was on.
     pub rounded: bool,
-    /// Mean squared error of the standardized answers over the pass; a constant answer has 1, unless
-    /// [`Options::direction_weight`] weighs rows.
+    /// Mean squared error of the standardized answers over the pass; a constant answer has 1,
+    /// unless [`Options::direction_weight`] weighs rows.
     pub loss: f64,
     /// The same on the held-out samples after the pass; not a number when there are none.
     pub held_out: f64,
@@ -52,8 +52,8 @@ pub struct Progress {
 
 /// Trains a network. The same samples and options give the same network, on every machine.
 ///
-/// `held_out` decides which pass was best: the network is the one after that pass. Without held-out samples it is the
-/// one after the last.
+/// `held_out` decides which pass was best: the network is the one after that pass. Without held-out
+/// samples it is the one after the last.
 ///
 /// # Errors
 /// When there is too little data, features and answers differ in number, or training diverges.
@@ -152,9 +152,9 @@ const MOST_APART: f64 = 16.0;
 
 /// Scaling of features and answers, from the data.
 ///
-/// The components of a force that vary share the smallest of their deviations, so that a millinewton counts the same in each:
-/// F_z varies several times as much as F_x and F_y, and would be learnt as much more coarsely with a deviation of its own. A place
-/// has deviations of its own.
+/// The components of a force that vary share the smallest of their deviations, so that a
+/// millinewton counts the same in each: F_z varies several times as much as F_x and F_y, and would
+/// be learnt as much more coarsely with a deviation of its own. A place has deviations of its own.
 fn scaling(training: &Samples, meaning: Meaning) -> Result<[Standardization; 2]> {
     let mut answers = Standardization::of_answers(&training.answers)?;
     if meaning.is_vector() {

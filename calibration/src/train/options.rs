@@ -150,7 +150,8 @@ impl Options {
         let start = self.start.as_ref();
         ensure!(
             self.epochs == 0 || !start.is_some_and(|it| it.saturates),
-            "the network to go on from has units in parts: it can go on with rounding only, without passes in floats"
+            "the network to go on from has units in parts: it can go on with rounding only, \
+             without passes in floats"
         );
         if self.unit_parts == 1 {
             return Ok(());
@@ -158,7 +159,8 @@ impl Options {
         ensure!(self.unit_parts > 1, "a unit has at least one part");
         ensure!(
             self.arithmetic != Arithmetic::Int16 && self.rounded_epochs > 0,
-            "units are split for int8, and before passes with rounding: ask for these, or leave the units whole"
+            "units are split for int8, and before passes with rounding: ask for these, or leave \
+             the units whole"
         );
         let hidden = start.map_or_else(
             || self.hidden.clone(),
@@ -173,7 +175,8 @@ impl Options {
         let (_, coarse) = hidden.split_last().unwrap_or((&0, &[]));
         ensure!(
             !coarse.is_empty(),
-            "units are split between two hidden layers: this network has fewer, and no activation of seven bits"
+            "units are split between two hidden layers: this network has fewer, and no activation \
+             of seven bits"
         );
         let widest = coarse.iter().max().unwrap_or(&0) * self.unit_parts;
         ensure!(

@@ -1,8 +1,9 @@
-//! The one product of matrices that training needs, quick enough and the same bits on every machine.
+//! The one product of matrices that training needs, quick enough and the same bits on every
+//! machine.
 //!
-//! Every element is summed in the order of the inner index, by itself: vector instructions only do several elements at a
-//! time, nothing is fused and nothing is reassociated. So it does not matter which instructions or how many threads a
-//! machine has.
+//! Every element is summed in the order of the inner index, by itself: vector instructions only do
+//! several elements at a time, nothing is fused and nothing is reassociated. So it does not matter
+//! which instructions or how many threads a machine has.
 
 use std::ops::{AddAssign, Mul};
 
@@ -44,8 +45,8 @@ pub(super) fn product<T: Number>(a: &[T], b: &[T], [m, k, n]: [usize; 3]) -> Vec
     c
 }
 
-/// Up to four rows of the result; a type of its own, because a closure would not be compiled for the vector
-/// instructions that it is dispatched to.
+/// Up to four rows of the result; a type of its own, because a closure would not be compiled for
+/// the vector instructions that it is dispatched to.
 struct Block<'a, T> {
     a: &'a [T],
     b: &'a [T],

@@ -1,7 +1,8 @@
-//! The forward pass as the chip does it: the exporter's integers, the chip's arithmetic, every rounding included.
+//! The forward pass as the chip does it: the exporter's integers, the chip's arithmetic, every
+//! rounding included.
 //!
-//! The backward pass takes each rounding for the identity and each limit for what it is (straight-through estimator,
-//! Bengio et al. 2013).
+//! The backward pass takes each rounding for the identity and each limit for what it is
+//! (straight-through estimator, Bengio et al. 2013).
 
 use anyhow::Result;
 
@@ -21,7 +22,8 @@ pub(super) struct Rounded {
     pub mlp: Mlp,
 }
 
-/// Runs the integers of `network`, whose layers are the state of training, on standardized inputs in the chip's steps.
+/// Runs the integers of `network`, whose layers are the state of training, on standardized inputs
+/// in the chip's steps.
 pub(super) fn forward(network: &Network, inputs: Vec<f64>, rows: usize) -> Result<Rounded> {
     let quantized = layers(network)?;
     let mlp = Mlp {

@@ -156,12 +156,14 @@ impl State {
         })
     }
 
-    /// Starts a phase. The first fixes how much each hidden layer of the chip can carry for the second.
+    /// Starts a phase. The first fixes how much each hidden layer of the chip can carry for the
+    /// second.
     pub fn begin(&mut self, phase: &Phase, training: &Samples) -> Result<()> {
         self.best = None;
         if phase.rounded {
             self.network.layers = self.mlp.to_layers();
-            // Activations of twelve bits have steps to spare, and the weights after them would be the coarser for it.
+            // Activations of twelve bits have steps to spare, and the weights after them would be
+            // the coarser for it.
             if phase.epochs > 0 && self.network.arithmetic != Arithmetic::Int16 {
                 self.network.equalize(&training.features);
             }

@@ -44,7 +44,8 @@ fn features(random: &mut ChaCha8Rng) -> [i64; INPUTS] {
     std::array::from_fn(|_| random.random_range(90 << 16..110_i64 << 16))
 }
 
-/// Training's forward pass and the exported model on the chip give the same integers, every one of them.
+/// Training's forward pass and the exported model on the chip give the same integers, every one of
+/// them.
 fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let q16: Vec<_> = (0..ROWS).map(|_| features(&mut random)).collect();
@@ -175,7 +176,8 @@ fn parts_of_units_make_rounding_cost_less() {
     // The rounding of weights stays.
     assert!(off_four < 0.9 * off_one, "{off_one} {off_four}");
 
-    // In floats such a network saturates, too, so that it can be measured and gone on from with rounding.
+    // In floats such a network saturates, too, so that it can be measured and gone on from with
+    // rounding.
     let again = Options {
         epochs: 0,
         rounded_epochs: 2,
@@ -192,7 +194,8 @@ fn parts_of_units_make_rounding_cost_less() {
     assert!(error.to_string().contains("rounding only"), "{error}");
 }
 
-/// How far a network on the chip is from another in floats, root mean square in its standard deviations.
+/// How far a network on the chip is from another in floats, root mean square in its standard
+/// deviations.
 fn apart(chip: &Network, float: &Network, samples: &Samples) -> f64 {
     let state = State::new(
         samples,

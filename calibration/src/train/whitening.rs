@@ -1,10 +1,11 @@
 //! Directions that the optimizer walks along.
 //!
-//! The eleven features nearly all say the same: how far the film was pressed. What tells directions is small differences of
-//! them, which Adam, walking along features, would take long to find. So the first layer is trained on the features'
-//! principal components, weak ones made as large as a feature (after LeCun et al. 1998, "Efficient BackProp"), and folded back
-//! afterwards: the network is the same. The strong one stays as it is: made smaller, what varies quickly along it, such as the
-//! pixel grid's part in a centroid, would be learnt late.
+//! The eleven features nearly all say the same: how far the film was pressed. What tells directions
+//! is small differences of them, which Adam, walking along features, would take long to find. So
+//! the first layer is trained on the features' principal components, weak ones made as large as a
+//! feature (after LeCun et al. 1998, "Efficient BackProp"), and folded back afterwards: the network
+//! is the same. The strong one stays as it is: made smaller, what varies quickly along it, such as
+//! the pixel grid's part in a centroid, would be learnt late.
 
 use super::mlp::Mlp;
 use crate::network::INPUTS;
@@ -16,7 +17,8 @@ const SWEEPS: usize = 12;
 
 type Matrix = [[f64; INPUTS]; INPUTS];
 
-/// Standardized features to components of variance 1 or more: row k holds the weights of component k.
+/// Standardized features to components of variance 1 or more: row k holds the weights of component
+/// k.
 #[derive(Clone, Debug)]
 pub(super) struct Whitening {
     rows: [[f32; INPUTS]; INPUTS],

@@ -24,7 +24,8 @@ fn pseudo_terminal() -> (File, File, String) {
     (gauge.into(), host.into(), name.into_string().unwrap())
 }
 
-/// A gauge that shows, 0.15 s late, what presses; now and then a line is spoilt. Until it is told to end.
+/// A gauge that shows, 0.15 s late, what presses; now and then a line is spoilt. Until it is told
+/// to end.
 fn play(mut gauge: File, begun: Instant, end: Arc<AtomicBool>) {
     let mut count = 0;
     while !end.load(Ordering::Relaxed) {

@@ -1,4 +1,5 @@
-//! Tracker and follower in a simulated world: whatever happens, what is delivered is right and everything is counted.
+//! Tracker and follower in a simulated world: whatever happens, what is delivered is right and
+//! everything is counted.
 
 mod world;
 
@@ -179,7 +180,8 @@ fn a_frame_under_way_at_a_stop_is_not_captured_and_the_next_one_says_so() {
     assert_eq!(world.after, [(false, false), (false, false), (true, false)]);
 }
 
-/// While the pipeline is set anew it looks at nothing, and no frame is of the time before and after.
+/// While the pipeline is set anew it looks at nothing, and no frame is of the time before and
+/// after.
 #[test]
 fn frames_that_are_passed_over_are_counted_and_never_mixed() {
     for words in 1..3 * FRAME {
@@ -257,8 +259,9 @@ fn check_everything(frames: &[Sent], pace: Pace) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2048))]
 
-    /// Whatever the camera sends, and however slow the follower is: what is delivered is right, and every frame is
-    /// counted once. Interrupts may come up to two bands late, so that one is missed.
+    /// Whatever the camera sends, and however slow the follower is: what is delivered is right, and
+    /// every frame is counted once. Interrupts may come up to two bands late, so that one is
+    /// missed.
     #[test]
     fn nothing_is_lost_or_duplicated_silently(
         frames in prop::collection::vec(sent(), 1..40),
@@ -268,7 +271,8 @@ proptest! {
         check_everything(&frames, Pace { interrupts, follower })?;
     }
 
-    /// The same with interrupts that come later than that, as long as no frame is too long by just what was missed.
+    /// The same with interrupts that come later than that, as long as no frame is too long by just
+    /// what was missed.
     #[test]
     fn late_interrupts_are_noticed(
         frames in prop::collection::vec(sent(), 1..40),
@@ -280,8 +284,8 @@ proptest! {
         check_everything(&frames, Pace { interrupts, follower })?;
     }
 
-    /// With prompt handlers, exactly the good frames are delivered and counted as processed: a broken one costs no
-    /// other.
+    /// With prompt handlers, exactly the good frames are delivered and counted as processed: a
+    /// broken one costs no other.
     #[test]
     fn a_broken_frame_costs_no_other(frames in prop::collection::vec(sent(), 1..40)) {
         let world = promptly(&frames);

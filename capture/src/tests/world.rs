@@ -1,4 +1,5 @@
-//! The world that a tracker and a follower live in: camera, DMA, memory and processor, in steps of one word.
+//! The world that a tracker and a follower live in: camera, DMA, memory and processor, in steps of
+//! one word.
 
 use crate::{Action, Edge, Event, Follower, Interface, Shape, Tally, Tracker};
 use std::collections::VecDeque;
@@ -201,7 +202,8 @@ impl World {
         self.pass(PULSE);
     }
 
-    /// For the next `words` of time the follower does something else, and then passes over what came.
+    /// For the next `words` of time the follower does something else, and then passes over what
+    /// came.
     pub fn busy_for(&mut self, words: usize) {
         self.follower_at = usize::MAX;
         self.pass_over_at = self.now + words;

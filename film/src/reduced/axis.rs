@@ -3,8 +3,8 @@
 /// How many coefficients a spline's value at a point is made of.
 pub const SPAN: usize = 4;
 
-/// The nodes of cubic splines, and the B-splines that they are sums of: one for each node, smooth over
-/// the second node and the last but one (not-a-knot).
+/// The nodes of cubic splines, and the B-splines that they are sums of: one for each node, smooth
+/// over the second node and the last but one (not-a-knot).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     nodes: Vec<f64>,

@@ -1,7 +1,7 @@
 //! The film under a tip anywhere, by tables made from full solutions.
 //!
-//! One marker's tables serve all four: mirroring the film at its axes puts every marker into the corner
-//! (+, +), and mirroring it at the diagonal makes of what moves along x what moves along y.
+//! One marker's tables serve all four: mirroring the film at its axes puts every marker into the
+//! corner (+, +), and mirroring it at the diagonal makes of what moves along x what moves along y.
 
 mod axis;
 mod pose;

@@ -1,7 +1,7 @@
 //! A load in the variables in which the film's answer is nearly a polynomial.
 
-/// A load of size s is a force of `LINEAR_N`·s + s³ newton: s grows like the depth, from where bending
-/// holds the film to where stretching does.
+/// A load of size s is a force of `LINEAR_N`·s + s³ newton: s grows like the depth, from where
+/// bending holds the film to where stretching does.
 pub const LINEAR_N: f64 = 0.01;
 /// The size of the largest load, of 0.255 N.
 pub const LARGEST_SIZE: f64 = 0.628_8;

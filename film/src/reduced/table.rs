@@ -81,7 +81,8 @@ impl Table {
         sums.map(|lanes| lanes.iter().map(|part| f64::from(*part)).sum())
     }
 
-    /// Its coefficients as a file keeps them: the size of a step for each output and term, then the steps.
+    /// Its coefficients as a file keeps them: the size of a step for each output and term, then the
+    /// steps.
     pub fn to_bytes(&self) -> Vec<u8> {
         let rows = self.coefficients.chunks(self.row());
         let mut largest = vec![0.0_f32; self.row()];

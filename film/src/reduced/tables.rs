@@ -8,7 +8,8 @@ use super::unit::Unit;
 
 use crate::{DiscMotion, FilmError, MARKER_CENTRES_MM, MAX_PLACE_MM};
 
-/// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the marker is.
+/// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the
+/// marker is.
 const NODES_MM: [f64; 16] = [
     -5.0, -3.8, -2.5, -1.4, 0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0,
 ];
@@ -24,7 +25,8 @@ pub const NOMINAL_RADIUS_MM: f64 = 0.5;
 pub const LARGEST_RADIUS_MM: f64 = 2.0;
 /// The smallest, mm.
 pub const SMALLEST_RADIUS_MM: f64 = 0.25;
-/// How far before and behind it is seen what changes on the way of a marker and a tip, in parts of that.
+/// How far before and behind it is seen what changes on the way of a marker and a tip, in parts of
+/// that.
 const STEP: f64 = 0.1;
 /// What a film's own differences are: thickness, grip, and the posts' places along x and y.
 pub const UNIT_PARTS: usize = 10;
@@ -38,8 +40,8 @@ pub enum Kind {
     Slopes,
     /// The way of a tip in the corner (+, +), mm: along x, along z.
     Tip,
-    /// What the first, second and third power of ρ = (R² − 0.25) / 3.75 add for a tip of radius R mm: to
-    /// the motion along x and along z, power by power.
+    /// What the first, second and third power of ρ = (R² − 0.25) / 3.75 add for a tip of radius R
+    /// mm: to the motion along x and along z, power by power.
     Radius,
     /// The same for the tip's own way.
     TipRadius,
@@ -73,7 +75,8 @@ impl Kind {
         match self {
             Kind::Moved | Kind::Tip => Terms::up_to(7, 4, 1),
             Kind::Slopes => Terms::up_to(5, 3, 1),
-            // Of these no derivatives by the force are known: two rings of tilts tell no third degree.
+            // Of these no derivatives by the force are known: two rings of tilts tell no third
+            // degree.
             Kind::Radius | Kind::TipRadius | Kind::Unit => Terms::up_to(4, 2, 1),
         }
     }
@@ -182,7 +185,8 @@ impl Tables {
         }
     }
 
-    /// The first outputs of a table of motions along x and z under a tip of a radius, by the table of what that adds.
+    /// The first outputs of a table of motions along x and z under a tip of a radius, by the table
+    /// of what that adds.
     fn under<const N: usize>(
         &self,
         [nominal, by_radius]: [Kind; 2],
@@ -214,9 +218,10 @@ impl Tables {
         })
     }
 
-    /// The motion of a marker glued `beside_mm` marker 2's place: that of marker 2 with the tip as far beside
-    /// it, and what changes on the way as both go on to where they are. That changes little and evenly, where
-    /// the motion of a place near the tip is quite another a little beside.
+    /// The motion of a marker glued `beside_mm` marker 2's place: that of marker 2 with the tip as
+    /// far beside it, and what changes on the way as both go on to where they are. That changes
+    /// little and evenly, where the motion of a place near the tip is quite another a little
+    /// beside.
     fn beside(
         &self,
         pose: &Pose,

@@ -9,8 +9,8 @@ pub const MOST_TERMS: usize = 88;
 const MOST_SIZES: usize = 8;
 const MOST_TILTS: usize = 5;
 
-/// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the tilt
-/// (a, b) in parts of the largest.
+/// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the
+/// tilt (a, b) in parts of the largest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Terms {
     powers: Vec<[u8; 3]>,
@@ -20,8 +20,8 @@ pub struct Terms {
 pub type Values = [f32; MOST_TERMS];
 
 impl Terms {
-    /// Those of tilts up to a degree, with so many sizes without tilt and fewer with it: one less for each
-    /// `per_size` degrees of tilt, or part of them.
+    /// Those of tilts up to a degree, with so many sizes without tilt and fewer with it: one less
+    /// for each `per_size` degrees of tilt, or part of them.
     pub fn up_to(sizes: u8, degree: u8, per_size: u8) -> Terms {
         let left = |tilt: u8| sizes.saturating_sub(tilt.div_ceil(per_size));
         Terms::with_sizes((0..=degree).map(left))

@@ -38,7 +38,8 @@ fn info_for_a_person() {
              frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0, set-up 0\n\
              camera     0 timeouts, 0 restarts, 0 overruns\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\
-             time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n",
+             time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after \
+             the middle of its exposure\n",
             device.port
         )
     );
@@ -106,8 +107,8 @@ fn a_silent_device_is_no_device() {
     assert_eq!(
         run.stderr,
         format!(
-            "hivtac: no hello from {} within 0.6 s (nothing came); is it a HiVTac sensor, and running? \
-             (choose another port with --port, or wait longer with --timeout)\n",
+            "hivtac: no hello from {} within 0.6 s (nothing came); is it a HiVTac sensor, and \
+             running? (choose another port with --port, or wait longer with --timeout)\n",
             device.port
         )
     );
@@ -266,8 +267,8 @@ fn the_pixel_format_follows_the_threshold() {
     );
     assert_eq!(
         set.stderr,
-        "hivtac: samples have markers but no force (model_mismatch): the device's model was made for rgb565, \
-         H 170–10, S 100–255, V 45–255; `hivtac threshold --model` goes back to that\n"
+        "hivtac: samples have markers but no force (model_mismatch): the device's model was made \
+         for rgb565, H 170–10, S 100–255, V 45–255; `hivtac threshold --model` goes back to that\n"
     );
     let expected = Request::SetThreshold(Threshold::Yuv422 { cr_low: 162 });
     assert_eq!(device.commands.iter().next(), Some(expected));
@@ -289,7 +290,8 @@ fn a_format_that_the_camera_does_not_send_is_refused() {
     assert_eq!(refused.code, Some(6));
     assert_eq!(
         refused.stderr,
-        "hivtac: the device refused \"set threshold\": its camera does not send that pixel format; choose another\n"
+        "hivtac: the device refused \"set threshold\": its camera does not send that pixel format; \
+         choose another\n"
     );
 }
 

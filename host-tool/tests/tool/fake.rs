@@ -207,8 +207,8 @@ impl FakeDevice {
     }
 }
 
-/// A new pseudo-terminal: the device's end, the host's end, and the name by which the host opens it. Neither is
-/// inherited by the tool: a terminal that the tool itself holds would never vanish.
+/// A new pseudo-terminal: the device's end, the host's end, and the name by which the host opens
+/// it. Neither is inherited by the tool: a terminal that the tool itself holds would never vanish.
 fn pseudo_terminal() -> rustix::io::Result<(File, File, String)> {
     let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
     let device = rustix::pty::openpt(flags)?;

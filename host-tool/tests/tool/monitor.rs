@@ -28,10 +28,11 @@ fn json_lines_and_a_summary_on_standard_error() {
     assert_eq!(
         run.stderr,
         "2 frames shown, 2 received, 0 lost\n\
-         lost: 0 samples on the way (gaps in the sequence), 0 frames not processed (gaps in the frame number); \
-         rejected here: 0 messages, 0 bytes\n\
+         lost: 0 samples on the way (gaps in the sequence), 0 frames not processed (gaps in the \
+         frame number); rejected here: 0 messages, 0 bytes\n\
          device: 0 frames exposed, 0 processed; dropped: busy 0, overrun 0, size 0, USB 0; \
-         tracked 0, lost 0 times; camera timeouts 0, restarts 0, overruns 0; commands rejected 0; last frame took 0 µs, its sample was ready 0 µs after the middle of its exposure\n\
+         tracked 0, lost 0 times; camera timeouts 0, restarts 0, overruns 0; commands rejected 0; \
+         last frame took 0 µs, its sample was ready 0 µs after the middle of its exposure\n\
          without a force: 1 (markers_missing 1)\n"
     );
     assert_eq!(run.code, Some(0));
@@ -121,10 +122,12 @@ fn losses_are_counted_by_cause() {
     assert_eq!(
         run.stderr,
         "3 frames shown, 3 received, 4 lost\n\
-         lost: 2 samples on the way (gaps in the sequence), 2 frames not processed (gaps in the frame number); \
-         rejected here: 2 messages, 26 bytes (overlong 0, cobs 1, crc 1, body 0, trailing 0)\n\
-         device: 7 frames exposed, 5 processed; dropped: busy 2, overrun 0, size 0, set-up 3, USB 2; \
-         camera timeouts 1, restarts 0, overruns 0; commands rejected 0; last frame took 5300 µs, its sample was ready 4800 µs after the middle of its exposure\n"
+         lost: 2 samples on the way (gaps in the sequence), 2 frames not processed (gaps in the \
+         frame number); rejected here: 2 messages, 26 bytes (overlong 0, cobs 1, crc 1, body 0, \
+         trailing 0)\n\
+         device: 7 frames exposed, 5 processed; dropped: busy 2, overrun 0, size 0, set-up 3, USB \
+         2; camera timeouts 1, restarts 0, overruns 0; commands rejected 0; last frame took 5300 \
+         µs, its sample was ready 4800 µs after the middle of its exposure\n"
     );
     assert_eq!(run.code, Some(0));
 }
@@ -156,8 +159,9 @@ fn what_is_left_over_from_before_the_hello_is_ignored() {
     );
 }
 
-/// The port stays open, but the device behind it was unplugged or restarted and knows nothing of the conversation.
-/// The output is not read until the device has sent everything; nothing of it is lost.
+/// The port stays open, but the device behind it was unplugged or restarted and knows nothing of
+/// the conversation. The output is not read until the device has sent everything; nothing of it is
+/// lost.
 #[test]
 fn it_ends_after_the_given_time() {
     let device = FakeDevice::on_tcp([streaming(samples(0..2))]);
@@ -256,7 +260,8 @@ fn the_truth_stands_beside_and_is_compared() {
     assert_eq!(
         tail,
         [
-            "mean direction error: 30.000° over 3 frames with a force, 0.000° over 2 frames with true |F| ≥ 50 mN",
+            "mean direction error: 30.000° over 3 frames with a force, 0.000° over 2 frames with \
+             true |F| ≥ 50 mN",
             "RMSE of |F|: 77.675 mN over 3 frames",
             "RMSE of the place: 353.6 µm over 2 frames",
         ]

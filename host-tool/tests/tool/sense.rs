@@ -299,8 +299,8 @@ fn bad_pictures_are_named_and_the_others_looked_at() {
     assert_eq!(
         lines[1],
         format!(
-            "hivtac: the picture {big} has 801 × 2 px, more than the 800 × 800 px of the largest frame; \
-             scale it down, for example to 640 px wide"
+            "hivtac: the picture {big} has 801 × 2 px, more than the 800 × 800 px of the largest \
+             frame; scale it down, for example to 640 px wide"
         )
     );
     assert_eq!(

@@ -7,8 +7,8 @@ use crate::frame_source::{Coding, Picture};
 const FLIP: u8 = 0x80;
 const MIRROR: u8 = 0x40;
 const SWAP_RED_BLUE: u8 = 0x20;
-/// Luma before chroma. The data sheet calls it "swap Y/UV" and leaves open from what; common drivers of the sensor set
-/// it for Y Cb Y Cr, and it is set after power-up.
+/// Luma before chroma. The data sheet calls it "swap Y/UV" and leaves open from what; common
+/// drivers of the sensor set it for Y Cb Y Cr, and it is set after power-up.
 const LUMA_FIRST: u8 = 0x10;
 const REVERSE_BITS: u8 = 0x08;
 const COLOUR_BARS: u8 = 0x01;
@@ -63,7 +63,8 @@ fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
     }
 }
 
-/// Luma of one output pixel, and Cb and Cr of its pair, of a picture that has them. Outside the array it is black.
+/// Luma of one output pixel, and Cb and Cr of its pair, of a picture that has them. Outside the
+/// array it is black.
 fn luma_and_chroma(output: &Output, picture: &Picture, column: u32, row: u32) -> (u8, [u8; 2]) {
     let Some(place) = place(output, picture, column, row) else {
         return (0, [128; 2]);
@@ -139,7 +140,8 @@ fn encode(output: &Output, pixels: &[[u8; 3]], row: u32) -> Vec<u8> {
     }
 }
 
-/// Pixels as they travel, from the luma of each and Cb and Cr; those of the first pixel of a pair are sent.
+/// Pixels as they travel, from the luma of each and Cb and Cr; those of the first pixel of a pair
+/// are sent.
 fn yuv(output: &Output, pixels: impl Iterator<Item = (u8, [u8; 2])>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut chroma = [128; 2];

@@ -1,8 +1,10 @@
-//! The OV7725: registers on SCCB, a clock from the microcontroller, and pixels that its registers describe.
+//! The OV7725: registers on SCCB, a clock from the microcontroller, and pixels that its registers
+//! describe.
 //!
-//! The sensor runs by itself. It never waits for the firmware, and what it sends follows from its registers, power-up
-//! values included. Geometry, format and clock are taken over at the start of a frame; a register reset, a change of
-//! the input clock and power-up start the frame timing afresh, and the first VSYNC edge comes one frame later.
+//! The sensor runs by itself. It never waits for the firmware, and what it sends follows from its
+//! registers, power-up values included. Geometry, format and clock are taken over at the start of a
+//! frame; a register reset, a change of the input clock and power-up start the frame timing afresh,
+//! and the first VSYNC edge comes one frame later.
 //!
 //! Exposure, gain and colours follow the registers (`exposure`, `colour`). Registers that sources
 //! disagree about hold other values for each seed after a reset; capturing a frame that depends on
@@ -29,7 +31,8 @@ use output::{Format, Output, VSYNC_LINES};
 use registers::Registers;
 pub use sccb::Sccb;
 
-/// Rows that a frame has too many under [`Kind::FrameLong`]; there is room for eight before the next VSYNC.
+/// Rows that a frame has too many under [`Kind::FrameLong`]; there is room for eight before the
+/// next VSYNC.
 const SURPLUS_ROWS: u32 = 5;
 
 /// What the board gives the sensor.
@@ -210,8 +213,9 @@ impl Camera {
         if let Some(address) = self.registers.unwritten() {
             self.rules.broken(|| {
                 format!(
-                    "OV7725: a frame was captured that depends on register 0x{address:02X}, which was never written and has no \
-                     value after a reset that its data sheets agree about"
+                    "OV7725: a frame was captured that depends on register 0x{address:02X}, which \
+                     was never written and has no value after a reset that its data sheets agree \
+                     about"
                 )
             });
         }

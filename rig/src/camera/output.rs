@@ -1,4 +1,5 @@
-//! What the OV7725's registers make it send: size, format, clock, polarities and the timing of a frame.
+//! What the OV7725's registers make it send: size, format, clock, polarities and the timing of a
+//! frame.
 //!
 //! Frame timing (datasheet, "Timing specifications"): VGA 784 × 510 pixel periods with 640 × 480
 //! active, QVGA 576 × 278 with 320 × 240 active, VSYNC for the first four lines, then 18 or 22
@@ -83,7 +84,8 @@ pub struct Output {
 }
 
 impl Output {
-    /// What the registers say, at an input clock (XCLK) in Hz. `None` when the sensor sleeps or has no usable clock.
+    /// What the registers say, at an input clock (XCLK) in Hz. `None` when the sensor sleeps or has
+    /// no usable clock.
     pub fn new(registers: &Registers, input_clock_hz: u64) -> Option<Output> {
         if !INPUT_CLOCK_HZ.contains(&input_clock_hz) || registers.get(reg::COM2) & 0x10 != 0 {
             return None;

@@ -1,5 +1,5 @@
-//! The sensor's side of SCCB, which is I2C without the acknowledge's meaning: address 0x21, one register per
-//! transaction, no automatic increment.
+//! The sensor's side of SCCB, which is I2C without the acknowledge's meaning: address 0x21, one
+//! register per transaction, no automatic increment.
 
 use rigless::chip::Timeline;
 use rigless::chip::i2c::Peer;

@@ -1,8 +1,10 @@
-//! The camera interface: what the sensor's signals do to it, in virtual time, and what the firmware sees of that.
+//! The camera interface: what the sensor's signals do to it, in virtual time, and what the firmware
+//! sees of that.
 //!
-//! The sensor's clock drives everything. Bytes arrive in groups of sixteen, one FIFO's worth, at the instant at which
-//! the last of them is on the lines; the FIFO holds four words, and a fifth overruns. Pixels leave only through
-//! DCMI_DR, by a DMA request through DMAMUX1 or by the processor.
+//! The sensor's clock drives everything. Bytes arrive in groups of sixteen, one FIFO's worth, at
+//! the instant at which the last of them is on the lines; the FIFO holds four words, and a fifth
+//! overruns. Pixels leave only through DCMI_DR, by a DMA request through DMAMUX1 or by the
+//! processor.
 
 mod receiver;
 mod signals;
@@ -170,7 +172,12 @@ impl Dcmi {
         let pixel_clock = frame.output.pixel_clock_hz;
         if self.hclk_hz * 2 < pixel_clock * 5 {
             let hclk = self.hclk_hz;
-            self.rules.broken(|| format!("DCMI: HCLK is {hclk} Hz, less than 2.5 times PIXCLK, {pixel_clock} Hz (RM0433, DCMI clocks)"));
+            self.rules.broken(|| {
+                format!(
+                    "DCMI: HCLK is {hclk} Hz, less than 2.5 times PIXCLK, \
+                {pixel_clock} Hz (RM0433, DCMI clocks)"
+                )
+            });
         }
     }
 
@@ -188,13 +195,7 @@ impl Dcmi {
         }
     }
 
-    fn bytes(
-        &mut self,
-        run: Run,
-        from: u32,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
+    fn bytes(&mut self, run: Run, from: u32, context: &mut DeviceContext<'_>) {
         let to = (from + GROUP).min(run.bytes);
         let waiting = self.receiver.waiting();
         let ends = to == run.bytes && run.ends_line;
@@ -352,7 +353,7 @@ impl Device for Dcmi {
             Step::Retry => self.start_over(registers, context),
             Step::VsyncBegins => self.begin_frame(registers, context),
             Step::VsyncEnds => self.end_vsync(registers, context),
-            Step::Bytes(run, from) => self.bytes(run, from, registers, context),
+            Step::Bytes(run, from) => self.bytes(run, from, context),
         }
     }
 

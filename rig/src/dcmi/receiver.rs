@@ -1,8 +1,9 @@
-//! The data path of the camera interface: frame, line and byte selection, packing, and the four-word FIFO.
+//! The data path of the camera interface: frame, line and byte selection, packing, and the
+//! four-word FIFO.
 //!
-//! RM0433 rev 7 chapter 33. Simulated: hardware synchronization, 8 data bits, snapshot and continuous mode, frame
-//! rate selection, byte and line selection, overrun. Not simulated: crop, embedded codes, JPEG, more
-//! data bits.
+//! RM0433 rev 7 chapter 33. Simulated: hardware synchronization, 8 data bits, snapshot and
+//! continuous mode, frame rate selection, byte and line selection, overrun. Not simulated: crop,
+//! embedded codes, JPEG, more data bits.
 
 use std::collections::VecDeque;
 
@@ -100,7 +101,8 @@ impl Receiver {
     /// One byte at the valid level of HSYNC and VSYNC.
     ///
     /// # Errors
-    /// When it completed a word and the FIFO was full: the FIFO is emptied and the frame is given up.
+    /// When it completed a word and the FIFO was full: the FIFO is emptied and the frame is given
+    /// up.
     pub fn byte(&mut self, byte: u8, settings: &Settings) -> Result<(), Overrun> {
         let clock = self.clock;
         self.clock += 1;

@@ -71,8 +71,8 @@ impl Frame {
             && clock < self.output.row_bytes
     }
 
-    /// The first run at or after a line, before the line `end`. With `inverted`, the interface takes HREF's idle level
-    /// for data.
+    /// The first run at or after a line, before the line `end`. With `inverted`, the interface
+    /// takes HREF's idle level for data.
     pub fn run_from(&self, line: u32, end: u32, inverted: bool) -> Option<Run> {
         (line..end).find_map(|line| self.run_in(line, inverted))
     }
@@ -105,8 +105,8 @@ impl Frame {
             .filter(|&row| row < self.output.rows)
     }
 
-    /// Bytes of a run, `from..to`; the picture is asked for when the first row is needed. Between rows the lines are
-    /// low.
+    /// Bytes of a run, `from..to`; the picture is asked for when the first row is needed. Between
+    /// rows the lines are low.
     pub fn bytes(
         &mut self,
         run: &Run,
@@ -126,8 +126,9 @@ impl Frame {
     }
 }
 
-/// What is latched when the lines are sampled at the edge at which they change: bits that differ from the byte before
-/// are as likely old as new. The pattern is fixed, so that a run can be repeated.
+/// What is latched when the lines are sampled at the edge at which they change: bits that differ
+/// from the byte before are as likely old as new. The pattern is fixed, so that a run can be
+/// repeated.
 pub fn sampled_while_changing(before: u8, byte: u8, position: u64) -> u8 {
     let coin = (position.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 56) as u8;
     byte ^ ((before ^ byte) & coin)

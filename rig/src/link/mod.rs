@@ -1,4 +1,5 @@
-//! The serial port as programs on this machine see it: a TCP port, a pseudo-terminal, or both; one client at a time.
+//! The serial port as programs on this machine see it: a TCP port, a pseudo-terminal, or both; one
+//! client at a time.
 
 mod pty;
 mod tcp;
@@ -51,8 +52,8 @@ impl Link {
         }
     }
 
-    /// Whether a client holds the port; looks for a new one when none did. A client that leaves is seen to leave
-    /// before the next one is seen to come.
+    /// Whether a client holds the port; looks for a new one when none did. A client that leaves is
+    /// seen to leave before the next one is seen to come.
     pub fn connected(&mut self) -> bool {
         match self.holder {
             Some(holder) => {

@@ -1,7 +1,8 @@
 //! The port as a pseudo-terminal.
 //!
-//! The rig keeps the terminal side open itself, so that it stays raw: the system resets a terminal that nobody holds.
-//! So a hang-up on the other side does not tell that a client left; inotify does.
+//! The rig keeps the terminal side open itself, so that it stays raw: the system resets a terminal
+//! that nobody holds. So a hang-up on the other side does not tell that a client left; inotify
+//! does.
 
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};

@@ -16,8 +16,8 @@ pub struct Block {
     pub bytes: u64,
 }
 
-/// What the registers of a channel ask for, or what is wrong with it. `get` reads a register by its row, `control` is
-/// what was written to CR.
+/// What the registers of a channel ask for, or what is wrong with it. `get` reads a register by its
+/// row, `control` is what was written to CR.
 pub fn asked_for(get: &dyn Fn(usize) -> u64, control: u64) -> Result<Block, String> {
     let (tcr, tbr) = (get(row::TCR), get(row::TBR));
     let field = |shift: u32, bits: u32| tcr >> shift & ((1 << bits) - 1);

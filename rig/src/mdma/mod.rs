@@ -1,9 +1,11 @@
-//! The master DMA controller, which alone reaches DTCM and ITCM: blocks of memory on software request.
+//! The master DMA controller, which alone reaches DTCM and ITCM: blocks of memory on software
+//! request.
 //!
-//! RM0433 rev 7 chapter 14. A request moves its block after the time that it takes at 240 MHz, all at once at its end.
-//! Simulated: 16 channels, software requests for one block, increments, sizes with packing, flags, interrupt, errors.
-//! Not simulated: hardware triggers, repeated blocks, linked lists, endianness, offsets other than the size; using them
-//! ends the run with an error, and so does a transfer that the manual forbids.
+//! RM0433 rev 7 chapter 14. A request moves its block after the time that it takes at 240 MHz, all
+//! at once at its end. Simulated: 16 channels, software requests for one block, increments, sizes
+//! with packing, flags, interrupt, errors. Not simulated: hardware triggers, repeated blocks,
+//! linked lists, endianness, offsets other than the size; using them ends the run with an error,
+//! and so does a transfer that the manual forbids.
 
 mod block;
 
@@ -19,8 +21,8 @@ use block::{Block, asked_for};
 const CHANNELS: usize = 16;
 /// Registers of a channel in the vendor's table, the first channel's from row 1 on.
 const ROWS: usize = 13;
-/// One buffer of 128 bytes is read in 16 beats of 8 bytes, written in 32 of 4, with as many cycles again for
-/// arbitration as reading takes: an assumption.
+/// One buffer of 128 bytes is read in 16 beats of 8 bytes, written in 32 of 4, with as many cycles
+/// again for arbitration as reading takes: an assumption.
 const BUFFER_BYTES: u64 = 128;
 const BUFFER_CYCLES: u64 = 64;
 const BUS_HZ: u64 = 240_000_000;

@@ -1,7 +1,8 @@
 //! The core's three register blocks on the bus: global, device, and FIFOs.
 //!
-//! The vendor's register tables leave out the FIFOs and some endpoints. So the part's slots are exchanged for slots
-//! that cover every word, with the same clock gate; the reset line and the clock follow the slot.
+//! The vendor's register tables leave out the FIFOs and some endpoints. So the part's slots are
+//! exchanged for slots that cover every word, with the same clock gate; the reset line and the
+//! clock follow the slot.
 
 use rigless::device::{DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange};
 use rigless::mcu::Mcu;
@@ -104,7 +105,8 @@ impl Blocks {
         Ok(blocks)
     }
 
-    /// Takes the place of the part's own blocks, or gives it back. A part is reset with its own blocks in place.
+    /// Takes the place of the part's own blocks, or gives it back. A part is reset with its own
+    /// blocks in place.
     pub fn exchange(&mut self, part: &mut Stm32h743) {
         for slot in self.slots {
             std::mem::swap(part.bus_mut().slot_mut(slot), self.donor.slot_mut(slot));
@@ -124,7 +126,8 @@ impl Blocks {
     }
 }
 
-/// A bus with the part's instances in the part's order, so that a gate names the same bits, and with our blocks.
+/// A bus with the part's instances in the part's order, so that a gate names the same bits, and
+/// with our blocks.
 fn donor(part: &Stm32h743) -> Result<Bus, Error> {
     let ours = Which::ALL.map(Which::peripheral);
     let replaced = |had: &Peripheral| {

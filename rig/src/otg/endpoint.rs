@@ -1,4 +1,5 @@
-//! One endpoint's registers: DIEPCTLn, DIEPINTn, DIEPTSIZn and the transmit FIFO, or DOEPCTLn, DOEPINTn, DOEPTSIZn.
+//! One endpoint's registers: DIEPCTLn, DIEPINTn, DIEPTSIZn and the transmit FIFO, or DOEPCTLn,
+//! DOEPINTn, DOEPTSIZn.
 
 use std::collections::VecDeque;
 

@@ -2,7 +2,8 @@
 
 use super::{Core, interrupt, packet_status};
 
-/// OTG_CID as silicon answers it. (ST's register description file says 0x1200, which is an older core's.)
+/// OTG_CID as silicon answers it. (ST's register description file says 0x1200, which is an older
+/// core's.)
 const CORE_ID: u32 = 0x0000_2300;
 /// GRSTCTL: the AHB master is idle.
 const AHB_IDLE: u32 = 1 << 31;

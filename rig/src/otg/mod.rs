@@ -1,13 +1,14 @@
 //! The full-speed USB OTG core (OTG2 at 0x4008_0000) as a device: registers, FIFOs, interrupts.
 //!
-//! RM0433 rev 7 chapter 60, FIFO mode (no internal DMA). The host on the other end of the cable calls [`Core::setup`],
-//! [`Core::receive`] and [`Core::transmit`]; everything else is what the firmware reads and writes. Bytes leave the
-//! device only through its transmit FIFOs.
+//! RM0433 rev 7 chapter 60, FIFO mode (no internal DMA). The host on the other end of the cable
+//! calls [`Core::setup`], [`Core::receive`] and [`Core::transmit`]; everything else is what the
+//! firmware reads and writes. Bytes leave the device only through its transmit FIFOs.
 //!
-//! Simulated: soft connect, bus reset, enumeration at full speed, suspend, resume, address, stall, NAK, FIFO depths.
-//! Not simulated: isochronous transfers, remote wake-up, host mode, data toggles, and timing below a transaction.
-//! An OUT endpoint counts as armed when it is active, its NAK status is clear and its packet count is not zero; EPENA
-//! must have been set once since it became active. That is what drivers for this core rely on.
+//! Simulated: soft connect, bus reset, enumeration at full speed, suspend, resume, address, stall,
+//! NAK, FIFO depths. Not simulated: isochronous transfers, remote wake-up, host mode, data toggles,
+//! and timing below a transaction. An OUT endpoint counts as armed when it is active, its NAK
+//! status is clear and its packet count is not zero; EPENA must have been set once since it became
+//! active. That is what drivers for this core rely on.
 
 mod blocks;
 mod device_registers;
@@ -264,7 +265,8 @@ impl Core {
         }
         let packet = sender.packet(endpoint);
         if endpoint == 0 && packet.is_some() {
-            // A new address holds from the end of the transfer that sets it, though it is written before.
+            // A new address holds from the end of the transfer that sets it, though it is written
+            // before.
             self.address = self.dcfg_address();
         }
         packet.map_or(Answer::Nak, Answer::Ack)

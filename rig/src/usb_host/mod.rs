@@ -1,7 +1,8 @@
 //! A USB host with one full-speed port: enumerates a CDC-ACM device and moves its bytes.
 //!
-//! One transaction every 1/19 ms, which is what a full-speed bus carries of 64-byte bulk packets. Times are those of
-//! USB 2.0 chapters 7 and 9: 100 ms debounce, 10 ms reset, 10 ms recovery, suspend after 3 ms without activity.
+//! One transaction every 1/19 ms, which is what a full-speed bus carries of 64-byte bulk packets.
+//! Times are those of USB 2.0 chapters 7 and 9: 100 ms debounce, 10 ms reset, 10 ms recovery,
+//! suspend after 3 ms without activity.
 
 mod control;
 mod descriptors;

@@ -1,8 +1,8 @@
 //! Runs the firmware under a scripted host, and decodes what it sends.
 //!
-//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each seeded bug, and
-//! `yuv422.elf` with the model for YUV422.
-//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
+//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each
+//! seeded bug, and `yuv422.elf` with the model for YUV422. `HIVTAC_INSTRUCTIONS_PER_SECOND` lets
+//! every test run at another speed.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -58,8 +58,8 @@ fn path_from(variable: &str, what: &str) -> PathBuf {
         panic!(
             "set {variable} to {what}. `cargo xtask test` does; by hand: in the project's root, \
              `cargo build --release -p hivtac-firmware --target thumbv7em-none-eabihf`, then \
-             HIVTAC_ELF=$PWD/target/thumbv7em-none-eabihf/release/hivtac-firmware; the seeded bugs are cargo features \
-             of that package"
+             HIVTAC_ELF=$PWD/target/thumbv7em-none-eabihf/release/hivtac-firmware; the seeded bugs \
+             are cargo features of that package"
         )
     };
     // Cargo runs tests in the package's folder; a relative path is meant from the project's root.
@@ -79,7 +79,8 @@ fn path_from(variable: &str, what: &str) -> PathBuf {
     path
 }
 
-/// What every test assumes of the core, unless it says otherwise: `HIVTAC_INSTRUCTIONS_PER_SECOND`, or the default.
+/// What every test assumes of the core, unless it says otherwise: `HIVTAC_INSTRUCTIONS_PER_SECOND`,
+/// or the default.
 pub fn instructions_per_second() -> u64 {
     match std::env::var("HIVTAC_INSTRUCTIONS_PER_SECOND") {
         Ok(text) => text
@@ -89,7 +90,8 @@ pub fn instructions_per_second() -> u64 {
     }
 }
 
-/// A run under a scripted host that opens the port, says hello, starts the stream, and asks for counters at the end.
+/// A run under a scripted host that opens the port, says hello, starts the stream, and asks for
+/// counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
     /// A scene's name, or its file from the package's folder.
@@ -323,7 +325,8 @@ impl Run {
         frames.windows(2).flat_map(between).collect()
     }
 
-    /// Asserts that every frame was measured, or passed while something was set; one may be under way.
+    /// Asserts that every frame was measured, or passed while something was set; one may be under
+    /// way.
     pub fn assert_only_setup_drops(&self) {
         let stats = self.stats();
         let losses = [
@@ -347,13 +350,14 @@ impl Run {
             .collect()
     }
 
-    /// Asserts that every sample names an exposure, and that the device's clock and the true one differ by one and the
-    /// same time: its start.
+    /// Asserts that every sample names an exposure, and that the device's clock and the true one
+    /// differ by one and the same time: its start.
     pub fn assert_times(&self) {
         let ahead = |sample: &&Sample| sample.time_us as i64 - self.true_time_us(sample.frame);
         let ahead: Vec<i64> = self.samples().iter().map(ahead).collect();
         let first = *ahead.first().expect("samples");
-        // HAL and emulator disagree about a compare flag at the timer's start: half a turn of 16 bits, 65.5 ms.
+        // HAL and emulator disagree about a compare flag at the timer's start: half a turn of 16
+        // bits, 65.5 ms.
         assert!((-20_000..70_000).contains(&first), "{ahead:?}");
         assert!(
             ahead.iter().all(|other| other.abs_diff(first) <= 10),

@@ -8,11 +8,12 @@ use self::sections::SceneFile;
 use crate::{Scene, SceneError};
 
 impl Scene {
-    /// The scene that a TOML text describes, as `docs/scene-file.md` says. What it leaves out is as in the default.
+    /// The scene that a TOML text describes, as `docs/scene-file.md` says. What it leaves out is as
+    /// in the default.
     ///
     /// # Errors
-    /// [`SceneError::File`], with the line, when the text is no TOML, has a key that there is not, or a value that cannot
-    /// be.
+    /// [`SceneError::File`], with the line, when the text is no TOML, has a key that there is not,
+    /// or a value that cannot be.
     pub fn from_toml(text: &str) -> Result<Scene, SceneError> {
         let file: SceneFile =
             toml::from_str(text).map_err(|error| SceneError::File(error.to_string()))?;

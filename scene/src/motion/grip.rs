@@ -10,11 +10,12 @@ use crate::{Load, SceneError};
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
 
-/// Grasp an object from a table, lift it, hold it, put it down, let go (the paper's Section 7.3 and Figure 15).
+/// Grasp an object from a table, lift it, hold it, put it down, let go (the paper's Section 7.3 and
+/// Figure 15).
 ///
-/// The grip rises; lifting takes the weight off the table, speeds up and slows down again; all of it backwards at the
-/// end. The paper's objects weigh 30 and 36 g, which pull more steeply than the 12° of its calibration and of the
-/// film's default range: the default object is lighter.
+/// The grip rises; lifting takes the weight off the table, speeds up and slows down again; all of
+/// it backwards at the end. The paper's objects weigh 30 and 36 g, which pull more steeply than the
+/// 12° of its calibration and of the film's default range: the default object is lighter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -70,7 +71,8 @@ impl Grasp {
         let lowered_s = closed_s + self.lift_s + self.hold_s;
         let gripped = ramp(time_s - self.start_s, self.close_s)
             - ramp(time_s - lowered_s - self.lift_s, self.close_s);
-        // The table bears nothing any more after a tenth of the way up, and again a tenth before the end.
+        // The table bears nothing any more after a tenth of the way up, and again a tenth before
+        // the end.
         let tenth_s = self.lift_s / 10.0;
         let hanging = ramp(time_s - closed_s, tenth_s)
             - ramp(time_s - lowered_s - self.lift_s + tenth_s, tenth_s);
@@ -89,10 +91,12 @@ impl Grasp {
     }
 }
 
-/// Catch an object: it hits, bounces on the film with decaying force, and is held (the paper's Figure 1).
+/// Catch an object: it hits, bounces on the film with decaying force, and is held (the paper's
+/// Figure 1).
 ///
-/// From the impact on, |F| = hold · (1 − d·cos ωt) + peak · d·sin ωt with d = exp(−t / decay), and nothing while that is
-/// negative, when the object has left the film. The direction of the impact dies away as d does.
+/// From the impact on, |F| = hold · (1 − d·cos ωt) + peak · d·sin ωt with d = exp(−t / decay), and
+/// nothing while that is negative, when the object has left the film. The direction of the impact
+/// dies away as d does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -114,7 +118,8 @@ pub struct Catch {
 }
 
 impl Default for Catch {
-    /// Hits with 0.2 N at α = 8°, β = −5° and ends in 0.06 N; 10 Hz, gone in 0.1 s: some 30 g on a film of 0.1 N/mm.
+    /// Hits with 0.2 N at α = 8°, β = −5° and ends in 0.06 N; 10 Hz, gone in 0.1 s: some 30 g on a
+    /// film of 0.1 N/mm.
     fn default() -> Catch {
         Catch {
             peak_n: 0.2,

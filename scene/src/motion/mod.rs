@@ -13,19 +13,22 @@ pub use slide::Drag;
 
 use crate::{Load, SceneError};
 
-/// What presses the film, as a function of time. Before time 0, and at a time that is no number, nothing does.
+/// What presses the film, as a function of time. Before time 0, and at a time that is no number,
+/// nothing does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
     /// Nothing presses.
     Rest,
     /// One load, from time 0 on.
     Static(Load),
-    /// A tenth of a second of rest, then a tip whose force wanders smoothly: |F| 0.02–0.2 N, |α| ≤ 8°, |β| ≤ 6°.
+    /// A tenth of a second of rest, then a tip whose force wanders smoothly: |F| 0.02–0.2 N, |α| ≤
+    /// 8°, |β| ≤ 6°.
     Demo {
         /// Decides where α and β start.
         seed: u64,
     },
-    /// |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then tilted by α = ±8° and by β = ±6°.
+    /// |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then tilted by α = ±8° and by β =
+    /// ±6°.
     Sweep,
     /// Press, hold, release.
     Press(Press),
@@ -57,8 +60,8 @@ impl Motion {
         "vibration",
     ];
 
-    /// A motion by its name, with default parameters: one of [`Motion::NAMES`]. `static` is 0.1 N at α = 4°,
-    /// β = −3°. The seed decides where `demo` starts.
+    /// A motion by its name, with default parameters: one of [`Motion::NAMES`]. `static` is 0.1 N
+    /// at α = 4°, β = −3°. The seed decides where `demo` starts.
     ///
     /// # Errors
     /// When there is none of that name.
@@ -95,7 +98,8 @@ impl Motion {
         }
     }
 
-    /// Whether its parameters are possible and the film can take (`film` says) what it does in its first ten seconds.
+    /// Whether its parameters are possible and the film can take (`film` says) what it does in its
+    /// first ten seconds.
     ///
     /// # Errors
     /// When a parameter is outside its range, or the film cannot take a load on the way.
@@ -122,8 +126,8 @@ fn load(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
     Load::from_angles(magnitude_n, alpha_deg, beta_deg).unwrap_or(Load::REST)
 }
 
-/// A load by its pressure on the film (N, ≥ 0) and its pull along a direction in the film's plane (degrees from x
-/// towards y). What does not press does not pull.
+/// A load by its pressure on the film (N, ≥ 0) and its pull along a direction in the film's plane
+/// (degrees from x towards y). What does not press does not pull.
 fn pressed_and_pulled(normal_n: f64, lateral_n: f64, direction_deg: f64) -> Load {
     let (sin, cos) = libm::sincos(crate::camera::radians(direction_deg));
     Load::from_vector([lateral_n * cos, lateral_n * sin, -normal_n]).unwrap_or(Load::REST)

@@ -69,7 +69,8 @@ impl Press {
     }
 }
 
-/// A press with a sinusoid on it, from its start to the end of time: |F| = force + amplitude · sin, once it has risen.
+/// A press with a sinusoid on it, from its start to the end of time: |F| = force + amplitude · sin,
+/// once it has risen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]

@@ -5,10 +5,11 @@ use super::{pressed_and_pulled, ramp};
 use crate::options::within;
 use crate::{Load, SceneError};
 
-/// Press, then pull sideways at a constant rate until friction gives way; slide with less friction; release.
+/// Press, then pull sideways at a constant rate until friction gives way; slide with less friction;
+/// release.
 ///
-/// Coulomb friction: the pull grows to `friction_static` · N, then falls to `friction_sliding` · N within 20 ms.
-/// The film is known to a ratio of 0.8: what sticks better than that is out of reach.
+/// Coulomb friction: the pull grows to `friction_static` · N, then falls to `friction_sliding` · N
+/// within 20 ms. The film is known to a ratio of 0.8: what sticks better than that is out of reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -35,7 +36,8 @@ pub struct Drag {
 const SLIP_S: f64 = 0.02;
 
 impl Default for Drag {
-    /// 0.12 N, pulled to the right at 0.05 N/s, slipping at a ratio of 0.2 and sliding for 0.5 s at 0.15.
+    /// 0.12 N, pulled to the right at 0.05 N/s, slipping at a ratio of 0.2 and sliding for 0.5 s at
+    /// 0.15.
     fn default() -> Drag {
         Drag {
             force_n: 0.12,

@@ -24,7 +24,8 @@ pub struct Resting {
     areas: [f32; 4],
 }
 
-/// A marker that rests this far from where it rested when the model was made, px in Q16.16, is another unit's: half a pixel.
+/// A marker that rests this far from where it rested when the model was made, px in Q16.16, is
+/// another unit's: half a pixel.
 const LARGEST_DRIFT: u32 = 1 << 15;
 /// Areas at which a marker's noise is known, in parts of the one at rest.
 const AREAS: [f32; 2] = [0.5, 6.0];
@@ -36,8 +37,8 @@ impl Resting {
         (forward.steps > 0).then(|| Resting::new(forward, rest, &model.rest))
     }
 
-    /// For markers that rest there, by what the model knows of the unit that it was made on; of another one by what its rest
-    /// picture tells.
+    /// For markers that rest there, by what the model knows of the unit that it was made on; of
+    /// another one by what its rest picture tells.
     fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest) -> Resting {
         let is_own = is_near(rest, own);
         let told = forward.rest_image.mounting(rest);
@@ -155,7 +156,8 @@ impl Resting {
     }
 }
 
-/// Whether a rest position is that of the unit that a model was made on, as it may have drifted since.
+/// Whether a rest position is that of the unit that a model was made on, as it may have drifted
+/// since.
 fn is_near(rest: &Rest, own: &Rest) -> bool {
     let pairs = rest.features.centroids.iter().zip(&own.features.centroids);
     pairs.into_iter().all(|(a, b)| {

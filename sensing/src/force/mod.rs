@@ -1,13 +1,14 @@
 //! Forces: direction, size and the Cartesian vector.
 //!
-//! Film frame, right-handed: x right and y down in the image, z = x × y out of the film, away from the camera.
+//! Film frame, right-handed: x right and y down in the image, z = x × y out of the film, away from
+//! the camera.
 //!
-//! F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's. A press has F_z < 0. The other way round,
-//! α = atan2(Fx, −Fz), −180° < α ≤ 180°, and β = atan2(Fy, √(Fx² + Fz²)), −90° ≤ β ≤ 90°. Where β = ±90°, and where
-//! F = 0, α is 0; where F = 0, so is β.
+//! F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's. A press has F_z < 0. The
+//! other way round, α = atan2(Fx, −Fz), −180° < α ≤ 180°, and β = atan2(Fy, √(Fx² + Fz²)), −90° ≤ β
+//! ≤ 90°. Where β = ±90°, and where F = 0, α is 0; where F = 0, so is β.
 //!
-//! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at most 0.5 µN;
-//! a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
+//! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at
+//! most 0.5 µN; a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
 
 mod contact;
 mod explained;
@@ -29,11 +30,11 @@ use crate::{
     units::{MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres},
 };
 
-/// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range of ±10°
-/// (Section 4), so that little more than the sign of α is left.
+/// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range
+/// of ±10° (Section 4), so that little more than the sign of α is left.
 pub const UNRELIABLE_DIRECTION: MilliDegrees = MilliDegrees(5_000);
-/// How far beyond the calibrated range a force still counts as inside: a training set's largest forces come out
-/// a little larger or smaller than they were. |F|: one part in this many.
+/// How far beyond the calibrated range a force still counts as inside: a training set's largest
+/// forces come out a little larger or smaller than they were. |F|: one part in this many.
 pub const RANGE_MARGIN: i32 = 20;
 /// The same, for angles.
 pub const ANGLE_MARGIN: MilliDegrees = MilliDegrees(1_000);
@@ -53,8 +54,8 @@ pub struct Force {
     /// (Fx, Fy, Fz): |F| in the direction of α and β. Where a model's angles are those of the
     /// pressing direction (`stick`, `slip`), it is |F| along that.
     pub cartesian: [MicroNewtons; 3],
-    /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within 1.731 times this angle of
-    /// the one found (`model::Uncertainty`).
+    /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within
+    /// 1.731 times this angle of the one found (`model::Uncertainty`).
     pub direction_sigma: MilliDegrees,
     /// Standard uncertainty of |F|: 95 of 100 are within 1.960 times this.
     pub magnitude_sigma: MicroNewtons,
@@ -110,8 +111,8 @@ impl Polar {
 impl Force {
     /// The force that a model's outputs mean, and its status bits:
     /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`],
-    /// [`Status::DIRECTION_UNRELIABLE`] and [`Status::PLACE_OUT_OF_RANGE`]. A negative |F| from a model
-    /// is one of nothing: it becomes 0.
+    /// [`Status::DIRECTION_UNRELIABLE`] and [`Status::PLACE_OUT_OF_RANGE`]. A negative |F| from a
+    /// model is one of nothing: it becomes 0.
     pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
         let outputs = output.values;
         let (polar, vector) = match model.output {

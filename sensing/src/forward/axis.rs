@@ -7,8 +7,8 @@ pub const NODES: core::ops::RangeInclusive<usize> = 6..=16;
 /// Parts of one that weights are kept in: Q15.
 const ONE: f32 = 32_768.0;
 
-/// The nodes of cubic splines, which are sums of B-splines: one for each node, smooth over the second node
-/// and the last but one (not-a-knot).
+/// The nodes of cubic splines, which are sums of B-splines: one for each node, smooth over the
+/// second node and the last but one (not-a-knot).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     nodes_mm: [f32; *NODES.end()],
@@ -17,7 +17,8 @@ pub struct Axis {
     slope_unit: f32,
 }
 
-/// What the value and the slope at a point are made of: so much of each coefficient from the first on.
+/// What the value and the slope at a point are made of: so much of each coefficient from the first
+/// on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
     /// The first coefficient.
@@ -29,7 +30,8 @@ pub struct Weights {
 }
 
 impl Axis {
-    /// Of growing nodes between ±100 mm, at least 0.01 mm apart; `None` of others, or of too few or too many.
+    /// Of growing nodes between ±100 mm, at least 0.01 mm apart; `None` of others, or of too few or
+    /// too many.
     pub fn new(nodes_mm: &[f32]) -> Option<Axis> {
         let count = nodes_mm.len();
         let grow = nodes_mm.windows(2).all(|pair| pair[1] - pair[0] >= 0.01);
@@ -43,8 +45,8 @@ impl Axis {
             slope_unit: 0.0,
         };
         axis.nodes_mm[..count].copy_from_slice(nodes_mm);
-        // Parts of B-splines of the second degree add up to one, over at least the narrowest span: the slopes'
-        // parts, differences of three times these, add up to at most six over it.
+        // Parts of B-splines of the second degree add up to one, over at least the narrowest span:
+        // the slopes' parts, differences of three times these, add up to at most six over it.
         let spans = (SPAN - 1..count).map(|span| axis.knot(span + 1) - axis.knot(span));
         axis.slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
         Some(axis)
@@ -98,7 +100,8 @@ impl Axis {
         }
     }
 
-    /// Four times the first node, the nodes but the outer two at each end, four times the last node.
+    /// Four times the first node, the nodes but the outer two at each end, four times the last
+    /// node.
     fn knot(&self, k: usize) -> f32 {
         let last = self.count - 1;
         self.nodes_mm[match k {

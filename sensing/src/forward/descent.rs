@@ -12,9 +12,9 @@ use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
 const LEFT_TO_EXPLAIN: f32 = 0.25;
 /// The first of the unknowns that are the tilt, which the place follows.
 const TILT: usize = 1;
-/// What is likely before there is a frame: tilt along x and y, rad, and place along x and y, mm, are
-/// nothing to within this. A load too weak for its direction and place keeps what is likely, instead of
-/// being sought where steps do not end.
+/// What is likely before there is a frame: tilt along x and y, rad, and place along x and y, mm,
+/// are nothing to within this. A load too weak for its direction and place keeps what is likely,
+/// instead of being sought where steps do not end.
 const LIKELY: [f32; 4] = [0.3, 0.3, 2.5, 2.5];
 /// The markers' equations, and those of what is likely.
 const ROWS: usize = EQUATIONS + LIKELY.len();
@@ -36,7 +36,8 @@ pub struct Descent<'a> {
 /// A load, and what the markers say there.
 struct Linearization {
     pose: Pose,
-    /// What the load does not explain of the markers: the sum of squares in parts of their variances.
+    /// What the load does not explain of the markers: the sum of squares in parts of their
+    /// variances.
     unexplained: f32,
     /// That, and how unlikely the load is.
     square: f32,

@@ -6,11 +6,11 @@ use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
 use super::solve::{Column, Solved};
 
-/// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ² of three degrees of freedom is
-/// more than 17.7 then.
+/// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
+/// of three degrees of freedom is more than 17.7 then.
 pub const UNEXPLAINED: f32 = 17.7;
-/// Steps that a frame takes at most: more than the model asks for while what they led to does not explain the markers. Units of
-/// which little is known begin far from where they end.
+/// Steps that a frame takes at most: more than the model asks for while what they led to does not
+/// explain the markers. Units of which little is known begin far from where they end.
 pub const STEPS_AT_MOST: u8 = 6;
 
 /// How the markers' images moved since the rest position, and how well that is known.
@@ -18,10 +18,11 @@ pub const STEPS_AT_MOST: u8 = 6;
 pub struct Observed {
     /// x and y of markers 0–3, focal lengths along the film's axes.
     pub moved: Column,
-    /// Standard uncertainty of each marker, away from the pattern's middle and across that, focal lengths, > 0: what markers weigh
-    /// by.
+    /// Standard uncertainty of each marker, away from the pattern's middle and across that, focal
+    /// lengths, > 0: what markers weigh by.
     pub sigma: Column,
-    /// How many times that their variance is on the mean with what is not known of the unit and weighs nothing, ≥ 1.
+    /// How many times that their variance is on the mean with what is not known of the unit and
+    /// weighs nothing, ≥ 1.
     pub wider: f32,
 }
 
@@ -41,8 +42,8 @@ pub struct Estimate {
 }
 
 impl Forward<'_> {
-    /// Takes steps from a guess; if they lead to a load that does not explain the markers, from the film's middle, too: from
-    /// there steps find their way where a guess was bad.
+    /// Takes steps from a guess; if they lead to a load that does not explain the markers, from the
+    /// film's middle, too: from there steps find their way where a guess was bad.
     pub fn estimate(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
         let found = self.descend(observed, mounting, guess);
         // What noise explains.
@@ -113,8 +114,8 @@ impl Estimate {
     }
 }
 
-/// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across that so much less as the circle
-/// is shorter than its angle.
+/// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across
+/// that so much less as the circle is shorter than its angle.
 fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
     let [x, y] = pose.tilt;
     let square = x * x + y * y;
@@ -128,8 +129,9 @@ fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
     [away, sine * both, sine * sine * along]
 }
 
-/// What a covariance (xx, xy, yy) states as its σ: 95 of 100 errors are within 1.731 times it (√(−ln 0.05)), however long and
-/// narrow their ellipse is. A round one's is the root of its trace; of a narrow one's 95 of 100 are within 1.960 times that.
+/// What a covariance (xx, xy, yy) states as its σ: 95 of 100 errors are within 1.731 times it
+/// (√(−ln 0.05)), however long and narrow their ellipse is. A round one's is the root of its trace;
+/// of a narrow one's 95 of 100 are within 1.960 times that.
 fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
     let trace = xx + yy;
     let apart = (xx - yy) * (xx - yy) + 4.0 * xy * xy;

@@ -1,11 +1,14 @@
-//! Which force at which place explains where the markers are: a model of the film run forwards, and Gauss–Newton steps on it.
+//! Which force at which place explains where the markers are: a model of the film run forwards, and
+//! Gauss–Newton steps on it.
 //!
-//! Four markers have eight coordinates, a contact five unknowns. The network's answer is the first guess; each step evaluates the
-//! film at it, with its slopes, and solves the linearized problem. What three redundant coordinates do not
-//! explain tells a load that the model does not know, and the slopes tell how well the load is known.
+//! Four markers have eight coordinates, a contact five unknowns. The network's answer is the first
+//! guess; each step evaluates the film at it, with its slopes, and solves the linearized problem.
+//! What three redundant coordinates do not explain tells a load that the model does not know, and
+//! the slopes tell how well the load is known.
 //!
-//! Single precision throughout, each operation rounded once and in a fixed order: additions, multiplications, divisions and roots
-//! are IEEE 754's on every machine, so that the same numbers come out on all of them.
+//! Single precision throughout, each operation rounded once and in a fixed order: additions,
+//! multiplications, divisions and roots are IEEE 754's on every machine, so that the same numbers
+//! come out on all of them.
 //!
 //! | file | subject |
 //! |---|---|
@@ -43,7 +46,8 @@ pub const MOST_STEPS: u8 = 3;
 /// A film run forwards, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forward<'a> {
-    /// Gauss–Newton steps from the network's guess, 0 to [`MOST_STEPS`]; with 0 the network stands alone.
+    /// Gauss–Newton steps from the network's guess, 0 to [`MOST_STEPS`]; with 0 the network stands
+    /// alone.
     pub steps: u8,
     /// The largest loads.
     pub limits: Limits,
@@ -51,7 +55,8 @@ pub struct Forward<'a> {
     pub stiffness: Stiffness,
     /// What a rest picture says of a unit.
     pub rest_image: RestImage,
-    /// What is known of the unit that it was made on, beside its rest picture; `None` when nothing is.
+    /// What is known of the unit that it was made on, beside its rest picture; `None` when nothing
+    /// is.
     pub mounting: Option<Mounting>,
     /// How well markers are seen.
     pub noise: Noise,
@@ -66,11 +71,11 @@ pub struct Forward<'a> {
 /// How far a marker's coordinates in one frame are from where it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// By the pixel grid at rest, where it is the same in every frame: what a tare takes for the rest position less where the
-    /// markers rest, px.
+    /// By the pixel grid at rest, where it is the same in every frame: what a tare takes for the
+    /// rest position less where the markers rest, px.
     pub rest_px: Markers,
-    /// Standard uncertainty of a marker as large as at rest, px, > 0: away from the pattern's middle, in which direction a
-    /// disc's image is narrow, and across that.
+    /// Standard uncertainty of a marker as large as at rest, px, > 0: away from the pattern's
+    /// middle, in which direction a disc's image is narrow, and across that.
     pub at_rest_px: [f32; 2],
     /// How many times that of one four times as large.
     pub at_four_areas: [f32; 2],

@@ -6,7 +6,8 @@ use crate::model::Rest;
 /// How a unit's camera sees its film, and where its markers are glued.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mounting {
-    /// Focal lengths per px: (x + iy) in px times this complex number is in focal lengths along the film's axes.
+    /// Focal lengths per px: (x + iy) in px times this complex number is in focal lengths along the
+    /// film's axes.
     pub per_px: [f32; 2],
     /// How far each marker is glued beside its place, mm.
     pub beside_mm: Markers,
@@ -22,8 +23,9 @@ pub struct RestImage {
 }
 
 impl RestImage {
-    /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the whole pattern count as the
-    /// camera's, which a rest picture cannot tell from gluing; what is left is gluing.
+    /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the
+    /// whole pattern count as the camera's, which a rest picture cannot tell from gluing; what is
+    /// left is gluing.
     pub fn mounting(&self, rest: &Rest) -> Mounting {
         let centroids = rest.features.centroids;
         let seen = centroids.map(|(x, y)| [x.to_f32(), y.to_f32()]);
@@ -52,7 +54,8 @@ impl RestImage {
             across += self.corner * (x * cy - y * cx);
             square += x * x + y * y;
         }
-        // Four markers in a sound rest position are not all in one place; if they were, nothing would be seen to move.
+        // Four markers in a sound rest position are not all in one place; if they were, nothing
+        // would be seen to move.
         let square = if square > 0.0 { square } else { f32::MAX };
         [along / square, across / square]
     }
@@ -132,7 +135,8 @@ mod tests {
         assert!((x - 0.01).abs() < 1e-6 && (y - 0.02).abs() < 1e-6);
     }
 
-    /// A taper is nobody's but the markers'. It makes the pattern a little larger, too, by its square.
+    /// A taper is nobody's but the markers'. It makes the pattern a little larger, too, by its
+    /// square.
     #[test]
     fn gluing_that_no_camera_makes_is_found() {
         let taper = [[0.01, 0.0], [-0.01, 0.0], [0.01, 0.0], [-0.01, 0.0]];

@@ -47,7 +47,8 @@ impl Stiffness {
 }
 
 impl Pose {
-    /// Of a force, N, that presses (F_z < 0) at a place, mm; one that pulls is as one that does nothing.
+    /// Of a force, N, that presses (F_z < 0) at a place, mm; one that pulls is as one that does
+    /// nothing.
     pub fn of_force(
         [x, y, z]: [f32; 3],
         place_mm: [f32; 2],

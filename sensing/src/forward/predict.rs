@@ -1,8 +1,8 @@
 //! Where the markers' images go under a load, with the slopes of that.
 //!
-//! One table serves all four markers and both directions: mirroring the film at its axes puts every marker into the lower
-//! right corner, and mirroring it at the diagonal makes of what moves along x what moves along y. What one unit has beside
-//! that is in tables of its own, without mirrors.
+//! One table serves all four markers and both directions: mirroring the film at its axes puts every
+//! marker into the lower right corner, and mirroring it at the diagonal makes of what moves along x
+//! what moves along y. What one unit has beside that is in tables of its own, without mirrors.
 
 use super::pose::Pose;
 use super::solve::{Column, EQUATIONS, UNKNOWNS};
@@ -20,8 +20,9 @@ pub type Markers = [[f32; 2]; 4];
 pub struct Tables<'a> {
     /// How the image of marker 2 moves along x, in focal lengths.
     pub moved: Table<'a>,
-    /// How that changes when marker and tip are both farther along x or along y, in focal lengths per mm: less, and more
-    /// evenly, than when the marker alone is, which near the tip moves quite otherwise a little beside.
+    /// How that changes when marker and tip are both farther along x or along y, in focal lengths
+    /// per mm: less, and more evenly, than when the marker alone is, which near the tip moves quite
+    /// otherwise a little beside.
     pub beside: Table<'a>,
     /// What this unit's images move more: x and y of markers 0–3, in focal lengths.
     pub own: Option<Table<'a>>,
@@ -93,7 +94,8 @@ impl Prediction {
     }
 }
 
-/// The reflection in which a marker is in the lower right corner, and moves along x where it moves along `axis`.
+/// The reflection in which a marker is in the lower right corner, and moves along x where it moves
+/// along `axis`.
 struct Reflection {
     corner: [f32; 2],
     axis: usize,

@@ -1,14 +1,14 @@
 //! Linear equations for five unknowns, by least squares.
 //!
-//! Modified Gram–Schmidt on columns scaled to one, the right side as a sixth column: as stable as Householder's
-//! reflections for least squares (Björck 1967), and nothing is squared.
+//! Modified Gram–Schmidt on columns scaled to one, the right side as a sixth column: as stable as
+//! Householder's reflections for least squares (Björck 1967), and nothing is squared.
 
 /// Unknowns: size, tilt along x and y, place along x and y.
 pub const UNKNOWNS: usize = 5;
 /// Equations of the markers: four, x and y each.
 pub const EQUATIONS: usize = 8;
-/// A column of which less than this part is left beside those before it says nothing of its own: the tables' slopes are exact
-/// to some 10⁻³ of the largest.
+/// A column of which less than this part is left beside those before it says nothing of its own:
+/// the tables' slopes are exact to some 10⁻³ of the largest.
 const LEAST_OWN: f32 = 1e-3;
 
 /// A column of the markers' equations.
@@ -23,7 +23,8 @@ pub struct Solved {
     pub left_over: f32,
     /// The square of what they explain.
     pub explained: f32,
-    /// By unknown: rows whose products are the unknowns' covariances when the equations' are the unit matrix.
+    /// By unknown: rows whose products are the unknowns' covariances when the equations' are the
+    /// unit matrix.
     pub spread: [[f32; UNKNOWNS]; UNKNOWNS],
 }
 
@@ -52,8 +53,8 @@ impl Solved {
     }
 }
 
-/// The unknowns whose combination of `columns` is nearest to `side`; `None` when the columns do not tell them apart, or a
-/// number is no number.
+/// The unknowns whose combination of `columns` is nearest to `side`; `None` when the columns do not
+/// tell them apart, or a number is no number.
 pub fn solve<const N: usize>(
     mut columns: [[f32; N]; UNKNOWNS],
     mut side: [f32; N],
@@ -173,7 +174,8 @@ mod tests {
             prop_assert!(solved.left_over <= 1e-6 * side * side);
         }
 
-        /// Against f64 normal equations: nearest, with what is left at right angles to every column.
+        /// Against f64 normal equations: nearest, with what is left at right angles to every
+        /// column.
         #[test]
         fn what_is_left_is_across_all_columns(
             parts in prop::array::uniform(-1.0f32..1.0),

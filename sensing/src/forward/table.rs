@@ -1,7 +1,8 @@
 //! Numbers that depend on a load: splines over its place, sums of terms in its size and tilt.
 //!
-//! Coefficients are steps of 16 bits of a size for each output and term. Along both axes they are summed up in
-//! integers, which cannot overflow whatever a file says (`kernels::spline`); what is left is single precision.
+//! Coefficients are steps of 16 bits of a size for each output and term. Along both axes they are
+//! summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what is
+//! left is single precision.
 
 use super::axis::{Axis, Weights};
 use super::terms::{MOST_TERMS, Sizes, Terms, Tilts};
@@ -10,7 +11,8 @@ use crate::kernels::{Parts, spline};
 /// Steps that a sum over both axes is in parts of: Q15 · Q15 / 2¹⁶.
 const SUM: f32 = 1.0 / 16_384.0;
 
-/// Outputs, each a sum of terms whose coefficients are splines over the place. Borrowed from a file.
+/// Outputs, each a sum of terms whose coefficients are splines over the place. Borrowed from a
+/// file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<'a> {
     axis: Axis,
@@ -54,7 +56,8 @@ pub struct Answer {
 }
 
 impl<'a> Table<'a> {
-    /// Of these bytes, as many as [`Table::lengths`] says; `None` of others, or when the size of a step is no number.
+    /// Of these bytes, as many as [`Table::lengths`] says; `None` of others, or when the size of a
+    /// step is no number.
     pub fn new(
         axis: Axis,
         terms: Terms,
@@ -165,7 +168,8 @@ struct Group {
 }
 
 impl Sizes {
-    /// Of as many terms as there are sums: loops whose length the compiler knows take half the time.
+    /// Of as many terms as there are sums: loops whose length the compiler knows take half the
+    /// time.
     fn group(&self, sums: &[[i32; 3]], steps: &[[u8; 4]]) -> Group {
         match sums.len() {
             1 => self.group_of::<1>(sums, steps),
@@ -276,7 +280,8 @@ mod tests {
         });
     }
 
-    /// The largest steps everywhere, of either sign: nothing overflows (tests check it), and the sum is what it should be.
+    /// The largest steps everywhere, of either sign: nothing overflows (tests check it), and the
+    /// sum is what it should be.
     #[test]
     fn the_largest_steps_add_up() {
         for step in [i16::MIN, i16::MAX] {

@@ -9,11 +9,11 @@ pub const MOST_TILTS: usize = 5;
 /// Groups of a set at most.
 const MOST_GROUPS: usize = MOST_TILTS * (MOST_TILTS + 1) / 2;
 
-/// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the tilt
-/// (a, b) in parts of the largest.
+/// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the
+/// tilt (a, b) in parts of the largest.
 ///
-/// There are so many sizes without tilt, so many with each a^j·b^k of the first degree, and so on. Terms of one a^j·b^k are a
-/// *group*: degrees one after the other, in each j falling.
+/// There are so many sizes without tilt, so many with each a^j·b^k of the first degree, and so on.
+/// Terms of one a^j·b^k are a *group*: degrees one after the other, in each j falling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Terms {
     /// For each degree of tilt.

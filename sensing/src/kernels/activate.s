@@ -1,8 +1,8 @@
 @ From sums to activations: see `activate` in cortex_m7.rs for what it computes and why it is exact.
 @
-@ r0 biases   r1 multipliers   r2 shifts   r3 sums   r4-r7 four rows   r8, r9 loaded   r10 their shifts − 33
-@ r11 33 in each byte   r12 where activations go   lr the largest activation, twice
-@ stack: where activations go, their end, the largest twice
+@ r0 biases   r1 multipliers   r2 shifts   r3 sums   r4-r7 four rows   r8, r9 loaded
+@ r10 their shifts − 33   r11 33 in each byte   r12 where activations go
+@ lr the largest activation, twice   stack: where activations go, their end, the largest twice
 
     .syntax unified
     .section .itcm.hivtac_activate, "ax", %progbits

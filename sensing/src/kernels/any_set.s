@@ -1,6 +1,7 @@
 @ Whether words of the mask have a set bit: see `any_set` in cortex_m7.rs.
 @
-@ r0 words, then all of them in one   r1 how many are left   r2-r5 some of them   r6, r12 those before them in one
+@ r0 words, then all of them in one   r1 how many are left   r2-r5 some of them
+@ r6, r12 those before them in one
 
     .syntax unified
     .section .itcm.hivtac_dilate_any_set, "ax", %progbits

@@ -1,8 +1,9 @@
 @ The edges of a row of the mask, dilated once: see `dilate_edges` in cortex_m7.rs.
 @
-@ r0, r4, r5 behind the words of three rows   r1 the highest bit   r2 words left, negative   r3 column of the word   r6 the word
-@ r7 the one to its right   r8 the one to its left   r9, lr scratch   r10 the last bit of the dilated word to the left
-@ r11 where edges go   r12 edges, mirrored   stack: where edges go, bits of the last word
+@ r0, r4, r5 behind the words of three rows   r1 the highest bit   r2 words left, negative
+@ r3 column of the word   r6 the word   r7 the one to its right   r8 the one to its left
+@ r9, lr scratch   r10 the last bit of the dilated word to the left   r11 where edges go
+@ r12 edges, mirrored   stack: where edges go, bits of the last word
 
     .syntax unified
     .section .itcm.hivtac_dilate_edges, "ax", %progbits

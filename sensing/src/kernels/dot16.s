@@ -1,10 +1,12 @@
-@ Sums of an int16 layer: see `dot16` in cortex_m7.rs for what it computes and why it cannot overflow.
+@ Sums of an int16 layer: see `dot16` in cortex_m7.rs for what it computes and why it cannot
+@ overflow.
 @
-@ r0 weights   r1 inputs   r2-r5 sums of four rows   r6, r7 inputs of two columns each   r8-r11 weights, loaded ahead
-@ r12 where sums go   lr blocks left   stack: inputs, blocks, end of sums
+@ r0 weights   r1 inputs   r2-r5 sums of four rows   r6, r7 inputs of two columns each
+@ r8-r11 weights, loaded ahead   r12 where sums go   lr blocks left
+@ stack: inputs, blocks, end of sums
 @
-@ Schedule: every SMLAD goes with a load, so that both issue in one cycle; weights are loaded four products, inputs
-@ two columns, before they are used.
+@ Schedule: every SMLAD goes with a load, so that both issue in one cycle; weights are loaded four
+@ products, inputs two columns, before they are used.
 
     .syntax unified
     .section .itcm.hivtac_dot16, "ax", %progbits
@@ -13,7 +15,8 @@
     .type hivtac_dot16, %function
     .thumb_func
 
-@ Four columns of four rows, 16 products; \w and \x are the offsets of their weights and inputs in the block.
+@ Four columns of four rows, 16 products; \w and \x are the offsets of their weights and inputs in
+@ the block.
 .macro hivtac_dot16_columns w, x
     smlad  r2, r8, r6, r2
     ldr.w  r8, [r0, #\w + 16]
@@ -67,7 +70,8 @@ hivtac_dot16:
 
 @ The same for up to 12 columns, whose inputs stay in registers.
 @
-@ r0 weights   r4-r9 inputs   r2, r3, r10, r11 weights and sums of two rows   r12 where sums go   lr their end
+@ r0 weights   r4-r9 inputs   r2, r3, r10, r11 weights and sums of two rows   r12 where sums go
+@ lr their end
     .section .itcm.hivtac_dot16_narrow, "ax", %progbits
     .balign 8
     .global hivtac_dot16_narrow

@@ -1,10 +1,13 @@
-@ Sums of an int8 layer by composite lanes: see `dot8` in cortex_m7.rs for what it computes and why it is exact.
+@ Sums of an int8 layer by composite lanes: see `dot8` in cortex_m7.rs for what it computes and why
+@ it is exact.
 @
-@ r0 weights   r1 inputs   r2-r5 sums of four rows   r6, r7 inputs of four columns   r8, r9 weights, loaded ahead
-@ r10, r11 low bytes of the weights   r12 where sums go   lr blocks left   stack: inputs, blocks, end of sums
+@ r0 weights   r1 inputs   r2-r5 sums of four rows   r6, r7 inputs of four columns
+@ r8, r9 weights, loaded ahead   r10, r11 low bytes of the weights   r12 where sums go
+@ lr blocks left   stack: inputs, blocks, end of sums
 @
-@ Schedule: every SMLAD goes with an instruction of another unit, so that both of a pair issue in one cycle; weights
-@ are loaded four instructions, and the next four inputs one pair, before they are used.
+@ Schedule: every SMLAD goes with an instruction of another unit, so that both of a pair issue in
+@ one cycle; weights are loaded four instructions, and the next four inputs one pair, before they
+@ are used.
 
     .syntax unified
     .section .itcm.hivtac_dot8, "ax", %progbits
@@ -13,7 +16,8 @@
     .type hivtac_dot8, %function
     .thumb_func
 
-@ Four columns of four rows, 16 products; \w and \x are the offsets of their weights and inputs in the block.
+@ Four columns of four rows, 16 products; \w and \x are the offsets of their weights and inputs in
+@ the block.
 .macro hivtac_dot8_columns w, x
     sxtb16 r10, r8
     smlad  r2, r8, r7, r2
@@ -73,7 +77,8 @@ hivtac_dot8:
     pop    {r1, r2, r4-r11, pc}
     .size hivtac_dot8, . - hivtac_dot8
 
-@ Inputs a0 a1 | a2 a3 become 256·a0 − a1, 256·a2 − a3 | a1, a3, in place: r0 inputs, r1 groups of eight.
+@ Inputs a0 a1 | a2 a3 become 256·a0 − a1, 256·a2 − a3 | a1, a3, in place: r0 inputs, r1 groups of
+@ eight.
     .section .itcm.hivtac_expand, "ax", %progbits
     .balign 8
     .global hivtac_expand

@@ -4,8 +4,8 @@ use super::{Parts, Sums};
 use crate::model::{Layer, MAX_WIDTH, ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 use crate::rescale::rescale_sum;
 
-/// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::model::Model::parse) has proven that it fits, in
-/// any order of summation.
+/// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::model::Model::parse) has proven
+/// that it fits, in any order of summation.
 pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
     match layer.weight_width() {
         WeightWidth::Int8 => sum_groups(layer, inputs, sums, unpack8),
@@ -13,12 +13,14 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
     }
 }
 
-/// For each of `sums` the sum of a term's coefficients at four by four nodes, in parts of 2¹⁴ to a step: its value, its slope along x
-/// and its slope along y. A coefficient is an i16; those of a term that lie beside each other along x follow each other, the next
-/// term's are `node` bytes farther, and those beside each other along y `line` bytes. What lies beyond the end counts as zero.
+/// For each of `sums` the sum of a term's coefficients at four by four nodes, in parts of 2¹⁴ to a
+/// step: its value, its slope along x and its slope along y. A coefficient is an i16; those of a
+/// term that lie beside each other along x follow each other, the next term's are `node` bytes
+/// farther, and those beside each other along y `line` bytes. What lies beyond the end counts as
+/// zero.
 ///
-/// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹, and one over both axes below
-/// 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
+/// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
+/// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
 pub fn spline(steps: &[u8], line: usize, node: usize, parts: &Parts, sums: &mut [[i32; 3]]) {
     let times = |sum: i32, part: i16| ((i64::from(sum) * i64::from(part)) >> 16) as i32;
     for (term, sums) in sums.iter_mut().enumerate() {
@@ -76,8 +78,8 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, activations: &mut [i16; MAX_WIDT
     }
 }
 
-/// The mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w + i. `mask` has
-/// ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
+/// The mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w + i.
+/// `mask` has ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], first: usize) {
     // Each bit is shifted in from the top; a shorter last word is moved down.
     let shift_in = |bits: u32, raw: &u16| bits >> 1 | u32::from(table[usize::from(*raw)]) << 31;
@@ -90,8 +92,9 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], firs
     }
 }
 
-/// Of the bytes that `table` has for the pixels of a run, bits 1–7 are weights: their sum, and the sum of all sums so far, from
-/// right to left: it counts each weight once for its own column and once for each one to the left of that.
+/// Of the bytes that `table` has for the pixels of a run, bits 1–7 are weights: their sum, and the
+/// sum of all sums so far, from right to left: it counts each weight once for its own column and
+/// once for each one to the left of that.
 #[cfg(not(armv7em))]
 pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
     let weights = run.iter().rev().map(|raw| table[usize::from(*raw)] >> 1);
@@ -101,9 +104,9 @@ pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
     })
 }
 
-/// The mask of a row of YUV422 (Y0 Cb Y1 Cr): bits 2·i and 2·i + 1 of a word are set where Cr of its pair i is at least
-/// `low`. `mask` has ⌈pixels / 32⌉ words; bits beyond the row, and of a pixel without its pair, become unset. Starts with
-/// word `first`.
+/// The mask of a row of YUV422 (Y0 Cb Y1 Cr): bits 2·i and 2·i + 1 of a word are set where Cr of
+/// its pair i is at least `low`. `mask` has ⌈pixels / 32⌉ words; bits beyond the row, and of a
+/// pixel without its pair, become unset. Starts with word `first`.
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32], first: usize) {
     for (word, pixels) in mask.iter_mut().zip(row.chunks(32)).skip(first) {
         let pairs = (0..).zip(pixels.chunks_exact(2));
@@ -114,8 +117,9 @@ pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32], first: usize) {
     }
 }
 
-/// The mask of a row of mono pixels, two in a `u16`: a bit is set where its pixel is `low` to `low + span`, counted modulo
-/// 256. `mask` has ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
+/// The mask of a row of mono pixels, two in a `u16`: a bit is set where its pixel is `low` to
+/// `low + span`, counted modulo 256. `mask` has ⌈pixels / 32⌉ words; bits beyond the row become
+/// unset. Starts with word `first`.
 pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32], first: usize) {
     for (word, pairs) in mask.iter_mut().zip(row.chunks(16)).skip(first) {
         *word = (0..).zip(pairs).fold(0, |bits, (i, pair)| {

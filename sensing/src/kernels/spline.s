@@ -1,8 +1,9 @@
 @ Sums of coefficients over four by four nodes: see `spline` in cortex_m7.rs.
 @
-@ r0 coefficients   r1 bytes to the next line   r3, r12 four coefficients   lr, r2 sums along x of value and slope
-@ r4-r7 parts along x: of the value, of the slope   r8 parts along y, value and slope   r9-r11 the three sums
-@ s0 the sums' end   s1 bytes from the last line back to the next term   s2 sums   s4-s7 parts along y
+@ r0 coefficients   r1 bytes to the next line   r3, r12 four coefficients
+@ lr, r2 sums along x of value and slope   r4-r7 parts along x: of the value, of the slope
+@ r8 parts along y, value and slope   r9-r11 the three sums   s0 the sums' end
+@ s1 bytes from the last line back to the next term   s2 sums   s4-s7 parts along y
 
     .syntax unified
     .fpu fpv4-sp-d16

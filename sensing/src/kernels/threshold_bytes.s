@@ -1,11 +1,12 @@
 @ The mask of RGB565 pixels through a table of bytes: see `threshold_bytes` in cortex_m7.rs.
 @
-@ r0 pixels   r1 table   r2 where the mask goes   r3 words left   r4-r10 pixels, then their bytes   r12 the word
-@ of the mask   stack: the first pixel
+@ r0 pixels   r1 table   r2 where the mask goes   r3 words left   r4-r10 pixels, then their bytes
+@ r12 the word of the mask   stack: the first pixel
 @
-@ Each byte's bit 0 goes to its place in the word. A pixel is loaded four before it, and its byte two before; behind the
-@ last word these are the first pixels again, so that nothing beyond them is read. The order is a search's, judged by
-@ LLVM's model of the core: 103 instructions, and 53 cycles.
+@ Each byte's bit 0 goes to its place in the word. A pixel is loaded four before it, and its byte
+@ two before; behind the last word these are the first pixels again, so that nothing beyond them is
+@ read. The order is a search's, judged by LLVM's model of the core: 103 instructions, and
+@ 53 cycles.
 
     .syntax unified
     .section .itcm.hivtac_threshold_bytes, "ax", %progbits

@@ -1,12 +1,12 @@
 @ The mask of YUV422 pixels by their Cr: see `threshold_cr` in cortex_m7.rs.
 @
-@ r0 pixels   r1 the lowest Cr, four times   r2 where the mask goes   r3 its last word   r4-r10 Cr of pairs   r11 0
-@ r12 the word of the mask   lr 0x03030303
+@ r0 pixels   r1 the lowest Cr, four times   r2 where the mask goes   r3 its last word
+@ r4-r10 Cr of pairs   r11 0   r12 the word of the mask   lr 0x03030303
 @
-@ Group i of a word takes its pairs i, i + 4, i + 8 and i + 12: their Cr, side by side, are compared at once, and choose two
-@ bits each, as far apart as the mask has them. While the bytes of one group are put together, those of the next are
-@ loaded; the last word loads none. The order is a search's, judged by LLVM's model of the core: 42 instructions and the
-@ branch, and 23 cycles.
+@ Group i of a word takes its pairs i, i + 4, i + 8 and i + 12: their Cr, side by side, are compared
+@ at once, and choose two bits each, as far apart as the mask has them. While the bytes of one group
+@ are put together, those of the next are loaded; the last word loads none. The order is a search's,
+@ judged by LLVM's model of the core: 42 instructions and the branch, and 23 cycles.
 
     .syntax unified
     .section .itcm.hivtac_threshold_cr, "ax", %progbits

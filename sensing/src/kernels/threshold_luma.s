@@ -1,11 +1,13 @@
 @ The mask of mono pixels: see `threshold_luma` in cortex_m7.rs.
 @
-@ r0 pixels   r1 the lowest luma, four times   r2 where the mask goes   r3 its end   r4-r8 pixels, then their bits
-@ r10 0x08040201   r11 0   r12 the word of the mask   lr the highest luma less the lowest, four times
+@ r0 pixels   r1 the lowest luma, four times   r2 where the mask goes   r3 its end
+@ r4-r8 pixels, then their bits   r10 0x08040201   r11 0   r12 the word of the mask
+@ lr the highest luma less the lowest, four times
 @
-@ Four pixels at a time are made relative to the lowest luma and compared with the highest; each that passes chooses its bit
-@ of four, and a sum over bytes brings eight of these together. The order is a search's, judged by LLVM's model of the
-@ core: 46 instructions and the branch, and 36 cycles; 28 of them can only go one a cycle.
+@ Four pixels at a time are made relative to the lowest luma and compared with the highest; each
+@ that passes chooses its bit of four, and a sum over bytes brings eight of these together. The
+@ order is a search's, judged by LLVM's model of the core: 46 instructions and the branch, and
+@ 36 cycles; 28 of them can only go one a cycle.
 
     .syntax unified
     .section .itcm.hivtac_threshold_luma, "ax", %progbits

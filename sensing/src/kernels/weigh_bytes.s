@@ -1,10 +1,11 @@
-@ The weights of a run of RGB565 pixels through a table of bytes, summed: see `weigh_bytes` in cortex_m7.rs.
+@ The weights of a run of RGB565 pixels through a table of bytes, summed: see `weigh_bytes` in
+@ cortex_m7.rs.
 @
-@ r0 behind the pixels left, then Σw   r1 table, then the sum of all sums so far   r2 pixels left   r3 Σw   r4-r7 pixels, then
-@ their bytes   r12 the sum of all sums so far
+@ r0 behind the pixels left, then Σw   r1 table, then the sum of all sums so far   r2 pixels left
+@ r3 Σw   r4-r7 pixels, then their bytes   r12 the sum of all sums so far
 @
-@ From right to left: first one, then two, where they are left over, then four at a time, all of which are looked up before they
-@ are added.
+@ From right to left: first one, then two, where they are left over, then four at a time, all of
+@ which are looked up before they are added.
 
     .syntax unified
     .section .itcm.hivtac_weigh_bytes, "ax", %progbits

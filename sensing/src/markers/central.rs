@@ -1,4 +1,5 @@
-//! How the pixels of a blob lie around their mean: variances and third moments, to 2⁻²⁷ of them and their last place.
+//! How the pixels of a blob lie around their mean: variances and third moments, to 2⁻²⁷ of them and
+//! their last place.
 
 use crate::{
     blob::Blob,
@@ -8,9 +9,11 @@ use crate::{
 /// Central moments of a blob per pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Central {
-    /// E x², E xy, E y² and what a pixel has as it is a square, px² with 12 fractional bits. Below 800²/4 px².
+    /// E x², E xy, E y² and what a pixel has as it is a square, px² with 12 fractional bits. Below
+    /// 800²/4 px².
     pub variance: [i32; 3],
-    /// E x³, E x²y, E xy², E y³, px³ with 8 fractional bits. Those beyond ±2²³ px³, of no marker, are as those.
+    /// E x³, E x²y, E xy², E y³, px³ with 8 fractional bits. Those beyond ±2²³ px³, of no marker,
+    /// are as those.
     pub third: [i32; 4],
 }
 
@@ -20,8 +23,9 @@ const PIXEL_VARIANCE: i32 = 341;
 impl Central {
     /// Of a blob of at least one pixel, with one over its area.
     ///
-    /// Sums are first taken about a whole pixel next to the mean, exactly: no term is beyond 3 · 640,000 · 799³ < 2⁵¹. About
-    /// the mean, which is (a, b) away from that, they are then corrected.
+    /// Sums are first taken about a whole pixel next to the mean, exactly: no term is beyond 3 ·
+    /// 640,000 · 799³ < 2⁵¹. About the mean, which is (a, b) away from that, they are then
+    /// corrected.
     pub fn of_blob(blob: &Blob, by_area: &Reciprocal) -> Central {
         let area = i64::from(blob.area);
         let [sx, sy, sxx, sxy, syy] = [
@@ -51,7 +55,8 @@ impl Central {
     }
 }
 
-/// From about a point that is (a, b) off the mean, px with 16 fractional bits: E(x−a)² = E x² − a² and so on.
+/// From about a point that is (a, b) off the mean, px with 16 fractional bits: E(x−a)² = E x² − a²
+/// and so on.
 fn about_the_mean(
     [a, b]: [i32; 2],
     [xx, xy, yy]: [i32; 3],
@@ -63,7 +68,8 @@ fn about_the_mean(
         xy - (product(a, b) >> 20) as i32,
         yy - (product(b, b) >> 20) as i32,
     ];
-    // E(x−a)³ = E x³ − a·(2·E x² + the variance), and E(x−a)²(y−b) = E x²y − 2·a·E xy − b·the variance along x.
+    // E(x−a)³ = E x³ − a·(2·E x² + the variance), and E(x−a)²(y−b) = E x²y − 2·a·E xy − b·the
+    // variance along x.
     let [vxx, _, vyy] = variance;
     let third = [
         (xxx, 2 * product(a, xx) + product(a, vxx)),
@@ -140,7 +146,8 @@ pub mod tests {
         }
     }
 
-    /// Two pixels in opposite corners have the largest variance, and three the largest third moment.
+    /// Two pixels in opposite corners have the largest variance, and three the largest third
+    /// moment.
     #[test]
     fn what_fills_the_largest_frame_does_not_overflow() {
         let pixel = |x: u16, y: u16| Blob::of_run(Run { x0: x, x1: x }, y, Weights::NONE);

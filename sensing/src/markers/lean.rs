@@ -1,8 +1,9 @@
 //! Third moments: how far a shape leans to one side.
 //!
-//! An ellipse's third central moments are zero. What is cut off or sticks out leaves one. Scaled to a round shape by the
-//! diameters, E|d|²d is the part of it that a pixel grid hardly disturbs: a pixel more or less on the edge of
-//! a disc shifts its centroid and E|d|²d so that the two nearly cancel.
+//! An ellipse's third central moments are zero. What is cut off or sticks out leaves one. Scaled to
+//! a round shape by the diameters, E|d|²d is the part of it that a pixel grid hardly disturbs: a
+//! pixel more or less on the edge of a disc shifts its centroid and E|d|²d so that the two nearly
+//! cancel.
 
 use super::pattern::length;
 use crate::division::{Reciprocal, limited, scaled};
@@ -61,8 +62,9 @@ fn sum<const N: usize>(terms: [(i32, i32); N]) -> i32 {
 
 /// E|d|²d of a shape, scaled to a round one, times its variance: px² with 16 fractional bits.
 ///
-/// `third` are its third moments, px³ with 8 fractional bits. `by` divides by the variances along and across the direction, in px²
-/// with 12 fractional bits, and `deviation` is the root of the second of them, in px with 16.
+/// `third` are its third moments, px³ with 8 fractional bits. `by` divides by the variances along
+/// and across the direction, in px² with 12 fractional bits, and `deviation` is the root of the
+/// second of them, in px with 16.
 pub fn lean(
     [xxx, xxy, xyy, yyy]: [i32; 4],
     direction: &Direction,

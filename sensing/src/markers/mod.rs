@@ -3,27 +3,32 @@
 //! The rules rest on optics and on the pattern's geometry, not on how the film gives:
 //!
 //! 1. *Candidates* (`shape`): blobs off the border, of a plausible area, filled like an ellipse.
-//! 2. *Pattern* (`pattern`): four candidates, one in each quadrant around their own centre, that make a near-square.
-//! 3. *Size*: a lens that is symmetric about its axis shows a circle about the axis as a circle, so it magnifies
-//!    *across* the radius by image radius over film radius, whatever the film's height and tilt. A marker at distance
-//!    r from the pattern's centre is therefore r·d/R wide across it, plus what dilation and soft edges add.
-//! 4. *Trust* (`trust`): with a rest position, much tighter limits relative to it decide whether there may be a
-//!    force. What the pattern does at a film's symmetric answer to any force bounds how far one marker may be displaced
-//!    (strain); how little each image leans, is hollow or skewed, how alike their colours are, and how many of its pixels
-//!    passed the threshold themselves, bounds what may be cut off, grown, hidden or holed.
+//! 2. *Pattern* (`pattern`): four candidates, one in each quadrant around their own centre, that
+//!    make a near-square.
+//! 3. *Size*: a lens that is symmetric about its axis shows a circle about the axis as a circle, so
+//!    it magnifies *across* the radius by image radius over film radius, whatever the film's height
+//!    and tilt. A marker at distance r from the pattern's centre is therefore r·d/R wide across it,
+//!    plus what dilation and soft edges add.
+//! 4. *Trust* (`trust`): with a rest position, much tighter limits relative to it decide whether
+//!    there may be a force. What the pattern does at a film's symmetric answer to any force bounds
+//!    how far one marker may be displaced (strain); how little each image leans, is hollow or
+//!    skewed, how alike their colours are, and how many of its pixels passed the threshold
+//!    themselves, bounds what may be cut off, grown, hidden or holed.
 //!
 //! Exactly one set of four must pass 1 to 3; two are ambiguous, however different.
 //!
-//! What stays unseen at QVGA (`tests/tests/markers.rs` and `tests/tests/hard_cases.rs` assert it on rendered frames,
-//! and `hard-cases` of the tests prints a table): with weighted centroids and this unit's own rest, a marker that is
-//! covered, glares or has red grown on it is off by less than 0.3 px when it is accepted, as is a disc of its size in its
-//! place (0.04 mm away at most). At 800×600 every hard case is within 0.15 px, but JPEG of quality 70 and less: up to
-//! 0.2 px. Under a tip that sticks or slips the pattern may be strained more: 0.45 px, at 320×240 seldom 0.5 px of JPEG of quality
-//! 30. Binary centroids are off by up to 0.36 px on honest frames, which no rule can tell
-//! from a fault: there, 0.6 px for a covered marker, and 0.85 px for one under a red disc of nearly its size. At 800×600
-//! a disc of a marker's size in its place is accepted up to 0.3 px away at small forces and 1.2 px under the largest
-//! sideways ones, which strain the film as much: such a disc looks like a marker in everything else. Without an own rest
-//! position the pattern may be strained by 5 px, for another unit's markers lie elsewhere.
+//! What stays unseen at QVGA (`tests/tests/markers.rs` and `tests/tests/hard_cases.rs` assert it on
+//! rendered frames, and `hard-cases` of the tests prints a table): with weighted centroids and this
+//! unit's own rest, a marker that is covered, glares or has red grown on it is off by less than
+//! 0.3 px when it is accepted, as is a disc of its size in its place (0.04 mm away at most). At
+//! 800×600 every hard case is within 0.15 px, but JPEG of quality 70 and less: up to 0.2 px. Under
+//! a tip that sticks or slips the pattern may be strained more: 0.45 px, at 320×240 seldom 0.5 px
+//! of JPEG of quality 30. Binary centroids are off by up to 0.36 px on honest frames, which no rule
+//! can tell from a fault: there, 0.6 px for a covered marker, and 0.85 px for one under a red disc
+//! of nearly its size. At 800×600 a disc of a marker's size in its place is accepted up to 0.3 px
+//! away at small forces and 1.2 px under the largest sideways ones, which strain the film as much:
+//! such a disc looks like a marker in everything else. Without an own rest position the pattern may
+//! be strained by 5 px, for another unit's markers lie elsewhere.
 
 mod central;
 mod lean;
@@ -45,8 +50,8 @@ use heapless::Vec;
 use pattern::Pattern;
 use shape::{RadialShape, Shape, nominal_edge};
 
-/// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3 lower left
-/// as the image shows them.
+/// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3
+/// lower left as the image shows them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Marker {
     /// Centroid, column.
@@ -101,23 +106,27 @@ struct Image {
 
 /// More candidates than this are not sorted out: 8 make 70 sets of four.
 const MAX_CANDIDATES: usize = 8;
-/// A candidate has at least one part in this many of a marker's area at rest: markers only come nearer.
+/// A candidate has at least one part in this many of a marker's area at rest: markers only come
+/// nearer.
 const SMALLEST_PART: u32 = 3;
-/// A candidate has at most this many times a marker's area at rest: at twice the rest's distance from the axis it
-/// has less than four times, before dilation adds its share.
+/// A candidate has at most this many times a marker's area at rest: at twice the rest's distance
+/// from the axis it has less than four times, before dilation adds its share.
 const LARGEST_MULTIPLE: u32 = 8;
-/// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any size and tilt, a
-/// half disc 0.95, two touching discs 0.88, a crescent less.
+/// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any
+/// size and tilt, a half disc 0.95, two touching discs 0.88, a crescent less.
 const LEAST_FILL: i32 = 60_950;
-/// How far a marker may be from the optical law in width, of 256 (±37.5 %): threshold, light and blur are unknown
-/// before there is a rest position, and under a tip far off the middle the pattern's centre is not on the axis.
+/// How far a marker may be from the optical law in width, of 256 (±37.5 %): threshold, light and
+/// blur are unknown before there is a rest position, and under a tip far off the middle the
+/// pattern's centre is not on the axis.
 const SIZE_TOLERANCE: i64 = 96;
-/// Narrowest marker, along the radius over across it, of 256 (0.2): foreshortened by distance and steepest film.
+/// Narrowest marker, along the radius over across it, of 256 (0.2): foreshortened by distance and
+/// steepest film.
 const LEAST_ASPECT: i64 = 51;
 /// Widest, of 256 (1.15): round, and the noise of a small picture.
 const LARGEST_ASPECT: i64 = 294;
 
-/// Finds the markers among the blobs of a frame. Holds all that follows from the settings before there is a frame.
+/// Finds the markers among the blobs of a frame. Holds all that follows from the settings before
+/// there is a frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Finder {
     /// Columns and rows of a frame.
@@ -153,9 +162,10 @@ impl Finder {
     /// The four markers among `blobs`.
     ///
     /// # Errors
-    /// [`Status::MARKERS_MISSING`] with fewer than four candidates; [`Status::MARKERS_IMPLAUSIBLE`] when four of them
-    /// make the pattern but their sizes do not fit it; else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does,
-    /// or there are too many candidates.
+    /// [`Status::MARKERS_MISSING`] with fewer than four candidates; [`Status::MARKERS_IMPLAUSIBLE`]
+    /// when four of them make the pattern but their sizes do not fit it;
+    /// else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does, or there are too many
+    /// candidates.
     pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
         let candidates = self.candidates(blobs)?;
         let mut found = None;

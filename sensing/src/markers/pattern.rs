@@ -1,10 +1,11 @@
 //! The pattern of four points: where its centre is, how large, turned and distorted it is.
 //!
-//! Four points have eight coordinates: centre (2), size and turn (2), *strain* (2: stretched along x against y, or
-//! sheared) and *taper* (2: one side longer than the opposite one). For a square film, a force at its middle changes
-//! strain only to second order, wherever it points: a straight press changes the size, a sideways one shifts and
-//! tapers. One marker displaced by δ changes strain by δ/4r whatever the direction, r being the markers' distance
-//! from the centre. That makes strain the test for a thing that stands in for a marker.
+//! Four points have eight coordinates: centre (2), size and turn (2), *strain* (2: stretched along
+//! x against y, or sheared) and *taper* (2: one side longer than the opposite one). For a square
+//! film, a force at its middle changes strain only to second order, wherever it points: a straight
+//! press changes the size, a sideways one shifts and tapers. One marker displaced by δ changes
+//! strain by δ/4r whatever the direction, r being the markers' distance from the centre. That makes
+//! strain the test for a thing that stands in for a marker.
 
 use super::shape::Shape;
 use crate::{
@@ -29,8 +30,8 @@ pub struct Pattern {
     pub taper: [i32; 2],
 }
 
-/// Limits of a pattern before there is a rest position: lens, mounting and punched film are as they come.
-/// Turned by at most 20°.
+/// Limits of a pattern before there is a rest position: lens, mounting and punched film are as they
+/// come. Turned by at most 20°.
 const LARGEST_TURN: MilliDegrees = MilliDegrees(20_000);
 /// Strain of at most 0.075, of 65,536 (seen: 0.065, under a tip 4 mm off the middle).
 const LARGEST_STRAIN: i32 = 4_915;
@@ -38,7 +39,8 @@ const LARGEST_STRAIN: i32 = 4_915;
 const LARGEST_TAPER: i32 = 9_830;
 /// Centre at most 0.8 of the half side at rest away from the picture's middle; of 256.
 const LARGEST_SHIFT: i64 = 205;
-/// 0.75 to 2.2 times as large as at rest, of 256: a film pulled outwards, and one that nearly touches the lens.
+/// 0.75 to 2.2 times as large as at rest, of 256: a film pulled outwards, and one that nearly
+/// touches the lens.
 const SCALE: (i64, i64) = (192, 563);
 
 /// √½ of 256: a square's half side over its half diagonal.
@@ -47,8 +49,8 @@ const SQRT_HALF: i64 = 181;
 /// (Sign of x, sign of y) of markers 0–3 around their centre.
 const SIGNS: [(i32, i32); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
 
-/// Puts four shapes in the order of the identities: by the quadrant around their own centre. `None` unless there is
-/// one in each.
+/// Puts four shapes in the order of the identities: by the quadrant around their own centre. `None`
+/// unless there is one in each.
 pub fn identify(shapes: [&Shape; 4]) -> Option<[&Shape; 4]> {
     let sum = |value: fn(&Shape) -> Px| shapes.iter().map(|s| i64::from(value(s).0)).sum::<i64>();
     let (sum_x, sum_y) = (sum(|s| s.x), sum(|s| s.y));
@@ -71,7 +73,8 @@ pub fn identify(shapes: [&Shape; 4]) -> Option<[&Shape; 4]> {
 impl Pattern {
     /// Of four points in the order of the identities.
     pub fn of_centroids(centroids: [(Px, Px); 4]) -> Pattern {
-        // Four times the coefficient of a sign pattern in x and in y: below 2²⁹, as positions are below 2²⁶.
+        // Four times the coefficient of a sign pattern in x and in y: below 2²⁹, as positions are
+        // below 2²⁶.
         let project = |weight: fn((i32, i32)) -> i32| {
             let terms = centroids.iter().zip(SIGNS);
             terms.fold((0, 0), |(x, y), (point, signs)| {
@@ -95,8 +98,8 @@ impl Pattern {
         }
     }
 
-    /// Whether it can be the markers of a sensor in any state, from geometry alone: `center` is the picture's, and at rest
-    /// they are `rest_distance` from it.
+    /// Whether it can be the markers of a sensor in any state, from geometry alone: `center` is the
+    /// picture's, and at rest they are `rest_distance` from it.
     pub fn is_plausible(&self, center: (Px, Px), rest_distance: Px) -> bool {
         let rest = i64::from(rest_distance.0) * SQRT_HALF / 256;
         let shift = i64::from(distance(self.center, center).0);

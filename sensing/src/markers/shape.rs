@@ -1,4 +1,5 @@
-//! How the image of one marker looks: its moments as an ellipse's, and what the optics says of them.
+//! How the image of one marker looks: its moments as an ellipse's, and what the optics says of
+//! them.
 
 use super::{
     central::Central,
@@ -24,13 +25,14 @@ pub struct Shape {
     pub area: u32,
     /// [`Blob::passed`].
     pub passed: u32,
-    /// Area over that of the ellipse with the same moments, of 65,536. 1 for an ellipse, less for anything else.
+    /// Area over that of the ellipse with the same moments, of 65,536. 1 for an ellipse, less for
+    /// anything else.
     pub fill: i32,
-    /// What [`fill`](Self::fill) lacks of 1, times the mean variance: px² in Q16.16. Pixels make it the same for discs of
-    /// any size.
+    /// What [`fill`](Self::fill) lacks of 1, times the mean variance: px² in Q16.16. Pixels make it
+    /// the same for discs of any size.
     pub hollow: i32,
-    /// Distance of the centroid from the middle of the bounding box, the larger of x and y, px in Q16.16: 0 for an
-    /// ellipse, more for one that is cut.
+    /// Distance of the centroid from the middle of the bounding box, the larger of x and y, px in
+    /// Q16.16: 0 for an ellipse, more for one that is cut.
     pub lopsided: i32,
     /// Mean weight of its pixels, of 65,536; 0 when nothing was weighed.
     pub density: i32,
@@ -46,7 +48,8 @@ pub struct RadialShape {
     pub across: i32,
     /// Diameter along the radius.
     pub along: i32,
-    /// Covariance of both directions over the variance across, of 65,536: 0 where the ellipse lies across or along.
+    /// Covariance of both directions over the variance across, of 65,536: 0 where the ellipse lies
+    /// across or along.
     pub skew: i32,
     /// How far it leans to one side ([`lean`]), px² in Q16.16.
     pub lean: i32,
@@ -54,7 +57,8 @@ pub struct RadialShape {
 
 /// 4π in Q16.
 const FOUR_PI: u64 = 823_550;
-/// What soft edges add to a diameter (0.8 px: a pixel half covered by red passes), and a dilation (2 px).
+/// What soft edges add to a diameter (0.8 px: a pixel half covered by red passes), and a dilation
+/// (2 px).
 const SOFT_EDGE: i32 = 52_429;
 const DILATION_EDGE: i32 = 131_072;
 
@@ -64,7 +68,8 @@ pub fn nominal_edge(dilations: u8) -> Px {
 }
 
 impl Shape {
-    /// Of a blob of at least one pixel; `None` when its position cannot be told: no pixel has a weight.
+    /// Of a blob of at least one pixel; `None` when its position cannot be told: no pixel has a
+    /// weight.
     pub fn of_blob(blob: &Blob, estimator: CentroidEstimator) -> Option<Shape> {
         let (x, y) = match estimator {
             CentroidEstimator::BinaryMask => blob.centroid(),
@@ -125,7 +130,8 @@ fn diameter(deviation: i32) -> i32 {
     4 * deviation
 }
 
-/// [`Shape::fill`] and [`Shape::hollow`]. An ellipse's area is 4π√det of its covariance; the determinant is below 2⁶⁰.
+/// [`Shape::fill`] and [`Shape::hollow`]. An ellipse's area is 4π√det of its covariance; the
+/// determinant is below 2⁶⁰.
 fn fill(area: u32, [xx, xy, yy]: [i32; 3]) -> (i32, i32) {
     let product = |a: i32, b: i32| u64::from(a.unsigned_abs()) * u64::from(b.unsigned_abs());
     let determinant = product(xx, yy).saturating_sub(product(xy, xy));

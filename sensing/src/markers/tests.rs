@@ -232,7 +232,8 @@ proptest! {
         }
     }
 
-    /// A disc in place of a hidden marker is refused, unless it covers most of where that was and has its size.
+    /// A disc in place of a hidden marker is refused, unless it covers most of where that was and
+    /// has its size.
     #[test]
     fn a_stand_in_is_refused(
         hidden in 0usize..4,

@@ -1,10 +1,11 @@
 //! Whether four markers may make a force: how they compare with a rest position.
 //!
-//! The limits stand between what a load does to the markers and what a false, cut or half dark marker does. The first
-//! was measured on rendered frames of the film's curves at QVGA and 800×600, both presets: forces to 0.25 N tilted by up
-//! to 12°, tip offsets to 0.5 mm. Each limit's comment gives the largest value seen. Lengths do not grow with the frame
-//! where they come of the pixel grid. A model of presses in the middle would read presses far off it wrong: they are
-//! refused where they strain the pattern. One that tells places has wider limits ([`Reading`]).
+//! The limits stand between what a load does to the markers and what a false, cut or half dark
+//! marker does. The first was measured on rendered frames of the film's curves at QVGA and 800×600,
+//! both presets: forces to 0.25 N tilted by up to 12°, tip offsets to 0.5 mm. Each limit's comment
+//! gives the largest value seen. Lengths do not grow with the frame where they come of the pixel
+//! grid. A model of presses in the middle would read presses far off it wrong: they are refused
+//! where they strain the pattern. One that tells places has wider limits ([`Reading`]).
 
 use super::{
     Found, Image,
@@ -24,11 +25,12 @@ use crate::{
     units::{MilliDegrees, Px},
 };
 
-/// Strain of binary centroids against this unit's own rest, as the displacement of one marker that makes it: 0.7 px (seen: 0.7
-/// at QVGA, 0.26 at 800×600). Of weighted ones: [`Reading::displacement`]. It is what a thing that stands in for a marker may
-/// be off.
+/// Strain of binary centroids against this unit's own rest, as the displacement of one marker that
+/// makes it: 0.7 px (seen: 0.7 at QVGA, 0.26 at 800×600). Of weighted ones:
+/// [`Reading::displacement`]. It is what a thing that stands in for a marker may be off.
 const STRAIN_BINARY: i32 = 45_875;
-/// Strain against a model's rest, 0.015 of 65,536: another unit's markers are not quite where this one's are.
+/// Strain against a model's rest, 0.015 of 65,536: another unit's markers are not quite where this
+/// one's are.
 const STRAIN_FOREIGN: i32 = 983;
 /// Turn against the rest's: 5° (seen: 0.1°).
 const TURN: MilliDegrees = MilliDegrees(5_000);
@@ -36,37 +38,41 @@ const TURN: MilliDegrees = MilliDegrees(5_000);
 const SHIFT: i64 = 90;
 /// Size against the rest's: 0.85 to 2 (seen: 1 to 1.71), of 256.
 const SCALE: (i64, i64) = (218, 512);
-/// Width across the radius: off by [`Reading::width`] of it and 0.35 px (seen: 0.3 px). Eaten or swollen edges.
+/// Width across the radius: off by [`Reading::width`] of it and 0.35 px (seen: 0.3 px). Eaten or
+/// swollen edges.
 const WIDTH_PIXELS: i32 = 22_938;
-/// The narrowest marker's aspect over the widest's: 1 less 0.05 less 0.5 px of its width less 6 times the taper less the
-/// shift over the rest's half side: the film is steeper on the side that comes nearer, and where an off-centre tip is.
-/// One marker eaten or cut along the radius.
+/// The narrowest marker's aspect over the widest's: 1 less 0.05 less 0.5 px of its width less 6
+/// times the taper less the shift over the rest's half side: the film is steeper on the side that
+/// comes nearer, and where an off-centre tip is. One marker eaten or cut along the radius.
 const ASPECT: i32 = 3_277;
 const ASPECT_PIXELS: i32 = 32_768;
 const ASPECT_TAPER: i32 = 6;
 /// Skew: 1 px of its width (seen: 0.91 px) and the taper. Eaten or cut on one side.
 const SKEW_PIXELS: i32 = 65_536;
-/// Hollowness: at most 0.22, 0.22, 0.31 and 0.49 px² with none to three dilations, which make a disc a little square (seen: 0.20,
-/// 0.20, 0.28 and 0.44). Dented, notched, grown.
+/// Hollowness: at most 0.22, 0.22, 0.31 and 0.49 px² with none to three dilations, which make a
+/// disc a little square (seen: 0.20, 0.20, 0.28 and 0.44). Dented, notched, grown.
 const HOLLOW: [i32; 1 + MAX_DILATIONS as usize] = [14_418, 14_418, 20_316, 32_113];
-/// Pixels that passed the threshold themselves, before dilation: at least as many as an ellipse has whose diameters are
-/// smaller than the mask's by what dilation adds to them, 8/π px each time (it adds 2 px to the width and to the height of
-/// what it dilates, 8·r + 4 px to a disc's area), and by 0.33 px (seen: 0.27). In px with 8 fractional bits. What is less
-/// are holes, which dilation closes: white pixels, stripes, spots of light.
+/// Pixels that passed the threshold themselves, before dilation: at least as many as an ellipse has
+/// whose diameters are smaller than the mask's by what dilation adds to them, 8/π px each time (it
+/// adds 2 px to the width and to the height of what it dilates, 8·r + 4 px to a disc's area), and
+/// by 0.33 px (seen: 0.27). In px with 8 fractional bits. What is less are holes, which dilation
+/// closes: white pixels, stripes, spots of light.
 const DILATED: i32 = 652;
 const HOLES: i32 = 84;
-/// Lean: at most 0.3 px² for a marker as wide as at rest, and more as it is wider: the lens bends what comes near
-/// (seen: 0.16 near rest, 0.26 at 1.5 times its width). Cut or grown on one side.
+/// Lean: at most 0.3 px² for a marker as wide as at rest, and more as it is wider: the lens bends
+/// what comes near (seen: 0.16 near rest, 0.26 at 1.5 times its width). Cut or grown on one side.
 const LEAN: i32 = 19_661;
-/// Mean weight of a marker's pixels against that of all four: 0.015 and 12 px² over its width's square (seen at QVGA: more in 6
-/// of 20,000 frames, 13.1 px² at most; at 800×600 less than 0.012 in all). Striped, stained or glaring inside, where the dilated mask closes.
+/// Mean weight of a marker's pixels against that of all four: 0.015 and 12 px² over its width's
+/// square (seen at QVGA: more in 6 of 20,000 frames, 13.1 px² at most; at 800×600 less than 0.012
+/// in all). Striped, stained or glaring inside, where the dilated mask closes.
 const DENSITY: i32 = 983;
 const DENSITY_AREA: i32 = 12;
 /// Centroid against bounding box: 0.6 px and 0.03 of its width (of 256). Cut or grown on one side.
 const LOPSIDED_PIXELS: i32 = 39_322;
 const LOPSIDED: i32 = 8;
 
-/// What four markers are compared with: a rest position, and all that follows from it before there is a frame.
+/// What four markers are compared with: a rest position, and all that follows from it before there
+/// is a frame.
 #[derive(Clone, Debug)]
 pub struct Trust {
     at_rest: Pattern,
@@ -76,21 +82,24 @@ pub struct Trust {
     by_rest_width: Reciprocal,
     /// By half the pattern's side at rest, px in Q16.16.
     by_half_side: Reciprocal,
-    /// Limits of a marker's second moments that come of the pixel grid are so many times those of other formats: YUV422 has one
-    /// Cr for two columns. It hardly changes means: see [`grid_of_means`].
+    /// Limits of a marker's second moments that come of the pixel grid are so many times those of
+    /// other formats: YUV422 has one Cr for two columns. It hardly changes means: see
+    /// [`grid_of_means`].
     grid: i32,
     /// Largest hollowness.
     hollow: i32,
-    /// By how much the diameters of the pixels that passed may be smaller than the mask's, px with 8 fractional bits.
+    /// By how much the diameters of the pixels that passed may be smaller than the mask's, px with
+    /// 8 fractional bits.
     rim: i32,
-    /// Strain as the displacement of one marker that makes it, px in Q16.16; `None` against a model's rest.
+    /// Strain as the displacement of one marker that makes it, px in Q16.16; `None` against a
+    /// model's rest.
     displacement: Option<i32>,
     reading: Reading,
 }
 
 impl Trust {
-    /// For markers found with these settings that rest there; `own_rest` says whether that was taken on this unit, and
-    /// `reading` what presses.
+    /// For markers found with these settings that rest there; `own_rest` says whether that was
+    /// taken on this unit, and `reading` what presses.
     pub fn new(settings: &Settings, rest: &Rest, own_rest: bool, reading: Reading) -> Trust {
         let geometry = &settings.geometry;
         let at_rest = Pattern::of_centroids(rest.features.centroids);
@@ -122,7 +131,8 @@ impl Trust {
         }
     }
 
-    /// Says whether these markers may make a force: [`Status::OK`] or [`Status::MARKERS_IMPLAUSIBLE`].
+    /// Says whether these markers may make a force: [`Status::OK`] or
+    /// [`Status::MARKERS_IMPLAUSIBLE`].
     pub fn judge(&self, found: &Found) -> Status {
         let moved = distance(found.pattern.center, self.at_rest.center);
         let shift = self.by_half_side.part(moved.0);
@@ -154,8 +164,8 @@ impl Trust {
         let Some(displacement) = self.displacement else {
             return STRAIN_FOREIGN.max(always);
         };
-        // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over four of those, and
-        // tapers by √2 times as much: that part of a taper is no tip's.
+        // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over
+        // four of those, and tapers by √2 times as much: that part of a taper is no tip's.
         let four_distances = scaled(now.half_side, 1_452, 8);
         let displaced = by(four_distances).part(displacement);
         let tapered = (taper - scaled(displaced, 363, 8)).max(0);
@@ -235,7 +245,8 @@ impl Trust {
     }
 }
 
-/// Whether all markers are alike in their mean weight, to 0.015 of it and `more`. Always without weights.
+/// Whether all markers are alike in their mean weight, to 0.015 of it and `more`. Always without
+/// weights.
 fn evenly_coloured(densities: &[i32; 4], more: i32) -> bool {
     // Below 2²⁸ each.
     let sum: i32 = densities.iter().sum();
@@ -250,8 +261,9 @@ fn over_square(area: i32, by_width: &Reciprocal) -> i32 {
     limited(by_width.times(by_width.times(i64::from(area) << 40) << 8))
 }
 
-/// The mean weight of a marker without what the mask adds around it, which weighs little and is a larger part of a narrow
-/// image: of an ellipse a by b, e/a + e/b when it adds e to both. Images of other aspects are comparable only so.
+/// The mean weight of a marker without what the mask adds around it, which weighs little and is a
+/// larger part of a narrow image: of an ellipse a by b, e/a + e/b when it adds e to both. Images of
+/// other aspects are comparable only so.
 fn inner_density(image: &Image, by_across: &Reciprocal, edge: i32) -> i32 {
     let outer = by_across
         .part(edge)
@@ -264,9 +276,9 @@ fn grid_of_means(grid: i32, limit: i32) -> i32 {
     (grid + 7) * limit / 8
 }
 
-/// Whether enough pixels passed, for diameters that may be smaller by `rim`, px with 8 fractional bits, but for `holes` of 256
-/// of them. Both products are below
-/// 2⁵⁷: diameters are below 2¹⁸ then, and an area is at most 640,000 px.
+/// Whether enough pixels passed, for diameters that may be smaller by `rim`, px with 8 fractional
+/// bits, but for `holes` of 256 of them. Both products are below 2⁵⁷: diameters are below 2¹⁸ then,
+/// and an area is at most 640,000 px.
 fn is_filled(image: &Image, rim: i32, holes: i64) -> bool {
     let [across, along] = [image.radial.across, image.radial.along].map(|length| length >> 8);
     let product = |count: u32, a: i32, b: i32| i64::from(count) * (i64::from(a) * i64::from(b));
@@ -281,8 +293,9 @@ fn by(length: i32) -> Reciprocal {
 
 /// What the mask added to a marker's diameters at rest, px in Q16.16.
 ///
-/// At rest the film is flat, and the optics gives the marker's image: t across the radius, q = t·sin θ·cos θ/θ along
-/// it. So (t + e)(q + e)·π/4 is the area: e = (√((t − q)² + 16·area/π) − t − q)/2.
+/// At rest the film is flat, and the optics gives the marker's image: t across the radius, q =
+/// t·sin θ·cos θ/θ along it. So (t + e)(q + e)·π/4 is the area: e = (√((t − q)² + 16·area/π) − t −
+/// q)/2.
 fn edge_at_rest(geometry: &Geometry, distance: Px, area: u32) -> i32 {
     /// 16/π in Q32.
     const SIXTEEN_OVER_PI: u64 = 21_874_088_818;

@@ -39,13 +39,15 @@ pub struct ModelSpec {
 /// One layer, to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LayerSpec {
-    /// Number of inputs, 1–512: 11 in the first layer, the outputs of the layer before in the others.
+    /// Number of inputs, 1–512: 11 in the first layer, the outputs of the layer before in the
+    /// others.
     pub inputs: u16,
     /// Number of outputs, 1–512: in the last layer as many as [`OutputKind::count`] says.
     pub outputs: u16,
     /// How wide the weights are: int16 in the first layer.
     pub weight_width: WeightWidth,
-    /// What activations are limited to: 1–32,767, at most 127 before a layer with int8 weights; 0 in the last layer.
+    /// What activations are limited to: 1–32,767, at most 127 before a layer with int8 weights; 0
+    /// in the last layer.
     pub largest_activation: u16,
     /// `outputs` rows of `inputs` weights, −127 to 127 or −32,767 to 32,767.
     pub weights: Vec<i16>,
@@ -61,7 +63,8 @@ impl ModelSpec {
     /// The bytes of the model file. What it returns can be read: it was.
     ///
     /// # Errors
-    /// [`ModelError`], as [`Model::parse`] gives it for such a file, or for a list of the wrong length.
+    /// [`ModelError`], as [`Model::parse`] gives it for such a file, or for a list of the wrong
+    /// length.
     pub fn encode(&self) -> Result<Vec<u8>, ModelError> {
         for (index, layer) in self.layers.iter().enumerate() {
             layer.check_lengths(index)?;

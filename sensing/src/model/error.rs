@@ -102,13 +102,15 @@ impl fmt::Display for ModelError {
             Self::NotAModel => write!(f, "not a model file: it does not begin with HVTM"),
             Self::Version { found } => write!(
                 f,
-                "model file version {found}, this program reads versions {} and {}: export the model again",
+                "model file version {found}, this program reads versions {} and {}: export the \
+                 model again",
                 super::layout::FORCE_VERSION,
                 super::layout::PLACE_VERSION
             ),
             Self::Packing { found } => write!(
                 f,
-                "model file with weights packed as {found}, this program reads {}: export the model again",
+                "model file with weights packed as {found}, this program reads {}: export the \
+                 model again",
                 super::layout::PACKING
             ),
             Self::TooShort { offset, length } => {
@@ -139,7 +141,8 @@ impl fmt::Display for ModelError {
             }
             Self::WideInputs { layer, largest } => write!(
                 f,
-                "model file: layer {layer} has int8 weights, which take inputs of 0 to 127, but is fed up to {largest}"
+                "model file: layer {layer} has int8 weights, which take inputs of 0 to 127, but is \
+                 fed up to {largest}"
             ),
             Self::Row {
                 layer,
@@ -154,7 +157,8 @@ impl fmt::Display for ModelError {
             }
             Self::Accumulator { layer, row, bound } => write!(
                 f,
-                "model file: the sum of layer {layer}, row {row} can reach {bound}, beyond 2147483647"
+                "model file: the sum of layer {layer}, row {row} can reach {bound}, beyond \
+                 2147483647"
             ),
             Self::SpecLength {
                 layer,

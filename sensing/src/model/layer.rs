@@ -42,7 +42,8 @@ impl<'a> Layer<'a> {
         self.largest_activation
     }
 
-    /// A weight, −127 to 127 or −32,767 to 32,767; 0 beyond the layer's rows and columns. Slow: for looking at a model.
+    /// A weight, −127 to 127 or −32,767 to 32,767; 0 beyond the layer's rows and columns. Slow: for
+    /// looking at a model.
     pub fn weight(&self, row: usize, column: usize) -> i16 {
         let per_word = self.weight_width.per_word();
         let group = self.groups().nth(row / ROWS_TOGETHER);

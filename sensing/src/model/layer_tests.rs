@@ -53,7 +53,8 @@ fn int8_weights_take_seven_bits() {
 #[test]
 fn weights_beyond_rows_and_columns_are_zero() {
     let good = spec(&[11, 5, 3]).encode().unwrap();
-    // Rows 0–3 of 16 columns, two to a word, then rows 4–7: column 11 of row 2, row 5, row 3 of the second layer.
+    // Rows 0–3 of 16 columns, two to a word, then rows 4–7: column 11 of row 2, row 5, row 3 of the
+    // second layer.
     let (layer_0, layer_1) = (396, 724);
     for (offset, layer, row) in [
         (layer_0 + 5 * 16 + 2 * 4 + 2, 0, 2),

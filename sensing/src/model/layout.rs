@@ -116,7 +116,8 @@ fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, Mode
         _ => Err(ModelError::Field {
             name: "beside the layers",
             offset,
-            allowed: "0, or 2 with the output kind 2 (1, a closed form, is not read: train a network)",
+            allowed: "0, or 2 with the output kind 2 (1, a closed form, is not read: train a \
+                      network)",
         }),
     }
 }

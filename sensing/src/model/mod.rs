@@ -1,9 +1,10 @@
 //! The model file: a quantized network with its input scaling, the film run forwards, and the
 //! conditions they were made under.
 //!
-//! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves it sound before it can
-//! be used. It may lie anywhere; kernels run one that lies at a multiple of four ([`AlignedFile`]). Feature `encode` adds the writer, `encode::ModelSpec`.
-//! Both follow `docs/model-file.md`.
+//! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves
+//! it sound before it can be used. It may lie anywhere; kernels run one that lies at a multiple of
+//! four ([`AlignedFile`]). Feature `encode` adds the writer, `encode::ModelSpec`. Both follow
+//! `docs/model-file.md`.
 
 mod aligned;
 #[cfg(any(test, feature = "encode"))]
@@ -103,8 +104,9 @@ pub struct Conditions {
 pub enum CentroidEstimator {
     /// The mean of its pixels in the mask (the paper's).
     BinaryMask,
-    /// The mean of the same pixels, each weighted with how much of it a marker covers ([`Pixels::weight`]): by the
-    /// [`redness`](crate::tables::redness) of RGB565, the Cr of YUV422, the luma of mono.
+    /// The mean of the same pixels, each weighted with how much of it a marker covers
+    /// ([`Pixels::weight`]): by the [`redness`](crate::tables::redness) of RGB565, the Cr of
+    /// YUV422, the luma of mono.
     ///
     /// [`Pixels::weight`]: crate::tables::Pixels::weight
     RednessWeighted,
@@ -192,7 +194,8 @@ pub struct CalibratedRange {
 }
 
 impl Rest {
-    /// Whether it can be a rest position: inside the largest picture, with markers of at least a pixel.
+    /// Whether it can be a rest position: inside the largest picture, with markers of at least a
+    /// pixel.
     pub fn is_sound(&self) -> bool {
         let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
         let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;
@@ -203,9 +206,10 @@ impl Rest {
             && self.areas.iter().all(|area| (1..=largest).contains(area))
     }
 
-    /// Whether the markers are as far from their common centre as a film at rest shows them, to 15 %. That leaves room
-    /// for a film 1.5 mm nearer or farther and for markers 0.7 mm off their places, and refuses a film that something
-    /// presses: every force against such a rest would be wrong.
+    /// Whether the markers are as far from their common centre as a film at rest shows them, to
+    /// 15 %. That leaves room for a film 1.5 mm nearer or farther and for markers 0.7 mm off their
+    /// places, and refuses a film that something presses: every force against such a rest would be
+    /// wrong.
     pub fn fits(&self, geometry: &Geometry) -> bool {
         let center = Pattern::of_centroids(self.features.centroids).center;
         let sum: i64 = self
@@ -223,8 +227,8 @@ impl<'a> Model<'a> {
     /// Reads and proves a model file.
     ///
     /// # Errors
-    /// [`ModelError`] says what is wrong and where: not a model file, another version, cut or damaged, a value
-    /// outside its range, or a row of weights whose sum could overflow.
+    /// [`ModelError`] says what is wrong and where: not a model file, another version, cut or
+    /// damaged, a value outside its range, or a row of weights whose sum could overflow.
     pub fn parse(bytes: &'a [u8]) -> Result<Model<'a>, ModelError> {
         layout::parse(bytes)
     }
@@ -239,7 +243,8 @@ impl<'a> Model<'a> {
         &self.layers[..self.layer_count]
     }
 
-    /// True when its file lies at a multiple of four, so that kernels can run it. Every layer then lies so, too.
+    /// True when its file lies at a multiple of four, so that kernels can run it. Every layer then
+    /// lies so, too.
     pub fn is_aligned(&self) -> bool {
         let lies_so = |layer: &Layer<'_>| layer.weights.as_ptr().cast::<u32>().is_aligned();
         self.layers().iter().all(lies_so)

@@ -1,7 +1,7 @@
 //! How weights lie in the model file, so that a kernel reads them one word after the other.
 //!
-//! Four rows go together: for each word's worth of columns, a word of each row. Columns are filled up with zeros to a
-//! whole block of the kernel, rows to a group of four.
+//! Four rows go together: for each word's worth of columns, a word of each row. Columns are filled
+//! up with zeros to a whole block of the kernel, rows to a group of four.
 
 /// Rows whose words alternate.
 pub const ROWS_TOGETHER: usize = 4;
@@ -61,8 +61,8 @@ impl WeightWidth {
     }
 }
 
-/// The four weights of a word of int8: each half is 256·w₁ + w₀, as a number of 16 bits. Only words of weights beyond
-/// −127 to 127 give such.
+/// The four weights of a word of int8: each half is 256·w₁ + w₀, as a number of 16 bits. Only words
+/// of weights beyond −127 to 127 give such.
 pub fn unpack8(word: [u8; 4]) -> [i16; 4] {
     let [[w0, w1], [w2, w3]] = unpack16(word).map(|lane| {
         let low = lane as i8;

@@ -1,9 +1,10 @@
-//! How well a model knows its forces, and their places if it tells them: standard uncertainties over |F|, by linear
-//! interpolation between knots.
+//! How well a model knows its forces, and their places if it tells them: standard uncertainties
+//! over |F|, by linear interpolation between knots.
 //!
-//! A standard uncertainty σ is stated such that 95 of 100 errors lie within what a normal distribution of that σ says: the
-//! angle between true and found force within [`DIRECTION_BOUND`] · σ of the direction (two dimensions across the force), |F|
-//! within [`MAGNITUDE_BOUND`] · σ of |F|. Errors have long tails, so that this is not their root mean square.
+//! A standard uncertainty σ is stated such that 95 of 100 errors lie within what a normal
+//! distribution of that σ says: the angle between true and found force within [`DIRECTION_BOUND`] ·
+//! σ of the direction (two dimensions across the force), |F| within [`MAGNITUDE_BOUND`] · σ of |F|.
+//! Errors have long tails, so that this is not their root mean square.
 
 use super::{ModelError, reader::Reader};
 use crate::units::{MicroNewtons, Micrometres, MilliDegrees};
@@ -31,12 +32,13 @@ pub struct Uncertainty {
 /// Standard uncertainties at one |F|, those of forces 0 to [`LARGEST_UNCERTAINTY`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct UncertaintyKnot {
-    /// Of the force's part across itself, in two dimensions: over |F| it is the direction's uncertainty in radians.
+    /// Of the force's part across itself, in two dimensions: over |F| it is the direction's
+    /// uncertainty in radians.
     pub across: MicroNewtons,
     /// Of |F|.
     pub along: MicroNewtons,
-    /// Of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 in a model that does
-    /// not tell places.
+    /// Of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 in a model that
+    /// does not tell places.
     pub place: Micrometres,
 }
 
@@ -98,8 +100,8 @@ impl Uncertainty {
 
 /// across / whole as an angle, rounded to nearest, at most 180°; across < 2³⁰, whole < 2³¹.
 ///
-/// From 33 mN across on both lose their last bits, which changes the angle by less than 3.1 · 10⁻⁴ of itself and keeps sums
-/// within 32 bits.
+/// From 33 mN across on both lose their last bits, which changes the angle by less than 3.1 · 10⁻⁴
+/// of itself and keeps sums within 32 bits.
 fn angle(across: u32, whole: u32) -> MilliDegrees {
     /// A radian in m°, to 4 · 10⁻⁶ of itself.
     const RADIAN: u32 = 57_296;

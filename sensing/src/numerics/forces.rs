@@ -73,7 +73,8 @@ fn angles_as_the_force_goes_to_nothing() {
     );
 }
 
-/// Directions in steps of half a degree, sizes from 1 µN to the largest that three components can have.
+/// Directions in steps of half a degree, sizes from 1 µN to the largest that three components can
+/// have.
 #[test]
 fn angles_at_the_ends_of_the_range() {
     let (mut worst, mut tried) = ([0.0; 3], 0);
@@ -98,7 +99,8 @@ fn angles_at_the_ends_of_the_range() {
     row("angles and |F| of a vector", tried, BOUND, words(worst));
 }
 
-/// The largest error of a component, µN, over a grid of directions in steps of a quarter of a degree.
+/// The largest error of a component, µN, over a grid of directions in steps of a quarter of a
+/// degree.
 fn vector_error(size: i32) -> f64 {
     let mut worst = 0.0_f64;
     for alpha in (-180_000..=180_000).step_by(250) {

@@ -1,5 +1,6 @@
-//! Worst cases of the sensing's arithmetic, measured and held against their bounds (`docs/numerics.md`). Each test prints a row
-//! of that document's table: `cargo test --release -p hivtac-sensing --lib numerics -- --nocapture`.
+//! Worst cases of the sensing's arithmetic, measured and held against their bounds
+//! (`docs/numerics.md`). Each test prints a row of that document's table: `cargo test --release -p
+//! hivtac-sensing --lib numerics -- --nocapture`.
 
 mod forces;
 mod moments;

@@ -1,8 +1,9 @@
 //! Looking ahead: the force is worked out while the camera still sends the rows below the markers.
 //!
-//! When as many blobs are whole as there are markers, and none is open, what they make is worked out at once. If no
-//! other blob has come until the frame ends, that is its measurement, and nothing but the check is left to do after the last
-//! row. Otherwise it is worked out anew, as it depends on the blobs alone.
+//! When as many blobs are whole as there are markers, and none is open, what they make is worked
+//! out at once. If no other blob has come until the frame ends, that is its measurement, and
+//! nothing but the check is left to do after the last row. Otherwise it is worked out anew, as it
+//! depends on the blobs alone.
 
 use super::{Measurement, Sensor};
 use crate::tables::Table;

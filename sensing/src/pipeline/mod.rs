@@ -38,12 +38,14 @@ pub struct Measurement {
 /// A frame has more set pixels than one in this many: no four dots look like that.
 const SATURATED_PART: u32 = 2;
 
-/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565 up in a `T`.
+/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
+/// up in a `T`.
 ///
-/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it
-/// shall stay: in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it in place; nothing large crosses the stack.
-/// For each frame: [`begin_frame`](Self::begin_frame), [`push_rows`](Self::push_rows) with all rows from the top, one
-/// or more at a time as they arrive, and [`finish_frame`](Self::finish_frame).
+/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it shall stay:
+/// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
+/// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
+/// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
+/// and [`finish_frame`](Self::finish_frame).
 #[derive(Clone, Debug)]
 pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
@@ -93,7 +95,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// Sets everything and forgets the tare. Without a model there are markers and features but no force.
+    /// Sets everything and forgets the tare. Without a model there are markers and features but no
+    /// force.
     ///
     /// # Errors
     /// A setting out of its range; nothing is then changed.
@@ -128,8 +131,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.settings.threshold
     }
 
-    /// Sets the threshold, effective from the next row; do it between frames. A model made with another one gives no
-    /// force then ([`Status::MODEL_MISMATCH`]).
+    /// Sets the threshold, effective from the next row; do it between frames. A model made with
+    /// another one gives no force then ([`Status::MODEL_MISMATCH`]).
     ///
     /// # Errors
     /// A threshold that means nothing; it is then unchanged.
@@ -140,8 +143,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// Sets the rest position of this unit, or goes back to the model's. One that is not [sound](Rest::is_sound) is
-    /// as none.
+    /// Sets the rest position of this unit, or goes back to the model's. One that is not
+    /// [sound](Rest::is_sound) is as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {
         self.tare = tare.filter(Rest::is_sound);
         self.prepare();
@@ -176,15 +179,16 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.look_ahead();
     }
 
-    /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than one by one.
+    /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than
+    /// one by one.
     pub fn push_rows(&mut self, rows: &[u16]) {
         self.scanner.push_rows(&self.pixels, rows);
         self.look_ahead();
     }
 
-    /// The same when the rows that came last are still in memory, one after the other, as `above`: all of the frame, or at
-    /// least as many as there are [`Settings::dilations`]. Nothing is copied then
-    /// ([`Scanner::push_rows_below`]).
+    /// The same when the rows that came last are still in memory, one after the other, as `above`:
+    /// all of the frame, or at least as many as there are [`Settings::dilations`]. Nothing is
+    /// copied then ([`Scanner::push_rows_below`]).
     pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
         self.scanner.push_rows_below(&self.pixels, above, rows);
         self.look_ahead();

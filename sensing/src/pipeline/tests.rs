@@ -13,7 +13,8 @@ const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
 /// µN for a pixel, of the linear model below.
 const PER_PIXEL: i32 = 10_000;
 
-/// A model whose Fx and Fy are the shift of the rectangle's centre, 10 mN a pixel, and Fz is −100 mN.
+/// A model whose Fx and Fy are the shift of the rectangle's centre, 10 mN a pixel, and Fz is
+/// −100 mN.
 fn linear() -> ModelSpec {
     let mut spec = spec(&[11, 3]);
     spec.conditions.geometry = GEOMETRY;
@@ -118,7 +119,8 @@ fn a_tare_that_cannot_be_is_none() {
     assert_eq!(sensor.tare(), None);
 }
 
-/// The pattern tapered along x and sheared, px at each marker: what a tip does that the film sticks to.
+/// The pattern tapered along x and sheared, px at each marker: what a tip does that the film sticks
+/// to.
 fn pulled(taper: f64, shear: f64) -> Pattern {
     let signs = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     Pattern {

@@ -3,14 +3,15 @@
     python3 -m venv venv && venv/bin/pip install opencv-python-headless==5.0.0.93 numpy
     venv/bin/python reference.py
 
-There is one file for each box of BOXES. It has 8192 bytes: bit p % 8 of byte p // 8 is set where pixel p (red in
-bits 15-11), replicated to 8 bits a channel, passes cvtColor(COLOR_RGB2HSV) and inRange; a box whose hue wraps is two
-inRange, joined by "or". "dilated.bits" holds four masks of HEIGHT rows of WIDTH pixels, each row padded with zeros to
-whole 32-bit words, lowest bit first: a random mask, and the same after one, two and three dilations by 3x3.
+There is one file for each box of BOXES. It has 8192 bytes: bit p % 8 of byte p // 8 is set where
+pixel p (red in bits 15-11), replicated to 8 bits a channel, passes cvtColor(COLOR_RGB2HSV) and
+inRange; a box whose hue wraps is two inRange, joined by "or". "dilated.bits" holds four masks of
+HEIGHT rows of WIDTH pixels, each row padded with zeros to whole 32-bit words, lowest bit first: a
+random mask, and the same after one, two and three dilations by 3x3.
 
-Every way that OpenCV may take must agree before anything is written: with and without its optimized paths, and as
-one long row (vector code) and as rows of one pixel (scalar code). The committed files are those of OpenCV 5.0.0;
-OpenCV 4.14.0 writes the same bytes.
+Every way that OpenCV may take must agree before anything is written: with and without its optimized
+paths, and as one long row (vector code) and as rows of one pixel (scalar code). The committed files
+are those of OpenCV 5.0.0; OpenCV 4.14.0 writes the same bytes.
 """
 
 from pathlib import Path

@@ -1,4 +1,5 @@
-//! Frames at the limits: full, empty, at every border, with the most runs and the most labels, the largest.
+//! Frames at the limits: full, empty, at every border, with the most runs and the most labels, the
+//! largest.
 
 use crate::reference::{Mask, scan, settings};
 use hivtac_sensing::{
@@ -187,7 +188,8 @@ fn combs_open_the_most_labels_and_join_them() {
     assert_eq!(checked::<2>(&both, 1).len(), 2);
 }
 
-/// Teeth that join two by two, then four by four, and so on: paths in the forest grow at every level.
+/// Teeth that join two by two, then four by four, and so on: paths in the forest grow at every
+/// level.
 #[test]
 fn a_tournament_of_teeth_ends_in_one_blob() {
     let mask = Mask::from_fn(512, 40, |x, y| {
@@ -204,7 +206,8 @@ fn spiral(size: usize) -> Mask {
     let ring = |x: usize, y: usize| x.min(y).min(size - 1 - x).min(size - 1 - y);
     Mask::from_fn(size, size, |x, y| {
         let k = ring(x, y);
-        // The left side opens one pixel below each ring's upper left corner, and a bridge leads inwards there.
+        // The left side opens one pixel below each ring's upper left corner, and a bridge leads
+        // inwards there.
         let gap = x == k && y == k + 1 && k.is_multiple_of(2);
         let bridge = x == k && y == k + 1 && !k.is_multiple_of(2);
         (k.is_multiple_of(2) && !gap) || bridge
@@ -254,7 +257,8 @@ fn salt_does_not_fill_the_storage() {
     assert_eq!(checked::<4>(&mask, 200).len(), 4);
 }
 
-/// As many runs as a frame may have are all taken; one more ends it, and a frame after it knows nothing of that.
+/// As many runs as a frame may have are all taken; one more ends it, and a frame after it knows
+/// nothing of that.
 #[test]
 fn a_frame_of_more_runs_than_it_may_have_is_left() {
     let mask = Mask::from_fn(64, 20, |x, _| x % 2 == 0);

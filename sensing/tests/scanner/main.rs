@@ -1,4 +1,5 @@
-//! The scanner through its public face: against a pixel-by-pixel reference, at the limits, and on what it refuses.
+//! The scanner through its public face: against a pixel-by-pixel reference, at the limits, and on
+//! what it refuses.
 
 mod extremes;
 mod random;

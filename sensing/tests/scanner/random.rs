@@ -15,8 +15,8 @@ const ALL: usize = 100 * 30 / 4 + 200;
 thread_local!(static TABLE: Box<ByteTable> =
     Box::new(ByteTable::new(&HsvBox::RED, ByteOrder::Swapped).unwrap()));
 
-/// Masks of any width around the borders of words, from sparse to dense. Near a density of 0.4, where blobs percolate,
-/// labels join in the most tangled ways.
+/// Masks of any width around the borders of words, from sparse to dense. Near a density of 0.4,
+/// where blobs percolate, labels join in the most tangled ways.
 fn masks() -> impl Strategy<Value = Mask> {
     (1..=100_usize, 1..=30_usize, 0.02..0.98_f64).prop_flat_map(|(width, height, density)| {
         vec(prop::bool::weighted(density), width * height)

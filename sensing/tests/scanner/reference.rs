@@ -1,4 +1,5 @@
-//! What the scanner should find, pixel by pixel: dilation by definition, blobs by flood fill, moments by summing.
+//! What the scanner should find, pixel by pixel: dilation by definition, blobs by flood fill,
+//! moments by summing.
 
 use hivtac_sensing::{
     blob::Blob,

@@ -11,7 +11,8 @@ const SLOPES_COUNT: f64 = 0.05;
 /// What is told least of the terms is at least this part of what is told most.
 const LEAST_TOLD: f64 = 1e-7;
 
-/// What is known of outputs at a load: their values and their derivatives by size and tilt, if they are known.
+/// What is known of outputs at a load: their values and their derivatives by size and tilt, if they
+/// are known.
 pub struct Known {
     /// The load.
     pub pose: Pose,
@@ -64,7 +65,8 @@ pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, ShellError> {
 /// Rows of numbers at nodes along two axes.
 type Nodes = Vec<Vec<Vec<f64>>>;
 
-/// The coefficients of splines through rows of numbers at an axis' nodes along y and, within, along x.
+/// The coefficients of splines through rows of numbers at an axis' nodes along y and, within, along
+/// x.
 pub fn splines(axis: &Axis, rows: Nodes) -> Nodes {
     let count = axis.nodes().len();
     let mut matrix = Mat::<f64>::zeros(count, count);

@@ -22,7 +22,8 @@ pub struct Sweeps<'a> {
 type Row = Vec<f64>;
 
 impl<'a> Sweeps<'a> {
-    /// What is known of a table's outputs with the tip at a place: by every mirror in which a place that was solved lies there.
+    /// What is known of a table's outputs with the tip at a place: by every mirror in which a place
+    /// that was solved lies there.
     pub fn known(&self, kind: Kind, place_mm: [f64; 2]) -> Result<Vec<Known>, ShellError> {
         let mut all = Vec::new();
         for mirror in Mirror::all() {
@@ -35,7 +36,8 @@ impl<'a> Sweeps<'a> {
         }
         if all.is_empty() {
             return Err(ShellError::Solver(format!(
-                "no solution has its tip at {place_mm:?} mm or a mirrored place: sweep the film anew"
+                "no solution has its tip at {place_mm:?} mm or a mirrored place: sweep the film \
+                 anew"
             )));
         }
         Ok(all)
@@ -68,8 +70,8 @@ impl<'a> Sweeps<'a> {
         Ok(())
     }
 
-    /// The coefficients of ρ, ρ² and ρ³ in what a larger tip adds: by the difference at ρ = 1 and the slopes at both ends.
-    /// Nothing at places that are not solved with the largest.
+    /// The coefficients of ρ, ρ² and ρ³ in what a larger tip adds: by the difference at ρ = 1 and
+    /// the slopes at both ends. Nothing at places that are not solved with the largest.
     fn by_radius(&self, kind: Kind, mirror: &Mirror, index: usize) -> Option<Known> {
         let nominal = &self.nominal[index];
         let same_load = |solved: &&Solved| solved.pose == nominal.pose;

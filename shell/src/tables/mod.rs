@@ -14,7 +14,8 @@ use known::Sweeps;
 /// Two places are the same that are so near, mm.
 const SAME_PLACE_MM: f64 = 1e-9;
 
-/// The tables of a film that is known at the places of two sweeps: with a tip of the nominal radius and the largest.
+/// The tables of a film that is known at the places of two sweeps: with a tip of the nominal radius
+/// and the largest.
 ///
 /// # Errors
 /// When a place is missing in a sweep, or too few loads were solved there.

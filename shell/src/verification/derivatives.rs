@@ -1,4 +1,5 @@
-//! Gradient against energy and stiffness against gradient, by differences, on a bent, stretched and held film.
+//! Gradient against energy and stiffness against gradient, by differences, on a bent, stretched and
+//! held film.
 
 use super::*;
 use crate::newton::inner;

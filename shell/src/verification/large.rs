@@ -5,9 +5,10 @@ use super::*;
 const HALF_MM: f64 = 5.0;
 const LOAD_N_PER_MM2: f64 = 0.02;
 
-/// A long strip between two held edges under a dead load is a string of St Venant–Kirchhoff's law: with H the
-/// constant horizontal force and q X the vertical one, A λ(λ²−1)/2 = √(H² + q² X²) gives the stretch λ at each X, and
-/// the strip must still span the gap: ∫ λ H/T dX = half of it. Returns the depth in the middle, ∫ λ q X/T dX.
+/// A long strip between two held edges under a dead load is a string of St Venant–Kirchhoff's law:
+/// with H the constant horizontal force and q X the vertical one, A λ(λ²−1)/2 = √(H² + q² X²) gives
+/// the stretch λ at each X, and the strip must still span the gap: ∫ λ H/T dX = half of it. Returns
+/// the depth in the middle, ∫ λ q X/T dX.
 fn string_depth(stiffness: f64) -> f64 {
     let integrals = |h: f64| {
         let (mut across, mut down) = (0.0, 0.0);

@@ -18,7 +18,8 @@ fn uneven() -> Shell {
     Shell::new(Grid { axes }, &FILM)
 }
 
-/// The largest force on a function that vanishes with its slope on the edges: none in a state of equilibrium.
+/// The largest force on a function that vanishes with its slope on the edges: none in a state of
+/// equilibrium.
 fn inner_force(shell: &Shell, u: &[f64], components: &[usize]) -> f64 {
     let gradient = shell.derivatives(u).gradient;
     let inside = gradient.chunks(3).enumerate().filter(|(k, _)| {

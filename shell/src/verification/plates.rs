@@ -1,7 +1,8 @@
 //! The linear limit against plate theory: deflections of square plates of side a.
 //!
-//! Timoshenko & Woinowsky-Krieger, "Theory of Plates and Shells", 2nd ed., Tables 8 and 35 and Sections 30, 34 and 44;
-//! the clamped plate's digits are those of Taylor & Govindjee, Commun. Numer. Meth. Engng 20 (2004) 757.
+//! Timoshenko & Woinowsky-Krieger, "Theory of Plates and Shells", 2nd ed., Tables 8 and 35 and
+//! Sections 30, 34 and 44; the clamped plate's digits are those of Taylor & Govindjee, Commun.
+//! Numer. Meth. Engng 20 (2004) 757.
 
 use super::*;
 
@@ -98,7 +99,8 @@ fn plates_under_a_force_converge_with_order_two() {
     }
 }
 
-/// Pure twist, which tests the free edges: held at three corners, pulled at the fourth, w = P x y / (2 D (1−ν)).
+/// Pure twist, which tests the free edges: held at three corners, pulled at the fourth, w = P x y /
+/// (2 D (1−ν)).
 #[test]
 fn a_plate_twisted_at_its_corners_is_exact() {
     let mut shell = rectangle([SIDE_MM; 2], [5, 4], &PLATE);

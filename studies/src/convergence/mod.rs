@@ -107,8 +107,9 @@ impl Convergence {
         }
         maps::write(&self.picture, 3, &panels(&maps))?;
         let mut text = String::from(
-            "| force | places | condition, median, largest | steps from the network's guess, median, most | lost from there | \
-             of all starts: found, another contact, nothing | the sensor from these starts | most steps |\n\
+            "| force | places | condition, median, largest | steps from the network's guess, \
+             median, most | lost from there | of all starts: found, another contact, nothing | the \
+             sensor from these starts | most steps |\n\
              |--:|---|--:|--:|--:|---|---|--:|\n",
         );
         text.extend(rows.iter().map(Row::line));
@@ -192,8 +193,9 @@ impl Row {
             most_steps,
         } = self;
         format!(
-            "| {force_mn} mN | within ±{within_mm} mm | {usual:.0}, {worst:.0} | {median}, {most} | {lost} of {places} | \
-             {found:.2}, {another:.3}, {nothing:.2} % | {sensed:.2}, {mistaken:.3}, {refused:.2} % | {most_steps} |\n"
+            "| {force_mn} mN | within ±{within_mm} mm | {usual:.0}, {worst:.0} | {median}, {most} \
+             | {lost} of {places} | {found:.2}, {another:.3}, {nothing:.2} % | {sensed:.2}, \
+             {mistaken:.3}, {refused:.2} % | {most_steps} |\n"
         )
     }
 }

@@ -8,11 +8,12 @@ use hivtac_scene::{FILM_DISTANCE_MM, FOCAL_LENGTH_MM, HALF_SIDE_MM};
 /// What D_ph is: the paper has it both ways, and the mean of R* depends on it (0.2609 or 0.3546).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PinholeDistance {
-    /// Eq. 23: D_ph = √(PM² + h²), from the marker to the pinhole. Gives Figure 8, but PM / D_ph is then the sine and
-    /// not the tangent of the ray's angle, and eqs. 15–17 take its arctangent all the same. At PM = 5.257 mm that is
-    /// 24.95° for a ray at 27.73°.
+    /// Eq. 23: D_ph = √(PM² + h²), from the marker to the pinhole. Gives Figure 8, but PM / D_ph is
+    /// then the sine and not the tangent of the ray's angle, and eqs. 15–17 take its arctangent all
+    /// the same. At PM = 5.257 mm that is 24.95° for a ray at 27.73°.
     Slant,
-    /// The text below eq. 15: D_ph = h, along the optical axis. What a camera does; [`Camera`](hivtac_scene::Camera) uses it.
+    /// The text below eq. 15: D_ph = h, along the optical axis. What a camera does;
+    /// [`Camera`](hivtac_scene::Camera) uses it.
     Axial,
 }
 
@@ -57,10 +58,11 @@ impl<T: Real> Design<T> {
         Ok(self.distance(pm_mm))
     }
 
-    /// Eq. 17 with this design's D_ph and ε = 0: disp_N, mm on the image plane. PM is 0 to PN; z_m' 0 or more.
+    /// Eq. 17 with this design's D_ph and ε = 0: disp_N, mm on the image plane. PM is 0 to PN; z_m'
+    /// 0 or more.
     ///
-    /// Accurate as [`NormalPress::disp_n_mm`](super::NormalPress::disp_n_mm); D_ph − z_m' is taken without the
-    /// rounding error of D_ph.
+    /// Accurate as [`NormalPress::disp_n_mm`](super::NormalPress::disp_n_mm); D_ph − z_m' is taken
+    /// without the rounding error of D_ph.
     ///
     /// # Errors
     /// When a value is outside its domain, or when the pressed marker is the pinhole.
@@ -77,9 +79,10 @@ impl<T: Real> Design<T> {
     ///
     /// Largest relative error against the reference table: 5e-16 in `f64`, 3e-7 in `f32`.
     ///
-    /// The two displacements are not alike: disp_N is on the image plane, disp_S on the film, which the lens shows
-    /// about f / h = 0.21 times as large. z_m' and PP' are held while PM varies, though in the paper's own model
-    /// the marker's depth z_m' falls from the press depth at PM = 0 to 0 at PM = PN.
+    /// The two displacements are not alike: disp_N is on the image plane, disp_S on the film, which
+    /// the lens shows about f / h = 0.21 times as large. z_m' and PP' are held while PM varies,
+    /// though in the paper's own model the marker's depth z_m' falls from the press depth at PM = 0
+    /// to 0 at PM = PN.
     ///
     /// # Errors
     /// As [`disp_n_mm`](Self::disp_n_mm) and [`disp_s_mm`].
@@ -98,7 +101,8 @@ impl<T: Real> Design<T> {
         }
     }
 
-    /// D_ph − z, unchecked. On the slant as (PM² + h² − z²) / (D_ph + z), which does not inherit D_ph's rounding.
+    /// D_ph − z, unchecked. On the slant as (PM² + h² − z²) / (D_ph + z), which does not inherit
+    /// D_ph's rounding.
     pub(super) fn ahead(&self, pm: T, z: T) -> T {
         let h = self.film_distance_mm;
         match self.d_ph {

@@ -18,7 +18,8 @@ const LARGEST_R: f64 = 0.4;
 const PAPER_MEAN: f64 = 0.2655;
 /// Where Q has no maximum at a positive PM.
 const NONE_COLOUR: &str = "#d9d9d9";
-/// Corners of the colour scale: dark blue over green to yellow, lighter throughout (after matplotlib's viridis).
+/// Corners of the colour scale: dark blue over green to yellow, lighter throughout (after
+/// matplotlib's viridis).
 const SCALE: [[f64; 3]; 5] = [
     [68.0, 1.0, 84.0],
     [59.0, 82.0, 139.0],
@@ -30,8 +31,9 @@ const SCALE: [[f64; 3]; 5] = [
 impl Map {
     /// This map as an SVG picture with axes and a colour bar; the same text on every machine.
     ///
-    /// Colours are steps of 0.01 from R* = 0 to 0.4, larger R* having the last; grey is where Q has no maximum at a
-    /// positive PM. The bar is marked with the mean over positive values and with what the paper prints for it.
+    /// Colours are steps of 0.01 from R* = 0 to 0.4, larger R* having the last; grey is where Q has
+    /// no maximum at a positive PM. The bar is marked with the mean over positive values and with
+    /// what the paper prints for it.
     pub fn to_svg(&self, title: &str) -> String {
         let [width, height] = SIZE;
         let mut svg = format!(
@@ -52,7 +54,8 @@ impl Map {
     fn cells_svg(&self) -> String {
         let cell = SIDE / self.cells() as f64;
         let mut svg = format!(
-            "<g shape-rendering=\"crispEdges\" transform=\"translate({LEFT} {BOTTOM}) scale({cell} -{cell})\">\n"
+            "<g shape-rendering=\"crispEdges\" transform=\"translate({LEFT} {BOTTOM}) scale({cell} \
+             -{cell})\">\n"
         );
         for level in (0..LEVELS).map(Some).chain([None]) {
             let path = self.path(level);
@@ -171,7 +174,8 @@ fn ticks(extent: f64) -> Vec<(f64, String)> {
 /// The outline of something as high as the map, from its left edge and width.
 fn frame([left, width]: [f64; 2]) -> String {
     format!(
-        "<rect x=\"{left}\" y=\"{TOP}\" width=\"{width}\" height=\"{SIDE}\" fill=\"none\" stroke=\"#333333\"/>\n"
+        "<rect x=\"{left}\" y=\"{TOP}\" width=\"{width}\" height=\"{SIDE}\" fill=\"none\" \
+         stroke=\"#333333\"/>\n"
     )
 }
 

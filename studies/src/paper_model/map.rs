@@ -5,8 +5,8 @@ use super::{Design, OutOfDomain};
 /// The mean of R*(z_m', PP') over a map (eq. 25), in the readings that the paper leaves open.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanBestR {
-    /// Over the part of the map where Q has a maximum at a positive PM: the paper's "real positive values". 0 when
-    /// there is no such part.
+    /// Over the part of the map where Q has a maximum at a positive PM: the paper's "real positive
+    /// values". 0 when there is no such part.
     pub positive: f64,
     /// Over the whole map, with 0 where there is no such maximum.
     pub with_zeros: f64,
@@ -26,8 +26,8 @@ impl Map {
     /// The map of a design with `cells` × `cells` cells, 1 to 4096 along each axis.
     ///
     /// # Errors
-    /// When `cells` is outside its range or a measure of the design is outside its domain; when a/2 reaches to the
-    /// pinhole.
+    /// When `cells` is outside its range or a measure of the design is outside its domain; when a/2
+    /// reaches to the pinhole.
     pub fn new(design: &Design<f64>, cells: usize) -> Result<Map, OutOfDomain> {
         if !(1..=4096).contains(&cells) {
             return Err(OutOfDomain {
@@ -58,8 +58,8 @@ impl Map {
         self.cells
     }
 
-    /// R* of each cell, `None` where Q has no maximum at a positive PM. Cell (i, j), at [`middle_mm`](Self::middle_mm)
-    /// i along z_m' and j along PP', is number j·cells + i.
+    /// R* of each cell, `None` where Q has no maximum at a positive PM. Cell (i, j), at
+    /// [`middle_mm`](Self::middle_mm) i along z_m' and j along PP', is number j·cells + i.
     pub fn best_r(&self) -> &[Option<f64>] {
         &self.best_r
     }
@@ -95,8 +95,8 @@ impl Design<f64> {
     /// | slant (eq. 23) | 0.2609 | 0.2548 | 97.6 % |
     /// | axial | 0.3546 | 0.3462 | 97.6 % |
     ///
-    /// The first is what the paper describes; a marker there is 0.09 mm nearer to the centre than at 0.2655. No reading
-    /// that was tried gives 0.2655: `docs/paper-model.md` has the list.
+    /// The first is what the paper describes; a marker there is 0.09 mm nearer to the centre than
+    /// at 0.2655. No reading that was tried gives 0.2655: `docs/paper-model.md` has the list.
     ///
     /// # Errors
     /// As [`Map::new`].

@@ -1,5 +1,6 @@
-//! The paper's analytic model of the film (HiVTac, *Sensors* 2022, Sections 3 and 4, eqs. 13–25): how far a marker is
-//! seen to move, and where it should sit so that presses and shears are both seen well.
+//! The paper's analytic model of the film (HiVTac, *Sensors* 2022, Sections 3 and 4, eqs. 13–25):
+//! how far a marker is seen to move, and where it should sit so that presses and shears are both
+//! seen well.
 //!
 //! | paper | here |
 //! |---|---|
@@ -14,12 +15,14 @@
 //! | eq. 25, its mean | [`Design::mean_best_r`] |
 //! | Figure 8 | [`Map`], [`Map::to_svg`] |
 //!
-//! Lengths are in mm, angles in radians. The paper's z is a *depth*: positive towards the camera, opposite to the z of
-//! the film frame. Everything is generic over `f32` and `f64` ([`Real`]), but the mean and the map, which are `f64`.
-//! Values outside a function's domain, and values that are no number, are an [`OutOfDomain`].
+//! Lengths are in mm, angles in radians. The paper's z is a *depth*: positive towards the camera,
+//! opposite to the z of the film frame. Everything is generic over `f32` and `f64` ([`Real`]), but
+//! the mean and the map, which are `f64`. Values outside a function's domain, and values that are
+//! no number, are an [`OutOfDomain`].
 //!
-//! The model is a guide to where markers go, not the film that scenes use. Where the paper is ambiguous or wrong, the
-//! item's documentation says so; `docs/paper-model.md` collects it with numbers.
+//! The model is a guide to where markers go, not the film that scenes use. Where the paper is
+//! ambiguous or wrong, the item's documentation says so; `docs/paper-model.md` collects it with
+//! numbers.
 //!
 //! ```
 //! use hivtac_studies::paper_model::{Design, PinholeDistance};

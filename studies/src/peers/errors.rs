@@ -16,7 +16,8 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Of some of the frames. An answer without size has no direction: it is as far off as one can be on average.
+    /// Of some of the frames. An answer without size has no direction: it is as far off as one can
+    /// be on average.
     pub fn of(answers: &Answers, frames: &[usize]) -> Self {
         let known = || frames.iter().filter_map(|&i| answers[i]);
         let angle = |[truth, found]: [[f64; 3]; 2]| angle_deg(found, truth).unwrap_or(90.0);

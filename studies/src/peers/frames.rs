@@ -96,7 +96,8 @@ impl Frames {
             Ok::<_, anyhow::Error>(made)
         };
         let [ours, theirs] = see(&training, "training", None)?;
-        // Any model of these frames: what is refused depends on its rest position and contact reading only.
+        // Any model of these frames: what is refused depends on its rest position and contact
+        // reading only.
         let smallest = Options {
             hidden: Vec::new(),
             epochs: 1,

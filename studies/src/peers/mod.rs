@@ -1,8 +1,10 @@
-//! `hivtac-studies peers`: the sensing and its models beside the paper's own pipeline, on the same rendered frames.
+//! `hivtac-studies peers`: the sensing and its models beside the paper's own pipeline, on the same
+//! rendered frames.
 //!
-//! The paper's pipeline is its Section 5: OpenCV's HSV, threshold, dilation, contours and moments, and a float network of
-//! three hidden layers of 512 that answers with angles and |F|. Both are trained on the same frames of four fifths of the
-//! paper's poses and judged on the same frames of the others.
+//! The paper's pipeline is its Section 5: OpenCV's HSV, threshold, dilation, contours and moments,
+//! and a float network of three hidden layers of 512 that answers with angles and |F|. Both are
+//! trained on the same frames of four fifths of the paper's poses and judged on the same frames of
+//! the others.
 
 mod errors;
 mod frames;
@@ -65,7 +67,8 @@ pub struct PeersArgs {
     /// Write the figures as JSON, too.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Write the tables into this document, between its lines `<!-- peers: begin … -->` and `<!-- peers: end -->`.
+    /// Write the tables into this document, between its lines `<!-- peers: begin … -->` and
+    /// `<!-- peers: end -->`.
     #[arg(long)]
     document: Option<PathBuf>,
 }
@@ -78,7 +81,8 @@ impl PeersArgs {
     /// Does it, and prints the tables.
     ///
     /// # Errors
-    /// When OpenCV cannot be had, files are of another run, or the scene cannot render what is asked for.
+    /// When OpenCV cannot be had, files are of another run, or the scene cannot render what is
+    /// asked for.
     pub fn run(&self) -> Result<()> {
         let python = Python::in_folder(&self.folder)
             .context("without OpenCV there is nothing to compare with")?;

@@ -187,8 +187,8 @@ fn plain_tier(args: &PeersArgs) -> Tier {
     }
 }
 
-/// Wider, with everything that makes a network fine: directions of weak forces count, unused weights decay, and in int8 each
-/// unit of the first layer has four parts.
+/// Wider, with everything that makes a network fine: directions of weak forces count, unused
+/// weights decay, and in int8 each unit of the first layer has four parts.
 fn fine_tier(args: &PeersArgs) -> Tier {
     let float = Options {
         hidden: vec![128, 64],

@@ -1,4 +1,5 @@
-//! The paper's image processing in OpenCV, as a detector: a Python that is shown frames through a pipe.
+//! The paper's image processing in OpenCV, as a detector: a Python that is shown frames through a
+//! pipe.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
@@ -43,7 +44,8 @@ impl Python {
             .context("`python3` cannot be started: install Python 3 with its venv module")?;
         ensure!(
             made.status.success(),
-            "there is no Python with OpenCV (see above): install python3-venv, and see that pip reaches its index"
+            "there is no Python with OpenCV (see above): install python3-venv, and see that pip \
+             reaches its index"
         );
         Ok(Self {
             python: PathBuf::from(String::from_utf8(made.stdout)?.trim()),
@@ -110,7 +112,8 @@ impl Drop for OpenCv {
     }
 }
 
-/// The paper's features of four contours (x, y, area in px), which lie in the four quadrants about their middle.
+/// The paper's features of four contours (x, y, area in px), which lie in the four quadrants about
+/// their middle.
 fn observation(contours: &[[f64; 3]]) -> Detection {
     let missing = || "markers_missing".to_owned();
     if contours.len() != 4 {
@@ -166,7 +169,8 @@ mod tests {
         assert_eq!(observation(&twice), Err("markers_missing".into()));
     }
 
-    /// A process that answers without looking: what goes through the pipe, and what is said when it ends.
+    /// A process that answers without looking: what goes through the pipe, and what is said when it
+    /// ends.
     #[test]
     fn frames_and_answers_go_through_a_pipe() {
         let scene = Recipe::default().scene(0).unwrap();

@@ -72,9 +72,10 @@ impl Comparison {
 
     fn markdown(&self) -> String {
         let mut text = format!(
-            "Contact reading `{}`, preset `{}`: trained on {} frames, judged on {} of {} frames of {} held-out poses \
-             that everyone accepted. The paper's network: {} passes.\n\n| frame | model | direction | \\|F\\| ≥ 50 mN | RMSE of \
-             \\|F\\| | rejected | times the paper's at {} | times the paper's at this size |\n|---|---|--:|--:|--:|--:|---|---|\n",
+            "Contact reading `{}`, preset `{}`: trained on {} frames, judged on {} of {} frames of \
+             {} held-out poses that everyone accepted. The paper's network: {} passes.\n\n| frame \
+             | model | direction | \\|F\\| ≥ 50 mN | RMSE of \\|F\\| | rejected | times the \
+             paper's at {} | times the paper's at this size |\n|---|---|--:|--:|--:|--:|---|---|\n",
             self.contact,
             self.preset,
             self.training_frames,
@@ -114,8 +115,9 @@ fn limits(contact: &str, size: &str, tenths: &[Tenth]) -> String {
     };
     let names: Vec<_> = first.found.iter().map(|(name, _)| *name).collect();
     let mut text = format!(
-        "The limit, `{contact}`, {size}: root mean squares by tenths of the frames, direction and \\|F\\|; models as multiples of \
-         the bound.\n\n| \\|F\\|, mN | scatter, px | noise alone | bound | bound of noise alone | {} |\n|---|--:|--:|---|---|{}\n",
+        "The limit, `{contact}`, {size}: root mean squares by tenths of the frames, direction and \
+         \\|F\\|; models as multiples of the bound.\n\n| \\|F\\|, mN | scatter, px | noise alone | \
+         bound | bound of noise alone | {} |\n|---|--:|--:|---|---|{}\n",
         names.join(" | "),
         "---|".repeat(names.len())
     );
@@ -140,7 +142,8 @@ fn limits(contact: &str, size: &str, tenths: &[Tenth]) -> String {
     text
 }
 
-/// All comparisons as Markdown. A cell with three ratios has direction, direction from 50 mN up, and RMSE of |F|.
+/// All comparisons as Markdown. A cell with three ratios has direction, direction from 50 mN up,
+/// and RMSE of |F|.
 pub fn markdown(comparisons: &[Comparison]) -> String {
     let texts: Vec<_> = comparisons.iter().map(Comparison::markdown).collect();
     texts.join("\n")

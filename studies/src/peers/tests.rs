@@ -2,7 +2,8 @@ use hivtac_calibration::dataset::{MarkerDetector, Recipe, Sensing};
 
 use super::*;
 
-/// The whole study, small, without OpenCV: the sensing with the paper's binary centroids stands in for it.
+/// The whole study, small, without OpenCV: the sensing with the paper's binary centroids stands in
+/// for it.
 #[test]
 fn a_small_comparison_runs_and_goes_on_where_it_was() {
     let directory = tempfile::tempdir().unwrap();

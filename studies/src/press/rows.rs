@@ -104,7 +104,8 @@ impl Errors {
         }
     }
 
-    /// Root mean squares: of the direction, degrees, of |F|, mN, and of each coordinate of the place, µm.
+    /// Root mean squares: of the direction, degrees, of |F|, mN, and of each coordinate of the
+    /// place, µm.
     pub fn rms(&self) -> [f64; 3] {
         self.squares.map(|sum| (sum / f64::from(self.count)).sqrt())
     }

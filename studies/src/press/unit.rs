@@ -36,12 +36,14 @@ pub struct Answer {
     pub force: Option<Force>,
     /// Why it was refused, or how far to trust it.
     pub status: Status,
-    /// How far each marker's centroid is from where it truly was, px; `None` where it was not found.
+    /// How far each marker's centroid is from where it truly was, px; `None` where it was not
+    /// found.
     pub off_px: Option<[[f64; 2]; 4]>,
 }
 
 impl TestedUnit {
-    /// Of these options, as a camera of these conditions sees it, pressed by a tip of a radius in mm.
+    /// Of these options, as a camera of these conditions sees it, pressed by a tip of a radius in
+    /// mm.
     ///
     /// # Errors
     /// When an option is out of range.
@@ -169,7 +171,8 @@ impl Tared<'_> {
         self.sensor.tare()
     }
 
-    /// Where markers are seen under a press, the mean of some frames; the number selects their noise.
+    /// Where markers are seen under a press, the mean of some frames; the number selects their
+    /// noise.
     ///
     /// # Errors
     /// When the film cannot take the press, or markers are not found.

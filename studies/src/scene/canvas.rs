@@ -53,8 +53,8 @@ impl Canvas {
         canvas
     }
 
-    /// Half as wide and high: each pixel the mean of four, in steps of 4 of 255, which noise hardly leaves: the file is
-    /// then a third as large.
+    /// Half as wide and high: each pixel the mean of four, in steps of 4 of 255, which noise hardly
+    /// leaves: the file is then a third as large.
     pub fn halved(&self) -> Canvas {
         let mut small = Canvas::new(self.width / 2, self.height / 2, BLACK);
         for y in 0..small.height {
@@ -108,8 +108,8 @@ impl Canvas {
         }
     }
 
-    /// Text from the upper left pixel of its first character; every pixel of a character is a square of `scale`.
-    /// Characters that the font has not become question marks.
+    /// Text from the upper left pixel of its first character; every pixel of a character is a
+    /// square of `scale`. Characters that the font has not become question marks.
     pub fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
         let side = i64::from(scale);
         let advance = side * i64::from(CHARACTER);

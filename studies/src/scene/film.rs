@@ -26,8 +26,9 @@ pub struct FilmArgs {
     /// Direction, degrees.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     beta_deg: f64,
-    /// What force and direction mean: force (they are the force on the film), stick (the tip's way, and the force along it) or
-    /// slip:RATIO (the same, until the tip slides at that ratio of friction).
+    /// What force and direction mean: force (they are the force on the film), stick (the tip's way,
+    /// and the force along it) or slip:RATIO (the same, until the tip slides at that ratio of
+    /// friction).
     #[arg(long, default_value = "force")]
     contact: ContactArg,
     /// Where the tip first touches, mm from the middle.

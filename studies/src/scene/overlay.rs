@@ -4,7 +4,8 @@ use hivtac_scene::Truth;
 
 use super::canvas::{BLACK, CHARACTER, CYAN, Canvas};
 
-/// Draws a cross at each marker's true centroid and its identity beside it, into a picture of a frame at a scale.
+/// Draws a cross at each marker's true centroid and its identity beside it, into a picture of a
+/// frame at a scale.
 pub fn draw(canvas: &mut Canvas, truth: &Truth, scale: u32) {
     for (id, marker) in truth.markers.iter().enumerate() {
         if let Some(marker) = marker {

@@ -109,7 +109,8 @@ fn centroid_px(marker: Marker) -> [f64; 2] {
     [marker.x, marker.y].map(|part| f64::from(part.0) / PX)
 }
 
-/// The largest distance of a found marker from the truth, px; endless when the truth has no such marker.
+/// The largest distance of a found marker from the truth, px; endless when the truth has no such
+/// marker.
 pub fn worst_px(centroids_px: &[[f64; 2]; 4], truth: &Truth) -> f64 {
     let pairs = centroids_px.iter().zip(&truth.markers);
     let distances = pairs.map(|([x, y], marker)| match marker {

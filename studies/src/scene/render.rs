@@ -14,8 +14,8 @@ use super::{cases, overlay};
 /// Arguments of `scene render`.
 #[derive(Args)]
 pub struct RenderArgs {
-    /// A scene file (docs/scene-file.md), or a name: of a motion of the usual sensor (rest, static, demo, …), or of a
-    /// hard case (see `scene cases`).
+    /// A scene file (docs/scene-file.md), or a name: of a motion of the usual sensor (rest, static,
+    /// demo, …), or of a hard case (see `scene cases`).
     scene: String,
     /// The PNG file to write.
     #[arg(long)]
@@ -23,7 +23,8 @@ pub struct RenderArgs {
     /// Draw a cross at the true centroid of every marker, and its identity.
     #[arg(long)]
     overlay: bool,
-    /// Seconds from the beginning of the scene; if not given 0, and for hard cases what their sheet shows.
+    /// Seconds from the beginning of the scene; if not given 0, and for hard cases what their sheet
+    /// shows.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     at: Option<f64>,
     /// The frame's number: it selects the noise.

@@ -1,4 +1,5 @@
-//! What configurations cost on the chip, out of the parts that `cargo xtask bench --tradeoff` counted.
+//! What configurations cost on the chip, out of the parts that `cargo xtask bench --tradeoff`
+//! counted.
 
 use std::fs;
 use std::path::Path;
@@ -13,9 +14,11 @@ use super::plan::{Estimator, Numbers};
 pub const COMMAND: &str = "cargo xtask bench --tradeoff";
 /// The core's clock, MHz.
 pub const CLOCK_MHZ: f64 = 480.0;
-/// A model of at most so many bytes is copied to DTCM, a larger one stays in flash (`firmware/src/model.rs`).
+/// A model of at most so many bytes is copied to DTCM, a larger one stays in flash
+/// (`firmware/src/model.rs`).
 const NEAR_LIMIT: u64 = 12 * 1024;
-/// For each column of a frame: a ring of 32 bands and three bands more, of 8 rows and 2 bytes a pixel (`firmware/src/bands.rs`).
+/// For each column of a frame: a ring of 32 bands and three bands more, of 8 rows and 2 bytes a
+/// pixel (`firmware/src/bands.rs`).
 const BAND_BYTES_OF_A_COLUMN: i64 = (32 + 3) * 8 * 2;
 /// Memories that hold data; the code's copy in ITCM is none.
 const DATA_MEMORIES: [&str; 3] = ["RAM", "SRAM", "AXISRAM"];

@@ -1,4 +1,5 @@
-//! The frames of a sweep: rendered once for each size, seen with both centroid estimators, kept as data sets.
+//! The frames of a sweep: rendered once for each size, seen with both centroid estimators, kept as
+//! data sets.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,7 +52,8 @@ struct Looked {
     looks: [EstimatorResult; 2],
 }
 
-/// The frames of a size, from `folder` or rendered into it. `progress` is called for each, from any thread.
+/// The frames of a size, from `folder` or rendered into it. `progress` is called for each, from any
+/// thread.
 ///
 /// # Errors
 /// When the folder holds something else or cannot be written, or the scene cannot be rendered.

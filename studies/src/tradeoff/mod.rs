@@ -1,4 +1,5 @@
-//! `hivtac-studies tradeoff`: speed against accuracy, and the best under a user's limits (`docs/tradeoff.md`).
+//! `hivtac-studies tradeoff`: speed against accuracy, and the best under a user's limits
+//! (`docs/tradeoff.md`).
 //!
 //! ```text
 //! plan → frames → sweep (train, judge) → results ┐
@@ -40,12 +41,12 @@ pub struct TradeoffArgs {
     /// Pick the best that the core can do at least so often a second, modelled.
     #[arg(long)]
     min_rate: Option<f64>,
-    /// Pick the fastest whose mean direction error from 50 mN up is at most this, simulated; the upper end of its interval
-    /// counts.
+    /// Pick the fastest whose mean direction error from 50 mN up is at most this, simulated; the
+    /// upper end of its interval counts.
     #[arg(long)]
     max_error_deg: Option<f64>,
-    /// Train the pick on as many frames as the default model, and write its model and settings into this folder. Without any
-    /// limit the pick is the default.
+    /// Train the pick on as many frames as the default model, and write its model and settings into
+    /// this folder. Without any limit the pick is the default.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Frames of each size; of another number than the results' file has, name another file.
@@ -117,10 +118,12 @@ impl TradeoffArgs {
 
     /// Does what is missing of the sweep, and then picks, or writes the documents.
     ///
-    /// `begins` is told the numbers of frames and trainings ahead, and gives what to call at every step.
+    /// `begins` is told the numbers of frames and trainings ahead, and gives what to call at every
+    /// step.
     ///
     /// # Errors
-    /// When a file cannot be read or written or holds something else, a training fails, or nothing is within the limits.
+    /// When a file cannot be read or written or holds something else, a training fails, or nothing
+    /// is within the limits.
     pub fn run<P: Fn(Step) + Sync>(&self, begins: impl Fn([usize; 2]) -> P) -> Result<()> {
         if let Some(folder) = self.results.parent() {
             fs::create_dir_all(folder)?;
@@ -166,8 +169,8 @@ fn told(picked: &Configuration) -> String {
     let half = |mean: &table::Mean| mean.half_width.unwrap_or(0.0);
     let (strong, force) = (&picked.strong_direction_deg, &picked.force_rmse_mn);
     let mut text = format!(
-        "picked: {picked}\n  simulated: direction {:.3}° ± {:.3}° from 50 mN up, {:.3}° over all; |F| {:.3} ± {:.3} mN RMSE; \
-         place {:.1} µm along x and y each",
+        "picked: {picked}\n  simulated: direction {:.3}° ± {:.3}° from 50 mN up, {:.3}° over all; \
+         |F| {:.3} ± {:.3} mN RMSE; place {:.1} µm along x and y each",
         strong.value,
         half(strong),
         picked.direction_deg.value,
@@ -177,7 +180,8 @@ fn told(picked: &Configuration) -> String {
     );
     if let Some(cost) = &picked.cost {
         text += &format!(
-            "\n  modelled: {} cycles, {:.0} µs, {:.0} frames a second, {:.0} µs from the last pixel to the sample",
+            "\n  modelled: {} cycles, {:.0} µs, {:.0} frames a second, {:.0} µs from the last \
+             pixel to the sample",
             cost.cycles,
             cost.microseconds(),
             cost.rate(),

@@ -27,8 +27,9 @@ pub const FRAMES: usize = ROWS + NOISE.0;
 /// Frames to check on, and the seed of their loads and noise.
 const CHECKED: (usize, u64) = (4000, 1_000_001);
 
-/// Trains the model of a configuration on as many frames as the default model has, and writes `model.weights`, `model.hvtm` and
-/// `settings.json` into a folder. `progress` is called for every rendered frame.
+/// Trains the model of a configuration on as many frames as the default model has, and writes
+/// `model.weights`, `model.hvtm` and `settings.json` into a folder. `progress` is called for every
+/// rendered frame.
 ///
 /// Gives what to do with them, in words.
 ///
@@ -97,11 +98,13 @@ fn settings(conditions: &Conditions) -> serde_json::Value {
     })
 }
 
-/// What to type. The model file carries all settings of the sensing; the firmware takes them from it at the start.
+/// What to type. The model file carries all settings of the sensing; the firmware takes them from
+/// it at the start.
 fn orders(model: &Path) -> String {
     format!(
-        "flash it, from the root of the repository:\n\n  HIVTAC_MODEL={} \\\n    cargo run --release -p hivtac-firmware --target \
-         thumbv7em-none-eabihf\n\nthen, while nothing touches the film:\n\n  hivtac tare",
+        "flash it, from the root of the repository:\n\n  HIVTAC_MODEL={} \\\n    cargo run \
+         --release -p hivtac-firmware --target thumbv7em-none-eabihf\n\nthen, while nothing \
+         touches the film:\n\n  hivtac tare",
         model.display()
     )
 }

@@ -14,12 +14,13 @@ pub struct Limits {
     pub budget_us: Option<f64>,
     /// Least frames a second that the core can do, modelled.
     pub min_rate: Option<f64>,
-    /// Largest mean direction error from 50 mN up, degrees, simulated: the upper end of its interval.
+    /// Largest mean direction error from 50 mN up, degrees, simulated: the upper end of its
+    /// interval.
     pub max_error_deg: Option<f64>,
 }
 
-/// The configurations within reach that no other within reach beats or equals in both time and direction error from 50 mN
-/// up, by time.
+/// The configurations within reach that no other within reach beats or equals in both time and
+/// direction error from 50 mN up, by time.
 pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configuration> {
     let mut candidates: Vec<_> = configurations
         .iter()
@@ -141,7 +142,8 @@ pub(super) mod tests {
     use crate::tradeoff::table::Mean;
     use hivtac_calibration::conditions::CentroidName;
 
-    /// A configuration that takes so many cycles for so much error: direction (degrees) and |F| (mN).
+    /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
+    /// (mN).
     pub fn made(size: [u16; 2], cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         let mean = |value: f64| Mean {
             value,
@@ -172,7 +174,8 @@ pub(super) mod tests {
 
     const QVGA: [u16; 2] = [320, 240];
 
-    /// By cycles: rough; good; as good; a little better; much better in |F|; then one without a firmware, and one without a camera.
+    /// By cycles: rough; good; as good; a little better; much better in |F|; then one without a
+    /// firmware, and one without a camera.
     fn several() -> Vec<Configuration> {
         vec![
             made(QVGA, 96_000, [0.5, 0.3]),

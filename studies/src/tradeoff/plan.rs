@@ -167,7 +167,8 @@ impl Numbers {
     }
 }
 
-/// Lens and camera for frames of a size: the sensor's own, or the paper's for its 800×600, which no supported camera has.
+/// Lens and camera for frames of a size: the sensor's own, or the paper's for its 800×600, which no
+/// supported camera has.
 pub fn preset(size: [u16; 2]) -> Preset {
     if size == [800, 600] {
         Preset::Paper

@@ -16,8 +16,8 @@ pub fn markdown(results: &Results, configurations: &[Configuration]) -> String {
     let mut text = about(results);
     let _ = write!(
         text,
-        "\n### The Pareto front\n\nWhat a supported camera delivers, and nothing else beats in both time \
-         and direction error from 50 mN up:\n\n{}",
+        "\n### The Pareto front\n\nWhat a supported camera delivers, and nothing else beats in \
+         both time and direction error from 50 mN up:\n\n{}",
         table(&front(configurations, Reach::Camera))
     );
     let _ = write!(
@@ -49,11 +49,12 @@ fn about(results: &Results) -> String {
     let [epochs, rounded] = plan.epochs;
     let [paper_epochs, paper_rounded] = plan.paper_epochs;
     let mut text = format!(
-        "**Simulated** frames of a tip anywhere within ±{} mm, contact reading `force`, |F| to {} N, angles to ±{}°: {} of each \
-         size, in {} parts. Each of {} seeds trains without one part and is judged on it, on the frames up to {JUDGED_N} N and \
-         ±{JUDGED_MM} mm. Networks: {epochs} passes over the data in floats, then {rounded} with the chip's rounding for each \
-         arithmetic; 512-512-512: one seed, {paper_epochs} and {paper_rounded} passes. Intervals (±) hold the mean of all seeds \
-         with 95 %, by Student's t.\n\n\
+        "**Simulated** frames of a tip anywhere within ±{} mm, contact reading `force`, |F| to {} \
+         N, angles to ±{}°: {} of each size, in {} parts. Each of {} seeds trains without one part \
+         and is judged on it, on the frames up to {JUDGED_N} N and ±{JUDGED_MM} mm. Networks: \
+         {epochs} passes over the data in floats, then {rounded} with the chip's rounding for each \
+         arithmetic; 512-512-512: one seed, {paper_epochs} and {paper_rounded} passes. Intervals \
+         (±) hold the mean of all seeds with 95 %, by Student's t.\n\n\
          | frames | of | binary: rejected | weighted: rejected |\n\
          |---|---:|---:|---:|\n",
         RENDERED.place_mm, RENDERED.force_n, RENDERED.alpha_deg, plan.rows, plan.parts, plan.seeds
@@ -93,8 +94,10 @@ fn grouped(number: i64) -> String {
     groups.join(",")
 }
 
-const HEAD: &str = "| frame | centroids | network | numbers | steps | run forwards | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | \
-                    place, µm | worst: °, mN | unexplained | instructions | modelled cycles | µs | per second | latency, µs | flash, KB | RAM, KB |\n\
+const HEAD: &str = "| frame | centroids | network | numbers | steps | run forwards | direction ≥ \
+                    50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | worst: °, mN | unexplained \
+                    | instructions | modelled cycles | µs | per second | latency, µs | flash, KB | \
+                    RAM, KB |\n\
                     |---|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
 
 fn table(configurations: &[&Configuration]) -> String {
@@ -139,7 +142,8 @@ fn sizes(configurations: &[Configuration]) -> String {
     let estimator = default_estimator();
     let mut text = format!(
         "{estimator}, {}, {USUAL_STEPS} step.\n\n\
-         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | cycles | µs |\n\
+         | frame | centroids | direction ≥ 50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | \
+         cycles | µs |\n\
          |---|---|---:|---:|---:|---:|---:|---:|\n",
         Numbers::Int8PerChannel
     );

@@ -1,5 +1,5 @@
-//! What a sweep has found so far: a file of one JSON object a line, to which every finished training is added, so that an
-//! interrupted sweep goes on.
+//! What a sweep has found so far: a file of one JSON object a line, to which every finished
+//! training is added, so that an interrupted sweep goes on.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write;
@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::frames::FrameTally;
 use super::plan::{Numbers, Plan, Task};
 
-/// How far one model was from the truth, on frames that it was not made from, within the calibrated range of |F|.
+/// How far one model was from the truth, on frames that it was not made from, within the calibrated
+/// range of |F|.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Figures {
@@ -68,10 +69,12 @@ pub struct Results {
 }
 
 impl Results {
-    /// Reads what there is, or begins a file for `plan`. Another plan than the file's is an error, none is the file's.
+    /// Reads what there is, or begins a file for `plan`. Another plan than the file's is an error,
+    /// none is the file's.
     ///
     /// # Errors
-    /// When the file cannot be read or written, holds something else, or the results of another plan.
+    /// When the file cannot be read or written, holds something else, or the results of another
+    /// plan.
     pub fn open(file: &Path, plan: Option<&Plan>) -> Result<Self> {
         let text = match fs::read_to_string(file) {
             Ok(text) => text,

@@ -14,7 +14,8 @@ use super::results::{Figures, Finished, Results};
 pub struct Mean {
     /// The mean.
     pub value: f64,
-    /// Half of the interval that holds the true mean with 95 %, by Student's t; none of a single seed.
+    /// Half of the interval that holds the true mean with 95 %, by Student's t; none of a single
+    /// seed.
     pub half_width: Option<f64>,
 }
 
@@ -61,7 +62,8 @@ impl fmt::Display for Configuration {
         let centroid = words(self.centroid);
         write!(
             f,
-            "{estimator} ({numbers}) with {steps} step{} on {centroid} centroids of {width}×{height}",
+            "{estimator} ({numbers}) with {steps} step{} on {centroid} centroids of \
+             {width}×{height}",
             if *steps == 1 { "" } else { "s" }
         )
     }

@@ -4,7 +4,8 @@ use hivtac_studies::paper_model::{Design, PinholeDistance};
 
 use crate::table::{self, largest_errors};
 
-/// The errors that the documentation states: relative, but for R*, whose is |Δ(R*²)|. f64, then f32.
+/// The errors that the documentation states: relative, but for R*, whose is |Δ(R*²)|. f64, then
+/// f32.
 const BOUNDS: [(&str, f64, f64); 7] = [
     ("r_m", 3e-16, 2e-7),
     ("r_m_pressed", 3e-16, 2e-7),

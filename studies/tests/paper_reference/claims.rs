@@ -1,4 +1,5 @@
-//! Where the paper is ambiguous or wrong: the numbers that the documentation gives for each reading.
+//! Where the paper is ambiguous or wrong: the numbers that the documentation gives for each
+//! reading.
 
 use hivtac_studies::paper_model::{
     Design, NormalPress, PinholeDistance, disp_s_mm, shear_stretch, sheared_position_mm,
@@ -24,7 +25,8 @@ fn press(pm_mm: f64, z_mm: f64) -> NormalPress<f64> {
     }
 }
 
-/// The second and third lines of eq. 17 with the one-argument arctangent, and the second with two arguments.
+/// The second and third lines of eq. 17 with the one-argument arctangent, and the second with two
+/// arguments.
 fn lines_of_eq_17(pm: f64, z: f64) -> [f64; 3] {
     let rest = libm::atan(pm / 10.0);
     let third = libm::atan(z * pm / (pm * pm + 10.0 * (10.0 - z)));

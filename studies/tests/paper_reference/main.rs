@@ -1,5 +1,5 @@
-//! The paper's analytic model against a high-precision reference (`table.csv`, written by `reference.py`), and the
-//! numbers that its documentation states.
+//! The paper's analytic model against a high-precision reference (`table.csv`, written by
+//! `reference.py`), and the numbers that its documentation states.
 
 mod accuracy;
 mod claims;

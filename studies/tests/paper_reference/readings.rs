@@ -1,4 +1,5 @@
-//! The readings of the paper's Q that are not this crate's [`Design`], as the mean of R* that each gives.
+//! The readings of the paper's Q that are not this crate's [`Design`], as the mean of R* that each
+//! gives.
 
 use hivtac_studies::paper_model::{Design, NormalPress, OutOfDomain, PinholeDistance};
 
@@ -15,7 +16,8 @@ pub fn as_printed(d_ph: PinholeDistance) -> [f64; 2] {
     scan::means(|pm, z, shear| must(design.quality_mm(pm, z, shear)))
 }
 
-/// z is the depth of the centre and the marker's falls off towards the corner, as the model's film does.
+/// z is the depth of the centre and the marker's falls off towards the corner, as the model's film
+/// does.
 pub fn depth_of_the_centre(d_ph: PinholeDistance) -> [f64; 2] {
     let design = Design::paper(d_ph);
     let pn = design.pn_mm();
@@ -45,8 +47,8 @@ pub fn shear_as_seen(d_ph: PinholeDistance) -> Design<f64> {
     }
 }
 
-/// The smallest and the largest mean over positive values that a grid of points with its edges gives, for 5 to 101
-/// points along each side.
+/// The smallest and the largest mean over positive values that a grid of points with its edges
+/// gives, for 5 to 101 points along each side.
 pub fn over_grids(d_ph: PinholeDistance) -> [f64; 2] {
     let means = (5..=101).map(|points| on_a_grid(&Design::paper(d_ph), points));
     means.fold([f64::MAX, 0.0], |[low, high], mean| {

@@ -1,18 +1,19 @@
-"""Writes table.csv: values of the paper's analytic model (eqs. 15-25) to 25 digits (the means: 12), from 60-digit
-arithmetic.
+"""Writes table.csv: values of the paper's analytic model (eqs. 15-25) to 25 digits (the means: 12),
+from 60-digit arithmetic.
 
     python3 -m venv venv && venv/bin/pip install mpmath==1.3.0
     venv/bin/python reference.py
 
-Takes about a minute. Inputs are numbers that f32 and f64 both hold exactly; only f = 2.1 mm and PN = sqrt(2) a
-of the design are not. Nothing here is written as the Rust code writes it: disp_N is the second line of eq. 17 with
-the two-argument arctangent, R* the root of the derivative of that line, and the means integrate PP'(R) where the
-code sums R*(z, PP'). Every R* is also compared with Q along a scan of the whole of (0, PN].
+Takes about a minute. Inputs are numbers that f32 and f64 both hold exactly; only f = 2.1 mm and
+PN = sqrt(2) a of the design are not. Nothing here is written as the Rust code writes it: disp_N is
+the second line of eq. 17 with the two-argument arctangent, R* the root of the derivative of that
+line, and the means integrate PP'(R) where the code sums R*(z, PP'). Every R* is also compared with
+Q along a scan of the whole of (0, PN].
 
-Columns, lengths in mm: quantity, d_ph (slant or axial; empty where D_ph is an input or plays no part), pm, epsilon,
-d_ph_mm, z, shear, value. Quantities: r_m, r_m_pressed, disp_n (eqs. 15-17); disp_s (eq. 21, with PN in d_ph_mm);
-d_ph (eq. 23), quality (eq. 24), best_r (R*; "none" where Q has no maximum at a positive PM); and mean_positive,
-mean_with_zeros, positive_share (eq. 25).
+Columns, lengths in mm: quantity, d_ph (slant or axial; empty where D_ph is an input or plays no
+part), pm, epsilon, d_ph_mm, z, shear, value. Quantities: r_m, r_m_pressed, disp_n (eqs. 15-17);
+disp_s (eq. 21, with PN in d_ph_mm); d_ph (eq. 23), quality (eq. 24), best_r (R*; "none" where Q has
+no maximum at a positive PM); and mean_positive, mean_with_zeros, positive_share (eq. 25).
 """
 
 import struct

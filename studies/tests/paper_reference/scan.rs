@@ -7,7 +7,8 @@ const STEPS: usize = 1000;
 const EXTENT_MM: f64 = 7.0;
 const PN_MM: f64 = 14.0 * std::f64::consts::SQRT_2;
 
-/// The mean over positive values, and with zeros, of the R where `quality(PM, normal, shear)` is largest.
+/// The mean over positive values, and with zeros, of the R where `quality(PM, normal, shear)` is
+/// largest.
 ///
 /// Good to three digits: R is a multiple of 0.001.
 pub fn means(quality: impl Fn(f64, f64, f64) -> f64) -> [f64; 2] {

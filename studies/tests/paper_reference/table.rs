@@ -80,8 +80,8 @@ impl Row {
         Ok(Some(value))
     }
 
-    /// How far the model is from the row in precision `T`: of R*, |Δ(R*²)|, otherwise the relative error. Infinite
-    /// when one of the two is no maximum and the other is.
+    /// How far the model is from the row in precision `T`: of R*, |Δ(R*²)|, otherwise the relative
+    /// error. Infinite when one of the two is no maximum and the other is.
     pub fn error<T: Real>(&self) -> f64 {
         let computed = self.computed::<T>().unwrap_or_else(|why| panic!("{why}"));
         match (computed.map(T::to_f64), self.value) {
@@ -121,8 +121,8 @@ pub fn largest_errors(rows: &[Row], quantity: &str) -> (usize, f64, f64) {
     )
 }
 
-/// The largest relative error of R* itself in precision `T`, over the rows where it is at least `at_least`: below, it
-/// rises from 0 as a square root does.
+/// The largest relative error of R* itself in precision `T`, over the rows where it is at least
+/// `at_least`: below, it rises from 0 as a square root does.
 pub fn error_of_r<T: Real>(rows: &[Row], at_least: f64) -> f64 {
     let optima = rows.iter().filter(|row| row.quantity == "best_r");
     let errors = optima.filter_map(|row| {

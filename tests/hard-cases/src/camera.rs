@@ -55,7 +55,8 @@ fn shifted(x: f64, y: f64) -> Mounting {
     }
 }
 
-/// A shift upwards that brings so much of marker 0's height out of the frame under the scene's load.
+/// A shift upwards that brings so much of marker 0's height out of the frame under the scene's
+/// load.
 fn lifted(nominal: &Scene, part: f64) -> Mounting {
     let Some(marker) = nominal.truth(0.0).markers[0] else {
         return Mounting::default();

@@ -11,8 +11,8 @@ use hivtac_scene::{Load, Motion, Options, Patch, Preset, Scene, SceneError};
 
 /// A scene in which markers are hard to find.
 ///
-/// The rule for every one of them: the markers are found within [`HardCase::tolerance_px`] of the truth, or there is no
-/// force and a status that says why. Never is a force silently wrong.
+/// The rule for every one of them: the markers are found within [`HardCase::tolerance_px`] of the
+/// truth, or there is no force and a status that says why. Never is a force silently wrong.
 #[derive(Clone)]
 pub struct HardCase {
     /// Its name, such as `gain-0.30`; unique.
@@ -86,13 +86,14 @@ impl HardCase {
         nominal.with_options(options)
     }
 
-    /// Whether the case is about motion: [`Scene::frame`] at several times shows it, a constant load does not.
+    /// Whether the case is about motion: [`Scene::frame`] at several times shows it, a constant
+    /// load does not.
     pub fn moves(&self) -> bool {
         !matches!(self.motion, Motion::Static(_))
     }
 
-    /// How far a marker may be found from the truth in frames of a width, px: 0.3 up to QVGA, 0.15 at 800×600, linear
-    /// between them; 1 where the noise is four times the usual.
+    /// How far a marker may be found from the truth in frames of a width, px: 0.3 up to QVGA, 0.15
+    /// at 800×600, linear between them; 1 where the noise is four times the usual.
     pub fn tolerance_px(&self, width: u32) -> f64 {
         if self.noisy {
             return 1.0;

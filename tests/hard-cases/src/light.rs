@@ -3,7 +3,8 @@
 use super::{Expected, HardCase};
 use hivtac_scene::Options;
 
-/// Dark all over. The default threshold asks for a value of 45 of 255, which red tape reaches at a gain of about 0.3.
+/// Dark all over. The default threshold asks for a value of 45 of 255, which red tape reaches at a
+/// gain of about 0.3.
 pub(super) fn dark() -> Vec<HardCase> {
     let case = |(gain, expected)| {
         let name = format!("gain-{gain:.2}");

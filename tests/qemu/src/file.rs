@@ -110,7 +110,8 @@ impl fmt::Write for Writer {
 /// The program's name and arguments, separated by blanks.
 pub fn command_line(buffer: &mut [u8]) -> Result<&str, &'static str> {
     let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
-    // SAFETY: the block holds the address of the buffer and its length, which the host replaces by the text's.
+    // SAFETY: the block holds the address of the buffer and its length, which the host replaces by
+    // the text's.
     let failed =
         unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, block.as_mut_ptr() as usize) };
     let text = buffer.get(..block[1]).filter(|_| failed == 0);

@@ -1,6 +1,7 @@
 //! Runs a script of golden cases (`hivtac_tests::golden`) on a Cortex-M7.
 //!
-//! The command line, given by semihosting, is `hivtac-qemu-image SCRIPT RESULTS`: two files of the host.
+//! The command line, given by semihosting, is `hivtac-qemu-image SCRIPT RESULTS`: two files of the
+//! host.
 #![no_std]
 #![no_main]
 
@@ -50,7 +51,8 @@ fn run() -> Result<(), &'static str> {
     })
 }
 
-/// Storage in the memories that the benchmark tells apart (`memory.x`), which QEMU fills with zeros.
+/// Storage in the memories that the benchmark tells apart (`memory.x`), which QEMU fills with
+/// zeros.
 fn buffers() -> Result<Buffers<'static>, &'static str> {
     let model = cortex_m::singleton!(
         #[unsafe(link_section = ".weights")]

@@ -1,5 +1,5 @@
-//! Prints what the sensing makes of the scene's hard cases, as Markdown: `cargo run --release -p hivtac-tests --bin
-//! hard-cases -- [REPEATS [CONTACT]]`.
+//! Prints what the sensing makes of the scene's hard cases, as Markdown: `cargo run --release -p
+//! hivtac-tests --bin hard-cases -- [REPEATS [CONTACT]]`.
 
 use anyhow::{Context, Result};
 use hivtac_scene::Contact;

@@ -1,8 +1,9 @@
-//! `host-speed FOLDER`: writes the frames that `cargo xtask bench --peers` compares on, times the sensing on each of them on
-//! this computer, and prints one JSON object a line: `{"name":…,"file":…,"size":[columns,rows],"microseconds":…,"markers":…}`.
+//! `host-speed FOLDER`: writes the frames that `cargo xtask bench --peers` compares on, times the
+//! sensing on each of them on this computer, and prints one JSON object a line:
+//! `{"name":…,"file":…,"size":[columns,rows],"microseconds":…,"markers":…}`.
 //!
-//! What is timed is everything from RGB565 to markers and features, on one thread; the figure is the fastest of many
-//! repetitions, which a busy computer disturbs least.
+//! What is timed is everything from RGB565 to markers and features, on one thread; the figure is
+//! the fastest of many repetitions, which a busy computer disturbs least.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

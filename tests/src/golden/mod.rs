@@ -1,7 +1,9 @@
-//! Golden cases: a script of frames and numbers goes in, a text that says every bit of the results comes out.
+//! Golden cases: a script of frames and numbers goes in, a text that says every bit of the results
+//! comes out.
 //!
-//! A script is a sequence of records, each a kind in one byte and what [`Kind`] says, little-endian, until its end.
-//! Every result is one line, printed by `Debug`: all numbers are integers, so equal text means equal bits.
+//! A script is a sequence of records, each a kind in one byte and what [`Kind`] says,
+//! little-endian, until its end. Every result is one line, printed by `Debug`: all numbers are
+//! integers, so equal text means equal bits.
 
 mod marks;
 mod record;
@@ -47,7 +49,8 @@ pub const TWO_BANDS_PIXELS: usize = 2 * BAND_ROWS as usize * MAX_ROW_PIXELS;
 /// Blobs that a scan keeps.
 pub const BLOBS: usize = 64;
 
-/// Storage for what comes from a script. It is handed in, so that a microcontroller decides which memory it lies in.
+/// Storage for what comes from a script. It is handed in, so that a microcontroller decides which
+/// memory it lies in.
 pub struct Buffers<'b> {
     /// The model file.
     pub model: &'b mut AlignedFile<[u8]>,

@@ -11,22 +11,25 @@ use hivtac_sensing::threshold::ThresholdError;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
-    /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model file that later records
-    /// use.
+    /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model
+    /// file that later records use.
     Model = 1,
-    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the table takes; above them the number
-    /// of the pixel format), then the threshold (6 × u8) for later frames, as a model file has it.
+    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the table takes;
+    /// above them the number of the pixel format), then the threshold (6 × u8) for later frames, as
+    /// a model file has it.
     Threshold = 2,
-    /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16 each, or for two of mono): blobs.
+    /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16 each, or for two of
+    /// mono): blobs.
     Scan = 3,
-    /// Width, height, number of frames (u16), then their pixels: the whole pipeline, blobs included.
+    /// Width, height, number of frames (u16), then their pixels: the whole pipeline, blobs
+    /// included.
     Sense = 4,
     /// Eleven features, then eleven of the rest position (i64): network outputs.
     Network = 5,
     /// Three numbers (i32), taken as a force vector in µN and as α, β in m° and |F| in µN.
     Force = 6,
-    /// x, y (i32) and area (u32) of markers 0–3, then eleven features (i64) and four areas (u32) of the rest position: the
-    /// network and the steps from its answer.
+    /// x, y (i32) and area (u32) of markers 0–3, then eleven features (i64) and four areas (u32) of
+    /// the rest position: the network and the steps from its answer.
     Press = 7,
 }
 
@@ -44,7 +47,8 @@ impl Kind {
 
 /// Where a script comes from.
 pub trait Source {
-    /// Fills as much of the buffer as there is, and says how much: less than all only at the end of the script.
+    /// Fills as much of the buffer as there is, and says how much: less than all only at the end of
+    /// the script.
     fn read(&mut self, buffer: &mut [u8]) -> usize;
 }
 

@@ -100,7 +100,8 @@ mod tests {
         assert!((bound.force - 4e-6).abs() < 1e-15);
     }
 
-    /// A least-squares reading of noisy centroids of the scene comes as near to the truth as the bound, and no nearer.
+    /// A least-squares reading of noisy centroids of the scene comes as near to the truth as the
+    /// bound, and no nearer.
     #[test]
     fn the_bound_is_reached_where_the_film_is_nearly_a_line() {
         use rand::{Rng, SeedableRng};

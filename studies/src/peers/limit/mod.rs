@@ -1,8 +1,9 @@
 //! The physical limit: how well a force could be read from these centroids at all.
 //!
-//! Centroids scatter about the truth by the frames' noise and by how the markers happen to lie on the pixel grid. With the
-//! covariance Σ of that scatter and the Jacobian J of the true centroids by the force, no unbiased reading of single frames has
-//! a covariance below (JᵀΣ⁻¹J)⁻¹ (Cramér–Rao, for normal noise).
+//! Centroids scatter about the truth by the frames' noise and by how the markers happen to lie on
+//! the pixel grid. With the covariance Σ of that scatter and the Jacobian J of the true centroids
+//! by the force, no unbiased reading of single frames has a covariance below (JᵀΣ⁻¹J)⁻¹
+//! (Cramér–Rao, for normal noise).
 
 mod bound;
 pub mod matrix;
@@ -42,7 +43,8 @@ pub struct Tenth {
     pub found: Vec<(&'static str, [f64; 2])>,
 }
 
-/// One test frame: its label, the true centroids and how they follow the force, and how far the sensing was off.
+/// One test frame: its label, the true centroids and how they follow the force, and how far the
+/// sensing was off.
 struct TestSample {
     row: usize,
     force_n: [f64; 3],

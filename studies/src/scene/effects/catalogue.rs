@@ -22,8 +22,8 @@ pub struct Effect {
 /// What tells an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Compare {
-    /// What is found in its frames ([`Scene::frame`], at the times of a motion), through [`Frame::to_rgb565`] when its format
-    /// is another.
+    /// What is found in its frames ([`Scene::frame`], at the times of a motion), through
+    /// [`Frame::to_rgb565`] when its format is another.
     ///
     /// [`Frame::to_rgb565`]: hivtac_scene::Frame::to_rgb565
     Found,

@@ -89,7 +89,8 @@ impl Nominal {
         frames.any(|frame| frame.force_n.is_some())
     }
 
-    /// What an effect changes, without noise where it is not about noise: the change and not the noise is measured.
+    /// What an effect changes, without noise where it is not about noise: the change and not the
+    /// noise is measured.
     pub fn change(&self, effect: &Effect) -> Result<Change> {
         if effect.compare == Compare::Truth {
             return Ok(self.quiet.against_truth());
@@ -114,7 +115,8 @@ impl Nominal {
         Ok(measured(0)?.against(&measured(1)?))
     }
 
-    /// A sensor with a tare on the untouched film of a scene, or on the default one where that is not to be had.
+    /// A sensor with a tare on the untouched film of a scene, or on the default one where that is
+    /// not to be had.
     fn pipeline(&self, scene: &Scene) -> Result<Pipeline> {
         Pipeline::tared(scene).or_else(|_| Pipeline::tared(&self.noisy))
     }
@@ -237,7 +239,8 @@ mod tests {
             rms(lens.motion_px) > 50.0 * rms(floor.motion_px),
             "{lens:?}"
         );
-        // A shift of 24 and 12 µm is 2.24 px of 12 µm, and nothing after a tare but what pixels make of it.
+        // A shift of 24 and 12 µm is 2.24 px of 12 µm, and nothing after a tare but what pixels
+        // make of it.
         let shift = of("optical centre");
         assert!((rms(shift.centroid_px) - 2.236).abs() < 0.05, "{shift:?}");
         assert!(rms(shift.motion_px) < 0.1, "{shift:?}");

@@ -23,7 +23,8 @@ pub struct EffectsArgs {
     /// Geometry preset: paper or ov7725.
     #[arg(long, default_value = "ov7725")]
     preset: Preset,
-    /// Frame size, such as 320x240. Forces are measured where the default model fits: ov7725 at 320x240.
+    /// Frame size, such as 320x240. Forces are measured where the default model fits: ov7725 at
+    /// 320x240.
     #[arg(long, default_value = "320x240")]
     size: Size,
     /// Frames of the scene `sweep` for each effect, at 12 per second.
@@ -32,8 +33,8 @@ pub struct EffectsArgs {
     /// Print JSON.
     #[arg(long, conflicts_with = "document")]
     json: bool,
-    /// Write the table into this document instead, between its lines `<!-- effects PRESET SIZE: begin … -->` and
-    /// `… end -->`.
+    /// Write the table into this document instead, between its lines
+    /// `<!-- effects PRESET SIZE: begin … -->` and `… end -->`.
     #[arg(long)]
     document: Option<PathBuf>,
 }

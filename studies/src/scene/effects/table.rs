@@ -44,7 +44,8 @@ impl Table {
         }
     }
 
-    /// Whether a row moves centroids, after a tare, by more than other noise does, or makes frames useless.
+    /// Whether a row moves centroids, after a tare, by more than other noise does, or makes frames
+    /// useless.
     fn is_above_floor(&self, change: &Change) -> bool {
         let floor = self.floor.motion_px.rms().unwrap_or(0.0);
         change.rejected > 0 || change.motion_px.rms().is_none_or(|rms| rms > floor)

@@ -1,8 +1,11 @@
-//! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one file each, and prints what they are,
-//! one JSON object a line: `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
-//! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a board can hold of them it writes as `board.rs`, too,
-//! for `tests/board`. `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is made of
-//! (`trade`), and each line says the `"part"`, too. With times it writes the frames of the demo's scene at these times instead, for the figure over time.
+//! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one
+//! file each, and prints what they are, one JSON object a line:
+//! `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
+//! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
+//! board can hold of them it writes as `board.rs`, too, for `tests/board`.
+//! `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is
+//! made of (`trade`), and each line says the `"part"`, too. With times it writes the frames of the
+//! demo's scene at these times instead, for the figure over time.
 
 mod trade;
 
@@ -229,14 +232,17 @@ impl Board {
                 write(&pixels, &swapped.collect::<Vec<_>>())?;
                 let size = case.size;
                 self.frames += &format!(
-                    "Frame {{ size: {size:?}, special: {special:?}, pixels: include_bytes!({pixels:?}), model: &AlignedFile(*include_bytes!({model:?})).0 }},\n"
+                    "Frame {{ size: {size:?}, special: {special:?}, pixels: \
+                     include_bytes!({pixels:?}), model: &AlignedFile(*include_bytes!({model:?})).0 \
+                     }},\n"
                 );
             }
             Work::Network(widths) => {
                 let widths: Vec<String> = widths.iter().map(u16::to_string).collect();
                 let name = widths.join("-");
                 self.networks += &format!(
-                    "Network {{ name: {name:?}, model: &AlignedFile(*include_bytes!({model:?})).0 }},\n"
+                    "Network {{ name: {name:?}, model: &AlignedFile(*include_bytes!({model:?})).0 \
+                     }},\n"
                 );
             }
         }
@@ -265,8 +271,9 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
     ]
 }
 
-/// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first frame that goes all the
-/// way to a force, so that all of it is measured. In the smallest frames noise can make a marker implausible.
+/// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first
+/// frame that goes all the way to a force, so that all of it is measured. In the smallest frames
+/// noise can make a marker implausible.
 fn usual_frame(
     model: &[u8],
     format: PixelFormat,
