@@ -114,7 +114,7 @@ impl Stage {
     /// Builds the firmware beside the rig, whose emulator takes longest, and the host tool.
     fn build(toolchain: &Toolchain) -> Result<Stage> {
         eprintln!(
-            "Building the firmware, the emulated board and the host tool: some three minutes the \
+            "Building the firmware, the emulated board and the host tool: some four minutes the \
              first time on two cores, a second from then on."
         );
         let folder = workspace::work_folder("demo")?;
