@@ -59,7 +59,7 @@ enum Command {
     Tips(tips::Tips),
     /// Press with two tips at once, and with flat faces, by the film's full solver.
     Touches(touches::Touches),
-    /// Speed against accuracy: sweep frame sizes, estimators, arithmetics and scans, and write
+    /// Speed against accuracy: sweep frame sizes, estimators and arithmetics, and write
     /// docs/tradeoff.md; or pick the best under limits. An interrupted sweep goes on.
     Tradeoff(tradeoff::TradeoffArgs),
     /// Displace one marker and see what the residual does not tell.
