@@ -1,6 +1,7 @@
 """Trains a network on a data set in PyTorch and saves it for `hivtac-calibrate train --start`.
 
-    python calibration/python/train_pytorch.py data.csv net.safetensors [--hidden 64,64] [--epochs 100]
+    python calibration/python/train_pytorch.py data.csv net.safetensors
+        [--hidden 64,64] [--epochs 100]
 
 Needs torch and safetensors. The layout that it writes is described in docs/calibration.md.
 """
@@ -16,7 +17,11 @@ import hivtac_data
 def tensors_of(path):
     _, rows, rejected = hivtac_data.read(path)
     print(f"{len(rows)} accepted rows, rejected: {rejected or 'none'}")
-    pick = lambda names: torch.tensor([[row[name] for name in names] for row in rows], dtype=torch.float64)
+
+    def pick(names):
+        values = [[row[name] for name in names] for row in rows]
+        return torch.tensor(values, dtype=torch.float64)
+
     return pick(hivtac_data.FEATURES), pick(hivtac_data.FORCE)
 
 
@@ -46,7 +51,8 @@ def main():
     arguments.add_argument("out")
     arguments.add_argument("--hidden", default="64,64")
     arguments.add_argument("--epochs", type=int, default=100)
-    arguments.add_argument("--examples", type=int, default=0, help="also save this many features with the net's answers")
+    arguments.add_argument("--examples", type=int, default=0,
+                           help="also save this many features with the net's answers")
     arguments = arguments.parse_args()
 
     torch.manual_seed(1)
@@ -56,13 +62,15 @@ def main():
     net = train(x, y, [int(width) for width in arguments.hidden.split(",")], arguments.epochs)
 
     tensors = dict(net.state_dict())
-    tensors |= {"input.mean": x_mean, "input.sigma": x_sigma, "output.mean": y_mean, "output.sigma": y_sigma}
+    tensors |= {"input.mean": x_mean, "input.sigma": x_sigma,
+                "output.mean": y_mean, "output.sigma": y_sigma}
     if arguments.examples:
         some = slice(0, arguments.examples)
         with torch.no_grad():
             answers = net(x[some]).double() * y_sigma + y_mean
         tensors |= {"example.features": features[some].clone(), "example.answers": answers}
-    save_file(tensors, arguments.out, metadata={"meaning": "force-vector", "writer": f"PyTorch {torch.__version__}"})
+    metadata = {"meaning": "force-vector", "writer": f"PyTorch {torch.__version__}"}
+    save_file(tensors, arguments.out, metadata=metadata)
 
 
 if __name__ == "__main__":

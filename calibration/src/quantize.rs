@@ -355,7 +355,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn multiplier_and_shift_stand_for_the_factor(exponent in -30_i32..20, mantissa in 1.0..2.0_f64) {
+        fn multiplier_and_shift_stand_for_the_factor(
+            exponent in -30_i32..20,
+            mantissa in 1.0..2.0_f64,
+        ) {
             let factor = mantissa * 2_f64.powi(exponent);
             for bits in [24, 31] {
                 let (m, s) = multiplier_and_shift(factor, bits).unwrap();

@@ -133,7 +133,10 @@ proptest! {
         unit in vec(prop::array::uniform11(-1.0..1.0), 20),
     ) {
         let rows = rows(&network, &unit);
-        let px: Vec<[f64; INPUTS]> = rows.iter().map(|row| row.map(|q16| q16 as f64 / 65_536.0)).collect();
+        let px: Vec<[f64; INPUTS]> = rows
+            .iter()
+            .map(|row| row.map(|q16| q16 as f64 / 65_536.0))
+            .collect();
         network.activation_max = network.activation_maxima(&px);
         let weights = weights(network);
         let network = &weights.network;

@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn a_person_sees_aligned_columns() {
-        let expected = "     seq   frame         time        α        β      |F|       Fx       Fy       Fz  place x  place y  place ±  contact   true α   true β true |F|   true x   true y  status
+        let expected = r"     seq   frame         time        α        β      |F|       Fx       Fy       Fz  place x  place y  place ±  contact   true α   true β true |F|   true x   true y  status
                             s        °        °       mN       mN       mN       mN       mm       mm       mm                 °        °       mN       mm       mm
       41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.007    0.085      yes   -5.250    2.500  101.500    1.250   -0.500  not_calibrated";
         let truth = Some(Some(truth_with_place()));
@@ -331,7 +331,7 @@ mod tests {
             )
         );
         let without_place = sample(Some(force(None)), Status::default());
-        let expected = "      41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525        –        –        –       no   -5.250    2.500  101.500        –        –  ok";
+        let expected = r"      41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525        –        –        –       no   -5.250    2.500  101.500        –        –  ok";
         let truth = Some(Some(truth()));
         assert_eq!(row(Format::Human, &without_place, truth), expected);
     }

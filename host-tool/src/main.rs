@@ -61,7 +61,12 @@ enum Command {
         #[command(flatten)]
         device: Device,
         /// Good frames to average
-        #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=256))]
+        #[arg(
+            long,
+            value_name = "N",
+            default_value_t = 32,
+            value_parser = clap::value_parser!(u16).range(1..=256)
+        )]
         frames: u16,
     },
     /// Set which pixels a marker may have, and with that the camera's pixel format, until the

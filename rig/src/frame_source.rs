@@ -151,7 +151,11 @@ impl FrameSource for SceneSource {
         let force = truth.force.vector_n();
         let markers: Vec<Value> = (truth.markers.iter())
             .map(|marker| match marker {
-                Some(marker) => json!({"x": marker.centroid_px[0], "y": marker.centroid_px[1], "area": marker.area_px2}),
+                Some(marker) => json!({
+                    "x": marker.centroid_px[0],
+                    "y": marker.centroid_px[1],
+                    "area": marker.area_px2,
+                }),
                 None => Value::Null,
             })
             .collect();

@@ -292,7 +292,9 @@ mod tests {
             if cross(a, b, c[0], c[1]) < 0.0 {
                 std::mem::swap(&mut b, &mut c);
             }
-            let inside = |x, y| cross(a, b, x, y) >= 0.0 && cross(b, c, x, y) >= 0.0 && cross(c, a, x, y) >= 0.0;
+            let inside = |x, y| {
+                cross(a, b, x, y) >= 0.0 && cross(b, c, x, y) >= 0.0 && cross(c, a, x, y) >= 0.0
+            };
             let grid = Coverage::mean(&[Outline { corners: vec![a, b, c] }], 0.0);
             let mut exact = [0.0; 100];
             for (pixel, part) in grid.pixels(10, 10) {

@@ -2,7 +2,8 @@
 //! it.
 //!
 //! ```text
-//! load → film (hivtac-film) → marker discs in space → fisheye → coverage of pixels → light → noise → pixels
+//! load → film (hivtac-film) → marker discs in space → fisheye
+//!      → coverage of pixels → light → noise → pixels
 //! ```
 //!
 //! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure

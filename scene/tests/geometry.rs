@@ -201,7 +201,11 @@ proptest! {
         };
         for marker in frame.truth.markers.into_iter().flatten() {
             prop_assert!(marker.visible > 0.0 && marker.visible <= 1.0);
-            prop_assert!(marker.area_px2 > 0.0 && marker.area_px2 < 200.0, "{} px²", marker.area_px2);
+            prop_assert!(
+                marker.area_px2 > 0.0 && marker.area_px2 < 200.0,
+                "{} px²",
+                marker.area_px2
+            );
             let [x, y] = marker.centroid_px;
             prop_assert!((-40.0..200.0).contains(&x) && (-40.0..160.0).contains(&y), "{x}, {y}");
         }

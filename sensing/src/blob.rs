@@ -136,13 +136,21 @@ mod tests {
             let (x0, x1) = (a.min(b), a.max(b));
             let weights = Weights { sum: 3, sum_x: 5 };
             let blob = Blob::of_run(Run { x0, x1 }, y, weights);
-            let total = |f: fn(u64, u64) -> u64| (x0..=x1).map(|x| f(x.into(), y.into())).sum::<u64>();
+            let total = |f: fn(u64, u64) -> u64| {
+                (x0..=x1).map(|x| f(x.into(), y.into())).sum::<u64>()
+            };
             prop_assert_eq!(u64::from(blob.area), total(|_, _| 1));
             prop_assert_eq!((blob.sum_x, blob.sum_y), (total(|x, _| x), total(|_, y| y)));
             prop_assert_eq!((blob.sum_xx, blob.sum_yy), (total(|x, _| x * x), total(|_, y| y * y)));
             prop_assert_eq!(blob.sum_xy, total(|x, y| x * y));
-            prop_assert_eq!((blob.sum_xxx, blob.sum_yyy), (total(|x, _| x * x * x), total(|_, y| y * y * y)));
-            prop_assert_eq!((blob.sum_xxy, blob.sum_xyy), (total(|x, y| x * x * y), total(|x, y| x * y * y)));
+            prop_assert_eq!(
+                (blob.sum_xxx, blob.sum_yyy),
+                (total(|x, _| x * x * x), total(|_, y| y * y * y))
+            );
+            prop_assert_eq!(
+                (blob.sum_xxy, blob.sum_xyy),
+                (total(|x, y| x * x * y), total(|x, y| x * y * y))
+            );
             let row = u64::from(y);
             prop_assert_eq!((blob.weight, blob.weight_x, blob.weight_y), (3, 5, 3 * row));
             prop_assert_eq!((blob.x0, blob.y0, blob.x1, blob.y1), (x0, y, x1, y));

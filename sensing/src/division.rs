@@ -203,7 +203,10 @@ mod tests {
 
         #[test]
         fn it_is_the_quotient(dividend in numbers(), divisor in divisors()) {
-            prop_assert_eq!(Divisor::new(divisor).quotient(dividend), dividend / u64::from(divisor));
+            prop_assert_eq!(
+                Divisor::new(divisor).quotient(dividend),
+                dividend / u64::from(divisor)
+            );
         }
 
         #[test]
@@ -218,7 +221,11 @@ mod tests {
         }
 
         #[test]
-        fn signs_are_those_of_the_operator(dividend: i64, shift in 0..64u32, divisor in divisors()) {
+        fn signs_are_those_of_the_operator(
+            dividend: i64,
+            shift in 0..64u32,
+            divisor in divisors(),
+        ) {
             let (dividend, exact) = (dividend >> shift, i64::from(divisor));
             prop_assert_eq!(Divisor::new(divisor).signed_quotient(dividend), dividend / exact);
         }

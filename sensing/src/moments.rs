@@ -190,16 +190,23 @@ mod tests {
             }
             left.add(&right);
             let rows = (u64::from(y)..).zip(&runs).flat_map(|(y, (a, b))| [(*a, y), (*b, y)]);
-            let pixels: Vec<(u64, u64)> =
-                rows.flat_map(|(run, y)| (run.x0..=run.x1).map(move |x| (u64::from(x), y))).collect();
+            let pixels: Vec<(u64, u64)> = rows
+                .flat_map(|(run, y)| (run.x0..=run.x1).map(move |x| (u64::from(x), y)))
+                .collect();
             let total = |f: fn(u64, u64) -> u64| pixels.iter().map(|(x, y)| f(*x, *y)).sum::<u64>();
             let blob = left.blob();
             prop_assert_eq!(u64::from(blob.area), total(|_, _| 1));
             prop_assert_eq!((blob.sum_x, blob.sum_y), (total(|x, _| x), total(|_, y| y)));
             prop_assert_eq!((blob.sum_xx, blob.sum_yy), (total(|x, _| x * x), total(|_, y| y * y)));
             prop_assert_eq!(blob.sum_xy, total(|x, y| x * y));
-            prop_assert_eq!((blob.sum_xxx, blob.sum_yyy), (total(|x, _| x * x * x), total(|_, y| y * y * y)));
-            prop_assert_eq!((blob.sum_xxy, blob.sum_xyy), (total(|x, y| x * x * y), total(|x, y| x * y * y)));
+            prop_assert_eq!(
+                (blob.sum_xxx, blob.sum_yyy),
+                (total(|x, _| x * x * x), total(|_, y| y * y * y))
+            );
+            prop_assert_eq!(
+                (blob.sum_xxy, blob.sum_xyy),
+                (total(|x, y| x * x * y), total(|x, y| x * y * y))
+            );
         }
     }
 

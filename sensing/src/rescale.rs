@@ -125,7 +125,11 @@ mod tests {
 
         #[test]
         fn inputs(
-            value in prop_oneof![any::<i32>().prop_map(i64::from), any::<i64>(), -1i64 << 33..1 << 33],
+            value in prop_oneof![
+                any::<i32>().prop_map(i64::from),
+                any::<i64>(),
+                -1i64 << 33..1 << 33
+            ],
             multiplier in 1u32..1 << 24,
             shift in 1u8..=62,
         ) {

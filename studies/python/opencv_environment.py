@@ -13,7 +13,10 @@ PACKAGES = ["opencv-python-headless", "numpy"]
 
 
 def works(python):
-    return python.exists() and subprocess.run([python, "-c", "import cv2, numpy"], capture_output=True).returncode == 0
+    if not python.exists():
+        return False
+    imports = [python, "-c", "import cv2, numpy"]
+    return subprocess.run(imports, capture_output=True).returncode == 0
 
 
 def main(folder):
@@ -21,7 +24,8 @@ def main(folder):
     if not works(python):
         venv.create(folder, with_pip=True, clear=True)
         quiet = ["--quiet", "--disable-pip-version-check"]
-        subprocess.run([python, "-m", "pip", "install", *quiet, *PACKAGES], check=True, stdout=sys.stderr)
+        install = [python, "-m", "pip", "install", *quiet, *PACKAGES]
+        subprocess.run(install, check=True, stdout=sys.stderr)
         if not works(python):
             sys.exit(f"{' and '.join(PACKAGES)} are installed in {folder} and cannot be imported")
     print(python)

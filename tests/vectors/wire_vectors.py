@@ -3,7 +3,7 @@
 
 An implementation of its own, sharing nothing with the Rust one, so that the two check each other:
     python3 tests/vectors/wire_vectors.py          rewrite wire.json beside this file
-    python3 tests/vectors/wire_vectors.py --doc    print the annotated bytes that docs/wire.md quotes
+    python3 tests/vectors/wire_vectors.py --doc    print the annotated bytes of docs/wire.md
 """
 
 import json
@@ -75,7 +75,10 @@ def hello_start(protocol, schema):
 
 
 COMMAND = [raw("Command", [1])]
-RED = [raw("threshold: Rgb565", [0]), raw("H 170–10, S 100–255, V 45–255", [170, 10, 100, 255, 45, 255])]
+RED = [
+    raw("threshold: Rgb565", [0]),
+    raw("H 170–10, S 100–255, V 45–255", [170, 10, 100, 255, 45, 255]),
+]
 RED_CR = [raw("threshold: Yuv422", [1]), raw("cr_low 162", [162])]
 DARK = [raw("threshold: Mono", [2]), raw("luma_low 0, luma_high 88", [0, 88])]
 
@@ -188,7 +191,11 @@ DEVICE = {
         string("text", "camera silent, restarting"),
     ],
     "reply-done": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Done", [0])],
-    "reply-no-good-frames": [raw("Reply", [4]), unsigned("id", 65_535), raw("outcome: NoGoodFrames", [3])],
+    "reply-no-good-frames": [
+        raw("Reply", [4]),
+        unsigned("id", 65_535),
+        raw("outcome: NoGoodFrames", [3]),
+    ],
     "reply-unsupported": [raw("Reply", [4]), unsigned("id", 200), raw("outcome: Unsupported", [5])],
 }
 
@@ -215,7 +222,7 @@ FOREIGN = {
 
 
 def bad_crc():
-    """The reply "done" with one bit of its number flipped after the checksum was made: 7 became 6."""
+    """The reply "done" with one bit of its number flipped after the checksum: 7 became 6."""
     content = body(DEVICE["reply-done"])
     damaged = bytes([content[0], content[1] ^ 1, content[2]])
     return cobs(damaged + zlib.crc32(content).to_bytes(4, "little")) + b"\0"
@@ -246,7 +253,8 @@ def document():
         "host": {name: frame(body(fields)).hex(" ") for name, fields in HOST.items()},
         "foreign": {name: frame(body(fields)).hex(" ") for name, fields in FOREIGN.items()},
         "rejected": {
-            name: {"cause": cause, "frame": data.hex(" ")} for name, (cause, data) in rejects().items()
+            name: {"cause": cause, "frame": data.hex(" ")}
+            for name, (cause, data) in rejects().items()
         },
         "stream": {
             "bytes": resync.hex(" "),
@@ -259,7 +267,8 @@ def document():
 def annotate(name, fields, whole=None):
     """A block for docs/wire.md: the body field by field, then the frame."""
     content = body(fields)
-    rows = list(fields) + [(zlib.crc32(content).to_bytes(4, "little"), f"CRC-32 {zlib.crc32(content):#010x}")]
+    crc = zlib.crc32(content)
+    rows = list(fields) + [(crc.to_bytes(4, "little"), f"CRC-32 {crc:#010x}")]
     print(f"```text body {name}")
     for data, note in rows:
         print(f"{data.hex(' '):<35} # {note}" if len(data) < 12 else f"{data.hex(' ')} # {note}")
@@ -267,7 +276,8 @@ def annotate(name, fields, whole=None):
 
 
 def print_documentation():
-    for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare", "start-with-markers", "expose"]:
+    for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare",
+                 "start-with-markers", "expose"]:
         annotate(name, HOST[name])
     for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers",
                  "stats", "log", "reply-done"]:

@@ -31,7 +31,9 @@ fn decode_all<M: Message, const N: usize>(
 
 proptest! {
     #[test]
-    fn device_messages_make_the_round_trip(messages in proptest::collection::vec(any_device_message(), 1..5)) {
+    fn device_messages_make_the_round_trip(
+        messages in proptest::collection::vec(any_device_message(), 1..5),
+    ) {
         let bytes: Vec<u8> = messages.iter().flat_map(frame).collect();
         let mut decoder = HostDecoder::new();
         let received: Vec<Received<DeviceMessage>> = decode_all(&mut decoder, &bytes);
@@ -56,7 +58,10 @@ proptest! {
     }
 
     #[test]
-    fn slices_cut_anywhere_give_the_same(message in any_device_message(), cut in any::<prop::sample::Index>()) {
+    fn slices_cut_anywhere_give_the_same(
+        message in any_device_message(),
+        cut in any::<prop::sample::Index>(),
+    ) {
         let bytes = frame(&message);
         let (first, second) = bytes.split_at(cut.index(bytes.len()));
         let mut decoder = HostDecoder::new();
@@ -81,7 +86,10 @@ proptest! {
     }
 
     #[test]
-    fn a_truncated_frame_is_no_message(message in any_device_message(), cut in any::<prop::sample::Index>()) {
+    fn a_truncated_frame_is_no_message(
+        message in any_device_message(),
+        cut in any::<prop::sample::Index>(),
+    ) {
         let whole = frame(&message);
         let kept = cut.index(whole.len() - 2) + 1;
         let bytes = [&whole[..kept], &[0], &whole].concat();
@@ -111,7 +119,9 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_bytes_never_panic_and_are_accounted_for(bytes in proptest::collection::vec(any::<u8>(), 0..2000)) {
+    fn arbitrary_bytes_never_panic_and_are_accounted_for(
+        bytes in proptest::collection::vec(any::<u8>(), 0..2000),
+    ) {
         let mut small = Decoder::<5>::new();
         let _: Vec<Received<HostMessage>> = decode_all(&mut small, &bytes);
         let mut decoder = HostDecoder::new();

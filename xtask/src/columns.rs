@@ -1,10 +1,11 @@
 //! Lines of the committed text that are wider than [`WIDEST`].
 
+use std::collections::BTreeSet;
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::{process, workspace};
+use crate::{process, raw_strings, workspace};
 
 /// Columns of the widest line, in characters.
 const WIDEST: usize = 100;
@@ -54,27 +55,36 @@ fn committed() -> Result<Vec<String>> {
     Ok(names.map(str::to_owned).collect())
 }
 
-/// The lines of a file that are too wide. Rows of tables, what programs print and what they wrote
-/// into a document may be, and so may addresses: none of these can be broken.
+/// The lines of a file that are too wide. Rows of tables, addresses, fenced blocks, what programs
+/// wrote into a document, and raw strings may be: breaking these is impossible or makes them worse.
 fn too_wide(name: &str, text: &str) -> Vec<Wide> {
     let is_document = name.ends_with(".md");
-    let (mut printed, mut written) = (false, false);
-    let mut found = Vec::new();
+    let verbatim = match name.rsplit_once('.') {
+        Some((_, "md")) => fenced_or_written(text),
+        Some((_, "rs")) => raw_strings::lines(text),
+        _ => BTreeSet::new(),
+    };
+    let wide = (1..).zip(text.lines()).filter_map(|(line, text)| {
+        let columns = text.chars().count();
+        let may_be = verbatim.contains(&line) || is_row(is_document, text);
+        let is_wide = !may_be && columns - in_addresses(text) > WIDEST;
+        is_wide.then_some(Wide { line, columns })
+    });
+    wide.collect()
+}
+
+/// The lines of a document, from 1, that are in a fenced block or that a program wrote.
+fn fenced_or_written(text: &str) -> BTreeSet<usize> {
+    let (mut fenced, mut written) = (false, false);
+    let mut found = BTreeSet::new();
     for (number, line) in (1..).zip(text.lines()) {
         let words = line.trim_start();
-        if is_document {
-            if words.starts_with("```") {
-                printed = ["```console", "```json"].contains(&words.trim_end());
-            }
-            if words.starts_with("<!--") {
-                written = words.contains(": begin");
-            }
+        fenced ^= words.starts_with("```");
+        if words.starts_with("<!--") {
+            written = words.contains(": begin");
         }
-        let columns = line.chars().count();
-        let may_be = printed || written || is_row(is_document, line);
-        if !may_be && columns - in_addresses(line) > WIDEST {
-            let line = number;
-            found.push(Wide { line, columns });
+        if fenced || written {
+            found.insert(number);
         }
     }
     found
@@ -135,12 +145,22 @@ mod tests {
     }
 
     #[test]
-    fn what_programs_print_or_wrote_may_be_wide_and_what_follows_may_not() {
+    fn fenced_blocks_and_what_programs_wrote_may_be_wide_and_what_follows_may_not() {
         let wide = "a ".repeat(WIDEST);
-        let printed = format!("```console\n{wide}\n```\n{wide}\n```sh\n{wide}\n```\n");
-        assert_eq!(lines("a.md", &printed), [4, 6]);
+        let fenced = format!("```console\n{wide}\n```\n{wide}\n```text a\n{wide}\n```\n{wide}\n");
+        assert_eq!(lines("a.md", &fenced), [4, 8]);
         let written = format!("<!-- a: begin, by x -->\n{wide}\n<!-- a: end -->\n{wide}\n");
         assert_eq!(lines("a.md", &written), [4]);
         assert_eq!(lines("a.rs", &written), [2, 4]);
+    }
+
+    #[test]
+    fn raw_strings_may_be_wide_in_rust_and_fenced_blocks_of_its_comments_may_not() {
+        let wide = "a".repeat(WIDEST);
+        let raw = format!("r\"{wide}\n{wide}b\nc {wide}\"; d\n\"{wide}\"\n");
+        assert_eq!(lines("a.rs", &raw), [4]);
+        assert_eq!(lines("a.py", &raw), [1, 2, 3, 4]);
+        let fenced = format!("//! ```text\n//! {wide}\n//! ```\n");
+        assert_eq!(lines("a.rs", &fenced), [2]);
     }
 }

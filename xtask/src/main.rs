@@ -7,6 +7,7 @@ mod demo;
 mod numbers;
 mod packages;
 mod process;
+mod raw_strings;
 mod report;
 mod rig;
 mod size;

@@ -29,7 +29,8 @@ const TAKES: &str = "takes.csv";
 const UNIT: &str = "unit.json";
 
 const SAMPLE_COLUMNS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status,\
-x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,x3_q16,y3_q16,area3_px,x_mm,y_mm";
+x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,\
+x3_q16,y3_q16,area3_px,x_mm,y_mm";
 const GAUGE_COLUMNS: &str = "run,host_s,line";
 const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
 

@@ -151,8 +151,8 @@ mod tests {
 
     #[test]
     fn a_file_is_read_with_its_faults_counted() {
-        let text = "time;force\n# made by \
-                    hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n0.25;0.5N\nx;1\n0.5;1..2N\n0.6\n";
+        let text = "time;force\n# made by hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n\
+                    0.25;0.5N\nx;1\n0.5;1..2N\n0.6\n";
         let series = Series::parse(text, Unit::NEWTON);
         assert_eq!(series.readings(), 3);
         let counts: Vec<_> = series.bad.iter().map(|(why, n)| (*why, *n)).collect();

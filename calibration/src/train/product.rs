@@ -141,7 +141,12 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
-        fn it_is_the_plain_sum_to_the_bit(m in 1_usize..12, k in 1_usize..40, n in 1_usize..40, seed: u32) {
+        fn it_is_the_plain_sum_to_the_bit(
+            m in 1_usize..12,
+            k in 1_usize..40,
+            n in 1_usize..40,
+            seed: u32,
+        ) {
             let mut state = seed | 1;
             let mut next = || {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

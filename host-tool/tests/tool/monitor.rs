@@ -60,9 +60,11 @@ fn csv_has_a_header() {
     let run = run(&["monitor", "--port", &device.port, "--csv", "--frames", "2"]);
     assert_eq!(
         run.stdout,
-        "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,direction_sigma_deg,magnitude_sigma_n,\
-         place_x_mm,place_y_mm,place_sigma_mm,contact,status\n\
-         41,42,1399986,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900,1.250,-0.730,0.085,true,not_calibrated|contact\n\
+        "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,\
+         direction_sigma_deg,magnitude_sigma_n,place_x_mm,place_y_mm,place_sigma_mm,\
+         contact,status\n\
+         41,42,1399986,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,\
+         0.480,0.000900,1.250,-0.730,0.085,true,not_calibrated|contact\n\
          42,43,7,,,,,,,,,,,,,markers_missing|frame_dropped\n"
     );
     assert_eq!(run.code, Some(0));
@@ -77,9 +79,9 @@ fn a_person_sees_columns_and_the_summary_on_a_pseudo_terminal() {
     assert_eq!(
         lines[..5],
         [
-            "     seq   frame         time        α        β      |F|       Fx       Fy       Fz  place x  place y  place ±  contact  status",
-            "                            s        °        °       mN       mN       mN       mN       mm       mm       mm",
-            "      41      42     1.399986   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.730    0.085      yes  not_calibrated",
+            r"     seq   frame         time        α        β      |F|       Fx       Fy       Fz  place x  place y  place ±  contact  status",
+            r"                            s        °        °       mN       mN       mN       mN       mm       mm       mm",
+            r"      41      42     1.399986   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.730    0.085      yes  not_calibrated",
             "",
             "1 frames shown, 1 received, 0 lost",
         ]
@@ -240,7 +242,7 @@ fn the_truth_stands_beside_and_is_compared() {
     let lines: Vec<_> = run.stdout.lines().collect();
     assert_eq!(
         lines[3],
-        "       1       2     0.066666   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.730    0.085      yes   -5.000    2.500  200.000    1.650   -0.430  not_calibrated"
+        r"       1       2     0.066666   -5.000    2.500  100.000   -8.707    4.362  -99.525    1.250   -0.730    0.085      yes   -5.000    2.500  200.000    1.650   -0.430  not_calibrated"
     );
     assert!(
         lines[4].ends_with(

@@ -199,7 +199,10 @@ mod tests {
         }
 
         #[test]
-        fn any_number_is_survived(parts in prop::array::uniform(any::<f32>()), side in prop::array::uniform8(any::<f32>())) {
+        fn any_number_is_survived(
+            parts in prop::array::uniform(any::<f32>()),
+            side in prop::array::uniform8(any::<f32>()),
+        ) {
             if let Some(solved) = solve(columns(parts), side) {
                 prop_assert!(solved.unknowns.iter().all(|part| part.is_finite()));
             }

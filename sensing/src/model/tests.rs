@@ -400,7 +400,9 @@ proptest! {
         unit in prop::option::of(any::<[u8; 12]>()),
         tells_place: bool,
     ) {
-        let of = |last| -> Vec<u16> { [11].into_iter().chain(hidden.clone()).chain([last]).collect() };
+        let of = |last| -> Vec<u16> {
+            [11].into_iter().chain(hidden.clone()).chain([last]).collect()
+        };
         let plain = if tells_place { place_spec(&of(5)) } else { spec(&of(3)) };
         let spec = scramble(plain, &numbers, unit);
         let bytes = spec.encode().unwrap();

@@ -208,7 +208,9 @@ mod tests {
 
         #[test]
         fn it_is_what_exact_arithmetic_says(
-            values in prop::array::uniform16((0..=LARGEST_UNCERTAINTY.0, 0..=LARGEST_UNCERTAINTY.0)),
+            values in prop::array::uniform16(
+                (0..=LARGEST_UNCERTAINTY.0, 0..=LARGEST_UNCERTAINTY.0),
+            ),
             (shift, step_bits, magnitude) in (0..30_u32, 0..=MAX_STEP_BITS, 0..=i32::MAX),
             magnitude_shift in 0..31_u32,
         ) {

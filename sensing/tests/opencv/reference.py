@@ -59,7 +59,8 @@ def agreed(pixels, box):
         column = np.zeros((65536, 2, 3), np.uint8)[:, :1]
         column[:] = pixels.reshape(65536, 1, 3)
         answers.append(accepted(column, box))
-    assert all((answer == answers[0]).all() for answer in answers), f"OpenCV's paths disagree on {box}"
+    agree = all((answer == answers[0]).all() for answer in answers)
+    assert agree, f"OpenCV's paths disagree on {box}"
     return answers[0]
 
 

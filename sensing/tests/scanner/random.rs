@@ -120,7 +120,10 @@ proptest! {
         dilations in 0..=3_u8,
         bands in vec(1..=5_usize, 12),
     ) {
-        let pixels: Vec<u16> = seeds.iter().map(|(value, red)| if *red { 0x00d8 | value & 0x20e7 } else { *value }).collect();
+        let pixels: Vec<u16> = seeds
+            .iter()
+            .map(|(value, red)| if *red { 0x00d8 | value & 0x20e7 } else { *value })
+            .collect();
         let pixels = &pixels[..width * height];
         let table = TABLE.with(Clone::clone);
         let mask = Mask::from_fn(width, height, |x, y| table.accepts(pixels[y * width + x]));

@@ -50,9 +50,13 @@ proptest! {
         prop_assert!((here.energy - shell.energy(&u)).abs() < 1e-12);
         let h = 1e-4;
         let energy = |step: f64| shell.energy(&moved(&u, &way, step));
-        let slope = (8.0 * (energy(h) - energy(-h)) - energy(2.0 * h) + energy(-2.0 * h)) / (12.0 * h);
+        let slope =
+            (8.0 * (energy(h) - energy(-h)) - energy(2.0 * h) + energy(-2.0 * h)) / (12.0 * h);
         let expected = inner(&here.gradient, &way);
-        prop_assert!((slope - expected).abs() < 1e-7 * (1.0 + expected.abs()), "{slope} {expected}");
+        prop_assert!(
+            (slope - expected).abs() < 1e-7 * (1.0 + expected.abs()),
+            "{slope} {expected}"
+        );
 
         let gradient = |step: f64| shell.derivatives(&moved(&u, &way, step)).gradient;
         let (a, b, aa, bb) = (gradient(h), gradient(-h), gradient(2.0 * h), gradient(-2.0 * h));

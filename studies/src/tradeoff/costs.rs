@@ -210,12 +210,14 @@ pub(super) mod tests {
         let frame = |size: &str, answers_last: bool| {
             format!(
                 r#"{{"size":{size},"centroid":"binary-mask",
-                    "whole":{{"instructions":1000,"cycles":500}},"latency":{{"instructions":100,"cycles":50}},"answers_last":{answers_last}}}"#
+                    "whole":{{"instructions":1000,"cycles":500}},
+                    "latency":{{"instructions":100,"cycles":50}},"answers_last":{answers_last}}}"#
             )
         };
         let model = |name: &str, bytes: u64, flash: u64| {
             format!(
-                r#"{{"model":"{name}","bytes":{bytes},"whole":{{"instructions":100,"cycles":50}},"flash_cycles":{flash}}}"#
+                r#"{{"model":"{name}","bytes":{bytes},
+                    "whole":{{"instructions":100,"cycles":50}},"flash_cycles":{flash}}}"#
             )
         };
         let memory = |name: &str, used: u64| {
@@ -223,7 +225,8 @@ pub(super) mod tests {
         };
         let text = format!(
             r#"{{"compiler":"rustc","together":[],"frames":[{}],"models":[{}],
-                "film":{{"bytes":50000,"one_step":{{"instructions":300,"cycles":150}},"each_more":{{"instructions":200,"cycles":100}},"flash_cycles":40}},
+                "film":{{"bytes":50000,"one_step":{{"instructions":300,"cycles":150}},
+                    "each_more":{{"instructions":200,"cycles":100}},"flash_cycles":40}},
                 "firmware":[{}],"default_model_bytes":8000}}"#,
             [frame("[320,240]", false), frame("[640,480]", true),].join(","),
             [

@@ -98,7 +98,8 @@ const HEAD: &str = "| frame | centroids | network | numbers | steps | run forwar
                     50 mN, ° | all, ° | \\|F\\| RMSE, mN | place, µm | worst: °, mN | unexplained \
                     | instructions | modelled cycles | µs | per second | latency, µs | flash, KB | \
                     RAM, KB |\n\
-                    |---|---|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+                    |---|---|---|---|---:|---:|---:|---:|---:|---:|---:|\
+                    ---:|---:|---:|---:|---:|---:|---:|---:|\n";
 
 fn table(configurations: &[&Configuration]) -> String {
     let rows = configurations.iter().map(|c| row(c));
@@ -186,9 +187,12 @@ fn default(configurations: &[Configuration]) -> String {
 
 /// Every configuration.
 pub fn csv(configurations: &[Configuration]) -> String {
-    let mut text = "width,height,centroid,network,numbers,steps,looks,reach,direction_deg,direction_deg_95,strong_direction_deg,\
-                    strong_direction_deg_95,force_rmse_mn,force_rmse_mn_95,place_rmse_um,place_rmse_um_95,\
-                    worst_strong_direction_deg,worst_force_mn,unexplained,instructions,modelled_cycles,microseconds,per_second,latency_microseconds,flash_bytes,ram_bytes\n"
+    let mut text = "width,height,centroid,network,numbers,steps,looks,reach,\
+                    direction_deg,direction_deg_95,strong_direction_deg,strong_direction_deg_95,\
+                    force_rmse_mn,force_rmse_mn_95,place_rmse_um,place_rmse_um_95,\
+                    worst_strong_direction_deg,worst_force_mn,unexplained,instructions,\
+                    modelled_cycles,microseconds,per_second,latency_microseconds,\
+                    flash_bytes,ram_bytes\n"
         .to_owned();
     for c in configurations {
         let reach = match c.reach() {

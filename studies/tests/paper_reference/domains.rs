@@ -229,7 +229,11 @@ proptest! {
 
     /// R* falls with the shear and scales out: twice as large a sensor has the same R*.
     #[test]
-    fn best_r_falls_with_shear_and_has_no_scale(design in any_design(), depth in 0.01..0.99, shear in 0.0..30.0) {
+    fn best_r_falls_with_shear_and_has_no_scale(
+        design in any_design(),
+        depth in 0.01..0.99,
+        shear in 0.0..30.0,
+    ) {
         let z = depth * design.film_distance_mm;
         let r = |shear: f64| design.best_r(z, shear).unwrap().unwrap_or(0.0);
         prop_assert!(r(shear) >= r(shear * 1.01 + 1e-9));
@@ -260,7 +264,12 @@ proptest! {
 
     /// disp_N never falls as the marker goes deeper, through the pinhole's depth and beyond.
     #[test]
-    fn deeper_is_further_out(pm in 1e-6..19.0, z in 0.0..30.0, more in 1e-6..1.0, slant in any::<bool>()) {
+    fn deeper_is_further_out(
+        pm in 1e-6..19.0,
+        z in 0.0..30.0,
+        more in 1e-6..1.0,
+        slant in any::<bool>(),
+    ) {
         let design = Design::<f64>::paper(READINGS[usize::from(slant)]);
         let at = |z| design.disp_n_mm(pm, z).unwrap();
         prop_assert!(at(z + more) >= at(z));

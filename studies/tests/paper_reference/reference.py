@@ -83,7 +83,8 @@ def stationary_pm(reading, z, shear):
 
 def rows_of_eq_17():
     radii = [f32(r) for r in ("1e-6", "1e-3", "0.25", "5.257", "10", "19.7")]
-    depths = [f32(z) for z in ("1e-6", "1e-5", "1e-4", "1e-3", "0.01", "0.1", "1", "3.5", "7", "9.9")]
+    depths = ("1e-6", "1e-5", "1e-4", "1e-3", "0.01", "0.1", "1", "3.5", "7", "9.9")
+    depths = [f32(z) for z in depths]
     for pm in radii:
         for d_ph in (H, f32(sqrt(pm**2 + H**2)), mpf(2)):
             around = [d_ph, d_ph * (1 - mpf(2) ** -20), d_ph * (1 + mpf(2) ** -20)]
@@ -108,7 +109,8 @@ def rows_of_eq_21():
 def rows_of_the_design():
     for pm in [mpf(0)] + [f32(r) for r in ("1e-6", "1e-3", "1", "5.257", "10", "19.7")]:
         yield ["d_ph", "slant", pm, "", "", "", "", distance("slant", pm)]
-    depths = [f32(z) for z in ("1e-6", "1e-3", "0.1", "1", "3.5", "7", "9.999", "10", "10.5", "13", "100")]
+    depths = ("1e-6", "1e-3", "0.1", "1", "3.5", "7", "9.999", "10", "10.5", "13", "100")
+    depths = [f32(z) for z in depths]
     for reading in READINGS:
         for pm in [f32(r) for r in ("1e-6", "1e-3", "1", "5.257", "10", "18")]:
             for z in depths:
@@ -117,11 +119,13 @@ def rows_of_the_design():
 
 
 def rows_of_the_optimum():
-    depths = [f32(z) for z in ("1e-6", "1e-4", "0.01", "0.1", "0.33", "1", "2", "3.5", "5", "7", "9", "9.99")]
+    depths = ("1e-6", "1e-4", "0.01", "0.1", "0.33", "1", "2", "3.5", "5", "7", "9", "9.99")
+    depths = [f32(z) for z in depths]
     for reading in READINGS:
         for z in [mpf(0)] + depths:
             onset = balanced_shear(reading, mpf(0), z)
-            parts = ["1e-3", "0.02", "0.1", "0.3", "0.6", "0.9", "0.99", "0.999", "0.99999", "1.00001", "1.5"]
+            parts = ["1e-3", "0.02", "0.1", "0.3", "0.6", "0.9", "0.99",
+                     "0.999", "0.99999", "1.00001", "1.5"]
             near = [f32(onset * mpf(part)) for part in parts] if z else []
             for shear in [mpf(0), f32("1e-6"), mpf(1), f32("3.5"), mpf(7)] + near:
                 pm = best_pm(reading, z, shear)
@@ -135,11 +139,13 @@ def area_under_best_pm(reading, z):
         inner = stationary_pm(reading, z, EXTENT) if end == EXTENT else mpf(0)
         outer = stationary_pm(reading, z, mpf(0))
     with mp.workdps(20):
-        return end * inner + quad(lambda pm: exactly(balanced_shear, reading, pm, z), [inner, outer])
+        integral = quad(lambda pm: exactly(balanced_shear, reading, pm, z), [inner, outer])
+        return end * inner + integral
 
 
 def exactly(function, *arguments):
-    """At full precision: nodes of a quadrature come close to 0, where both angles of disp_N are nearly equal."""
+    """At full precision: nodes of a quadrature come close to 0, where both angles of
+    disp_N are nearly equal."""
     with mp.workdps(60):
         return function(*arguments)
 
@@ -164,12 +170,15 @@ def text(field):
 
 def main():
     lines = ["quantity,d_ph,pm,epsilon,d_ph_mm,z,shear,value"]
-    for rows in (rows_of_eq_17, rows_of_eq_21, rows_of_the_design, rows_of_the_optimum, rows_of_the_mean):
+    tables = (rows_of_eq_17, rows_of_eq_21, rows_of_the_design, rows_of_the_optimum,
+              rows_of_the_mean)
+    for rows in tables:
         for row in rows():
             digits = 12 if row[0].startswith(("mean", "positive")) else 25
             value = row[-1] if isinstance(row[-1], str) else nstr(row[-1], digits)
             lines.append(",".join([text(field) for field in row[:-1]] + [value]))
-    lines = list(dict.fromkeys(lines))  # at small PM the slant and the axial D_ph are the same number
+    # At small PM the slant and the axial D_ph are the same number.
+    lines = list(dict.fromkeys(lines))
     path = Path(__file__).with_name("table.csv")
     path.write_text("\n".join(lines) + "\n")
     print(f"{path.name}: {len(lines) - 1} rows")
