@@ -30,8 +30,8 @@ fn json_lines_and_a_summary_on_standard_error() {
         "2 frames shown, 2 received, 0 lost\n\
          lost: 0 samples on the way (gaps in the sequence), 0 frames not processed (gaps in the \
          frame number); rejected here: 0 messages, 0 bytes\n\
-         device: 0 frames exposed, 0 processed; dropped: busy 0, overrun 0, size 0, USB 0; \
-         tracked 0, lost 0 times; camera timeouts 0, restarts 0, overruns 0; commands rejected 0; \
+         device: 0 frames exposed, 0 processed; dropped: busy 0, overrun 0, size 0, set-up 0, \
+         USB 0; camera timeouts 0, restarts 0, overruns 0; commands rejected 0; \
          last frame took 0 µs, its sample was ready 0 µs after the middle of its exposure\n\
          without a force: 1 (markers_missing 1)\n"
     );
