@@ -16,7 +16,7 @@ use crate::toolchain::cargo;
 use crate::{artifacts, process, workspace};
 
 /// Where the paper's pipeline is, and what makes a Python that has OpenCV.
-const PYTHON: &str = "calibration/python";
+const PYTHON: &str = "studies/python";
 /// Lets OpenCV keep the memory that it frees: on a busy computer, getting its pages anew costs it
 /// as much as the work.
 const KEEP_MEMORY: [(&str, &str); 2] = [
