@@ -9,7 +9,8 @@ pub struct Picture {
     pub width: u16,
     /// Rows, 1 to [`MAX_HEIGHT`].
     pub height: u16,
-    pixels: Vec<u16>,
+    /// Row after row from the top.
+    pub pixels: Vec<u16>,
 }
 
 impl Picture {
@@ -28,11 +29,6 @@ impl Picture {
             height,
             pixels,
         })
-    }
-
-    /// Its rows from the top.
-    pub fn rows(&self) -> impl Iterator<Item = &[u16]> {
-        self.pixels.chunks_exact(self.width.into())
     }
 }
 

@@ -122,7 +122,7 @@ impl<'a> Bench<'a> {
             }
             sensor.set_tare(Some(tare.rest));
         }
-        let measurement = measure(&mut sensor, &picture);
+        let measurement = sensor.measure_frame(&picture.pixels);
         let finding = Finding::new(path, sensor.settings(), sensor.blobs(), measurement);
         Ok(if self.options.json {
             finding.json()
@@ -135,7 +135,7 @@ impl<'a> Bench<'a> {
     fn tare(&self, path: &str) -> Result<Tare, Failure> {
         let picture = Picture::load(path)?;
         let mut sensor = self.sensor(path, &picture)?;
-        let measurement = measure(&mut sensor, &picture);
+        let measurement = sensor.measure_frame(&picture.pixels);
         let found = measurement.markers.zip(measurement.features);
         let rest =
             found.and_then(|(markers, features)| TareBuilder::new(1)?.add(&markers, &features));
@@ -186,10 +186,4 @@ impl<'a> Bench<'a> {
         settings.min_area = self.options.min_area.unwrap_or(settings.min_area);
         settings
     }
-}
-
-fn measure(sensor: &mut Sensor, picture: &Picture) -> pipeline::Measurement {
-    sensor.begin_frame();
-    picture.rows().for_each(|row| sensor.push_row(row));
-    sensor.finish_frame()
 }

@@ -9,7 +9,6 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_scene::Options;
 use hivtac_sensing::model::Model;
-use serde::Serialize;
 
 use crate::page;
 use crate::press::{FORCES_MN, Held, REACH_MM, TestedUnit, press};
@@ -32,12 +31,6 @@ pub struct Anywhere {
     json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Held>,
-}
-
 impl Anywhere {
     /// Runs it.
     ///
@@ -46,9 +39,7 @@ impl Anywhere {
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         if self.json {
-            let rows = self.held(&weights, None)?;
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&self.held(&weights, None)?);
         }
         let mut text = String::from(
             "| steps | force | direction, rms | \\|F\\|, rms | place, rms | times the bound: \

@@ -15,7 +15,6 @@ use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_scene::Options;
 use hivtac_sensing::model::Model;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::page;
 use crate::press::{FORCES_MN, Held, REACH_MM, TestedUnit, press};
@@ -40,12 +39,6 @@ pub struct Large {
     pub json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Held>,
-}
-
 impl Large {
     /// Runs it.
     ///
@@ -63,8 +56,7 @@ impl Large {
         });
         let rows: Vec<Held> = rows.collect::<Result<_>>()?;
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         let mut text = String::from(
             "| force | direction, rms | \\|F\\|, rms | place, rms | times the bound: direction, \

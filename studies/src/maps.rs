@@ -1,11 +1,12 @@
 //! Maps over the place of the tip, as one SVG.
 
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use hivtac_scene::MARKERS;
+
+use crate::page;
 
 /// Places of the tip along each side of a map, and the farthest, mm.
 pub const PLACES: usize = 41;
@@ -65,14 +66,7 @@ pub fn write(path: &Path, columns: usize, maps: &[Map]) -> Result<()> {
         writeln!(svg, "</g>")?;
     }
     svg += "</svg>\n";
-    fs::write(path, svg).with_context(|| {
-        format!(
-            "cannot write {}: run it in the project's folder",
-            path.display()
-        )
-    })?;
-    println!("wrote {}", path.display());
-    Ok(())
+    page::write_file(path, &svg)
 }
 
 impl Map {

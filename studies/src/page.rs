@@ -1,9 +1,11 @@
-//! Pages under `docs/results`.
+//! What a study gives: a page under `docs/results` with its pictures, or one JSON object.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use serde::Serialize;
 
 /// Where a page's results go.
 const PLACE: &str = "<!-- results -->";
@@ -16,13 +18,31 @@ pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     let (before, after) = text
         .split_once(PLACE)
         .context("the page has no place for its results")?;
-    let path = Path::new("docs/results").join(name);
-    fs::write(&path, format!("{before}{}{after}", results.trim_end())).with_context(|| {
+    let text = format!("{before}{}{after}", results.trim_end());
+    write_file(&Path::new("docs/results").join(name), &text)
+}
+
+/// Writes a file of the project and says so.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_file(path: &Path, text: &str) -> Result<()> {
+    fs::write(path, text).with_context(|| {
         format!(
             "cannot write {}: run it in the project's folder",
             path.display()
         )
     })?;
     println!("wrote {}", path.display());
+    Ok(())
+}
+
+/// Prints `{"rows":[…]}` on one line.
+///
+/// # Errors
+/// When a row has no JSON.
+pub fn print_rows(rows: &[impl Serialize]) -> Result<()> {
+    let report = BTreeMap::from([("rows", rows)]);
+    println!("{}", serde_json::to_string(&report)?);
     Ok(())
 }

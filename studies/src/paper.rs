@@ -63,12 +63,6 @@ struct Row {
     frames: u32,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Row>,
-}
-
 impl Paper {
     /// Runs it.
     ///
@@ -88,8 +82,7 @@ impl Paper {
             rows.extend(FORCES_MN.map(|force_mn| Row::of(pipeline, force_mn, &judged)));
         }
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         let mut text = String::from(
             "| pipeline | force | direction, rms | \\|F\\|, rms | place, rms | frames \

@@ -42,12 +42,6 @@ struct Tilted {
     held: Held,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Tilted>,
-}
-
 impl Tangential {
     /// Runs it.
     ///
@@ -62,8 +56,7 @@ impl Tangential {
         let rows = rows.map(|&(ratio, force_mn)| self.tilted(&unit, &model, ratio, force_mn));
         let rows: Vec<Tilted> = rows.collect::<Result<_>>()?;
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         let mut text = String::from(
             "| tangential over normal | force | direction, rms | \\|F\\|, rms | place, rms | times \

@@ -52,12 +52,6 @@ struct Pressed {
     unexplained: u32,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Pressed>,
-}
-
 impl Tips {
     /// Runs it.
     ///
@@ -75,8 +69,7 @@ impl Tips {
         let rows = all.into_par_iter().map(|which| self.pressed(&model, which));
         let rows: Vec<Pressed> = rows.collect::<Result<_>>()?;
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         let mut text = String::from(
             "| within | tip's radius | force | direction, rms | \\|F\\|, rms | place, rms | \

@@ -89,12 +89,6 @@ struct Found {
     sigma: [f64; 3],
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Outcome>,
-}
-
 /// The sensor without its camera: centroids of the film's markers, with noise, in place of frames.
 struct CentroidSource<'m> {
     model: Model<'m>,
@@ -121,8 +115,7 @@ impl Touches {
         let rows = rows.map(|press| self.outcome(&source, &film, press));
         let rows: Vec<Outcome> = rows.collect::<Result<_>>()?;
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         let mut text = String::from(
             "| press | `unexplained` | \\|F\\| less the sum's | direction beside the sum's | place \

@@ -65,12 +65,6 @@ struct Row {
     at_mm: [f64; 2],
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Row>,
-}
-
 /// A place, with how many displacements matter and how many of those are refused.
 struct Cell {
     place_mm: [f64; 2],
@@ -103,8 +97,7 @@ impl Unseen {
             .map(|(force_mn, cells)| Row::of(*force_mn, cells))
             .collect();
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         maps::write(&self.picture, 2, &panels(&maps))?;
         let mut text = String::from(

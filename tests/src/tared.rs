@@ -233,9 +233,7 @@ impl TaredSensor {
 
     /// The whole pipeline on a frame.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
-        self.sensor.begin_frame();
-        self.sensor.push_rows(&frame.words());
-        self.sensor.finish_frame()
+        self.sensor.measure_frame(&frame.words())
     }
 
     /// What the pipeline makes of a frame.

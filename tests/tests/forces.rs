@@ -27,15 +27,10 @@ fn on_this_computer(model: &[u8], before: Option<&[u16]>, pixels: &[u16]) -> Mea
     sensor.configure(settings, Some(model)).unwrap();
     // An OV7725 has 278 lines.
     sensor.set_motion(Motion::rolling(278));
-    let mut measure = |pixels: &[u16]| {
-        sensor.begin_frame();
-        pixels.chunks(320).for_each(|row| sensor.push_row(row));
-        sensor.finish_frame()
-    };
     if let Some(before) = before {
-        measure(before);
+        sensor.measure_frame(before);
     }
-    measure(pixels)
+    sensor.measure_frame(pixels)
 }
 
 fn model_file(name: &str) -> Vec<u8> {

@@ -70,9 +70,7 @@ fn errors(model: &[u8], scene: &Scene, rate_hz: f64) -> [Errors; 2] {
     for number in 0..FRAMES {
         let frame = scene.frame_by(&shutter, number, 0.6 + number as f64 / rate_hz);
         for (nth, sensor) in sensors.iter_mut().enumerate() {
-            sensor.begin_frame();
-            sensor.push_rows(&frame.pixels);
-            let force = sensor.finish_frame().force;
+            let force = sensor.measure_frame(&frame.pixels).force;
             let truth = frame.truth.force;
             // The first frame has none before it.
             if number == 0 || truth.magnitude_n() < FLOOR_N {

@@ -82,9 +82,7 @@ impl MarkerDetector for Sensing<'_> {
 
 /// Shows a frame to a sensor.
 pub fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
-    sensor.begin_frame();
-    sensor.push_rows(&frame.words());
-    sensor.finish_frame()
+    sensor.measure_frame(&frame.words())
 }
 
 /// The names of the status bits that forbid a force, but not the missing model.

@@ -136,11 +136,7 @@ fn the_force_is_that_of_the_sensing_code() {
     sensor
         .configure(Settings::of_model(&model, ByteOrder::Native), Some(model))
         .unwrap();
-    sensor.begin_frame();
-    for row in frame.to_rgb565().chunks(320) {
-        sensor.push_row(row);
-    }
-    let measurement = sensor.finish_frame();
+    let measurement = sensor.measure_frame(&frame.to_rgb565());
     let force = measurement.force.unwrap_or_else(|| panic!("{found}"));
     let micro = |number: i32| f64::from(number) / 1e6;
     let milli = |number: i32| f64::from(number) / 1e3;

@@ -70,12 +70,6 @@ struct Row {
     most_steps: u32,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Report {
-    rows: Vec<Row>,
-}
-
 impl Convergence {
     /// Runs it.
     ///
@@ -102,8 +96,7 @@ impl Convergence {
         });
         let rows: Vec<Row> = rows.collect();
         if self.json {
-            println!("{}", serde_json::to_string(&Report { rows })?);
-            return Ok(());
+            return page::print_rows(&rows);
         }
         maps::write(&self.picture, 3, &panels(&maps))?;
         let mut text = String::from(

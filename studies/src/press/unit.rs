@@ -1,11 +1,12 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
+use hivtac_calibration::dataset::measure;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
-use hivtac_scene::{Frame, Load, Options, Scene};
+use hivtac_scene::{Load, Options, Scene};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::{Conditions, Model, Rest};
-use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::status::Status;
 use hivtac_sensing::tare::TareBuilder;
@@ -142,7 +143,7 @@ impl TestedUnit {
             let frame = self
                 .scene
                 .render_load(&Load::REST, 1_000_000 + u64::from(number))?;
-            let seen = look(sensor, &frame);
+            let seen = measure(sensor, &frame);
             let found = seen.markers.zip(seen.features);
             let (markers, features) = found.ok_or_else(|| {
                 let names: Vec<_> = seen.status.names().collect();
@@ -188,7 +189,7 @@ impl Tared<'_> {
             let picture = unit
                 .scene
                 .render_load(&unit.with_tip(load)?, number + frame)?;
-            let markers = look(&mut self.sensor, &picture).markers;
+            let markers = measure(&mut self.sensor, &picture).markers;
             let markers = markers.ok_or_else(|| anyhow!("no markers under a load"))?;
             for (mean, marker) in mean.iter_mut().zip(markers) {
                 mean[0] += marker.x.to_f64() / frames as f64;
@@ -204,7 +205,7 @@ impl Tared<'_> {
     /// When the film cannot take the press.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
         let frame = unit.scene.render_load(&unit.with_tip(load)?, number)?;
-        let seen = look(&mut self.sensor, &frame);
+        let seen = measure(&mut self.sensor, &frame);
         let off = |k: usize| {
             let [x, y] = frame.truth.markers[k]?.centroid_px;
             let marker = seen.markers?[k];
@@ -220,8 +221,3 @@ impl Tared<'_> {
     }
 }
 
-fn look(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
-    sensor.begin_frame();
-    sensor.push_rows(&frame.words());
-    sensor.finish_frame()
-}

@@ -69,7 +69,7 @@ impl Pipeline {
         // Numbers that no test frame has: their noise is the tare's alone.
         for number in (1 << 40).. {
             let frame = scene.render_load(&Load::REST, number)?;
-            let measured = pipeline.run(&frame);
+            let measured = pipeline.sensor.measure_frame(&frame.to_rgb565());
             let (Some(markers), Some(features)) = (measured.markers, measured.features) else {
                 bail!("no tare: {}", reasons(measured.status));
             };
@@ -88,20 +88,12 @@ impl Pipeline {
             markers,
             force,
             ..
-        } = self.run(frame);
+        } = self.sensor.measure_frame(&frame.to_rgb565());
         FrameMeasurement {
             centroids_px: markers.map(|markers| markers.map(centroid_px)),
             force_n: force.map(hivtac_calibration::check::vector_n),
             rejected: reasons(status),
         }
-    }
-
-    fn run(&mut self, frame: &Frame) -> Measurement {
-        self.sensor.begin_frame();
-        for row in frame.to_rgb565().chunks(frame.width as usize) {
-            self.sensor.push_row(row);
-        }
-        self.sensor.finish_frame()
     }
 }
 

@@ -345,9 +345,7 @@ fn seen(
         ..Settings::usual(geometry, ByteOrder::Native)
     };
     sensor.configure(settings, None)?;
-    sensor.begin_frame();
-    sensor.push_rows(pixels);
-    let measurement = sensor.finish_frame();
+    let measurement = sensor.measure_frame(pixels);
     let found = measurement.features.zip(measurement.markers);
     found.context("a frame that shows where the markers are has none")
 }
