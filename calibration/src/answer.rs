@@ -2,11 +2,12 @@
 
 use anyhow::Result;
 use hivtac_sensing::features::Features;
-use hivtac_sensing::force::{Force, Resting};
-use hivtac_sensing::markers::Marker;
-use hivtac_sensing::model::{Model, Rest};
+use hivtac_sensing::force::{self, Force, Resting};
+use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
-use hivtac_sensing::status::Status;
+use hivtac_sensing::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
 
 use crate::dataset::Observation;
 use crate::weights::features_from_q16;
@@ -56,7 +57,7 @@ impl<'m> Chip<'m> {
         let output = self.network.run(&self.model, &features, &self.tare);
         let forward = self.model.forward.as_ref().zip(self.resting.as_ref());
         let Some((forward, resting)) = forward else {
-            let (force, status) = Force::of_outputs(&self.model, &output);
+            let (force, status) = force::of_outputs(&self.model, &output);
             return Ok((force, status, 0));
         };
         let marker = |k: usize| {

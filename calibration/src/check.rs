@@ -7,10 +7,10 @@ use std::fmt;
 use anyhow::{Result, anyhow, bail, ensure};
 use hivtac_scene::Contact;
 use hivtac_sensing::force::Force;
-use hivtac_sensing::model::{ContactReading, Model};
+use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::Sensor;
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::conditions::ContactReading;
+use hivtac_terms::threshold::ByteOrder;
 use rayon::prelude::*;
 
 use crate::conditions::meaning;
@@ -119,7 +119,7 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
 
 fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
     let mut sensor = Box::new(Sensor::new());
-    let settings = Settings::of_model(model, ByteOrder::Native);
+    let settings = model.conditions.settings(ByteOrder::Native);
     sensor
         .configure(settings, Some(*model))
         .map_err(|error| anyhow!("{error}"))?;

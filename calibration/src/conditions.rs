@@ -2,9 +2,10 @@
 
 use anyhow::{Context, Result, ensure};
 use hivtac_scene::{Camera, Contact};
-use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::{self, CentroidEstimator, ContactReading, Origin};
-use hivtac_sensing::threshold::{PixelFormat, Threshold};
+use hivtac_sensing::model::{self, Origin};
+use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::threshold::{PixelFormat, Threshold};
 use serde::{Deserialize, Serialize};
 
 /// Everything about frames and labels that a model depends on (`docs/model-file.md`, conditions).
@@ -185,7 +186,7 @@ pub fn pixel_format(name: &str) -> Result<PixelFormat> {
 /// What files hold by its name.
 mod names {
     pub mod pixel_format {
-        use hivtac_sensing::threshold::PixelFormat;
+        use hivtac_terms::threshold::PixelFormat;
         use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
         pub fn serialize<S: Serializer>(format: &PixelFormat, to: S) -> Result<S::Ok, S::Error> {

@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-/// Features that enter the network (`sensing::features`).
+/// Features that enter the network (`force::features`).
 pub const INPUTS: usize = 11;
 /// Numbers that leave it and say a force ([`Meaning`]).
 pub const OUTPUTS: usize = hivtac_sensing::model::OUTPUTS;

@@ -7,11 +7,11 @@
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::FEATURES;
-use hivtac_sensing::model::encode::{LayerSpec, ModelSpec};
-use hivtac_sensing::model::{
-    self, InputScaling, MAX_ACTIVATION8, OutputKind, UncertaintyKnot, WeightWidth,
-};
-use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
+use hivtac_sensing::model::{self, InputScaling, OutputKind, UncertaintyKnot};
+use hivtac_sensing::model::{encode::LayerSpec, encode::ModelSpec};
+use hivtac_sensing::packing::{MAX_ACTIVATION8, WeightWidth};
+use hivtac_sensing::rest;
+use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::forward::FilmModel;
 use crate::network::{Layer, Meaning, Network, Standardization};
@@ -68,8 +68,8 @@ pub fn spec(weights: &Weights) -> Result<ModelSpec> {
     })
 }
 
-fn rest(rest: &Rest) -> Result<model::Rest> {
-    Ok(model::Rest {
+fn rest(rest: &Rest) -> Result<rest::Rest> {
+    Ok(rest::Rest {
         features: features_from_q16(&rest.features_q16)?,
         areas: rest.areas_px,
     })

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::units::Px;
+use hivtac_terms::units::Px;
 use serde::{Deserialize, Serialize};
 
 /// The rest position.

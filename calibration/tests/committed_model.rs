@@ -9,9 +9,10 @@ use hivtac_calibration::dataset::{Loads, Recipe, generate};
 use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Weights};
-use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, Origin, OutputKind};
-use hivtac_sensing::threshold::{HsvBox, PixelFormat, Threshold};
+use hivtac_sensing::model::{Model, Origin, OutputKind};
+use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 
 fn models() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("models")

@@ -10,10 +10,10 @@ use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardizati
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
 use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
-use hivtac_sensing::geometry::Preset;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::{Network as ChipNetwork, Output};
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
 use safetensors::serialize;
 use safetensors::tensor::{Dtype, TensorView};
 

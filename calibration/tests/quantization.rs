@@ -7,10 +7,10 @@ use hivtac_calibration::network::{
 };
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
-use hivtac_sensing::geometry::Preset;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
 use proptest::collection::vec;
 use proptest::prelude::*;
 

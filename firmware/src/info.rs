@@ -1,13 +1,13 @@
 //! What the device says about itself.
 
 use crate::shared::SETTINGS;
-use crate::{board, camera, convert};
+use crate::{board, camera};
 use core::cell::Cell;
 use core::fmt::Write;
 use heapless::String;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::threshold::ByteOrder;
 use hivtac_wire::message::{DeviceHello, ModelIdentity};
 use hivtac_wire::version::HelloPrefix;
 
@@ -30,10 +30,10 @@ pub fn hello(model: Option<&Model>) -> DeviceHello {
         model: model.map(identity),
         width: camera::WIDTH,
         height: camera::HEIGHT,
-        threshold: convert::threshold_to_wire(settings.threshold),
+        threshold: settings.threshold,
         preset: text(format_args!("{}", camera::PRESET.name())),
         dilations: settings.dilations,
-        centroid: convert::centroid_to_wire(settings.centroid),
+        centroid: settings.centroid,
     }
 }
 
@@ -42,7 +42,7 @@ fn identity(model: &Model) -> ModelIdentity {
         crc: model.crc(),
         name: model.name(),
         simulated: model.is_simulated(),
-        threshold: convert::threshold_to_wire(model.conditions.threshold),
+        threshold: model.conditions.threshold,
     }
 }
 

@@ -21,7 +21,6 @@ mod camera;
 mod capture;
 mod capture_task;
 mod commands;
-mod convert;
 mod faults;
 mod health;
 mod info;
@@ -49,7 +48,7 @@ use embassy_stm32::interrupt;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::motion::Motion;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::threshold::ByteOrder;
 use pipeline_task::Sensor;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -103,7 +102,7 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
     let settings = match &model {
         Some(model) if sent(model).is_some() => Settings {
             geometry,
-            ..Settings::of_model(model, order)
+            ..model.conditions.settings(order)
         },
         _ => Settings::usual(geometry, order),
     };

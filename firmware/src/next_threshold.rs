@@ -5,7 +5,7 @@ use crate::camera::Format;
 use crate::pipeline_task::Sensor;
 use crate::session::Asked;
 use crate::shared::REQUESTED_FORMAT;
-use hivtac_sensing::threshold::Threshold;
+use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::Outcome;
 
 /// The threshold that waits for the camera's pixels, if any, and who asked for it.

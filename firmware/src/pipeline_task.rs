@@ -4,7 +4,6 @@ use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
 use crate::camera;
 use crate::capture::{self, CaptureEvent};
-use crate::convert;
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
 use crate::next_threshold::NextThreshold;
@@ -16,8 +15,9 @@ use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
-use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Sample, Threshold};
-use hivtac_wire::status::Status;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::Threshold;
+use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Sample};
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
 pub enum Order {
@@ -157,7 +157,6 @@ impl PipelineTask {
     fn obey(&mut self, order: Order) {
         match order {
             Order::SetThreshold { id, threshold } => {
-                let threshold = convert::threshold_from_wire(threshold);
                 match self.next_threshold.take(id, threshold, self.sensor) {
                     Ok(true) => {
                         self.threshold_changed();
@@ -228,7 +227,7 @@ impl PipelineTask {
     }
 
     fn sample(&mut self, delivery: &Delivery, measurement: &Measurement) -> Sample {
-        let mut status = Status(measurement.status.bits());
+        let mut status = measurement.status;
         let first = core::mem::replace(&mut self.first, false);
         for (set, bit) in [
             (delivery.after_loss && !first, Status::FRAME_DROPPED),
@@ -244,11 +243,8 @@ impl PipelineTask {
             frame: delivery.edge.number,
             time_us: delivery.edge.time_us + u64::from(camera::exposure_middle_us()),
             status,
-            force: measurement.force.map(convert::force_to_wire),
-            markers: measurement
-                .markers
-                .filter(|_| session::wants_markers())
-                .map(|markers| markers.map(convert::marker_to_wire)),
+            force: measurement.force,
+            markers: measurement.markers.filter(|_| session::wants_markers()),
         }
     }
 

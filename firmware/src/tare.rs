@@ -3,8 +3,8 @@
 use crate::camera::FRAME_TIME;
 use crate::session;
 use embassy_time::{Duration, Instant};
-use hivtac_sensing::model::Rest;
 use hivtac_sensing::pipeline::Measurement;
+use hivtac_sensing::rest::Rest;
 use hivtac_sensing::tare::TareBuilder;
 
 /// Every second frame may be bad, and a camera may need some time to come back.

@@ -4,8 +4,8 @@ use crate::output::{note, print};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_host::threshold::{from_wire, text, to_wire};
-use hivtac_sensing::threshold::Threshold;
+use hivtac_host::threshold::text;
+use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use std::time::Duration;
 
@@ -37,9 +37,9 @@ pub fn threshold(
 ) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let wanted = wanted.map_or_else(|| of_model(&hello), Ok)?;
-    send(&mut link, Request::SetThreshold(to_wire(wanted)), patience)?;
+    send(&mut link, Request::SetThreshold(wanted), patience)?;
     print(&format!("threshold set: {}", text(&wanted)))?;
-    let made_for = hello.model.map(|model| from_wire(model.threshold));
+    let made_for = hello.model.map(|model| model.threshold);
     if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
         note(&format!(
             "hivtac: samples have markers but no force (model_mismatch): the device's model was \
@@ -56,7 +56,7 @@ fn of_model(hello: &DeviceHello) -> Result<Threshold, Failure> {
         Failure::new(Kind::Refused, message.to_owned())
     };
     let model = hello.model.as_ref().ok_or_else(none)?;
-    Ok(from_wire(model.threshold))
+    Ok(model.threshold)
 }
 
 fn send(link: &mut Link, request: Request, wait: Duration) -> Result<(), Failure> {

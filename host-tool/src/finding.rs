@@ -6,7 +6,7 @@ use crate::lines::{contact_text, status_text, to_json};
 use hivtac_sensing::blob::Blob;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 use serde::Serialize;
 
 /// Everything found in one picture. Positions in pixels, exact: 16 binary digits after the point.

@@ -1,8 +1,7 @@
 //! A force as JSON, the same for a sample of the device and for a picture.
 
 use crate::decimal::{Millionths, Thousandths};
-use hivtac_sensing::force;
-use hivtac_wire::message;
+use hivtac_terms::force::Force;
 use serde::Serialize;
 
 /// Keys and values of `"force"`.
@@ -40,27 +39,8 @@ pub struct PlaceJson {
     pub place_sigma_mm: Option<Thousandths>,
 }
 
-impl From<&message::Force> for ForceJson {
-    fn from(force: &message::Force) -> ForceJson {
-        let [x_n, y_n, z_n] = force.cartesian_un.map(Millionths::from_i32);
-        ForceJson {
-            alpha_deg: Thousandths::from_i32(force.alpha_mdeg),
-            beta_deg: Thousandths::from_i32(force.beta_mdeg),
-            magnitude_n: Millionths::from_i32(force.magnitude_un),
-            x_n,
-            y_n,
-            z_n,
-            direction_sigma_deg: Thousandths::from_u64(force.direction_sigma_mdeg.into()),
-            magnitude_sigma_n: Millionths::from_u64(force.magnitude_sigma_un.into()),
-            place: force.place.map_or_else(PlaceJson::default, |place| {
-                PlaceJson::of_micrometres(place.x_um, place.y_um, place.sigma_um)
-            }),
-        }
-    }
-}
-
-impl From<&force::Force> for ForceJson {
-    fn from(force: &force::Force) -> ForceJson {
+impl From<&Force> for ForceJson {
+    fn from(force: &Force) -> ForceJson {
         let [x_n, y_n, z_n] = force.cartesian.map(|n| Millionths::from_i32(n.0));
         ForceJson {
             alpha_deg: Thousandths::from_i32(force.alpha.0),
@@ -69,8 +49,8 @@ impl From<&force::Force> for ForceJson {
             x_n,
             y_n,
             z_n,
-            direction_sigma_deg: Thousandths::from_i32(force.direction_sigma.0),
-            magnitude_sigma_n: Millionths::from_i32(force.magnitude_sigma.0),
+            direction_sigma_deg: Thousandths::from_u64(force.direction_sigma.0.into()),
+            magnitude_sigma_n: Millionths::from_u64(force.magnitude_sigma.0.into()),
             place: force.place.map_or_else(PlaceJson::default, |place| {
                 PlaceJson::of_micrometres(place.x.0, place.y.0, place.sigma.0)
             }),
@@ -96,23 +76,13 @@ impl PlaceJson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres};
-
-    const WIRE: message::Force = message::Force {
-        alpha_mdeg: -5000,
-        beta_mdeg: 2500,
-        magnitude_un: 100_000,
-        cartesian_un: [-8707, 4362, -99_525],
-        direction_sigma_mdeg: 480,
-        magnitude_sigma_un: 900,
-        place: Some(message::Place {
-            x_um: 1250,
-            y_um: -7,
-            sigma_um: 85,
-        }),
+    use hivtac_terms::force::Place;
+    use hivtac_terms::units::{
+        MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+        UnsignedMilliDegrees,
     };
 
-    const SENSED: force::Force = force::Force {
+    const FORCE: Force = Force {
         alpha: MilliDegrees(-5000),
         beta: MilliDegrees(2500),
         magnitude: MicroNewtons(100_000),
@@ -121,9 +91,9 @@ mod tests {
             MicroNewtons(4362),
             MicroNewtons(-99_525),
         ],
-        direction_sigma: MilliDegrees(480),
-        magnitude_sigma: MicroNewtons(900),
-        place: Some(force::Place {
+        direction_sigma: UnsignedMilliDegrees(480),
+        magnitude_sigma: UnsignedMicroNewtons(900),
+        place: Some(Place {
             x: SignedMicrometres(1250),
             y: SignedMicrometres(-7),
             sigma: Micrometres(85),
@@ -135,21 +105,21 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_and_a_picture_give_the_same_json() {
-        assert_eq!(json((&WIRE).into()), json((&SENSED).into()));
+    fn numbers_are_exact() {
         assert!(
-            json((&WIRE).into())
+            json((&FORCE).into())
                 .ends_with(r#","place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085}"#)
         );
     }
 
     #[test]
     fn a_place_that_is_not_there_is_null() {
-        let (mut wire, mut sensed) = (WIRE, SENSED);
-        (wire.place, sensed.place) = (None, None);
-        assert_eq!(json((&wire).into()), json((&sensed).into()));
+        let force = Force {
+            place: None,
+            ..FORCE
+        };
         assert!(
-            json((&wire).into())
+            json((&force).into())
                 .ends_with(r#","place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null}"#)
         );
     }

@@ -1,7 +1,7 @@
 //! Thresholds on the command line.
 
-use hivtac_sensing::formats::Mono;
-use hivtac_sensing::threshold::HsvBox;
+use hivtac_terms::threshold::HsvBox;
+use hivtac_terms::threshold::Mono;
 
 /// Highest hue, saturation and value, each twice.
 const HIGHEST: [u8; 6] = [179, 179, 255, 255, 255, 255];

@@ -5,9 +5,10 @@ use crate::output::{note, print};
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_host::threshold::{from_wire, text, to_json as threshold_json};
-use hivtac_sensing::threshold::Threshold;
-use hivtac_wire::message::{Centroid, DeviceHello, DeviceMessage, Request, Stats};
+use hivtac_host::threshold::{text, to_json as threshold_json};
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::threshold::Threshold;
+use hivtac_wire::message::{DeviceHello, DeviceMessage, Request, Stats};
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
@@ -88,16 +89,16 @@ impl<'a> Info<'a> {
                 crc: format!("{:08x}", model.crc),
                 name: &model.name,
                 simulated: model.simulated,
-                threshold: from_wire(model.threshold),
+                threshold: model.threshold,
             }),
             width: hello.width,
             height: hello.height,
-            threshold: from_wire(hello.threshold),
+            threshold: hello.threshold,
             preset: &hello.preset,
             dilations: hello.dilations,
             centroid: match hello.centroid {
-                Centroid::BinaryMask => "binary-mask",
-                Centroid::RednessWeighted => "redness-weighted",
+                CentroidEstimator::BinaryMask => "binary-mask",
+                CentroidEstimator::RednessWeighted => "redness-weighted",
             },
             stats,
         }

@@ -3,8 +3,9 @@
 use crate::decimal::{Millionths, Thousandths};
 use crate::force_json::{ForceJson, PlaceJson};
 use crate::truth::Truth;
-use hivtac_wire::message::{Force, Sample};
-use hivtac_wire::status::Status;
+use hivtac_terms::force::Force;
+use hivtac_terms::status::Status;
+use hivtac_wire::message::Sample;
 use serde::Serialize;
 
 /// How samples are printed.
@@ -120,9 +121,9 @@ fn human_force(force: Option<&Force>) -> String {
     let Some(force) = force else {
         return NOTHING.repeat(9);
     };
-    let numbers = [force.alpha_mdeg, force.beta_mdeg, force.magnitude_un];
+    let numbers = [force.alpha.0, force.beta.0, force.magnitude.0];
     let mut text: String = numbers.map(column).concat();
-    text += &force.cartesian_un.map(column).concat();
+    text += &force.cartesian.map(|part| column(part.0)).concat();
     text += &human_place(ForceJson::from(force).place);
     text
 }
@@ -252,7 +253,11 @@ fn csv_truth(truth: Option<Truth>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_wire::message::Place;
+    use hivtac_terms::force::Place;
+    use hivtac_terms::units::{
+        MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+        UnsignedMilliDegrees,
+    };
 
     fn sample(force: Option<Force>, status: Status) -> Sample {
         Sample {
@@ -266,19 +271,19 @@ mod tests {
     }
 
     const PLACE: Place = Place {
-        x_um: 1250,
-        y_um: -7,
-        sigma_um: 85,
+        x: SignedMicrometres(1250),
+        y: SignedMicrometres(-7),
+        sigma: Micrometres(85),
     };
 
     fn force(place: Option<Place>) -> Force {
         Force {
-            alpha_mdeg: -5000,
-            beta_mdeg: 2500,
-            magnitude_un: 100_000,
-            cartesian_un: [-8707, 4362, -99_525],
-            direction_sigma_mdeg: 480,
-            magnitude_sigma_un: 900,
+            alpha: MilliDegrees(-5000),
+            beta: MilliDegrees(2500),
+            magnitude: MicroNewtons(100_000),
+            cartesian: [-8707, 4362, -99_525].map(MicroNewtons),
+            direction_sigma: UnsignedMilliDegrees(480),
+            magnitude_sigma: UnsignedMicroNewtons(900),
             place,
         }
     }

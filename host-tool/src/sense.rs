@@ -4,13 +4,14 @@ use crate::finding::Finding;
 use crate::output::{Reader, note, print};
 use crate::picture::Picture;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::{Model, Rest};
+use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline;
+use hivtac_sensing::rest::Rest;
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_sensing::threshold::{ByteOrder, HsvBox, PixelFormat};
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat};
 
 /// The sensing, with the table that is fastest on a computer.
 type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
@@ -165,7 +166,7 @@ impl<'a> Bench<'a> {
     /// The model's conditions as far as nothing else is said; a picture of another size is taken as
     /// one by the same preset, its focal length scaled with it.
     fn settings(&self, picture: &Picture) -> Settings {
-        let mut settings = Settings::of_model(&self.model, ByteOrder::Native);
+        let mut settings = self.model.conditions.settings(ByteOrder::Native);
         let conditions = &self.model.conditions;
         let size = (conditions.geometry.width, conditions.geometry.height);
         if self.options.preset.is_some() || size != (picture.width, picture.height) {

@@ -2,9 +2,10 @@
 //! truth.
 
 use crate::truth::Truth;
+use hivtac_terms::force::Force;
+use hivtac_terms::status::Status;
 use hivtac_wire::decoder::Rejected;
-use hivtac_wire::message::{Force, Sample, Stats};
-use hivtac_wire::status::Status;
+use hivtac_wire::message::{Sample, Stats};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -286,15 +287,15 @@ struct Errors {
 
 impl Errors {
     fn count(&mut self, force: &Force, truth: &Truth) {
-        let magnitude_error = f64::from(force.magnitude_un) / 1e6 - truth.magnitude_n;
+        let magnitude_error = f64::from(force.magnitude.0) / 1e6 - truth.magnitude_n;
         self.magnitude_squared
             .add(magnitude_error * magnitude_error);
         if let (Some(place), Some([x_mm, y_mm])) = (force.place, truth.place_mm()) {
-            let x = f64::from(place.x_um) - x_mm * 1e3;
-            let y = f64::from(place.y_um) - y_mm * 1e3;
+            let x = f64::from(place.x.0) - x_mm * 1e3;
+            let y = f64::from(place.y.0) - y_mm * 1e3;
             self.place_squared.add(x * x + y * y);
         }
-        let found = force.cartesian_un.map(f64::from);
+        let found = force.cartesian.map(|part| f64::from(part.0));
         let Some(angle) = angle_deg(found, [truth.x_n, truth.y_n, truth.z_n]) else {
             return;
         };
@@ -351,7 +352,11 @@ fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_wire::message::Place;
+    use hivtac_terms::force::Place;
+    use hivtac_terms::units::{
+        MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+        UnsignedMilliDegrees,
+    };
 
     #[test]
     fn gaps_are_told_apart() {
@@ -390,19 +395,19 @@ mod tests {
     #[test]
     fn the_error_of_a_place_is_a_distance_over_the_frames_that_have_both() {
         let force = |place| Force {
-            alpha_mdeg: 0,
-            beta_mdeg: 0,
-            magnitude_un: 0,
-            cartesian_un: [0; 3],
-            direction_sigma_mdeg: 0,
-            magnitude_sigma_un: 0,
+            alpha: MilliDegrees(0),
+            beta: MilliDegrees(0),
+            magnitude: MicroNewtons(0),
+            cartesian: [0; 3].map(MicroNewtons),
+            direction_sigma: UnsignedMilliDegrees(0),
+            magnitude_sigma: UnsignedMicroNewtons(0),
             place,
         };
-        let place = |x_um, y_um| {
+        let place = |x, y| {
             force(Some(Place {
-                x_um,
-                y_um,
-                sigma_um: 1,
+                x: SignedMicrometres(x),
+                y: SignedMicrometres(y),
+                sigma: Micrometres(1),
             }))
         };
         let truth = |place_x_mm, place_y_mm| Truth {

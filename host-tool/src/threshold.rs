@@ -1,38 +1,7 @@
-//! Thresholds: between the wire's and the sensing's, and as text and JSON.
+//! Thresholds as text and JSON.
 
-use hivtac_sensing::formats::{Mono, Yuv422};
-use hivtac_sensing::threshold::{HsvBox, Threshold};
-use hivtac_wire::message;
+use hivtac_terms::threshold::Threshold;
 use serde_json::{Value, json};
-
-/// A threshold from the wire, unchecked.
-pub fn from_wire(from: message::Threshold) -> Threshold {
-    match from {
-        message::Threshold::Rgb565(from) => Threshold::Rgb565(HsvBox::of_limits(from.limits())),
-        message::Threshold::Yuv422 { cr_low } => Threshold::Yuv422(Yuv422 { cr_low }),
-        message::Threshold::Mono {
-            luma_low,
-            luma_high,
-        } => Threshold::Mono(Mono {
-            low: luma_low,
-            high: luma_high,
-        }),
-    }
-}
-
-/// A threshold for the wire.
-pub fn to_wire(from: Threshold) -> message::Threshold {
-    match from {
-        Threshold::Rgb565(from) => {
-            message::Threshold::Rgb565(message::HsvBox::of_limits(from.limits()))
-        }
-        Threshold::Yuv422(Yuv422 { cr_low }) => message::Threshold::Yuv422 { cr_low },
-        Threshold::Mono(Mono { low, high }) => message::Threshold::Mono {
-            luma_low: low,
-            luma_high: high,
-        },
-    }
-}
 
 /// For a person: pixel format and limits.
 pub fn text(threshold: &Threshold) -> String {
@@ -75,6 +44,7 @@ pub fn to_json(threshold: &Threshold) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::threshold::{HsvBox, Mono, Yuv422};
 
     const ALL: [Threshold; 3] = [
         Threshold::Rgb565(HsvBox {
@@ -88,13 +58,6 @@ mod tests {
         Threshold::Yuv422(Yuv422 { cr_low: 162 }),
         Threshold::Mono(Mono { low: 7, high: 88 }),
     ];
-
-    #[test]
-    fn thresholds_go_over_the_wire_and_back() {
-        for threshold in ALL {
-            assert_eq!(from_wire(to_wire(threshold)), threshold);
-        }
-    }
 
     #[test]
     fn thresholds_are_told_with_their_format() {

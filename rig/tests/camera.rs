@@ -5,8 +5,8 @@ mod common;
 
 use common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
+use hivtac_terms::status::Status;
 use hivtac_wire::message::{Outcome, Request};
-use hivtac_wire::status::Status;
 
 fn assert_good(run: &Run) {
     let samples = run.samples();
@@ -55,7 +55,7 @@ fn the_first_sample_is_well_exposed() {
     };
     let run = setup.run();
     assert_good(&run);
-    let magnitude = |nth: usize| run.samples()[nth].force.unwrap().magnitude_un;
+    let magnitude = |nth: usize| run.samples()[nth].force.unwrap().magnitude.0;
     let (first, later) = (magnitude(0), magnitude(3));
     assert!(first.abs_diff(later) < 500, "{first} and {later} µN");
 }

@@ -5,8 +5,8 @@ mod common;
 use common::{HELLO_MS, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
+use hivtac_terms::status::Status;
 use hivtac_wire::message::Request;
-use hivtac_wire::status::Status;
 
 /// The camera is plugged in late. It is looked for again and again, and frames come.
 #[test]

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Setup, firmware};
 use hivtac_rig::run::INSTRUCTIONS_PER_SECOND;
-use hivtac_wire::status::Status;
+use hivtac_terms::status::Status;
 
 /// Statuses that say something about the picture. On an undisturbed scene none of them may appear.
 const PICTURE: Status = Status(

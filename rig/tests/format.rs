@@ -6,15 +6,15 @@ mod common;
 
 use common::{Run, Setup, command, firmware, set_threshold};
 use hivtac_rig::script::Action;
-use hivtac_wire::message::{HsvBox, Outcome, Request, Sample, Threshold};
-use hivtac_wire::status::Status;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::Mono;
+use hivtac_terms::threshold::Yuv422;
+use hivtac_terms::threshold::{HsvBox, Threshold};
+use hivtac_wire::message::{Outcome, Request, Sample};
 
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
-const RED_CR: Threshold = Threshold::Yuv422 { cr_low: 162 };
-const DARK: Threshold = Threshold::Mono {
-    luma_low: 0,
-    luma_high: 88,
-};
+const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });
+const DARK: Threshold = Threshold::Mono(Mono { low: 0, high: 88 });
 
 /// What the device answered to a command.
 fn outcome(run: &Run, asked: u16) -> Option<Outcome> {

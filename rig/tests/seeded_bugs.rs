@@ -5,7 +5,7 @@ mod common;
 
 use common::{Setup, bug};
 use hivtac_rig::usb_host::Port;
-use hivtac_wire::status::Status;
+use hivtac_terms::status::Status;
 
 /// DMAMUX connects another request: nobody empties the FIFO, so every frame overruns at its fifth
 /// word.

@@ -5,8 +5,9 @@ mod common;
 
 use common::{Setup, firmware, set_threshold};
 use hivtac_rig::script::Action;
-use hivtac_wire::message::{HsvBox, Outcome, Sample, Threshold};
-use hivtac_wire::status::Status;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{HsvBox, Threshold};
+use hivtac_wire::message::{Outcome, Sample};
 
 /// Accepts nothing that the scene shows.
 const GREEN: HsvBox = HsvBox {

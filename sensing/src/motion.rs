@@ -9,7 +9,8 @@
 //! middle) / L while nothing moves, so that of markers 54 rows off the middle of 278 lines the
 //! upper ones have 1.21 times the noise and the lower ones 0.83 times.
 
-use crate::{markers::Marker, units::Px};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
 
 /// What the markers of the frame before say of those of this one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

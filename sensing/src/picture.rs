@@ -1,15 +1,14 @@
 //! Pictures of discs, for tests: drawn without light or noise, so that what a test asserts is
 //! exact.
 
-use crate::{
-    geometry::Geometry,
-    markers::Marker,
-    model::{Model, Rest},
-    pipeline::{Measurement, Sensor},
-    settings::Settings,
-    tare::TareBuilder,
-    threshold::ByteOrder,
-};
+use crate::pipeline::{Measurement, Sensor};
+use crate::tare::TareBuilder;
+use hivtac_force::model::Model;
+use hivtac_force::rest::Rest;
+use hivtac_markers::settings::Settings;
+use hivtac_terms::geometry::Geometry;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::ByteOrder;
 use std::{boxed::Box, vec, vec::Vec};
 
 /// Passes the default threshold.

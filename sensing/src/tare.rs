@@ -1,10 +1,8 @@
 //! Tare: the rest position of this unit, measured as the mean of good frames.
 
-use crate::{
-    features::{FEATURES, Features},
-    markers::Marker,
-    model::Rest,
-};
+use hivtac_force::features::{FEATURES, Features};
+use hivtac_force::rest::Rest;
+use hivtac_terms::marker::Marker;
 
 /// Most frames in a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
@@ -65,7 +63,7 @@ impl TareBuilder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::Px;
+    use hivtac_terms::units::Px;
 
     fn frame(x: i32, area: u32) -> ([Marker; 4], Features) {
         let at = |x, y| Marker {

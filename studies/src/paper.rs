@@ -12,7 +12,7 @@ use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
 use hivtac_sensing::model::Model;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 use serde::Serialize;
 
 use crate::large::{Large, dataset};

@@ -8,7 +8,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_scene::Options;
 use hivtac_sensing::model::Model;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 use rayon::prelude::*;
 use serde::Serialize;
 

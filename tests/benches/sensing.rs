@@ -5,7 +5,6 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hivtac_scene::{Preset, Scene};
-use hivtac_sensing::geometry::{self, Geometry};
 use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::network::Network;
 use hivtac_sensing::pipeline::Sensor;
@@ -13,7 +12,8 @@ use hivtac_sensing::scanner::{ScanSettings, Scanner};
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tables::Table;
-use hivtac_sensing::threshold::{ByteOrder, HsvBox};
+use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::threshold::{ByteOrder, HsvBox};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures;
 

@@ -8,9 +8,9 @@ use std::vec::Vec;
 use anyhow::Result;
 use hivtac_hard_cases::{Expected, HardCase, hard_cases, hard_loads};
 use hivtac_scene::{Contact, Frame, Preset, Scene};
-use hivtac_sensing::model::CentroidEstimator;
-use hivtac_sensing::status::Status;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::PixelFormat;
 
 use crate::tared::{Detection, View};
 

@@ -7,7 +7,7 @@ use std::string::String;
 use hivtac_scene::{Load, SceneError, Truth};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::pipeline::Measurement;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 
 use crate::pictures::Random;
 

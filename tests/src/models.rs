@@ -3,15 +3,17 @@
 use std::vec::Vec;
 
 use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::model::encode::{LayerSpec, ModelSpec, with_steps};
 use hivtac_sensing::model::{
-    CalibratedRange, CentroidEstimator, Conditions, ContactReading, InputScaling, Origin,
-    OutputKind, Rest, Uncertainty, UncertaintyKnot, WeightWidth,
+    CalibratedRange, Conditions, InputScaling, Origin, OutputKind, Uncertainty, UncertaintyKnot,
 };
+use hivtac_sensing::model::{encode::LayerSpec, encode::ModelSpec, encode::with_steps};
+use hivtac_sensing::packing::WeightWidth;
+use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::{PixelFormat, Threshold};
-use hivtac_sensing::units::{MicroNewtons, Micrometres, MilliDegrees};
+use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::pictures::Random;
 use crate::script::features;

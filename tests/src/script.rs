@@ -3,9 +3,9 @@
 use std::vec::Vec;
 
 use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::markers::Marker;
-use hivtac_sensing::model::Rest;
-use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
+use hivtac_sensing::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 
 use crate::golden::Kind;
 
@@ -173,7 +173,7 @@ impl Default for Script {
 
 /// The eleven numbers as features; all but the last must fit 32 bits.
 pub fn features(numbers: [i64; FEATURES]) -> Features {
-    use hivtac_sensing::units::Px;
+    use hivtac_terms::units::Px;
     let px = |i: usize| Px(i32::try_from(numbers[i]).expect("a coordinate fits 32 bits"));
     Features {
         centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),

@@ -6,13 +6,15 @@ use std::vec::Vec;
 
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
-use hivtac_sensing::geometry::{self, Geometry};
-use hivtac_sensing::model::{CentroidEstimator, ContactReading, Model, OutputKind, Rest};
+use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::status::Status;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
+use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 
 use crate::models;
 
@@ -209,7 +211,7 @@ impl TaredSensor {
         let (width, height) = (geometry.width.into(), geometry.height.into());
         let preset = model.conditions.preset.name().parse()?;
         let mut sensor = Box::new(Sensor::new());
-        let settings = Settings::of_model(&model, ByteOrder::Native);
+        let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(model));
         configured.map_err(|error| anyhow!("{error}"))?;
         let mut tared = TaredSensor { sensor };

@@ -1,12 +1,13 @@
 //! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
 
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
-use hivtac_sensing::formats::{Mono, Yuv422};
 use hivtac_sensing::forward::MOST_STEPS;
-use hivtac_sensing::markers::Marker;
-use hivtac_sensing::model::{Model, OutputKind, Rest};
-use hivtac_sensing::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};
-use hivtac_sensing::units::Px;
+use hivtac_sensing::model::{Model, OutputKind};
+use hivtac_sensing::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};
+use hivtac_terms::threshold::{Mono, Yuv422};
+use hivtac_terms::units::Px;
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu;

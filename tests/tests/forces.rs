@@ -9,9 +9,8 @@ use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::status::Status;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::artifact;
 use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
 use serde_json::{Value, json};
@@ -23,7 +22,7 @@ const SEED: u64 = 5;
 fn on_this_computer(model: &[u8], before: Option<&[u16]>, pixels: &[u16]) -> Measurement {
     let model = Model::parse(model).unwrap();
     let mut sensor = Box::new(Sensor::<64>::new());
-    let settings = Settings::of_model(&model, ByteOrder::Native);
+    let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(model)).unwrap();
     // An OV7725 has 278 lines.
     sensor.set_motion(Motion::rolling(278));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use hivtac_hard_cases::{Expected, HardCase, hard_cases};
 use hivtac_scene::Preset;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;

@@ -2,8 +2,8 @@
 //! beyond a bound.
 
 use hivtac_scene::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
-use hivtac_sensing::model::CentroidEstimator;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::threshold::PixelFormat;
 use hivtac_tests::tared::{Detection, ESTIMATORS, TaredSensor, View};
 
 /// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small

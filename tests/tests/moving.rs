@@ -10,8 +10,7 @@ use hivtac_scene::{Motion, Preset, Scene, Shutter, Vibration};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::motion;
 use hivtac_sensing::pipeline::Sensor;
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::threshold::ByteOrder;
 
 /// Lines of an OV7725's frame, of which 240 are rows.
 const LINES: u16 = 278;
@@ -51,7 +50,7 @@ struct Errors {
 fn sensor(model: &[u8], motion: motion::Motion) -> Box<Sensor<'_>> {
     let model = Model::parse(model).unwrap();
     let mut sensor = Box::new(Sensor::<64>::new());
-    let settings = Settings::of_model(&model, ByteOrder::Native);
+    let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(model)).unwrap();
     sensor.set_motion(motion);
     sensor

@@ -61,12 +61,19 @@ fn the_sensing_runs_from_itcm() {
     // Bridges of the linker between the memories are no code of the project.
     let code = code.filter(|symbol| !symbol.name.contains("Thunk"));
     let is_sensing = |symbol: &&Symbol| {
-        symbol.name.contains("hivtac_sensing") || symbol.name.starts_with("hivtac_")
+        let packages = [
+            "hivtac_terms",
+            "hivtac_markers",
+            "hivtac_force",
+            "hivtac_sensing",
+        ];
+        packages.iter().any(|package| symbol.name.contains(package))
+            || symbol.name.starts_with("hivtac_")
     };
     // What runs for a model, a setting or a tare, and not for a frame.
     let once = [
-        "hivtac_sensing5model",
-        "hivtac_sensing..model",
+        "hivtac_force5model",
+        "hivtac_force..model",
         "hivtac_sensing4tare",
         "$GT$7prepare17h",
         "7forward8mounting",

@@ -2,9 +2,9 @@
 //! that does not.
 
 use hivtac_scene::{Contact, Preset, Scene};
-use hivtac_sensing::model::CentroidEstimator;
-use hivtac_sensing::status::Status;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::PixelFormat;
 use hivtac_tests::judged::Contacts;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::{Detection, ESTIMATORS, TaredSensor, View};

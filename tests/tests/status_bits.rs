@@ -1,30 +1,15 @@
-//! The status bits have one meaning in `hivtac-sensing`, `hivtac-wire` and `docs/wire.md`.
+//! The status bits have one meaning in `hivtac-terms` and `docs/wire.md`.
 
-use hivtac_sensing::status::Status as SensingStatus;
-use hivtac_wire::status::Status as WireStatus;
+use hivtac_terms::status::Status;
 use std::collections::BTreeMap;
 
 const DOCUMENT: &str = include_str!("../../docs/wire.md");
 
-fn wire_bits() -> BTreeMap<u32, &'static str> {
-    WireStatus::NAMES
+fn named_bits() -> BTreeMap<u32, &'static str> {
+    Status::NAMES
         .iter()
         .map(|(bit, name)| (bit.0, *name))
         .collect()
-}
-
-#[test]
-fn every_bit_of_the_pipeline_has_its_number_and_name_on_the_wire() {
-    let wire = wire_bits();
-    assert!(!SensingStatus::NAMES.is_empty());
-    for (bit, name) in SensingStatus::NAMES {
-        assert_eq!(wire.get(&bit.bits()), Some(name));
-    }
-}
-
-#[test]
-fn both_say_no_force_by_the_same_bits() {
-    assert_eq!(SensingStatus::NO_FORCE.bits(), WireStatus::NO_FORCE.0);
 }
 
 /// Rows of the document's table: bit, name, whether it says "no force".
@@ -56,8 +41,8 @@ fn the_document_lists_exactly_these_bits() {
         .iter()
         .map(|(bit, name, _)| (1 << bit, name.as_str()))
         .collect();
-    assert_eq!(names, wire_bits());
+    assert_eq!(names, named_bits());
     let no_force = documented.iter().filter(|(_, _, no_force)| *no_force);
     let mask = no_force.fold(0, |mask, (bit, ..)| mask | 1 << bit);
-    assert_eq!(mask, WireStatus::NO_FORCE.0);
+    assert_eq!(mask, Status::NO_FORCE.0);
 }

@@ -3,12 +3,13 @@
 
 use hivtac_sensing::force::{Force, Resting};
 use hivtac_sensing::forward::{Forward, Markers, Pose, STEPS_AT_MOST};
-use hivtac_sensing::markers::Marker;
 use hivtac_sensing::model::encode::FORWARD_OFFSET;
-use hivtac_sensing::model::{Model, ModelError, Rest};
+use hivtac_sensing::model::{Model, ModelError};
 use hivtac_sensing::network::Output;
-use hivtac_sensing::status::Status;
-use hivtac_sensing::units::Px;
+use hivtac_sensing::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::units::Px;
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 

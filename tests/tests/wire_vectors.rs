@@ -2,10 +2,19 @@
 //! shares nothing with the Rust one, equals what `hivtac-wire` writes and reads, and what
 //! `docs/wire.md` quotes.
 
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::force::{Force, Place};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::Mono;
+use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
+use hivtac_terms::units::{
+    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
+    UnsignedMilliDegrees,
+};
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
 use hivtac_wire::message::*;
-use hivtac_wire::status::Status;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -42,7 +51,7 @@ fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
 }
 
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
-const RED_CR: Threshold = Threshold::Yuv422 { cr_low: 162 };
+const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });
 
 fn hello(model: Option<ModelIdentity>, threshold: Threshold) -> DeviceMessage {
     DeviceMessage::Hello(DeviceHello {
@@ -57,7 +66,7 @@ fn hello(model: Option<ModelIdentity>, threshold: Threshold) -> DeviceMessage {
         threshold,
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
-        centroid: Centroid::RednessWeighted,
+        centroid: CentroidEstimator::RednessWeighted,
     })
 }
 
@@ -72,12 +81,12 @@ fn model(threshold: Threshold) -> ModelIdentity {
 
 fn sample(status: Status, place: Option<Place>) -> DeviceMessage {
     let force = Force {
-        alpha_mdeg: -5000,
-        beta_mdeg: 2500,
-        magnitude_un: 100_000,
-        cartesian_un: [-8707, 4362, -99_525],
-        direction_sigma_mdeg: 480,
-        magnitude_sigma_un: 900,
+        alpha: MilliDegrees(-5000),
+        beta: MilliDegrees(2500),
+        magnitude: MicroNewtons(100_000),
+        cartesian: [-8707, 4362, -99_525].map(MicroNewtons),
+        direction_sigma: UnsignedMilliDegrees(480),
+        magnitude_sigma: UnsignedMicroNewtons(900),
         place,
     };
     DeviceMessage::Sample(Sample {
@@ -91,9 +100,9 @@ fn sample(status: Status, place: Option<Place>) -> DeviceMessage {
 }
 
 const PLACE: Place = Place {
-    x_um: 1250,
-    y_um: -730,
-    sigma_um: 85,
+    x: SignedMicrometres(1250),
+    y: SignedMicrometres(-730),
+    sigma: Micrometres(85),
 };
 
 fn sample_without_force(frame: u32, status: Status) -> DeviceMessage {
@@ -108,10 +117,10 @@ fn sample_without_force(frame: u32, status: Status) -> DeviceMessage {
 }
 
 fn sample_with_markers() -> DeviceMessage {
-    let marker = |x_q16, y_q16, area_px| Marker {
-        x_q16,
-        y_q16,
-        area_px,
+    let marker = |x, y, area| Marker {
+        x: Px(x),
+        y: Px(y),
+        area,
     };
     DeviceMessage::Sample(Sample {
         sequence: 7,
@@ -211,10 +220,7 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
             "set-threshold-mono",
             command(
                 200,
-                Request::SetThreshold(Threshold::Mono {
-                    luma_low: 0,
-                    luma_high: 88,
-                }),
+                Request::SetThreshold(Threshold::Mono(Mono { low: 0, high: 88 })),
             ),
         ),
         ("tare", command(7, Request::Tare { frames: 128 })),

@@ -2,17 +2,17 @@
 """Makes wire.json, the golden vectors of docs/wire.md, from that text alone.
 
 An implementation of its own, sharing nothing with the Rust one, so that the two check each other:
-    python3 tests/vectors/wire_vectors.py          rewrite wire.json beside this file
-    python3 tests/vectors/wire_vectors.py --doc    print the annotated bytes of docs/wire.md
+    python3 tests/vectors/wire_vectors.py
+rewrites wire.json beside this file, and the schema hash and annotated bytes of docs/wire.md.
 """
 
 import json
 import pathlib
-import sys
+import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x3A59864A163AD574
+SCHEMA = 0x5F4B9EBDD0ABA1AE
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -264,32 +264,32 @@ def document():
     }
 
 
-def annotate(name, fields, whole=None):
-    """A block for docs/wire.md: the body field by field, then the frame."""
+def annotated(name, fields):
+    """Blocks of docs/wire.md by their titles: the body field by field, and the frame."""
     content = body(fields)
     crc = zlib.crc32(content)
     rows = list(fields) + [(crc.to_bytes(4, "little"), f"CRC-32 {crc:#010x}")]
-    print(f"```text body {name}")
-    for data, note in rows:
-        print(f"{data.hex(' '):<35} # {note}" if len(data) < 12 else f"{data.hex(' ')} # {note}")
-    print(f"```\n\n```text frame {name}\n{(whole or frame(content)).hex(' ')}\n```\n")
+    width = [35 if len(data) < 12 else 0 for data, _ in rows]
+    lines = [f"{data.hex(' '):<{w}} # {note}\n" for w, (data, note) in zip(width, rows)]
+    return {f"body {name}": "".join(lines), f"frame {name}": frame(content).hex(" ") + "\n"}
 
 
-def print_documentation():
-    for name in ["host-hello", "start", "set-threshold", "set-threshold-yuv422", "tare",
-                 "start-with-markers", "expose"]:
-        annotate(name, HOST[name])
-    for name in ["device-hello", "sample-force", "sample-without-force", "sample-with-markers",
-                 "stats", "log", "reply-done"]:
-        annotate(name, DEVICE[name])
-    for name in ["host-hello-version-1", "foreign-hello"]:
-        annotate(name, FOREIGN[name])
-    print(f"```text frame bad-crc\n{bad_crc().hex(' ')}\n```")
+def written_into(text):
+    """docs/wire.md with this schema hash and these bytes."""
+    blocks = {"frame bad-crc": bad_crc().hex(" ") + "\n"}
+    for name, fields in {**HOST, **DEVICE, **FOREIGN}.items():
+        blocks |= annotated(name, fields)
+
+    def block(match):
+        return f"```text {match[1]}\n{blocks[match[1]]}```"
+
+    text = re.sub(r"```text ((?:body|frame) [\w-]+)\n.*?```", block, text, flags=re.S)
+    return re.sub(r"schema hash \*\*0x\w+\*\*", f"schema hash **{SCHEMA:#018x}**", text)
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--doc"]:
-        print_documentation()
-    else:
-        path = pathlib.Path(__file__).with_name("wire.json")
-        path.write_text(json.dumps(document(), indent=2, ensure_ascii=False) + "\n")
+    here = pathlib.Path(__file__).parent
+    vectors = json.dumps(document(), indent=2, ensure_ascii=False)
+    (here / "wire.json").write_text(vectors + "\n")
+    page = here.parent.parent / "docs" / "wire.md"
+    page.write_text(written_into(page.read_text()))

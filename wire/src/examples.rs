@@ -1,9 +1,17 @@
 //! Messages for tests: the longest of each kind, and arbitrary ones.
 
 use crate::message::*;
-use crate::status::Status;
 use crate::version::SCHEMA_HASH;
 use heapless::String;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::force::{Force, Place};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
+use hivtac_terms::units::{
+    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
+    UnsignedMilliDegrees,
+};
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
 
@@ -29,7 +37,7 @@ pub fn device_hello() -> DeviceHello {
         threshold: RED,
         preset: String::try_from("ov7725").unwrap(),
         dilations: 1,
-        centroid: Centroid::RednessWeighted,
+        centroid: CentroidEstimator::RednessWeighted,
     }
 }
 
@@ -74,23 +82,23 @@ pub fn longest_sample() -> Sample {
         time_us: u64::MAX,
         status: Status(u32::MAX),
         force: Some(Force {
-            alpha_mdeg: i32::MIN,
-            beta_mdeg: i32::MIN,
-            magnitude_un: i32::MIN,
-            cartesian_un: [i32::MIN; 3],
-            direction_sigma_mdeg: u32::MAX,
-            magnitude_sigma_un: u32::MAX,
+            alpha: MilliDegrees(i32::MIN),
+            beta: MilliDegrees(i32::MIN),
+            magnitude: MicroNewtons(i32::MIN),
+            cartesian: [MicroNewtons(i32::MIN); 3],
+            direction_sigma: UnsignedMilliDegrees(u32::MAX),
+            magnitude_sigma: UnsignedMicroNewtons(u32::MAX),
             place: Some(Place {
-                x_um: i32::MIN,
-                y_um: i32::MIN,
-                sigma_um: u32::MAX,
+                x: SignedMicrometres(i32::MIN),
+                y: SignedMicrometres(i32::MIN),
+                sigma: Micrometres(u32::MAX),
             }),
         }),
         markers: Some(
             [Marker {
-                x_q16: i32::MIN,
-                y_q16: i32::MIN,
-                area_px: u32::MAX,
+                x: Px(i32::MIN),
+                y: Px(i32::MIN),
+                area: u32::MAX,
             }; 4],
         ),
     }
@@ -172,7 +180,10 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
 
 fn any_hello() -> impl Strategy<Value = DeviceHello> {
     let names = (any_string(), any_string(), any_string());
-    let centroid = prop_oneof![Just(Centroid::BinaryMask), Just(Centroid::RednessWeighted)];
+    let centroid = prop_oneof![
+        Just(CentroidEstimator::BinaryMask),
+        Just(CentroidEstimator::RednessWeighted)
+    ];
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
     let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
@@ -214,33 +225,33 @@ fn any_sample() -> impl Strategy<Value = Sample> {
 }
 
 fn any_marker() -> impl Strategy<Value = Marker> {
-    any::<(i32, i32, u32)>().prop_map(|(x_q16, y_q16, area_px)| Marker {
-        x_q16,
-        y_q16,
-        area_px,
+    any::<(i32, i32, u32)>().prop_map(|(x, y, area)| Marker {
+        x: Px(x),
+        y: Px(y),
+        area,
     })
 }
 
 fn any_force() -> impl Strategy<Value = Force> {
     let numbers = (any::<[i32; 3]>(), any::<[i32; 3]>(), any::<[u32; 2]>());
     (numbers, proptest::option::of(any_place())).prop_map(
-        |(([alpha_mdeg, beta_mdeg, magnitude_un], cartesian_un, sigma), place)| Force {
-            alpha_mdeg,
-            beta_mdeg,
-            magnitude_un,
-            cartesian_un,
-            direction_sigma_mdeg: sigma[0],
-            magnitude_sigma_un: sigma[1],
+        |(([alpha, beta, magnitude], cartesian, sigma), place)| Force {
+            alpha: MilliDegrees(alpha),
+            beta: MilliDegrees(beta),
+            magnitude: MicroNewtons(magnitude),
+            cartesian: cartesian.map(MicroNewtons),
+            direction_sigma: UnsignedMilliDegrees(sigma[0]),
+            magnitude_sigma: UnsignedMicroNewtons(sigma[1]),
             place,
         },
     )
 }
 
 fn any_place() -> impl Strategy<Value = Place> {
-    any::<(i32, i32, u32)>().prop_map(|(x_um, y_um, sigma_um)| Place {
-        x_um,
-        y_um,
-        sigma_um,
+    any::<(i32, i32, u32)>().prop_map(|(x, y, sigma)| Place {
+        x: SignedMicrometres(x),
+        y: SignedMicrometres(y),
+        sigma: Micrometres(sigma),
     })
 }
 
@@ -291,11 +302,8 @@ fn any_reply() -> impl Strategy<Value = Reply> {
 fn any_threshold() -> impl Strategy<Value = Threshold> {
     prop_oneof![
         any_box().prop_map(Threshold::Rgb565),
-        any::<u8>().prop_map(|cr_low| Threshold::Yuv422 { cr_low }),
-        any::<[u8; 2]>().prop_map(|[luma_low, luma_high]| Threshold::Mono {
-            luma_low,
-            luma_high
-        }),
+        any::<u8>().prop_map(|cr_low| Threshold::Yuv422(Yuv422 { cr_low })),
+        any::<[u8; 2]>().prop_map(|[low, high]| Threshold::Mono(Mono { low, high })),
     ]
 }
 

@@ -11,7 +11,6 @@ extern crate std;
 pub mod decoder;
 pub mod frame;
 pub mod message;
-pub mod status;
 pub mod usb;
 pub mod version;
 

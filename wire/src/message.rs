@@ -1,7 +1,11 @@
 //! Every message, both ways.
 
-use crate::status::Status;
 use heapless::String;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::force::Force;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::Threshold;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -68,16 +72,7 @@ pub struct DeviceHello {
     /// 3×3 dilations of the mask, 0–3.
     pub dilations: u8,
     /// How a marker's position is taken from its pixels.
-    pub centroid: Centroid,
-}
-
-/// How a marker's position is taken from its pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Centroid {
-    /// The mean of its pixels in the mask.
-    BinaryMask,
-    /// The mean of the same pixels, weighted with their redness.
-    RednessWeighted,
+    pub centroid: CentroidEstimator,
 }
 
 /// Which model makes the forces.
@@ -91,76 +86,6 @@ pub struct ModelIdentity {
     pub simulated: bool,
     /// The threshold that it was made for: with another one there is no force.
     pub threshold: Threshold,
-}
-
-/// Which pixels a marker may have, and with that what the camera sends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub enum Threshold {
-    /// RGB565: a box of colours.
-    Rgb565(HsvBox),
-    /// YUV422: a least Cr.
-    Yuv422 {
-        /// Lowest Cr of a pair of pixels.
-        cr_low: u8,
-    },
-    /// Mono: a range of the luma, ends included.
-    Mono {
-        /// Lowest luma.
-        luma_low: u8,
-        /// Highest luma.
-        luma_high: u8,
-    },
-}
-
-/// An inclusive box in OpenCV's 8-bit HSV (H 0–179). `hue_low > hue_high` wraps through 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct HsvBox {
-    /// Lowest hue, 0–179.
-    pub hue_low: u8,
-    /// Highest hue, 0–179.
-    pub hue_high: u8,
-    /// Lowest saturation.
-    pub saturation_low: u8,
-    /// Highest saturation.
-    pub saturation_high: u8,
-    /// Lowest value.
-    pub value_low: u8,
-    /// Highest value.
-    pub value_high: u8,
-}
-
-impl HsvBox {
-    /// Of its six limits, in the order of the fields.
-    pub const fn of_limits(limits: [u8; 6]) -> HsvBox {
-        let [
-            hue_low,
-            hue_high,
-            saturation_low,
-            saturation_high,
-            value_low,
-            value_high,
-        ] = limits;
-        HsvBox {
-            hue_low,
-            hue_high,
-            saturation_low,
-            saturation_high,
-            value_low,
-            value_high,
-        }
-    }
-
-    /// Its six limits, in the order of the fields.
-    pub const fn limits(&self) -> [u8; 6] {
-        [
-            self.hue_low,
-            self.hue_high,
-            self.saturation_low,
-            self.saturation_high,
-            self.value_low,
-            self.value_high,
-        ]
-    }
 }
 
 /// One frame's result.
@@ -179,48 +104,6 @@ pub struct Sample {
     pub force: Option<Force>,
     /// The four markers, when they were asked for ([`Request::StartWithMarkers`]) and found.
     pub markers: Option<[Marker; 4]>,
-}
-
-/// One of the four markers of a frame, 0–3 from the upper left, clockwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct Marker {
-    /// Centroid's column, 1/65,536 px.
-    pub x_q16: i32,
-    /// Centroid's row, 1/65,536 px.
-    pub y_q16: i32,
-    /// Pixels in the mask.
-    pub area_px: u32,
-}
-
-/// A force on the film. Conventions: `docs/wire.md`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct Force {
-    /// α, thousandths of a degree.
-    pub alpha_mdeg: i32,
-    /// β, thousandths of a degree.
-    pub beta_mdeg: i32,
-    /// |F|, µN, never negative.
-    pub magnitude_un: i32,
-    /// Fx, Fy, Fz in the film frame, µN: |F| in the direction of α and β.
-    pub cartesian_un: [i32; 3],
-    /// Standard uncertainty of the direction, thousandths of a degree.
-    pub direction_sigma_mdeg: u32,
-    /// Standard uncertainty of |F|, µN.
-    pub magnitude_sigma_un: u32,
-    /// Where the tip touches the film; `None` from a device whose model does not tell.
-    pub place: Option<Place>,
-}
-
-/// The point of the film that the tip touches, by where it rests in the film frame: (0, 0) is the
-/// film's middle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
-pub struct Place {
-    /// To the right in the image, µm.
-    pub x_um: i32,
-    /// Down in the image, µm.
-    pub y_um: i32,
-    /// Standard uncertainty of each coordinate, µm: the root of half the trace of their covariance.
-    pub sigma_um: u32,
 }
 
 /// Counters since boot. They wrap never in practice (32 bits at 1 kHz: 49 days) and saturate then.

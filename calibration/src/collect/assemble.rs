@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::Features;
-use hivtac_sensing::markers::Marker;
-use hivtac_sensing::units::Px;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
 
 use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};

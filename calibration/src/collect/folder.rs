@@ -16,8 +16,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_scene::Contact;
-use hivtac_wire::message::{Centroid, DeviceHello, Sample};
-use hivtac_wire::status::Status;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::status::Status;
+use hivtac_wire::message::{DeviceHello, Sample};
 use serde::{Deserialize, Serialize};
 
 use super::poses::Pose;
@@ -88,7 +89,7 @@ impl Folder {
         );
         match &sample.markers {
             Some(markers) => markers.iter().for_each(|m| {
-                line += &format!(",{},{},{}", m.x_q16, m.y_q16, m.area_px);
+                line += &format!(",{},{},{}", m.x.0, m.y.0, m.area);
             }),
             None => line += &",".repeat(12),
         }
@@ -207,7 +208,7 @@ fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
 /// # Errors
 /// When this program does not know its preset.
 pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
-    let threshold = hivtac_host::threshold::from_wire(hello.threshold);
+    let threshold = hello.threshold;
     crate::conditions::preset(&hello.preset)
         .context("the sensor says what this program does not know")?;
     Ok(Conditions {
@@ -218,8 +219,8 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
         threshold: threshold.limits(),
         dilations: hello.dilations,
         centroid: match hello.centroid {
-            Centroid::BinaryMask => CentroidName::BinaryMask,
-            Centroid::RednessWeighted => CentroidName::RednessWeighted,
+            CentroidEstimator::BinaryMask => CentroidName::BinaryMask,
+            CentroidEstimator::RednessWeighted => CentroidName::RednessWeighted,
         },
         contact: Contact::default(),
         origin: OriginName::unit(hello.device_id),
@@ -365,14 +366,17 @@ fn takes_done(path: &Path) -> Result<Vec<Pose>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_sensing::threshold::PixelFormat;
-    use hivtac_wire::message::{HsvBox, Marker, Threshold};
+    use hivtac_terms::marker::Marker;
+    use hivtac_terms::threshold::PixelFormat;
+    use hivtac_terms::threshold::Yuv422;
+    use hivtac_terms::threshold::{HsvBox, Threshold};
+    use hivtac_terms::units::Px;
 
     fn conditions() -> Conditions {
         Conditions {
             origin: OriginName::unit([7; 12]),
             ..Conditions::simulated(
-                hivtac_sensing::geometry::Preset::Ov7725,
+                hivtac_terms::geometry::Preset::Ov7725,
                 320,
                 240,
                 PixelFormat::Rgb565,
@@ -382,9 +386,9 @@ mod tests {
 
     fn sample(frame: u32, found: bool) -> Sample {
         let marker = |i: i32| Marker {
-            x_q16: 65_536 * i,
-            y_q16: -i,
-            area_px: 190,
+            x: Px(65_536 * i),
+            y: Px(-i),
+            area: 190,
         };
         Sample {
             sequence: frame,
@@ -454,19 +458,16 @@ mod tests {
             model: None,
             width: 320,
             height: 240,
-            threshold: Threshold::Yuv422 { cr_low: 170 },
+            threshold: Threshold::Yuv422(Yuv422 { cr_low: 170 }),
             preset: "ov7725".try_into().unwrap(),
             dilations: 1,
-            centroid: Centroid::RednessWeighted,
+            centroid: CentroidEstimator::RednessWeighted,
         };
         let yuv422 = conditions_of(&hello).unwrap();
         assert_eq!(yuv422.pixel_format, PixelFormat::Yuv422);
         assert_eq!(yuv422.threshold, [170, 0, 0, 0, 0, 0]);
         let model = yuv422.to_model().unwrap();
-        assert_eq!(
-            hivtac_host::threshold::to_wire(model.threshold),
-            hello.threshold
-        );
+        assert_eq!(model.threshold, hello.threshold);
         hello.threshold = Threshold::Rgb565(HsvBox::of_limits([1, 2, 3, 4, 5, 6]));
         let rgb565 = conditions_of(&hello).unwrap();
         assert_eq!(rgb565.pixel_format, PixelFormat::Rgb565);

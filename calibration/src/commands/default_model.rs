@@ -8,7 +8,7 @@ use hivtac_calibration::conditions::pixel_format;
 use hivtac_calibration::dataset::{Loads, Recipe};
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::train::Options;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::threshold::PixelFormat;
 
 use super::data::rendered;
 use super::model::{CheckArgs, exported};

@@ -5,12 +5,12 @@ use std::sync::Mutex;
 use anyhow::{Result, anyhow};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
-use hivtac_sensing::geometry::Geometry;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::status::Status;
-use hivtac_sensing::threshold::{ByteOrder, Threshold};
+use hivtac_terms::geometry::Geometry;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{ByteOrder, Threshold};
 
 use super::{Observation, Recipe};
 
@@ -58,7 +58,7 @@ impl<'m> Sensing<'m> {
     /// When the model's frames cannot be read.
     pub fn tared(model: &Model<'m>) -> Result<Self> {
         let mut sensor = Box::new(Sensor::new());
-        let settings = Settings::of_model(model, ByteOrder::Native);
+        let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
         sensor.set_tare(Some(model.rest));

@@ -207,8 +207,8 @@ impl Dataset {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_sensing::geometry::Preset;
-    use hivtac_sensing::threshold::PixelFormat;
+    use hivtac_terms::geometry::Preset;
+    use hivtac_terms::threshold::PixelFormat;
 
     pub(super) fn example() -> Dataset {
         let seen = |x: i64| Observation {

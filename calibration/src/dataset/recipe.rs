@@ -3,8 +3,8 @@
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use hivtac_scene::{Contact, Format, Load, Options, Preset as ScenePreset, Scene};
-use hivtac_sensing::geometry::Preset;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
 use serde::{Deserialize, Serialize};
 
 use super::session::Session;

@@ -7,7 +7,7 @@ use anyhow::{Result, anyhow, ensure};
 use hivtac_scene::Contact;
 use hivtac_sensing::force::{Force, Place};
 use hivtac_sensing::model::Model;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 
 use crate::answer::Chip;
 use crate::conditions::OriginName;

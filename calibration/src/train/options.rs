@@ -10,7 +10,7 @@ use crate::network::{Arithmetic, Layer, Meaning, Network};
 use crate::weights::Weights;
 
 /// The widest layer that a model file can hold.
-const WIDEST: usize = hivtac_sensing::model::MAX_WIDTH;
+const WIDEST: usize = hivtac_sensing::layer::MAX_WIDTH;
 /// The most layers between inputs and outputs.
 const MOST_HIDDEN: usize = hivtac_sensing::model::MAX_LAYERS - 1;
 

@@ -9,8 +9,8 @@ use crate::conditions::Conditions;
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
 use crate::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
-use hivtac_sensing::geometry::Preset;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
 
 const PX: f64 = 65_536.0;
 const ROWS: usize = 200;

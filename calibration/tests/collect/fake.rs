@@ -1,5 +1,6 @@
 //! A sensor whose film is a formula, and a hand that presses it.
 
+use hivtac_terms::units::Px;
 use std::f64::consts::TAU;
 use std::fs::File;
 use std::io::{Read, Write};
@@ -9,13 +10,15 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{
-    Centroid, DeviceHello, DeviceMessage, HostMessage, HsvBox, Marker, Outcome, PROTOCOL_VERSION,
-    Reply, Request, Sample, Threshold,
+    DeviceHello, DeviceMessage, HostMessage, Outcome, PROTOCOL_VERSION, Reply, Request, Sample,
 };
-use hivtac_wire::status::Status;
 use hivtac_wire::version::SCHEMA_HASH;
 
 /// How hard the hand presses at a time of the sensor, N; it begins after a second.
@@ -37,9 +40,9 @@ pub fn force_n(size: f64, [alpha, beta]: [f64; 2]) -> [f64; 3] {
 pub fn markers(force: [f64; 3]) -> [Marker; 4] {
     let apart = 40.0 * (-force[2]).max(0.0).sqrt();
     let marker = |x: f64, y: f64| Marker {
-        x_q16: ((160.0 + x * (44.0 + apart) + 60.0 * force[0]) * 65_536.0).round() as i32,
-        y_q16: ((120.0 + y * (44.0 + apart) + 60.0 * force[1]) * 65_536.0).round() as i32,
-        area_px: 190,
+        x: Px(((160.0 + x * (44.0 + apart) + 60.0 * force[0]) * 65_536.0).round() as i32),
+        y: Px(((120.0 + y * (44.0 + apart) + 60.0 * force[1]) * 65_536.0).round() as i32),
+        area: 190,
     };
     [
         marker(-1.0, -1.0),
@@ -62,7 +65,7 @@ pub fn hello() -> DeviceHello {
         threshold: Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255])),
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
-        centroid: Centroid::RednessWeighted,
+        centroid: CentroidEstimator::RednessWeighted,
     }
 }
 

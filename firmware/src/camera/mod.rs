@@ -7,7 +7,7 @@ pub use ov7725::*;
 pub use ov7725_registers::Format;
 pub use sccb::Sccb;
 
-use hivtac_sensing::geometry::Geometry;
+use hivtac_terms::geometry::Geometry;
 
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);

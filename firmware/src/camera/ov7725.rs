@@ -12,7 +12,7 @@ use core::sync::atomic::Ordering;
 use embassy_stm32::gpio::Output;
 use embassy_stm32::i2c;
 use embassy_time::{Duration, Instant, Timer};
-use hivtac_sensing::geometry::Preset;
+use hivtac_terms::geometry::Preset;
 
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";

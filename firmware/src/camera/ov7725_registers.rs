@@ -5,7 +5,7 @@
 
 use super::FRAMES_PER_SECOND;
 use crate::seeded_bugs;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::threshold::PixelFormat;
 
 /// Product number, high and low byte.
 pub const PID: (u8, u8) = (0x0A, 0x77);

@@ -2,6 +2,7 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
 use hivtac_wire::frame::encode;
 use hivtac_wire::message::*;
 use hivtac_wire::version::SCHEMA_HASH;
@@ -270,7 +271,7 @@ fn the_pixel_format_follows_the_threshold() {
         "hivtac: samples have markers but no force (model_mismatch): the device's model was made \
          for rgb565, H 170–10, S 100–255, V 45–255; `hivtac threshold --model` goes back to that\n"
     );
-    let expected = Request::SetThreshold(Threshold::Yuv422 { cr_low: 162 });
+    let expected = Request::SetThreshold(Threshold::Yuv422(Yuv422 { cr_low: 162 }));
     assert_eq!(device.commands.iter().next(), Some(expected));
 }
 

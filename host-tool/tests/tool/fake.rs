@@ -1,9 +1,16 @@
 //! A device that follows a script, on TCP or on a pseudo-terminal.
 
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::force::{Force, Place};
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{HsvBox, Threshold};
+use hivtac_terms::units::{
+    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+    UnsignedMilliDegrees,
+};
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::*;
-use hivtac_wire::status::Status;
 use hivtac_wire::version::SCHEMA_HASH;
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::OpenptFlags;
@@ -135,7 +142,7 @@ pub fn hello() -> DeviceHello {
         threshold: RED,
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
-        centroid: Centroid::RednessWeighted,
+        centroid: CentroidEstimator::RednessWeighted,
     }
 }
 
@@ -146,16 +153,16 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
         time_us: u64::from(frame) * 33_333,
         status: Status::NOT_CALIBRATED | Status::CONTACT,
         force: Some(Force {
-            alpha_mdeg: -5000,
-            beta_mdeg: 2500,
-            magnitude_un: 100_000,
-            cartesian_un: [-8707, 4362, -99_525],
-            direction_sigma_mdeg: 480,
-            magnitude_sigma_un: 900,
+            alpha: MilliDegrees(-5000),
+            beta: MilliDegrees(2500),
+            magnitude: MicroNewtons(100_000),
+            cartesian: [-8707, 4362, -99_525].map(MicroNewtons),
+            direction_sigma: UnsignedMilliDegrees(480),
+            magnitude_sigma: UnsignedMicroNewtons(900),
             place: Some(Place {
-                x_um: 1250,
-                y_um: -730,
-                sigma_um: 85,
+                x: SignedMicrometres(1250),
+                y: SignedMicrometres(-730),
+                sigma: Micrometres(85),
             }),
         }),
         markers: None,

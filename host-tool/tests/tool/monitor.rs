@@ -2,8 +2,8 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_terms::status::Status;
 use hivtac_wire::message::*;
-use hivtac_wire::status::Status;
 use std::io::Write;
 
 const JSON_41: &str = r#"{"seq":41,"frame":42,"time_us":1399986,"force":{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"place_x_mm":1.250,"place_y_mm":-0.730,"place_sigma_mm":0.085},"contact":true,"status":["not_calibrated","contact"]}"#;

@@ -4,8 +4,7 @@ use crate::run::*;
 use hivtac_scene::{Frame, Load, Preset, Scene};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::Sensor;
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::threshold::ByteOrder;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -134,7 +133,7 @@ fn the_force_is_that_of_the_sensing_code() {
     let model = Model::parse(MODEL).unwrap();
     let mut sensor: Box<Sensor> = Box::default();
     sensor
-        .configure(Settings::of_model(&model, ByteOrder::Native), Some(model))
+        .configure(model.conditions.settings(ByteOrder::Native), Some(model))
         .unwrap();
     let measurement = sensor.measure_frame(&frame.to_rgb565());
     let force = measurement.force.unwrap_or_else(|| panic!("{found}"));
@@ -148,8 +147,8 @@ fn the_force_is_that_of_the_sensing_code() {
             "alpha_deg": milli(force.alpha.0), "beta_deg": milli(force.beta.0),
             "magnitude_n": micro(force.magnitude.0),
             "x_n": micro(x), "y_n": micro(y), "z_n": micro(z),
-            "direction_sigma_deg": milli(force.direction_sigma.0),
-            "magnitude_sigma_n": micro(force.magnitude_sigma.0),
+            "direction_sigma_deg": milli(force.direction_sigma.0 as i32),
+            "magnitude_sigma_n": micro(force.magnitude_sigma.0 as i32),
             "place_x_mm": milli(place.x.0), "place_y_mm": milli(place.y.0),
             "place_sigma_mm": f64::from(place.sigma.0) / 1e3,
         })

@@ -20,13 +20,13 @@ use hivtac_rig::report::Report;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::{Action, Script};
 use hivtac_rig::truth::TruthLog;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::Threshold;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     self, Command, DeviceHello, DeviceMessage, HostMessage, Reply, Request, Sample, Stats,
-    Threshold,
 };
-use hivtac_wire::status::Status;
 use hivtac_wire::version::HelloPrefix;
 use serde_json::Value;
 

@@ -6,7 +6,7 @@
 //! depends on the blobs alone.
 
 use super::{Measurement, Sensor};
-use crate::tables::Table;
+use hivtac_markers::tables::Table;
 
 /// The fewest blobs that can be markers.
 const FEWEST_BLOBS: usize = 4;
@@ -69,10 +69,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        geometry::{Geometry, Preset},
-        picture::{Pattern, Picture, RED, tared},
-    };
+    use crate::picture::{Pattern, Picture, RED, tared};
+    use hivtac_terms::geometry::{Geometry, Preset};
     use proptest::prelude::*;
 
     const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 160, 120);

@@ -2,25 +2,28 @@
 
 mod ahead;
 #[cfg(test)]
+mod marker_tests;
+#[cfg(test)]
 mod tests;
 
-use crate::{
-    blob::Blob,
-    features::Features,
-    force::{Force, Resting},
-    formats::Formats,
-    geometry::{Geometry, Preset},
-    markers::{Finder, Found, Marker, Reading, Trust},
-    model::{CentroidEstimator, ContactReading, Model, Rest},
-    motion::Motion,
-    network::Network,
-    scanner::Scanner,
-    settings::{Settings, SettingsError},
-    status::Status,
-    tables::{ByteTable, Table},
-    threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError},
-};
+use crate::motion::Motion;
 use ahead::Ahead;
+use hivtac_force::features::Features;
+use hivtac_force::force::{self, Force, Resting};
+use hivtac_force::model::Model;
+use hivtac_force::network::Network;
+use hivtac_force::rest::Rest;
+use hivtac_markers::blob::Blob;
+use hivtac_markers::formats::Formats;
+use hivtac_markers::rules::{Finder, Found, Reading, Trust};
+use hivtac_markers::scanner::Scanner;
+use hivtac_markers::settings::{Settings, SettingsError};
+use hivtac_markers::tables::{ByteTable, Table};
+use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
 
 /// What one frame gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -271,7 +274,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let fitting = self
             .model
             .as_ref()
-            .filter(|model| settings.fit(&model.conditions));
+            .filter(|model| model.conditions.are_of(settings));
         let rest = self.tare.or(fitting.map(|model| model.rest));
         let reading = fitting.map_or(Reading::of(ContactReading::Force, false), |model| {
             Reading::of(model.conditions.contact, model.output.tells_place())
@@ -282,7 +285,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             resting: fitting
                 .zip(rest)
                 .and_then(|(model, rest)| Resting::of_model(model, &rest)),
-            trust: rest.map(|rest| Trust::new(settings, &rest, own_rest, reading)),
+            trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
             standing: self.standing_status(),
         });
     }
@@ -298,7 +301,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if model.is_simulated() {
                     status |= Status::NOT_CALIBRATED;
                 }
-                if !self.settings.fit(&model.conditions) {
+                if !model.conditions.are_of(&self.settings) {
                     status |= Status::MODEL_MISMATCH;
                 }
             }
@@ -348,7 +351,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .and_then(|prepared| prepared.resting.as_ref());
         let (force, trust) = match model.forward.as_ref().zip(resting) {
             Some((forward, resting)) => resting.force(forward, &model.range, markers, &output),
-            None => Force::of_outputs(model, &output),
+            None => force::of_outputs(model, &output),
         };
         *status |= trust;
         if status.contains(Status::UNEXPLAINED) {
@@ -357,7 +360,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         if output.input_saturated {
             *status |= Status::MAGNITUDE_OUT_OF_RANGE;
         }
-        if force.is_contact() {
+        if force::is_contact(&force) {
             *status |= Status::CONTACT;
         }
         Some(force)

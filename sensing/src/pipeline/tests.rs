@@ -1,11 +1,8 @@
 use super::*;
-use crate::{
-    formats::Mono,
-    model::{Origin, encode::ModelSpec, samples::spec},
-    picture::{GREY, Pattern, Picture, RED, rest_of, sensor, tared},
-    threshold::HsvBox,
-    units::{MicroNewtons, Micrometres, Px},
-};
+use crate::picture::{GREY, Pattern, Picture, RED, rest_of, sensor, tared};
+use hivtac_force::model::{Origin, encode::ModelSpec, samples::spec};
+use hivtac_terms::threshold::{HsvBox, Mono};
+use hivtac_terms::units::{MicroNewtons, Micrometres, Px};
 use proptest::prelude::*;
 use std::{boxed::Box, vec, vec::Vec};
 
@@ -450,7 +447,7 @@ proptest! {
         if let Some(force) = seen.force {
             prop_assert!(force.magnitude.0 >= 0);
         }
-        let touched = seen.force.is_some_and(|force| force.is_contact());
+        let touched = seen.force.is_some_and(|force| force::is_contact(&force));
         prop_assert_eq!(seen.status.contains(Status::CONTACT), touched);
     }
 

@@ -2,14 +2,14 @@
 
 use anyhow::Result;
 use hivtac_sensing::features::Features;
-use hivtac_sensing::force::Force;
+use hivtac_sensing::force;
 use hivtac_sensing::forward::{
     Descent, Estimate, Forward, Mounting, Observed, Pose, STEPS_AT_MOST, UNEXPLAINED,
 };
-use hivtac_sensing::markers::Marker;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
-use hivtac_sensing::units::Px;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
 
 use crate::press::{normal, seeded};
 
@@ -170,7 +170,7 @@ impl Contact<'_> {
         };
         let features = Features::of_markers(&std::array::from_fn(marker));
         let output = Network::new().run(alone, &features, &model.rest.features);
-        let (force, _) = Force::of_outputs(alone, &output);
+        let (force, _) = force::of_outputs(alone, &output);
         let place_mm = output.place.map(|part| part as f32 * 1e-3);
         let force_n = force.cartesian.map(|part| part.0 as f32 * 1e-6);
         Ok(Pose::of_force(

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use hivtac_scene::Contact;
-use hivtac_sensing::geometry::Preset;
+use hivtac_terms::geometry::Preset;
 
 use crate::document;
 use crate::scene::size::Size;

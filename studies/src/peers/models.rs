@@ -9,7 +9,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::{Weights, features_from_q16};
 use hivtac_scene::Contact;
-use hivtac_sensing::force::Force;
+use hivtac_sensing::force;
 use hivtac_sensing::model::Model as Chip;
 use hivtac_sensing::network::Network;
 
@@ -66,7 +66,7 @@ impl Model {
             let Ok(seen) = &row.seen else { return Ok(None) };
             let features = features_from_q16(&seen.features_q16)?;
             let output = network.run(&model, &features, &model.rest.features);
-            let (force, _) = Force::of_outputs(&model, &output);
+            let (force, _) = force::of_outputs(&model, &output);
             Ok(Some([row.force_n, vector_n(force)]))
         };
         sets.test.rows.iter().map(answer).collect()

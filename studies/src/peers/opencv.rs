@@ -10,8 +10,8 @@ use anyhow::{Context, Result, ensure};
 use hivtac_calibration::dataset::{Detection, MarkerDetector, Observation};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
-use hivtac_sensing::markers::Marker;
-use hivtac_sensing::units::Px;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
 
 const ENVIRONMENT: &str = include_str!("../../python/opencv_environment.py");
 const PIPELINE: &str = include_str!("../../python/paper_pipeline.py");

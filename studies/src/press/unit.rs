@@ -5,12 +5,12 @@ use hivtac_calibration::dataset::measure;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_scene::{Load, Options, Scene};
 use hivtac_sensing::force::Force;
-use hivtac_sensing::model::{Conditions, Model, Rest};
+use hivtac_sensing::model::{Conditions, Model};
 use hivtac_sensing::pipeline::Sensor;
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::status::Status;
+use hivtac_sensing::rest::Rest;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::ByteOrder;
 
 use super::Drawn;
 
@@ -128,7 +128,7 @@ impl TestedUnit {
     /// When the model's frames cannot be read, or no markers are found at rest.
     pub fn tare<'m>(&self, model: &Model<'m>) -> Result<Tared<'m>> {
         let mut sensor = Box::new(Sensor::new());
-        let settings = Settings::of_model(model, ByteOrder::Native);
+        let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
         let rest = self.rest(&mut sensor)?;
@@ -220,4 +220,3 @@ impl Tared<'_> {
         })
     }
 }
-

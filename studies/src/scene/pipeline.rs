@@ -3,13 +3,13 @@
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_calibration::dataset::reasons;
 use hivtac_scene::{Camera, Frame, Load, Preset as ScenePreset, Scene, Truth};
-use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::markers::Marker;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::ByteOrder;
 
 /// The model that firmware and host tool embed.
 static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
@@ -50,7 +50,7 @@ impl Pipeline {
         let model = Model::parse(MODEL).map_err(|error| anyhow!("the default model: {error}"))?;
         let model = (model.conditions.geometry == geometry).then_some(model);
         let settings = match &model {
-            Some(model) => Settings::of_model(model, ByteOrder::Native),
+            Some(model) => model.conditions.settings(ByteOrder::Native),
             None => Settings::usual(geometry, ByteOrder::Native),
         };
         let mut sensor = Box::new(Sensor::new());

@@ -12,11 +12,11 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Training, Uncertainty, Weights};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
-use hivtac_sensing::geometry::Geometry;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::geometry::Geometry;
+use hivtac_terms::threshold::ByteOrder;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,7 @@ use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::Recipe;
 use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::weights::Range;
-use hivtac_sensing::geometry::Preset;
+use hivtac_terms::geometry::Preset;
 use serde::{Deserialize, Serialize};
 
 /// What makes a force of features.

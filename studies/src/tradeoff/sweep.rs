@@ -14,7 +14,7 @@ use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::model::encode::with_steps;
-use hivtac_sensing::status::Status;
+use hivtac_terms::status::Status;
 use rayon::prelude::*;
 
 use super::frames::{Frames, frames};

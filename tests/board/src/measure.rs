@@ -5,9 +5,8 @@ use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as Inference;
 use hivtac_sensing::pipeline;
 use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
-use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tables::Pixels;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::threshold::ByteOrder;
 
 use crate::data::{Frame, Network};
 use crate::meter::Meter;
@@ -111,7 +110,7 @@ pub fn network(place: &mut Workplace, network: &Network, meter: &Meter) {
 /// Cycles of a frame from its first row to the force, and from its last band on.
 fn sense(sensor: &mut Sensor, buffer: &mut [u16; ROW], frame: &Frame, meter: &Meter) -> (u32, u32) {
     let model = parse(frame.model);
-    let settings = Settings::of_model(&model, ByteOrder::Swapped);
+    let settings = model.conditions.settings(ByteOrder::Swapped);
     let configured = sensor.configure(settings, Some(model));
     defmt::assert!(configured.is_ok(), "the model does not fit the frame");
     let (_, mut whole) = meter.time(|| sensor.begin_frame());

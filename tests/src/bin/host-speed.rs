@@ -11,11 +11,11 @@ use std::{env, fs};
 
 use anyhow::{Context, Result};
 use hivtac_scene::{Preset, Scene};
-use hivtac_sensing::geometry::{self, Geometry};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::threshold::ByteOrder;
+use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::pictures;
 use serde_json::json;
 

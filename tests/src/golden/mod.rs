@@ -14,16 +14,18 @@ use core::ops::Range;
 use hivtac_sensing::features::{FEATURES, Features};
 use hivtac_sensing::force::{Polar, Resting};
 use hivtac_sensing::formats::Formats;
-use hivtac_sensing::geometry::{Geometry, Preset};
-use hivtac_sensing::markers::Marker;
-use hivtac_sensing::model::{AlignedFile, CentroidEstimator, Model, Rest};
+use hivtac_sensing::model::{AlignedFile, Model};
 use hivtac_sensing::network::Network;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensing::rest::Rest;
 use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tables::{ByteTable, Pixels};
-use hivtac_sensing::threshold::{ByteOrder, PixelFormat, Threshold};
-use hivtac_sensing::units::{MicroNewtons, MilliDegrees, Px};
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
+use hivtac_terms::units::{MicroNewtons, MilliDegrees, Px};
 
 use marks::{counting_begins, counting_ends, last_band_begins};
 pub use record::{Kind, ScriptError, Source};
@@ -278,7 +280,7 @@ fn sensor(
 ) -> Result<Sensor<'_, BLOBS>, ScriptError> {
     let model = model(file)?;
     let mut settings = match &model {
-        Some(model) => Settings::of_model(model, sent.order),
+        Some(model) => model.conditions.settings(sent.order),
         None => Settings::usual(Geometry::preset(Preset::Ov7725, width, height), sent.order),
     };
     settings.threshold = sent.threshold;

@@ -5,7 +5,7 @@ use core::fmt;
 use hivtac_sensing::model::ModelError;
 use hivtac_sensing::scanner::ScanError;
 use hivtac_sensing::settings::SettingsError;
-use hivtac_sensing::threshold::ThresholdError;
+use hivtac_terms::threshold::ThresholdError;
 
 /// What a record holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,8 +7,11 @@ use std::path::Path;
 use addr2line::Loader;
 use anyhow::{Context, Result, anyhow};
 
-/// The files of each stage, a line each.
+/// The modules of each stage, a line each.
 const LISTED: &str = include_str!("../../../sensing/stages.txt");
+
+/// The folders of the packages that are the sensing.
+const PACKAGES: [&str; 4] = ["terms", "markers", "force", "sensing"];
 
 /// The stages, in the order in which a frame goes through them.
 pub const ORDER: [&str; 10] = [
@@ -99,14 +102,17 @@ fn stage(files: &[String]) -> Option<&'static str> {
 }
 
 fn stage_of_file(file: &str) -> Option<&'static str> {
-    let (_, module) = file.rsplit_once("sensing/src/")?;
-    let module = module.split(['/', '.']).next()?;
+    let module = PACKAGES.iter().find_map(|package| {
+        let (_, within) = file.rsplit_once(&format!("/{package}/src/"))?;
+        let name = within.split(['/', '.']).next()?;
+        Some(format!("{package}/{name}"))
+    })?;
     ORDER
         .into_iter()
         .find(|stage| modules_of(stage).any(|name| name == module))
 }
 
-/// The files and folders of a stage.
+/// The modules of a stage: package and name.
 fn modules_of(stage: &str) -> impl Iterator<Item = &'static str> {
     let lines = LISTED.lines().filter_map(|line| line.rsplit_once(':'));
     let of_it = lines.filter(move |(name, _)| *name == stage);
@@ -144,35 +150,39 @@ mod tests {
     #[test]
     fn the_innermost_function_of_the_sensing_decides() {
         let core = "/rustc/1/library/core/src/slice.rs";
-        let (label, scanner) = ("/p/sensing/src/label.rs", "/p/sensing/src/scanner.rs");
+        let (label, scanner) = ("/p/markers/src/label.rs", "/p/markers/src/scanner.rs");
         assert_eq!(
             stage_of(&[core, label, scanner]),
             Some("runs, labels, moments")
         );
         assert_eq!(stage_of(&[core, scanner]), Some("pipeline"));
         assert_eq!(
-            stage_of(&["/p/sensing/src/units.rs", label]),
+            stage_of(&["/p/terms/src/units.rs", label]),
             Some("runs, labels, moments")
         );
         assert_eq!(
-            stage_of(&["/p/sensing/src/markers/shape.rs"]),
+            stage_of(&["/p/markers/src/rules/shape.rs"]),
             Some("markers")
         );
     }
 
     #[test]
-    fn every_file_of_the_sensing_is_listed_once() {
+    fn every_module_of_the_sensing_is_listed_once() {
         let stages = ORDER.into_iter().chain(["caller"]);
         let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
         listed.sort();
-        let entries = std::fs::read_dir(crate::workspace::folder("sensing/src")).unwrap();
-        let name = |entry: std::io::Result<std::fs::DirEntry>| {
-            let path = entry.unwrap().path();
-            path.file_stem().unwrap().to_str().unwrap().to_owned()
+        let modules = |package: &&str| {
+            let folder = crate::workspace::folder(package).join("src");
+            let entries = std::fs::read_dir(folder).unwrap();
+            let name = |entry: std::io::Result<std::fs::DirEntry>| {
+                let path = entry.unwrap().path();
+                format!("{package}/{}", path.file_stem().unwrap().to_str().unwrap())
+            };
+            entries.map(name).collect::<Vec<_>>()
         };
-        let mut files: Vec<String> = entries.map(name).collect();
-        files.sort();
-        assert_eq!(listed, files);
+        let mut found: Vec<String> = PACKAGES.iter().flat_map(modules).collect();
+        found.sort();
+        assert_eq!(listed, found);
     }
 
     #[test]

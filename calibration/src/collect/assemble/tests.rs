@@ -1,5 +1,5 @@
-use hivtac_sensing::geometry::Preset;
-use hivtac_sensing::threshold::PixelFormat;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
 
 use super::*;
 use crate::collect::gauge::Unit;

@@ -1,0 +1,147 @@
+//! The paper's eleven features (Section 5).
+
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
+
+/// How many numbers the features are.
+pub const FEATURES: usize = 11;
+/// How many of them, the first ones, are coordinates; the last is an area.
+pub const COORDINATES: usize = 10;
+
+/// x = [x0, y0, x1, y1, x2, y2, x3, y3, x_rect, y_rect, Area_rect].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Features {
+    /// Centroids of markers 0–3, (x, y).
+    pub centroids: [(Px, Px); 4],
+    /// Centre of their bounding rectangle over the real-valued centroids, (x, y).
+    pub rect_center: (Px, Px),
+    /// Its area in px², Q16.16 in 64 bits (it overflows 32 bits from VGA up).
+    pub rect_area: i64,
+}
+
+impl Features {
+    /// The features of four markers. The centre rounds half up to 1/65,536 px, the area to
+    /// 1/65,536 px².
+    pub fn of_markers(markers: &[Marker; 4]) -> Features {
+        let centroids = markers.map(|marker| (marker.x, marker.y));
+        let (left, right) = extent(centroids.map(|c| c.0));
+        let (top, bottom) = extent(centroids.map(|c| c.1));
+        let area_q32 = (right - left) * (bottom - top);
+        Features {
+            centroids,
+            rect_center: (middle(left, right), middle(top, bottom)),
+            rect_area: (area_q32 + (1 << (Px::FRACTION_BITS - 1))) >> Px::FRACTION_BITS,
+        }
+    }
+
+    /// All but the area, in the paper's order.
+    pub fn coordinates(&self) -> [Px; COORDINATES] {
+        let [(x0, y0), (x1, y1), (x2, y2), (x3, y3)] = self.centroids;
+        let (x, y) = self.rect_center;
+        [x0, y0, x1, y1, x2, y2, x3, y3, x, y]
+    }
+
+    /// The eleven numbers in the paper's order, each with 16 fractional bits.
+    pub fn to_array(&self) -> [i64; FEATURES] {
+        let mut numbers = [0; FEATURES];
+        for (pair, &(x, y)) in numbers.chunks_exact_mut(2).zip(&self.centroids) {
+            pair[0] = i64::from(x.0);
+            pair[1] = i64::from(y.0);
+        }
+        numbers[8] = i64::from(self.rect_center.0.0);
+        numbers[9] = i64::from(self.rect_center.1.0);
+        numbers[10] = self.rect_area;
+        numbers
+    }
+
+    /// The other way round; centroids and centre must fit 32 bits.
+    pub fn from_array(numbers: [i64; FEATURES]) -> Features {
+        let px = |i: usize| Px(numbers[i] as i32);
+        Features {
+            centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
+            rect_center: (px(8), px(9)),
+            rect_area: numbers[10],
+        }
+    }
+}
+
+fn extent(values: [Px; 4]) -> (i64, i64) {
+    let low = values.iter().min().map_or(0, |v| i64::from(v.0));
+    let high = values.iter().max().map_or(0, |v| i64::from(v.0));
+    (low, high)
+}
+
+/// Half the sum, rounded half up. The sum of two `i32` halved fits `i32`.
+fn middle(low: i64, high: i64) -> Px {
+    Px(((low + high + 1) >> 1) as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marker(x: f64, y: f64) -> Marker {
+        let px = |value: f64| Px((value * 65_536.0) as i32);
+        Marker {
+            x: px(x),
+            y: px(y),
+            area: 1,
+        }
+    }
+
+    #[test]
+    fn the_rectangle_is_that_of_the_centroids() {
+        let turned = [
+            marker(10.5, 11.25),
+            marker(20.0, 10.0),
+            marker(21.5, 20.0),
+            marker(11.0, 22.0),
+        ];
+        let features = Features::of_markers(&turned);
+        assert_eq!(features.rect_center.0.to_f64(), 16.0);
+        assert_eq!(features.rect_center.1.to_f64(), 16.0);
+        assert_eq!(features.rect_area, (11 * 12) << 16);
+        assert_eq!(features.centroids[2], (turned[2].x, turned[2].y));
+    }
+
+    #[test]
+    fn the_largest_frame_fits() {
+        let corners = [
+            marker(0.0, 0.0),
+            marker(799.0, 0.0),
+            marker(799.0, 599.0),
+            marker(0.0, 599.0),
+        ];
+        let features = Features::of_markers(&corners);
+        assert_eq!(features.rect_area, (799 * 599) << 16);
+        assert_eq!(features.rect_center.0.to_f64(), 399.5);
+        assert_eq!(features.rect_center.1.to_f64(), 299.5);
+    }
+
+    #[test]
+    fn area_and_centre_round_to_nearest() {
+        let mut markers = [marker(0.0, 0.0); 4];
+        markers[2] = Marker {
+            x: Px(3),
+            y: Px(1 << 15),
+            area: 1,
+        };
+        let features = Features::of_markers(&markers);
+        assert_eq!(features.rect_center, (Px(2), Px(1 << 14)), "1.5 rounds up");
+        assert_eq!(features.rect_area, 2, "1.5 rounds up");
+    }
+
+    #[test]
+    fn the_array_is_in_the_papers_order_and_comes_back() {
+        let markers = [
+            marker(1.0, 2.0),
+            marker(3.0, 4.0),
+            marker(5.0, 6.0),
+            marker(7.0, 8.0),
+        ];
+        let features = Features::of_markers(&markers);
+        let array = features.to_array().map(|value| value >> 16);
+        assert_eq!(array, [1, 2, 3, 4, 5, 6, 7, 8, 4, 5, 36]);
+        assert_eq!(Features::from_array(features.to_array()), features);
+    }
+}

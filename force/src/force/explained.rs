@@ -1,0 +1,214 @@
+//! The force that explains the markers best, by the film run forwards.
+
+use super::{Force, Place, Polar, trust};
+use crate::forward::{
+    Column, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Tolerance,
+};
+use crate::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
+use crate::network::Output;
+use crate::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::units::{
+    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+};
+
+/// Where a unit's markers rest, and what follows from that before there is a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resting {
+    mounting: Mounting,
+    /// Whether they are on the unit that the model was made on.
+    is_own: bool,
+    /// How far the unit may differ from what the model says of it.
+    tolerance: Tolerance,
+    px: Markers,
+    areas: [f32; 4],
+}
+
+/// A marker that rests this far from where it rested when the model was made, px in Q16.16, is
+/// another unit's: half a pixel.
+const LARGEST_DRIFT: u32 = 1 << 15;
+/// Areas at which a marker's noise is known, in parts of the one at rest.
+const AREAS: [f32; 2] = [0.5, 6.0];
+
+impl Resting {
+    /// For a model that takes steps, and markers that rest there.
+    pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
+        let forward = model.forward.as_ref()?;
+        (forward.steps > 0).then(|| Resting::new(forward, rest, &model.rest))
+    }
+
+    /// For markers that rest there, by what the model knows of the unit that it was made on; of
+    /// another one by what its rest picture tells.
+    fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest) -> Resting {
+        let is_own = is_near(rest, own);
+        let told = forward.rest_image.mounting(rest);
+        let mounting = match (is_own, forward.mounting) {
+            (true, Some(known)) => known,
+            // The simulated sensor's markers are where they should be.
+            (true, None) => Mounting {
+                beside_mm: Markers::default(),
+                ..told
+            },
+            (false, _) => told,
+        };
+        let centroids = rest.features.centroids;
+        let (off, tolerance) = match is_own {
+            true => (forward.noise.rest_px, forward.own),
+            false => (Markers::default(), forward.other),
+        };
+        let at = |k: usize| {
+            [
+                centroids[k].0.to_f32() - off[k][0],
+                centroids[k].1.to_f32() - off[k][1],
+            ]
+        };
+        Resting {
+            mounting,
+            is_own,
+            tolerance,
+            px: core::array::from_fn(at),
+            areas: rest.areas.map(|area| area as f32),
+        }
+    }
+
+    /// How markers moved from there.
+    fn observed(&self, forward: &Forward<'_>, markers: &[Marker; 4]) -> Observed {
+        let mut moved: Column = [0.0; 8];
+        let mut sigma = [0.0; 8];
+        let scale = self.mounting.scale();
+        let shape = self.tolerance.shape * self.tolerance.shape;
+        let mut wider = 1.0_f32;
+        for (k, marker) in markers.iter().enumerate() {
+            let [x, y] = self.px[k];
+            let [x, y] = self
+                .mounting
+                .moved([marker.x.to_f32() - x, marker.y.to_f32() - y]);
+            [moved[2 * k], moved[2 * k + 1]] = [x, y];
+            let larger = (marker.area as f32 / self.areas[k]).clamp(AREAS[0], AREAS[1]);
+            let Noise {
+                at_rest_px,
+                at_four_areas,
+                ..
+            } = &forward.noise;
+            for i in [0, 1] {
+                let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
+                // A law that falls to nothing within the areas would weigh a marker as certain.
+                let seen = scale * at_rest_px[i] * growth.max(0.1);
+                let unknown = shape * (x * x + y * y);
+                // What is wrong with another unit is more than noise, and no two markers share it.
+                sigma[2 * k + i] = match self.is_own {
+                    true => seen,
+                    false => libm::sqrtf(seen * seen + unknown),
+                };
+                wider += unknown / (seen * seen) / 8.0;
+            }
+        }
+        Observed {
+            moved,
+            sigma,
+            wider: if self.is_own { wider } else { 1.0 },
+        }
+    }
+
+    /// The load that explains the markers best, from the network's answer on.
+    pub fn estimate(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker; 4],
+        output: &Output,
+    ) -> Estimate {
+        let newtons = output.values.map(|part| part as f32 * 1e-6);
+        let place_mm = output.place.map(|part| part as f32 * 1e-3);
+        let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
+        let observed = self.observed(forward, markers);
+        forward.estimate(&observed, &self.mounting, guess)
+    }
+
+    /// The force of [`Self::estimate`]; [`Status::UNEXPLAINED`] when it explains the markers badly,
+    /// or is the largest that the tables hold.
+    pub fn force(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        markers: &[Marker; 4],
+        output: &Output,
+    ) -> (Force, Status) {
+        self.told(forward, range, &self.estimate(forward, markers, output))
+    }
+
+    /// What a sample says of a load that was found.
+    pub fn told(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        estimate: &Estimate,
+    ) -> (Force, Status) {
+        let force = force(forward, estimate, self.tolerance.stiffness);
+        let mut status = trust(&force, range);
+        if !estimate.is_explained() {
+            status |= Status::UNEXPLAINED;
+        }
+        // Where the tables end, a larger force may explain the markers better.
+        if estimate.pose.size >= forward.limits.size {
+            status |= Status::MAGNITUDE_OUT_OF_RANGE | Status::UNEXPLAINED;
+        }
+        (force, status)
+    }
+}
+
+/// Whether a rest position is that of the unit that a model was made on, as it may have drifted
+/// since.
+fn is_near(rest: &Rest, own: &Rest) -> bool {
+    let pairs = rest.features.centroids.iter().zip(&own.features.centroids);
+    pairs.into_iter().all(|(a, b)| {
+        a.0.0.abs_diff(b.0.0) <= LARGEST_DRIFT && a.1.0.abs_diff(b.1.0) <= LARGEST_DRIFT
+    })
+}
+
+/// `softer` is the standard uncertainty of the film's stiffness, in parts of it.
+fn force(forward: &Forward<'_>, estimate: &Estimate, softer: f32) -> Force {
+    let pose = &estimate.pose;
+    let micronewtons = 1e6 * forward.stiffness.magnitude_n(pose.size);
+    let cartesian = pose
+        .direction()
+        .map(|part| MicroNewtons(rounded(micronewtons * part)));
+    let Polar {
+        alpha,
+        beta,
+        magnitude,
+    } = Polar::of_vector(cartesian);
+    let sigma = estimate.sigma(&forward.stiffness, softer);
+    let [direction, magnitude_sigma, place] = stated(sigma);
+    let [x, y] = pose
+        .place_mm
+        .map(|part| SignedMicrometres(rounded(1e3 * part)));
+    Force {
+        alpha,
+        beta,
+        magnitude,
+        cartesian,
+        direction_sigma: UnsignedMilliDegrees(direction),
+        magnitude_sigma: UnsignedMicroNewtons(magnitude_sigma),
+        place: Some(Place {
+            x,
+            y,
+            sigma: Micrometres(place),
+        }),
+    }
+}
+
+/// In m°, µN and µm, at least one of each.
+fn stated(sigma: Option<Sigma>) -> [u32; 3] {
+    let Some(sigma) = sigma else {
+        return [NO_DIRECTION.0, i32::MAX as u32, LARGEST_PLACE_UNCERTAINTY.0];
+    };
+    let direction = (sigma.direction.to_degrees() * 1e3).min(NO_DIRECTION.0 as f32);
+    let place = (sigma.place_mm * 1e3).min(LARGEST_PLACE_UNCERTAINTY.0 as f32);
+    [direction, sigma.magnitude_n * 1e6, place].map(|part| rounded(part).max(1).unsigned_abs())
+}
+
+/// To nearest; at the limits of 32 bits beyond them.
+fn rounded(value: f32) -> i32 {
+    (value + 0.5f32.copysign(value)) as i32
+}

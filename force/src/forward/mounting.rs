@@ -1,0 +1,170 @@
+//! Where this unit's markers are on its film, and how its camera sees them.
+
+use super::predict::{CORNERS, Markers};
+use crate::rest::Rest;
+
+/// How a unit's camera sees its film, and where its markers are glued.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mounting {
+    /// Focal lengths per px: (x + iy) in px times this complex number is in focal lengths along the
+    /// film's axes.
+    pub per_px: [f32; 2],
+    /// How far each marker is glued beside its place, mm.
+    pub beside_mm: Markers,
+}
+
+/// What a rest picture says of a mounting when the camera is as the tables have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RestImage {
+    /// Where marker 2 is seen at rest, along x and along y, focal lengths from the axis.
+    pub corner: f32,
+    /// What a focal length is on the film at a marker: away from the axis, and across that, mm.
+    pub film_mm: [f32; 2],
+}
+
+impl RestImage {
+    /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the
+    /// whole pattern count as the camera's, which a rest picture cannot tell from gluing; what is
+    /// left is gluing.
+    pub fn mounting(&self, rest: &Rest) -> Mounting {
+        let centroids = rest.features.centroids;
+        let seen = centroids.map(|(x, y)| [x.to_f32(), y.to_f32()]);
+        let mut middle = [0.0; 2];
+        for position in &seen {
+            middle = [0, 1].map(|i| middle[i] + position[i] / 4.0);
+        }
+        let seen = seen.map(|[x, y]| [x - middle[0], y - middle[1]]);
+        let per_px = self.similarity(&seen);
+        let beside = |k: usize| {
+            let [x, y] = turned(per_px, seen[k]);
+            let [sx, sy] = CORNERS[k];
+            self.on_film(CORNERS[k], [x - self.corner * sx, y - self.corner * sy])
+        };
+        Mounting {
+            per_px,
+            beside_mm: core::array::from_fn(beside),
+        }
+    }
+
+    /// The complex number that brings what is seen nearest to where it would be seen.
+    fn similarity(&self, seen: &Markers) -> [f32; 2] {
+        let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
+        for ([x, y], [cx, cy]) in seen.iter().zip(CORNERS) {
+            along += self.corner * (x * cx + y * cy);
+            across += self.corner * (x * cy - y * cx);
+            square += x * x + y * y;
+        }
+        // Four markers in a sound rest position are not all in one place; if they were, nothing
+        // would be seen to move.
+        let square = if square > 0.0 { square } else { f32::MAX };
+        [along / square, across / square]
+    }
+
+    /// What a shift of the image of the marker in a corner, focal lengths, is on the film, mm.
+    fn on_film(&self, [cx, cy]: [f32; 2], [x, y]: [f32; 2]) -> [f32; 2] {
+        let [away, across] = self.film_mm;
+        // Corners are √2 long.
+        let away = away * (x * cx + y * cy) / 2.0;
+        let across = across * (y * cx - x * cy) / 2.0;
+        [away * cx - across * cy, away * cy + across * cx]
+    }
+}
+
+impl Mounting {
+    /// How a marker's image moved, px, in focal lengths along the film's axes.
+    pub fn moved(&self, px: [f32; 2]) -> [f32; 2] {
+        turned(self.per_px, px)
+    }
+
+    /// Focal lengths per px.
+    pub fn scale(&self) -> f32 {
+        let [a, b] = self.per_px;
+        libm::sqrtf(a * a + b * b)
+    }
+}
+
+/// (a + ib)·(x + iy).
+fn turned([a, b]: [f32; 2], [x, y]: [f32; 2]) -> [f32; 2] {
+    [a * x - b * y, b * x + a * y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::Features;
+    use hivtac_terms::units::Px;
+
+    const REST: RestImage = RestImage {
+        corner: 0.342,
+        film_mm: [12.76, 10.85],
+    };
+
+    /// Markers seen at the places of a nominal camera, moved by so many focal lengths each.
+    fn rest(moved: Markers, per_focal: [f32; 2], middle: [f32; 2]) -> Rest {
+        let seen = |k: usize| {
+            let [x, y] = [0, 1].map(|i| REST.corner * CORNERS[k][i] + moved[k][i]);
+            let [x, y] = turned(per_focal, [x, y]);
+            let px = |part: f32| Px((65_536.0 * part) as i32);
+            (px(x + middle[0]), px(y + middle[1]))
+        };
+        Rest {
+            features: Features {
+                centroids: core::array::from_fn(seen),
+                ..Features::default()
+            },
+            areas: [200; 4],
+        }
+    }
+
+    #[test]
+    fn a_camera_that_is_off_moves_no_marker() {
+        // Rolled by 3°, 2 % longer, 5 px beside the middle.
+        let per_focal = [
+            178.5 * 3f32.to_radians().cos(),
+            178.5 * 3f32.to_radians().sin(),
+        ];
+        let mounting = REST.mounting(&rest([[0.0; 2]; 4], per_focal, [164.5, 115.0]));
+        assert!(
+            mounting
+                .beside_mm
+                .as_flattened()
+                .iter()
+                .all(|part| part.abs() < 1e-4)
+        );
+        assert!((mounting.scale() * 178.5 - 1.0).abs() < 1e-5);
+        let [x, y] = mounting.moved(turned(per_focal, [0.01, 0.02]));
+        assert!((x - 0.01).abs() < 1e-6 && (y - 0.02).abs() < 1e-6);
+    }
+
+    /// A taper is nobody's but the markers'. It makes the pattern a little larger, too, by its
+    /// square.
+    #[test]
+    fn gluing_that_no_camera_makes_is_found() {
+        let taper = [[0.01, 0.0], [-0.01, 0.0], [0.01, 0.0], [-0.01, 0.0]];
+        let mounting = REST.mounting(&rest(taper, [175.0, 0.0], [159.5, 119.5]));
+        for (k, [x, y]) in mounting.beside_mm.into_iter().enumerate() {
+            let [sx, sy] = CORNERS[k];
+            // Along x by 0.01: half of it away from the axis and half across.
+            let (away, across) = (taper[k][0] * sx / 2.0, -taper[k][0] * sy / 2.0);
+            let expected = [
+                12.76 * away * sx - 10.85 * across * sy,
+                12.76 * away * sy + 10.85 * across * sx,
+            ];
+            assert!((x - expected[0]).abs() < 3e-3, "{x} {expected:?}");
+            assert!((y - expected[1]).abs() < 3e-3, "{y} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn markers_in_one_place_say_nothing() {
+        let mounting = REST.mounting(&rest([[0.0; 2]; 4], [0.0; 2], [100.0, 100.0]));
+        assert_eq!(mounting.per_px, [0.0; 2]);
+        assert!(
+            mounting
+                .beside_mm
+                .as_flattened()
+                .iter()
+                .all(|part| part.is_finite())
+        );
+    }
+}

@@ -1,0 +1,58 @@
+//! The rest position: where the untouched film has its markers.
+
+use crate::features::Features;
+use hivtac_markers::rules::pattern::{Pattern, distance};
+use hivtac_terms::geometry::Geometry;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
+
+/// The longest side of a picture, px.
+const LARGEST_SIDE: i32 = 800;
+
+/// A rest position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Rest {
+    /// Features of the untouched film.
+    pub features: Features,
+    /// Areas of its markers 0–3 in the mask, px.
+    pub areas: [u32; 4],
+}
+
+impl Rest {
+    /// Its markers 0–3.
+    pub fn markers(&self) -> [Marker; 4] {
+        core::array::from_fn(|identity| {
+            let (x, y) = self.features.centroids[identity];
+            let area = self.areas[identity];
+            Marker { x, y, area }
+        })
+    }
+
+    /// Whether it can be a rest position: inside the largest picture, with markers of at least a
+    /// pixel.
+    pub fn is_sound(&self) -> bool {
+        let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
+        let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;
+        self.features
+            .centroids
+            .iter()
+            .all(|c| inside(c.0) && inside(c.1))
+            && self.areas.iter().all(|area| (1..=largest).contains(area))
+    }
+
+    /// Whether the markers are as far from their common centre as a film at rest shows them, to
+    /// 15 %. That leaves room for a film 1.5 mm nearer or farther and for markers 0.7 mm off their
+    /// places, and refuses a film that something presses: every force against such a rest would be
+    /// wrong.
+    pub fn fits(&self, geometry: &Geometry) -> bool {
+        let center = Pattern::of_centroids(self.features.centroids).center;
+        let sum: i64 = self
+            .features
+            .centroids
+            .iter()
+            .map(|&centroid| i64::from(distance(centroid, center).0))
+            .sum();
+        let expected = 4 * i64::from(geometry.rest_distance().0);
+        (sum - expected).abs() * 100 <= expected * 15
+    }
+}

@@ -1,0 +1,191 @@
+//! Kernels for Cortex-M4 and M7, in assembly, scheduled for the M7's two issues a cycle.
+//!
+//! All of them lie in sections `.itcm.*`, which a linker script can put into the memory nearest to
+//! the core. The cycles said here are those of LLVM's model of the core
+//! (`llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7`, the block between a label and the
+//! branch back to it), with rows and tables in memory without wait states.
+//!
+//! None of them touches the stack but for what it saves, only `hivtac_dilate_edges` has paths that
+//! depend on data, and all follow the procedure call standard: r0–r3, r12 and the flags are lost,
+//! the Q flag may be set.
+
+use core::arch::global_asm;
+
+use crate::mask::{MAX_WIDTH, Near};
+
+global_asm!(include_str!("any_set.s"), options(raw));
+global_asm!(include_str!("dilate_edges.s"), options(raw));
+global_asm!(include_str!("threshold_bytes.s"), options(raw));
+global_asm!(include_str!("threshold_cr.s"), options(raw));
+global_asm!(include_str!("threshold_luma.s"), options(raw));
+global_asm!(include_str!("weigh_bytes.s"), options(raw));
+
+unsafe extern "C" {
+    /// Equals [`any_set`](crate::mask::any_set), when what it gives is compared with 0: all words,
+    /// or-ed.
+    ///
+    /// *Contract.* `count`: a positive multiple of sixteen, of words.
+    ///
+    /// *Schedule.* Sixteen words: 35 instructions in 18 cycles.
+    fn hivtac_dilate_any_set(words: *const u32, count: usize) -> u32;
+
+    /// Equals `Dilation::edges` for one dilation: the edges of a dilated row, but for one at its
+    /// end.
+    ///
+    /// Words that are empty, as are their neighbours, cost one test. In others the bits that differ
+    /// from the one before are found from the left by CLZ, mirrored.
+    ///
+    /// *Contract.* `rows`: `words` ≥ 1 words, the same of the row `stride` bytes behind, and of the
+    /// one behind that; the words beside them in these rows are empty. `column`: that of the first
+    /// word. Writes at most 32 edges for each word, and gives where the next would go. `last`: the
+    /// bits of the last word that are in the row.
+    ///
+    /// *Schedule.* 12 cycles for an empty word, about 20 for another, and 5 for each edge.
+    fn hivtac_dilate_edges(
+        rows: *const u32,
+        stride: usize,
+        words: usize,
+        column: u32,
+        edges: *mut u16,
+        last: u32,
+    ) -> *mut u16;
+
+    /// Equals `portable::threshold_bytes` for whole words of the mask.
+    ///
+    /// BFI puts bit 0 of a pixel's byte into its place in the word, whatever the other bits are.
+    ///
+    /// *Contract.* `pixels`: 32 for each of `words` ≥ 1 words of the mask. `table`: 65,536 bytes.
+    /// Writes the words from `mask` on.
+    ///
+    /// *Schedule.* 32 pixels: 103 instructions in 53 cycles, 1.66 a pixel; 1.5 is the floor of two
+    /// loads and one operation.
+    fn hivtac_threshold_bytes(pixels: *const u16, table: *const u8, mask: *mut u32, words: usize);
+
+    /// Equals `portable::threshold_cr` for whole words of the mask. USUB8 compares the Cr of four
+    /// pairs with the lowest, and SEL chooses the bits of those that are not below it.
+    ///
+    /// *Contract.* `row`: 32 pixels for each word of the mask; it loads nothing else. `low` is the
+    /// lowest Cr in all four bytes. Writes `mask` up to `end`, which lies a positive number of
+    /// words after it.
+    ///
+    /// *Schedule.* 32 pixels: 43 instructions in 23 cycles, 0.72 a pixel; a load, a comparison and
+    /// an addition with carry for each pair would be 0.75.
+    fn hivtac_threshold_cr(row: *const u16, low: u32, mask: *mut u32, end: *const u32);
+
+    /// Equals `portable::threshold_luma` for whole words of the mask. USUB8 subtracts the lowest
+    /// luma modulo 256, another one compares what is left with `span`.
+    ///
+    /// *No overflow.* The bits of four pixels are 1, 2, 4 and 8, and those of the next four 16
+    /// times that: their sum is at most 255.
+    ///
+    /// *Contract.* `row`: 16 `u16`, 32 pixels, for each word of the mask; they are loaded as words,
+    /// which need not lie at a multiple of four (a core must not trap on that: as after reset) but
+    /// are slower elsewhere. `low` and `span` are in all four bytes. Writes `mask` up to `end`,
+    /// which lies a positive number of words after it.
+    ///
+    /// *Schedule.* 32 pixels: 47 instructions in 36 cycles, 1.13 a pixel. 28 of them only go one a
+    /// cycle.
+    fn hivtac_threshold_luma(row: *const u16, low: u32, mask: *mut u32, end: *const u32, span: u32);
+
+    /// Equals `portable::weigh_bytes`: gives Σw in the low word, and in the high one the sum of all
+    /// sums so far, from right to left.
+    ///
+    /// *No overflow.* As said of [`Weights`](crate::tables::Weights): pixels are at most 800.
+    ///
+    /// *Contract.* Reads the `count` pixels before `end`. `table`: 65,536 bytes.
+    ///
+    /// *Schedule.* Four pixels: 19 instructions in 11 cycles.
+    fn hivtac_weigh_bytes(end: *const u16, table: *const u8, count: usize) -> u64;
+}
+
+/// As [`portable::threshold_bytes`](super::portable::threshold_bytes) for the first words of the
+/// mask, and says for how many: all whole ones.
+pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> usize {
+    let whole = whole_words(row, mask, 32);
+    let (row, table, words) = (row.as_ptr(), table.as_ptr(), whole.len());
+    if words > 0 {
+        // SAFETY: the row has 32 pixels for each of the words, of which there is one at least.
+        unsafe { hivtac_threshold_bytes(row, table, whole.as_mut_ptr(), words) };
+    }
+    words
+}
+
+/// As [`portable::threshold_cr`](super::portable::threshold_cr) for the first words of the mask,
+/// and says for how many: all whole ones.
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> usize {
+    let whole = whole_words(row, mask, 32);
+    let range = whole.as_mut_ptr_range();
+    if !whole.is_empty() {
+        // SAFETY: the row has 32 pixels for each of the words, of which there is one at least.
+        unsafe { hivtac_threshold_cr(row.as_ptr(), in_all_bytes(low), range.start, range.end) };
+    }
+    whole.len()
+}
+
+/// As [`portable::threshold_luma`](super::portable::threshold_luma) for the first words of the
+/// mask, and says for how many: all whole ones.
+pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> usize {
+    let whole = whole_words(row, mask, 16);
+    let range = whole.as_mut_ptr_range();
+    let (low, span) = (in_all_bytes(low), in_all_bytes(span));
+    if !whole.is_empty() {
+        // SAFETY: the row has 32 pixels, two in a `u16`, for each of the words, of which there is
+        // one at least.
+        unsafe { hivtac_threshold_luma(row.as_ptr(), low, range.start, range.end, span) };
+    }
+    whole.len()
+}
+
+/// Whether a word is not 0.
+#[inline(always)]
+pub fn any_set(words: &[u32]) -> bool {
+    let (sixteens, rest) = words.as_chunks::<16>();
+    let all = match sixteens.len() {
+        0 => 0,
+        // SAFETY: so many words are there.
+        sixteens => unsafe { hivtac_dilate_any_set(words.as_ptr(), 16 * sixteens) },
+    };
+    all != 0 || crate::mask::any_set(rest)
+}
+
+/// As [`portable::weigh_bytes`](super::portable::weigh_bytes).
+#[inline(always)]
+pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
+    let end = run.as_ptr_range().end;
+    // SAFETY: the run's pixels lie before its end.
+    let sums = unsafe { hivtac_weigh_bytes(end, table.as_ptr(), run.len()) };
+    [sums as u32, (sums >> 32) as u32]
+}
+
+fn in_all_bytes(byte: u8) -> u32 {
+    u32::from_le_bytes([byte; 4])
+}
+
+/// The words of the mask whose 32 pixels, `each` `u16`s, are all in the row.
+fn whole_words<'m>(row: &[u16], mask: &'m mut [u32], each: usize) -> &'m mut [u32] {
+    let count = (row.len() / each).min(mask.len());
+    mask.split_at_mut(count).0
+}
+
+/// The edges of a row of the mask, of `near` words of which `rows` begins with those of three rows
+/// that lie `row_words` apart; their number. Zero when `rows` is too short for that, or there is no
+/// room.
+pub fn dilate_edges(
+    rows: &[u32],
+    row_words: usize,
+    near: &Near,
+    edges: &mut [u16; MAX_WIDTH as usize],
+) -> usize {
+    let &Near { first, words, last } = near;
+    let fits = rows.len() >= 2 * row_words + words && 32 * words <= edges.len();
+    if words == 0 || !fits {
+        return 0;
+    }
+    let begin = edges.as_mut_ptr();
+    // SAFETY: the words of all three rows are in `rows`, and there is room for 32 edges for each.
+    let end = unsafe {
+        let (rows, stride, column) = (rows.as_ptr(), 4 * row_words, 32 * first as u32);
+        hivtac_dilate_edges(rows, stride, words, column, begin, last)
+    };
+    (end as usize - begin as usize) / 2
+}

@@ -1,0 +1,47 @@
+//! The hottest loops, by the fastest means that this processor has.
+//!
+//! Each function is the definition in portable Rust, of the same name in `portable`, or a kernel
+//! that gives the same bits: on a Cortex-M4 or M7 (targets `thumbv7em-*`) those of `cortex_m7`, the
+//! only file of this package that holds `unsafe`.
+
+#[cfg(armv7em)]
+#[allow(unsafe_code)]
+mod cortex_m7;
+#[cfg(armv7em)]
+pub use cortex_m7::{any_set, dilate_edges, weigh_bytes};
+mod portable;
+#[cfg(not(armv7em))]
+pub use {crate::mask::any_set, portable::weigh_bytes};
+
+/// The mask of a row of pixels through a table of bytes: see `portable::threshold_bytes`.
+pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {
+    #[cfg(armv7em)]
+    let done = cortex_m7::threshold_bytes(table, row, mask);
+    #[cfg(not(armv7em))]
+    let done = 0;
+    if done < mask.len() {
+        portable::threshold_bytes(table, row, mask, done);
+    }
+}
+
+/// The mask of a row of YUV422 by its Cr: see `portable::threshold_cr`.
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) {
+    #[cfg(armv7em)]
+    let done = cortex_m7::threshold_cr(low, row, mask);
+    #[cfg(not(armv7em))]
+    let done = 0;
+    if done < mask.len() {
+        portable::threshold_cr(low, row, mask, done);
+    }
+}
+
+/// The mask of a row of mono pixels: see `portable::threshold_luma`.
+pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) {
+    #[cfg(armv7em)]
+    let done = cortex_m7::threshold_luma(low, span, row, mask);
+    #[cfg(not(armv7em))]
+    let done = 0;
+    if done < mask.len() {
+        portable::threshold_luma(low, span, row, mask, done);
+    }
+}

@@ -1,0 +1,26 @@
+//! What changes the features of a frame beside its geometry and threshold, and what forces mean.
+
+/// How a marker's position is taken from its pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub enum CentroidEstimator {
+    /// The mean of its pixels in the mask (the paper's).
+    BinaryMask,
+    /// The mean of the same pixels, each weighted with how much of it a marker covers: by the
+    /// redness of RGB565, the Cr of YUV422, the luma of mono.
+    RednessWeighted,
+}
+
+/// What α and β label.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ContactReading {
+    /// The direction of the force on the film.
+    Force,
+    /// The pressing direction of a tip that sticks to the film: not the force's.
+    Stick,
+    /// The pressing direction of a tip that slips on the film: not the force's.
+    Slip,
+}

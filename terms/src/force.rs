@@ -1,0 +1,51 @@
+//! What a frame gives: a force on the film, and where it touches.
+
+use crate::units::{
+    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+    UnsignedMilliDegrees,
+};
+
+/// A force with its standard uncertainty. Film frame, right-handed: x right and y down in the
+/// image, z = x × y out of the film, away from the camera. F = |F| · (sin α cos β, sin β, −cos α
+/// cos β): a press has F_z < 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Force {
+    /// α.
+    pub alpha: MilliDegrees,
+    /// β.
+    pub beta: MilliDegrees,
+    /// |F| ≥ 0.
+    pub magnitude: MicroNewtons,
+    /// (Fx, Fy, Fz): |F| in the direction of α and β. Where a model's angles are those of the
+    /// pressing direction (`stick`, `slip`), it is |F| along that.
+    pub cartesian: [MicroNewtons; 3],
+    /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within
+    /// 1.731 times this angle of the one found.
+    pub direction_sigma: UnsignedMilliDegrees,
+    /// Standard uncertainty of |F|: 95 of 100 are within 1.960 times this.
+    pub magnitude_sigma: UnsignedMicroNewtons,
+    /// Where the tip touches the film; `None` from a model that does not tell.
+    pub place: Option<Place>,
+}
+
+/// The point of the film that the tip touches, by where it rests in the film frame: (0, 0) is the
+/// film's middle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Place {
+    /// To the right in the image.
+    pub x: SignedMicrometres,
+    /// Down in the image.
+    pub y: SignedMicrometres,
+    /// Standard uncertainty of each coordinate: the root of half the trace of their 2×2 covariance.
+    /// Where that is the same in all directions, 95 of 100 true places lie within 2.448 times this
+    /// length of the one found.
+    pub sigma: Micrometres,
+}

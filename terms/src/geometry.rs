@@ -1,0 +1,274 @@
+//! What the sensing needs to know of lens and markers to tell a marker from another red thing.
+
+use crate::angle::atan2;
+use crate::cordic::{ONE_BITS, sin_cos};
+use crate::division::Divisor;
+use crate::units::{Micrometres, MilliDegrees, Px};
+
+/// Lens, frame and marker geometry (`docs/architecture.md`, presets).
+///
+/// The optical axis meets the image at its centre, ((W−1)/2, (H−1)/2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Geometry {
+    /// Columns of a frame, 1–800.
+    pub width: u16,
+    /// Rows of a frame, 1–800.
+    pub height: u16,
+    /// Focal length of the equidistant lens (r = f·θ), in pixels.
+    pub focal: Px,
+    /// Diameter of a marker on the film.
+    pub marker_diameter: Micrometres,
+    /// Distance of a marker's centre from the optical axis, on the film at rest.
+    pub marker_radius: Micrometres,
+    /// Distance of the film at rest from the lens, along the axis.
+    pub film_distance: Micrometres,
+}
+
+/// The geometries that the project knows by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Preset {
+    /// The paper's camera: f = 2.1 mm, 150° across the frame's diagonal whatever its size.
+    Paper,
+    /// The same lens on an OV7725: 640 × 480 pixels of 6 µm, binned or scaled to the frame's width.
+    Ov7725,
+}
+
+impl Preset {
+    /// Both presets.
+    pub const ALL: [Preset; 2] = [Preset::Paper, Preset::Ov7725];
+
+    /// The name in files, on the command line and in the hello.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Preset::Paper => "paper",
+            Preset::Ov7725 => "ov7725",
+        }
+    }
+
+    /// The preset of that name.
+    pub fn from_name(name: &str) -> Option<Preset> {
+        Preset::ALL.into_iter().find(|preset| preset.name() == name)
+    }
+}
+
+/// 6/(5π) in Q32: a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6)
+/// wide.
+const DIAGONAL_TO_FOCAL_Q32: u64 = 1_640_556_661;
+/// 2.1 mm / (640 · 6 µm) in Q16: an OV7725 frame's width to its focal length, both in pixels.
+/// Exact.
+const OV7725_WIDTH_TO_FOCAL_Q16: i32 = 35_840;
+
+/// A metre: nothing here is larger.
+const LARGEST_MEASURE: Micrometres = Micrometres(1_000_000);
+/// A radian in m°, to 4 · 10⁻⁶ of itself.
+const RADIAN: i64 = 57_296;
+/// π/4 in Q30.
+const QUARTER_PI_Q30: i64 = 843_314_857;
+
+impl Geometry {
+    /// Markers 1 mm across at (±3.717, ±3.717) mm on a film 10 mm away, seen by `preset` in frames
+    /// of `width` × `height` pixels (each 1–800).
+    pub const fn preset(preset: Preset, width: u16, height: u16) -> Geometry {
+        let focal = match preset {
+            Preset::Paper => paper_focal(width as u64, height as u64),
+            Preset::Ov7725 => Px(OV7725_WIDTH_TO_FOCAL_Q16 * width as i32),
+        };
+        Geometry {
+            width,
+            height,
+            focal,
+            marker_diameter: Micrometres(1_000),
+            marker_radius: Micrometres(5_257),
+            film_distance: Micrometres(10_000),
+        }
+    }
+
+    /// Where the optical axis meets the image.
+    pub const fn center(&self) -> (Px, Px) {
+        (half_span(self.width), half_span(self.height))
+    }
+
+    /// Whether all measures are positive and none is beyond a metre, and the markers do not cover
+    /// each other.
+    pub const fn is_sound(&self) -> bool {
+        let diameter = self.marker_diameter.0;
+        let radius = self.marker_radius.0;
+        self.focal.0 > 0
+            && 0 < diameter
+            && diameter <= radius
+            && radius <= LARGEST_MEASURE.0
+            && 0 < self.film_distance.0
+            && self.film_distance.0 <= LARGEST_MEASURE.0
+    }
+
+    /// Area of a marker's image at rest, px, rounded down, when the mask adds `edge` to its
+    /// diameters.
+    pub fn rest_area(&self, edge: Px) -> u32 {
+        let across = self.across(self.rest_distance());
+        let along = self.along_flat(self.rest_distance());
+        let grow = |diameter: Px| i128::from(diameter.0) + i128::from(edge.0);
+        let area_q62 = grow(across) * grow(along) * i128::from(QUARTER_PI_Q30);
+        u32::try_from(area_q62 >> (2 * Px::FRACTION_BITS + ONE_BITS)).unwrap_or(0)
+    }
+
+    /// Distance of a marker's image from the axis at rest: f·θ.
+    pub fn rest_distance(&self) -> Px {
+        let theta = atan2(
+            i64::from(self.marker_radius.0),
+            i64::from(self.film_distance.0),
+        );
+        saturated(i64::from(self.focal.0) * i64::from(theta.0) / RADIAN)
+    }
+
+    /// Diameter, across the radius, of the image of a marker at `distance` from the axis:
+    /// distance·d/R. A lens that is symmetric about its axis shows a circle about the axis as a
+    /// circle, so this holds for any lens and any height or tilt of the film.
+    pub fn across(&self, distance: Px) -> Px {
+        Across::of(self).at(distance)
+    }
+
+    /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with
+    /// θ = distance/f.
+    pub fn along_flat(&self, distance: Px) -> Px {
+        let theta = i64::from(distance.0) * RADIAN / i64::from(self.focal.0.max(1));
+        let theta = theta.clamp(1, 90_000);
+        let (sin, cos) = sin_cos(MilliDegrees(theta as i32));
+        let factor_q30 = ((sin * cos) >> ONE_BITS) * RADIAN / theta;
+        saturated((i64::from(self.across(distance).0) * factor_q30) >> ONE_BITS)
+    }
+}
+
+/// [`Geometry::across`] for many distances.
+#[derive(Clone, Copy, Debug)]
+pub struct Across {
+    diameter: i64,
+    by_radius: Divisor,
+}
+
+impl Across {
+    /// By a geometry's markers.
+    pub fn of(geometry: &Geometry) -> Across {
+        Across {
+            diameter: geometry.marker_diameter.0.into(),
+            by_radius: Divisor::new(geometry.marker_radius.0),
+        }
+    }
+
+    /// The width of a marker's image at this distance from the axis.
+    pub fn at(&self, distance: Px) -> Px {
+        let product = i64::from(distance.0) * self.diameter;
+        saturated(self.by_radius.signed_quotient(product))
+    }
+}
+
+/// As a length, at most ± 32,768 px.
+fn saturated(length_q16: i64) -> Px {
+    Px(length_q16.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32)
+}
+
+/// 2.1 mm over a pitch that makes the diagonal 150°: the pitch cancels out.
+const fn paper_focal(width: u64, height: u64) -> Px {
+    let diagonal_q16 = ((width * width + height * height) << 32).isqrt();
+    Px(((diagonal_q16 * DIAGONAL_TO_FOCAL_Q32 + (1 << 31)) >> 32) as i32)
+}
+
+/// (`pixels` − 1)/2.
+const fn half_span(pixels: u16) -> Px {
+    Px((pixels as i32 - 1) << (Px::FRACTION_BITS - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_have_the_documented_focal_lengths() {
+        for (preset, width, height, pitch_um) in [
+            (Preset::Paper, 800, 600, 5.497_787),
+            (Preset::Paper, 320, 240, 13.744_468),
+            (Preset::Ov7725, 320, 240, 12.0),
+            (Preset::Ov7725, 640, 480, 6.0),
+        ] {
+            let focal = Geometry::preset(preset, width, height).focal.to_f64();
+            let pitch = 2_100.0 / focal;
+            assert!(
+                (pitch - pitch_um).abs() < 1e-5,
+                "{preset:?} {width}: {pitch} µm"
+            );
+        }
+    }
+
+    #[test]
+    fn a_marker_at_rest_has_the_area_of_its_ellipse() {
+        let geometry = Geometry::preset(Preset::Ov7725, 320, 240);
+        let theta = (5.257f64 / 10.0).atan();
+        assert!((geometry.rest_distance().to_f64() - 175.0 * theta).abs() < 2e-3);
+        let across = 175.0 * theta / 5.257;
+        let along = across * theta.sin() * theta.cos() / theta;
+        assert!((geometry.across(geometry.rest_distance()).to_f64() - across).abs() < 1e-3);
+        assert!((geometry.along_flat(geometry.rest_distance()).to_f64() - along).abs() < 1e-3);
+        for edge in [0.0, 2.8] {
+            let area = std::f64::consts::FRAC_PI_4 * (across + edge) * (along + edge);
+            let found = geometry.rest_area(Px((edge * 65_536.0) as i32));
+            assert!((f64::from(found) - area).abs() < 1.0, "{found} for {area}");
+        }
+    }
+
+    #[test]
+    fn extreme_geometries_are_refused_or_give_a_number() {
+        let good = Geometry::preset(Preset::Paper, 800, 600);
+        assert!(good.is_sound());
+        for wrong in [
+            Geometry {
+                focal: Px(0),
+                ..good
+            },
+            Geometry {
+                marker_diameter: Micrometres(0),
+                ..good
+            },
+            Geometry {
+                marker_diameter: Micrometres(5_258),
+                ..good
+            },
+            Geometry {
+                marker_radius: Micrometres(u32::MAX),
+                ..good
+            },
+            Geometry {
+                film_distance: Micrometres(0),
+                ..good
+            },
+            Geometry {
+                film_distance: Micrometres(1_000_001),
+                ..good
+            },
+        ] {
+            assert!(!wrong.is_sound(), "{wrong:?}");
+            let _ = wrong.rest_area(Px(i32::MAX));
+        }
+        let largest = Geometry {
+            focal: Px(i32::MAX),
+            marker_diameter: Micrometres(1_000_000),
+            marker_radius: Micrometres(1_000_000),
+            film_distance: Micrometres(1),
+            ..good
+        };
+        assert!(largest.is_sound());
+        assert!(largest.rest_area(Px(0)) > 0);
+    }
+
+    #[test]
+    fn names_round_trip() {
+        for preset in Preset::ALL {
+            assert_eq!(Preset::from_name(preset.name()), Some(preset));
+        }
+        assert_eq!(Preset::from_name("Paper"), None);
+    }
+
+    #[test]
+    fn the_axis_meets_the_middle_of_the_frame() {
+        let (x, y) = Geometry::preset(Preset::Ov7725, 320, 240).center();
+        assert_eq!((x.to_f64(), y.to_f64()), (159.5, 119.5));
+    }
+}

@@ -1,0 +1,19 @@
+//! Markers: the four dots as an image shows them.
+
+use crate::units::Px;
+
+/// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3
+/// lower left as the image shows them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Marker {
+    /// Centroid, column.
+    pub x: Px,
+    /// Centroid, row.
+    pub y: Px,
+    /// Pixels in the mask, after dilation.
+    pub area: u32,
+}

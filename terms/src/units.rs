@@ -1,0 +1,96 @@
+//! The units that cross module borders. Each is a transparent newtype: no bare integer does.
+
+use core::ops::{Add, Sub};
+
+/// A pixel coordinate or distance in Q16.16: 65,536 steps a pixel. The centre of pixel (0, 0) is
+/// the origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Px(pub i32);
+
+impl Px {
+    /// Fractional bits.
+    pub const FRACTION_BITS: u32 = 16;
+    /// One pixel.
+    pub const ONE: Px = Px(1 << Self::FRACTION_BITS);
+
+    /// A whole number of pixels, |`pixels`| < 32,768.
+    pub const fn from_int(pixels: i32) -> Px {
+        Px(pixels << Self::FRACTION_BITS)
+    }
+
+    /// The value in pixels, to 2⁻²⁴ of it.
+    pub fn to_f32(self) -> f32 {
+        self.0 as f32 / 65_536.0
+    }
+
+    /// The value in pixels, for display and for tests; exact.
+    pub fn to_f64(self) -> f64 {
+        f64::from(self.0) / 65_536.0
+    }
+}
+
+impl Add for Px {
+    type Output = Px;
+    fn add(self, other: Px) -> Px {
+        Px(self.0 + other.0)
+    }
+}
+
+impl Sub for Px {
+    type Output = Px;
+    fn sub(self, other: Px) -> Px {
+        Px(self.0 - other.0)
+    }
+}
+
+/// A force component or magnitude in millionths of a newton.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct MicroNewtons(pub i32);
+
+/// An angle in thousandths of a degree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct MilliDegrees(pub i32);
+
+/// A length on the film or in the lens, in thousandths of a millimetre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Micrometres(pub u32);
+
+/// A coordinate on the film, in thousandths of a millimetre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct SignedMicrometres(pub i32);
+
+/// A standard uncertainty of a force component or magnitude, in millionths of a newton.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct UnsignedMicroNewtons(pub u32);
+
+/// A standard uncertainty of a direction, in thousandths of a degree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct UnsignedMilliDegrees(pub u32);
