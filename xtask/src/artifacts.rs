@@ -71,6 +71,21 @@ pub fn rig() -> Result<PathBuf> {
     build(command.args(["--bin", "hivtac-rig"]), "hivtac-rig")
 }
 
+/// Runs a workspace's tests past those that fail: in the profile in which the programs that they run
+/// are built, so that dependencies are built once.
+pub fn test(workspace: &Path) -> Command {
+    let mut command = cargo("test", workspace);
+    command.args(["--profile", TOOLS, "--no-fail-fast"]);
+    command
+}
+
+/// Lints a workspace, likewise: what dependencies run to build themselves is built once.
+pub fn clippy(workspace: &Path) -> Command {
+    let mut command = cargo("clippy", workspace);
+    command.args(["--profile", TOOLS]);
+    command
+}
+
 /// A cargo command for the rig: always in one profile, so that its emulator is built once, and with
 /// an emulator that declares a newer compiler than it needs.
 pub fn rig_cargo(verb: &str) -> Command {

@@ -39,6 +39,9 @@ pub struct Test {
     all: bool,
 }
 
+/// The rig's tests in which it matters how fast the core is.
+const TIMED: [&str; 4] = ["camera", "faults", "firmware", "threshold"];
+
 /// The programs that the tests of the rig and those across rooms run.
 struct Programs {
     firmware: PathBuf,
@@ -106,29 +109,34 @@ impl Test {
     fn host_tests(&self, report: &mut Report) {
         if self.wants("tests: host") {
             report.step("tests: host", |tally| {
-                let mut command = cargo("test", workspace::root());
-                command.args(HOST).arg("--no-fail-fast");
+                let mut command = artifacts::test(workspace::root());
+                command.args(HOST);
                 run_tests(self.slow_ones(&mut command), tally)
             });
         }
     }
 
-    /// The rig's tests at the speed that it assumes of the core, and at half of it.
+    /// The rig's tests at the speed that it assumes of the core, and those in which time matters
+    /// at half of it.
     fn rig_tests(&self, report: &mut Report, programs: Option<&Programs>) {
-        for (step, speed) in [
-            ("tests: rig", None),
-            ("tests: rig at half speed", Some("200000000")),
-        ] {
+        let mut test = |step, prepare: &dyn Fn(&mut Command)| {
             if self.wants(step) {
                 report.step(step, |tally| {
                     let programs = programs.context("not run: the firmware could not be built")?;
                     let mut command = artifacts::rig_cargo("test");
                     programs.name_to(command.arg("--no-fail-fast"));
-                    command.envs(speed.map(|speed| ("HIVTAC_INSTRUCTIONS_PER_SECOND", speed)));
+                    prepare(&mut command);
                     run_tests(&mut command, tally)
                 });
             }
-        }
+        };
+        test("tests: rig", &|_| {});
+        test("tests: rig at half speed", &|command| {
+            command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");
+            for name in TIMED {
+                command.args(["--test", name]);
+            }
+        });
     }
 
     fn cross_room_tests(
@@ -197,7 +205,7 @@ fn check_format() -> Result<()> {
 }
 
 fn host_lints() -> Result<()> {
-    let mut root = cargo("clippy", workspace::root());
+    let mut root = artifacts::clippy(workspace::root());
     root.args([
         "--workspace",
         "--exclude",
@@ -228,8 +236,8 @@ fn target_lints(toolchain: &Toolchain) -> Result<()> {
 
 fn cross_room_tests(toolchain: &Toolchain, programs: &Programs) -> Result<Command> {
     packages::ensure_qemu()?;
-    let mut command = cargo("test", workspace::root());
-    command.args(["--package", "hivtac-tests", "--no-fail-fast"]);
+    let mut command = artifacts::test(workspace::root());
+    command.args(["--package", "hivtac-tests"]);
     programs.name_to(&mut command);
     command
         .env("HIVTAC_TOOL", artifacts::host_tool()?)
