@@ -31,17 +31,21 @@ pub enum Preset {
     Paper,
     /// The same lens on an OV7725: 640 × 480 pixels of 6 µm, binned or scaled to the frame's width.
     Ov7725,
+    /// A lens of 1.2 mm on an MT9V034, whose pixels of 6 µm are binned 2 × 2: 12 µm whatever part
+    /// of them is sent.
+    Mt9v034,
 }
 
 impl Preset {
-    /// Both presets.
-    pub const ALL: [Preset; 2] = [Preset::Paper, Preset::Ov7725];
+    /// Every preset, in the order in which the model file numbers them.
+    pub const ALL: [Preset; 3] = [Preset::Paper, Preset::Ov7725, Preset::Mt9v034];
 
     /// The name in files, on the command line and in the hello.
     pub const fn name(self) -> &'static str {
         match self {
             Preset::Paper => "paper",
             Preset::Ov7725 => "ov7725",
+            Preset::Mt9v034 => "mt9v034",
         }
     }
 
@@ -57,6 +61,8 @@ const DIAGONAL_TO_FOCAL_Q32: u64 = 1_640_556_661;
 /// 2.1 mm / (640 · 6 µm) in Q16: an OV7725 frame's width to its focal length, both in pixels.
 /// Exact.
 const OV7725_WIDTH_TO_FOCAL_Q16: i32 = 35_840;
+/// 1.2 mm / 12 µm.
+const MT9V034_FOCAL: Px = Px(100 << Px::FRACTION_BITS);
 
 /// A metre: nothing here is larger.
 const LARGEST_MEASURE: Micrometres = Micrometres(1_000_000);
@@ -72,6 +78,7 @@ impl Geometry {
         let focal = match preset {
             Preset::Paper => paper_focal(width as u64, height as u64),
             Preset::Ov7725 => Px(OV7725_WIDTH_TO_FOCAL_Q16 * width as i32),
+            Preset::Mt9v034 => MT9V034_FOCAL,
         };
         Geometry {
             width,
@@ -183,14 +190,16 @@ mod tests {
 
     #[test]
     fn presets_have_the_documented_focal_lengths() {
-        for (preset, width, height, pitch_um) in [
-            (Preset::Paper, 800, 600, 5.497_787),
-            (Preset::Paper, 320, 240, 13.744_468),
-            (Preset::Ov7725, 320, 240, 12.0),
-            (Preset::Ov7725, 640, 480, 6.0),
+        for (preset, width, height, focal_um, pitch_um) in [
+            (Preset::Paper, 800, 600, 2_100.0, 5.497_787),
+            (Preset::Paper, 320, 240, 2_100.0, 13.744_468),
+            (Preset::Ov7725, 320, 240, 2_100.0, 12.0),
+            (Preset::Ov7725, 640, 480, 2_100.0, 6.0),
+            (Preset::Mt9v034, 160, 152, 1_200.0, 12.0),
+            (Preset::Mt9v034, 376, 240, 1_200.0, 12.0),
         ] {
             let focal = Geometry::preset(preset, width, height).focal.to_f64();
-            let pitch = 2_100.0 / focal;
+            let pitch = focal_um / focal;
             assert!(
                 (pitch - pitch_um).abs() < 1e-5,
                 "{preset:?} {width}: {pitch} µm"

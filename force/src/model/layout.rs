@@ -228,7 +228,7 @@ fn preset(reader: &mut Reader<'_>) -> Result<Preset, ModelError> {
         .ok_or(ModelError::Field {
             name: "preset name",
             offset,
-            allowed: "`paper` or `ov7725`",
+            allowed: "`paper`, `ov7725` or `mt9v034`",
         })
 }
 
