@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use crate::{Lens, Mounting, Projection, SceneError};
+use crate::{Format, Lens, Mounting, Paint, Projection, SceneError};
 
-/// Focal length of the lens, mm.
+/// Focal length of the paper's lens, mm.
 pub const FOCAL_LENGTH_MM: f64 = 2.1;
 /// Distance from the pinhole to the film at rest along the optical axis, mm.
 pub const FILM_DISTANCE_MM: f64 = 10.0;
@@ -13,6 +13,12 @@ pub const FILM_DISTANCE_MM: f64 = 10.0;
 const PAPER_VIEW_DEG: f64 = 150.0;
 /// Width of the OV7725's picture: 640 pixels of 6 µm, in mm.
 const OV7725_WIDTH_MM: f64 = 3.84;
+/// Focal length of the lens on an MT9V034, mm: the markers stay within the rows that it reads out.
+const MT9V034_FOCAL_LENGTH_MM: f64 = 1.2;
+/// Its pixels of 6 µm, binned 2 × 2, mm.
+const MT9V034_PITCH_MM: f64 = 0.012;
+/// Its whole array of binned pixels: columns and rows.
+const MT9V034_ARRAY: [u32; 2] = [376, 240];
 
 /// A named geometry (`docs/architecture.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,14 +29,67 @@ pub enum Preset {
     Paper,
     /// The same lens on an OV7725's 6 µm pixels (QVGA by 2×2 binning: 12 µm).
     Ov7725,
+    /// A lens of 1.2 mm on an MT9V034's pixels of 6 µm, binned 2 × 2, and any window of them about
+    /// the axis.
+    Mt9v034,
 }
 
 impl Preset {
-    /// Its name in files and on the command line: `paper` or `ov7725`.
+    /// Every preset.
+    pub const ALL: [Preset; 3] = [Preset::Paper, Preset::Ov7725, Preset::Mt9v034];
+
+    /// Its name in files and on the command line: `paper`, `ov7725` or `mt9v034`.
     pub fn name(self) -> &'static str {
         match self {
             Preset::Paper => "paper",
             Preset::Ov7725 => "ov7725",
+            Preset::Mt9v034 => "mt9v034",
+        }
+    }
+
+    /// Columns and rows of its usual frame.
+    pub fn usual_size(self) -> [u32; 2] {
+        match self {
+            Preset::Paper | Preset::Ov7725 => [320, 240],
+            Preset::Mt9v034 => [160, 152],
+        }
+    }
+
+    /// How its camera codes pixels by default.
+    pub fn usual_format(self) -> Format {
+        match self {
+            Preset::Paper | Preset::Ov7725 => Format::Rgb565,
+            Preset::Mt9v034 => Format::Mono,
+        }
+    }
+
+    /// What its markers are by default: black where the camera sees no colours.
+    pub fn usual_markers(self) -> Paint {
+        match self {
+            Preset::Paper | Preset::Ov7725 => Paint::Red,
+            Preset::Mt9v034 => Paint::Black,
+        }
+    }
+
+    /// Focal length of its lens, mm.
+    pub fn focal_length_mm(self) -> f64 {
+        match self {
+            Preset::Paper | Preset::Ov7725 => FOCAL_LENGTH_MM,
+            Preset::Mt9v034 => MT9V034_FOCAL_LENGTH_MM,
+        }
+    }
+
+    /// Whether its frames may have this size.
+    fn has_size(self, width: u32, height: u32) -> bool {
+        match self {
+            Preset::Paper | Preset::Ov7725 => {
+                (160..=800).contains(&width) && width * 3 == height.saturating_mul(4)
+            }
+            Preset::Mt9v034 => {
+                let [columns, rows] = MT9V034_ARRAY;
+                let even = width.is_multiple_of(2) && height.is_multiple_of(2);
+                even && (80..=columns).contains(&width) && (80..=rows).contains(&height)
+            }
         }
     }
 
@@ -40,6 +99,7 @@ impl Preset {
         match self {
             Preset::Paper => FOCAL_LENGTH_MM * radians(PAPER_VIEW_DEG) / (w * w + h * h).sqrt(),
             Preset::Ov7725 => OV7725_WIDTH_MM / w,
+            Preset::Mt9v034 => MT9V034_PITCH_MM,
         }
     }
 }
@@ -54,7 +114,7 @@ impl FromStr for Preset {
     type Err = SceneError;
 
     fn from_str(name: &str) -> Result<Preset, SceneError> {
-        [Preset::Paper, Preset::Ov7725]
+        Preset::ALL
             .into_iter()
             .find(|preset| preset.name() == name)
             .ok_or_else(|| SceneError::UnknownPreset(name.to_owned()))
@@ -82,19 +142,24 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The camera of a preset at a frame size: 4:3, 160×120 to 800×600.
+    /// The camera of a preset at a frame size: 4:3, 160×120 to 800×600; of `mt9v034` an even number
+    /// of columns and rows, 80×80 to 376×240.
     ///
     /// # Errors
     /// When the size is another.
     pub fn new(preset: Preset, width: u32, height: u32) -> Result<Camera, SceneError> {
-        if !(160..=800).contains(&width) || width * 3 != height.saturating_mul(4) {
-            return Err(SceneError::Size { width, height });
+        if !preset.has_size(width, height) {
+            return Err(SceneError::Size {
+                preset,
+                width,
+                height,
+            });
         }
         Ok(Camera {
             preset,
             width,
             height,
-            focal_px: FOCAL_LENGTH_MM / preset.pitch_mm(width, height),
+            focal_px: preset.focal_length_mm() / preset.pitch_mm(width, height),
             projection: Projection::Equidistant,
             axis_px: [centre(width), centre(height)],
             roll: (0.0, 1.0),
@@ -105,7 +170,7 @@ impl Camera {
     pub(crate) fn fitted(mut self, lens: &Lens, mounting: &Mounting) -> Camera {
         let preset_mm = self.preset.pitch_mm(self.width, self.height);
         let pitch_mm = lens.pitch_um.map_or(preset_mm, |um| um / 1000.0);
-        self.focal_px = FOCAL_LENGTH_MM / pitch_mm;
+        self.focal_px = self.preset.focal_length_mm() / pitch_mm;
         self.projection = lens.projection;
         let [dx, dy] = mounting.shift_px;
         self.axis_px = [centre(self.width) + dx, centre(self.height) + dy];
@@ -189,6 +254,10 @@ mod tests {
         assert!((pitch_um(Preset::Paper, 320) - 13.744).abs() < 0.0005);
         assert!((pitch_um(Preset::Ov7725, 320) - 12.0).abs() < 1e-9);
         assert!((pitch_um(Preset::Ov7725, 640) - 6.0).abs() < 1e-9);
+        for [width, height] in [Preset::Mt9v034.usual_size(), MT9V034_ARRAY] {
+            let camera = Camera::new(Preset::Mt9v034, width, height).unwrap();
+            assert!((camera.focal_px() - 100.0).abs() < 1e-9);
+        }
     }
 
     #[test]
@@ -241,14 +310,24 @@ mod tests {
         for (width, height) in [(0, 0), (156, 117), (320, 200), (804, 603), (320, u32::MAX)] {
             assert_eq!(
                 Camera::new(Preset::Paper, width, height),
-                Err(SceneError::Size { width, height })
+                Err(SceneError::Size {
+                    preset: Preset::Paper,
+                    width,
+                    height
+                })
+            );
+        }
+        for (width, height) in [(78, 152), (160, 151), (378, 240), (376, 242)] {
+            assert!(
+                Camera::new(Preset::Mt9v034, width, height).is_err(),
+                "{width} × {height}"
             );
         }
     }
 
     #[test]
     fn names_parse_back() {
-        for preset in [Preset::Paper, Preset::Ov7725] {
+        for preset in Preset::ALL {
             assert_eq!(preset.to_string().parse(), Ok(preset));
         }
         assert!("ov7670".parse::<Preset>().is_err());

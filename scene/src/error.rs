@@ -4,7 +4,7 @@ use std::fmt;
 
 use hivtac_film::FilmError;
 
-use crate::Motion;
+use crate::{Motion, Preset};
 
 /// A scene, size, load or option that cannot be simulated. The message says what, where and what is
 /// possible.
@@ -18,6 +18,8 @@ pub enum SceneError {
     UnknownFormat(String),
     /// A frame size that the simulated camera does not have.
     Size {
+        /// Whose camera.
+        preset: Preset,
         /// Columns asked for.
         width: u32,
         /// Rows asked for.
@@ -60,16 +62,27 @@ impl fmt::Display for SceneError {
                 write!(f, "unknown scene `{name}`: use one of {names}")
             }
             SceneError::UnknownPreset(name) => {
-                write!(f, "unknown preset `{name}`: use paper or ov7725")
+                write!(f, "unknown preset `{name}`: use paper, ov7725 or mt9v034")
             }
             SceneError::UnknownFormat(name) => {
                 write!(f, "unknown pixel format `{name}`: use {FORMATS}")
             }
-            SceneError::Size { width, height } => write!(
-                f,
-                "frame size {width}×{height}: use a 4:3 size from 160×120 to 800×600, such as \
-                 320×240"
-            ),
+            SceneError::Size {
+                preset,
+                width,
+                height,
+            } => {
+                let possible = match preset {
+                    Preset::Paper | Preset::Ov7725 => "a 4:3 size from 160×120 to 800×600",
+                    Preset::Mt9v034 => "even numbers from 80×80 to 376×240",
+                };
+                let [columns, rows] = preset.usual_size();
+                write!(
+                    f,
+                    "frame size {width}×{height}: for {preset} use {possible}, such as \
+                     {columns}×{rows}"
+                )
+            }
             SceneError::Film(error) => error.fmt(f),
             #[cfg(feature = "file")]
             SceneError::File(why) => write!(f, "scene file: {why}"),

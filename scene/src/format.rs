@@ -26,9 +26,10 @@ pub enum Format {
     /// of the pair. Read as a little-endian `u32`, a pair has its Cr in the top byte. A marker's Cr
     /// is 191, the film's 132.
     Yuv422,
-    /// One byte per pixel: a monochrome sensor behind a green filter, or in green light, so that
-    /// red markers are *dark*: 36 against the film's 141. (Without the filter red tape has half of
-    /// the film's luma, behind a red one all of it.)
+    /// One byte per pixel: a monochrome sensor, to which [`Options::mono`](crate::Options::mono)
+    /// says how red, green and blue count. Behind a green filter, or in green light, red markers
+    /// are *dark*: 36 against the film's 141. (Without the filter red tape has half of the film's
+    /// luma, behind a red one all of it.)
     Mono,
     /// The picture compressed and decompressed again, then coded as [`Format::Rgb565`]: what a
     /// computer works on that has a JPEG camera, as the paper's was. Chroma has half the resolution

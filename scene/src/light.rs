@@ -19,6 +19,10 @@ const FILM_COLOUR: [f64; 3] = [150.0, 141.0, 128.0];
 const RED_COLOUR: [f64; 3] = [160.0, 36.0, 40.0];
 /// A lamp's reflection: white even in dim light.
 const GLARE_COLOUR: [f64; 3] = [2000.0; 3];
+/// Matte black paint: it reflects some 7 % where the film reflects or lets through some 40 %.
+const BLACK_COLOUR: [f64; 3] = [25.0, 24.0, 22.0];
+/// Blue tape: hue 105, as bright in blue as the red tape is in red.
+const BLUE_COLOUR: [f64; 3] = [30.0, 75.0, 120.0];
 /// The angle that [`Options::falloff`] is given for, degrees.
 const FALLOFF_ANGLE_DEG: f64 = 75.0;
 
@@ -28,6 +32,8 @@ impl Paint {
             Paint::Red => RED_COLOUR,
             Paint::Film => FILM_COLOUR,
             Paint::Glare => GLARE_COLOUR,
+            Paint::Black => BLACK_COLOUR,
+            Paint::Blue => BLUE_COLOUR,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What makes a frame harder or easier than the default.
 
-use crate::{Format, Lens, Mechanics, Mounting, Patch, SceneError, Shutter};
+use crate::{Format, Lens, Mechanics, Mounting, Patch, Preset, SceneError, Shutter};
 use crate::{Paint, Specks};
 
 /// How a scene is lit, mounted, exposed and disturbed. The default is the nominal sensor.
@@ -32,6 +32,11 @@ pub struct Options {
     pub salt: Salt,
     /// What is taken of the film's answer.
     pub film: Mechanics,
+    /// What a camera of [`Format::Mono`] makes of red, green and blue: the weight of each, 0 to 1.
+    /// (0, 1, 0) is green light or a green filter.
+    pub mono: [f64; 3],
+    /// What the markers are painted with.
+    pub markers: Paint,
     /// Which markers (by identity) have come off.
     pub missing: [bool; 4],
     /// How far from its place each marker (by identity) is glued, mm along x and y, −1 to 1 each.
@@ -76,6 +81,8 @@ impl Default for Options {
                 paint: Paint::Red,
             },
             film: Mechanics::default(),
+            mono: [0.0, 1.0, 0.0],
+            markers: Paint::Red,
             missing: [false; 4],
             glued_mm: [[0.0; 2]; 4],
             patches: Vec::new(),
@@ -89,6 +96,15 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The nominal sensor of a preset.
+    pub fn of(preset: Preset) -> Options {
+        Options {
+            format: preset.usual_format(),
+            markers: preset.usual_markers(),
+            ..Options::default()
+        }
+    }
+
     /// # Errors
     /// When a value is outside its range or not a number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
@@ -101,6 +117,7 @@ impl Options {
         within("falloff", self.falloff, [0.0, 1.0])?;
         within("haze", self.haze, [0.0, 255.0])?;
         all_within("white_balance", self.white_balance, [0.0, 4.0])?;
+        all_within("mono", self.mono, [0.0, 1.0])?;
         within("texture", self.texture, [0.0, 0.5])?;
         within("noise", self.noise, [0.0, 64.0])?;
         within("salt", self.salt.fraction, [0.0, 1.0])?;
@@ -168,6 +185,7 @@ mod tests {
             (said_of(|o| o.gradient[1] = 1.5), "gradient"),
             (said_of(|o| o.haze = -1.0), "haze"),
             (said_of(|o| o.white_balance[2] = 5.0), "white_balance"),
+            (said_of(|o| o.mono[0] = 1.5), "mono"),
             (said_of(|o| o.texture = f64::INFINITY), "texture"),
             (said_of(|o| o.salt.fraction = 1.1), "salt"),
             (said_of(|o| o.checkerboard_px = 401), "checkerboard_px"),

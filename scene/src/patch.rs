@@ -27,18 +27,30 @@ pub enum Paint {
     Film,
     /// The reflection of a lamp: white, and as bright as the camera can show.
     Glare,
+    /// Matte black: a sixth of the film's light.
+    Black,
+    /// Blue: a fifth of the film's red, half of its green, nearly all of its blue.
+    Blue,
 }
 
 impl Paint {
     /// Every paint.
-    pub const ALL: [Paint; 3] = [Paint::Red, Paint::Film, Paint::Glare];
+    pub const ALL: [Paint; 5] = [
+        Paint::Red,
+        Paint::Film,
+        Paint::Glare,
+        Paint::Black,
+        Paint::Blue,
+    ];
 
-    /// Its name in files: `red`, `film` or `glare`.
+    /// Its name in files: `red`, `film`, `glare`, `black` or `blue`.
     pub fn name(self) -> &'static str {
         match self {
             Paint::Red => "red",
             Paint::Film => "film",
             Paint::Glare => "glare",
+            Paint::Black => "black",
+            Paint::Blue => "blue",
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::light::{Light, STEPS};
 use crate::motion::Motion;
 use crate::noise::{LOTS, Noise};
 use crate::{
-    Camera, Disc, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Shutter, Truth,
+    Camera, Disc, Format, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Shutter, Truth,
 };
 use hivtac_film::Film;
 
@@ -26,8 +26,8 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene by name, with default options, at a frame size (4:3, 160×120 to 800×600). The seed
-    /// decides the noise, and where `demo` starts.
+    /// A scene by name, with the preset's options, at a frame size that the preset has
+    /// ([`Camera::new`]). The seed decides the noise, and where `demo` starts.
     ///
     /// - `rest`: nothing presses.
     /// - `static`: 0.1 N at α = 4°, β = −3°.
@@ -49,7 +49,7 @@ impl Scene {
         seed: u64,
     ) -> Result<Scene, SceneError> {
         let camera = Camera::new(preset, width, height)?;
-        let options = Options::default();
+        let options = Options::of(preset);
         Ok(Scene {
             film: Film::default(),
             motion: Motion::named(name, seed)?,
@@ -210,7 +210,7 @@ impl Scene {
             self.paint(&mut picture, &exposure.image(speck), Paint::Red);
         }
         for marker in markers.iter().flatten() {
-            self.paint(&mut picture, marker, Paint::Red);
+            self.paint(&mut picture, marker, self.options.markers);
         }
         for patch in &self.options.patches {
             self.paint(&mut picture, &exposure.image(&patch.disc()), patch.paint);
@@ -235,9 +235,19 @@ impl Scene {
             } else {
                 clean.map(i32::from)
             };
+            let clean = self.as_seen(clean);
             std::array::from_fn(|channel| clean[channel] + noise[channel])
         });
         self.options.format.code(self.camera.width(), noisy)
+    }
+
+    /// Red, green and blue as the camera tells them apart: one that sees no colours not at all.
+    fn as_seen(&self, colour: [i32; 3]) -> [i32; 3] {
+        if self.options.format != Format::Mono {
+            return colour;
+        }
+        let weighed = (self.options.mono.iter().zip(colour)).map(|(w, c)| w * f64::from(c));
+        [weighed.sum::<f64>().round() as i32; 3]
     }
 
     fn truth_of<L: Fn(f64) -> Load>(

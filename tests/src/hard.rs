@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 use anyhow::Result;
 use hivtac_hard_cases::{Expected, HardCase, hard_cases, hard_loads};
-use hivtac_scene::{Contact, Frame, Preset, Scene};
+use hivtac_scene::{Contact, Frame, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::PixelFormat;
@@ -137,10 +137,7 @@ fn frames(scene: &Scene, moves: bool, repeats: u64) -> Result<Vec<Frame>> {
 
 /// The Markdown table of one view's outcomes.
 pub fn table(view: View, outcomes: &[Outcome]) -> String {
-    let preset = match view.preset {
-        Preset::Paper => "paper",
-        Preset::Ov7725 => "ov7725",
-    };
+    let preset = view.preset.name();
     let estimator = match view.estimator {
         CentroidEstimator::BinaryMask => "binary",
         CentroidEstimator::RednessWeighted => "redness-weighted",

@@ -176,6 +176,7 @@ impl View {
         let lens = match self.preset {
             Preset::Paper => geometry::Preset::Paper,
             Preset::Ov7725 => geometry::Preset::Ov7725,
+            Preset::Mt9v034 => geometry::Preset::Mt9v034,
         };
         let [width, height] = self.size;
         let geometry = Geometry::preset(lens, width as u16, height as u16);

@@ -27,9 +27,9 @@ pub(super) struct SceneFile {
 #[serde(default, deny_unknown_fields)]
 struct CameraSection {
     preset: Preset,
-    width: u32,
-    height: u32,
-    format: FormatName,
+    width: Option<u32>,
+    height: Option<u32>,
+    format: Option<FormatName>,
     jpeg_quality: Option<u8>,
 }
 
@@ -50,6 +50,7 @@ struct LightSection {
     falloff: f64,
     haze: f64,
     white_balance: [f64; 3],
+    mono: [f64; 3],
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -64,6 +65,7 @@ struct NoiseSection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct MarksSection {
+    paint: Option<Paint>,
     missing: Vec<u8>,
     glued_mm: [[f64; 2]; 4],
     patch: Vec<Patch>,
@@ -110,7 +112,7 @@ struct ConstantSection {
 
 impl SceneFile {
     pub(super) fn scene(&self) -> Result<Scene, SceneError> {
-        let CameraSection { width, height, .. } = self.camera;
+        let [width, height] = self.camera.size();
         Scene::preset("rest", self.camera.preset, width, height, self.seed)?
             .with_options(self.options()?)?
             .with_motion(self.load.motion(self.seed)?)
@@ -123,6 +125,7 @@ impl SceneFile {
             falloff,
             haze,
             white_balance,
+            mono,
         } = self.light;
         Ok(Options {
             format: self.camera.format()?,
@@ -131,6 +134,8 @@ impl SceneFile {
             falloff,
             haze,
             white_balance,
+            mono,
+            markers: (self.marks.paint).unwrap_or(self.camera.preset.usual_markers()),
             texture: self.noise.texture,
             noise: self.noise.noise,
             salt: Salt {
@@ -154,12 +159,19 @@ impl SceneFile {
 }
 
 impl CameraSection {
+    /// Columns and rows.
+    fn size(&self) -> [u32; 2] {
+        let [width, height] = self.preset.usual_size();
+        [self.width.unwrap_or(width), self.height.unwrap_or(height)]
+    }
+
     fn format(&self) -> Result<Format, SceneError> {
         let format = match self.format {
-            FormatName::Rgb565 => Format::Rgb565,
-            FormatName::Yuv422 => Format::Yuv422,
-            FormatName::Mono => Format::Mono,
-            FormatName::Jpeg => {
+            None => self.preset.usual_format(),
+            Some(FormatName::Rgb565) => Format::Rgb565,
+            Some(FormatName::Yuv422) => Format::Yuv422,
+            Some(FormatName::Mono) => Format::Mono,
+            Some(FormatName::Jpeg) => {
                 let quality = self.jpeg_quality.unwrap_or(JPEG_QUALITY);
                 return Ok(Format::Jpeg { quality });
             }
@@ -234,9 +246,9 @@ impl Default for CameraSection {
     fn default() -> CameraSection {
         CameraSection {
             preset: Preset::Ov7725,
-            width: 320,
-            height: 240,
-            format: FormatName::Rgb565,
+            width: None,
+            height: None,
+            format: None,
             jpeg_quality: None,
         }
     }
@@ -251,6 +263,7 @@ impl Default for LightSection {
             falloff: usual.falloff,
             haze: usual.haze,
             white_balance: usual.white_balance,
+            mono: usual.mono,
         }
     }
 }
@@ -271,6 +284,7 @@ impl Default for MarksSection {
     fn default() -> MarksSection {
         let usual = Options::default();
         MarksSection {
+            paint: None,
             missing: Vec::new(),
             glued_mm: usual.glued_mm,
             patch: Vec::new(),

@@ -44,6 +44,7 @@ impl Pipeline {
         let preset = match camera.preset() {
             ScenePreset::Paper => Preset::Paper,
             ScenePreset::Ov7725 => Preset::Ov7725,
+            ScenePreset::Mt9v034 => Preset::Mt9v034,
         };
         let (width, height) = (size(camera.width())?, size(camera.height())?);
         let geometry = Geometry::preset(preset, width, height);
