@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conditions {
-    /// Geometry preset: `paper` or `ov7725`.
+    /// Geometry preset: `paper`, `ov7725` or `mt9v034`.
     pub preset: String,
     /// Columns of a frame.
     pub width: u16,
@@ -170,7 +170,9 @@ impl Conditions {
 /// # Errors
 /// When there is none.
 pub fn preset(name: &str) -> Result<Preset> {
-    Preset::from_name(name).with_context(|| format!("unknown preset `{name}`: use paper or ov7725"))
+    let names = Preset::ALL.map(Preset::name);
+    Preset::from_name(name)
+        .with_context(|| format!("unknown preset `{name}`: use {}", names.join(", ")))
 }
 
 /// The pixel format of that name.

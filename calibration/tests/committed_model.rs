@@ -27,6 +27,11 @@ fn committed_for_yuv422() -> Vec<u8> {
     fs::read(models().join("yuv422/default.hvtm")).unwrap()
 }
 
+/// That for an MT9V034 with its lens of 1.2 mm and black markers.
+fn committed_for_mt9v034() -> Vec<u8> {
+    fs::read(models().join("mt9v034/default.hvtm")).unwrap()
+}
+
 /// The tip within ±4 mm of the middle: each ring of a millimetre.
 #[test]
 fn it_measures_force_and_place_wherever_the_tip_presses() {
@@ -81,6 +86,7 @@ fn committed_weights_give_the_committed_models() {
     for (weights, committed) in [
         ("default.weights", committed()),
         ("yuv422/default.weights", committed_for_yuv422()),
+        ("mt9v034/default.weights", committed_for_mt9v034()),
     ] {
         let bytes = export(&Weights::load(&models().join(weights)).unwrap()).unwrap();
         assert!(
@@ -103,6 +109,26 @@ fn the_model_for_yuv422_is_made_for_the_same_unit_and_measures_its_frames() {
     // It sees half as many columns in colour.
     assert!(errors.mean_strong_direction_deg() < 0.3, "{report}");
     assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
+}
+
+/// All markers stay within the rows that are read out, wherever the tip presses.
+#[test]
+fn the_model_for_an_mt9v034_measures_its_frames() {
+    let bytes = committed_for_mt9v034();
+    let model = Model::parse(&bytes).unwrap();
+    let conditions = model.conditions;
+    assert_eq!(
+        conditions.geometry,
+        Geometry::preset(Preset::Mt9v034, 160, 152)
+    );
+    assert_eq!(conditions.threshold, Threshold::red(PixelFormat::Mono));
+    let usual = committed();
+    assert_eq!(model.range, Model::parse(&usual).unwrap().range);
+    let report = check(&bytes, 1000, 77, || ()).unwrap();
+    let errors = &report.errors;
+    assert!(errors.count() >= 990, "{report}");
+    assert!(errors.mean_strong_direction_deg() < 0.3, "{report}");
+    assert!(errors.magnitude_rmse_n() < 0.13e-3, "{report}");
 }
 
 #[test]

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_calibration::conditions::pixel_format;
+use hivtac_calibration::conditions::{pixel_format, preset};
 use hivtac_calibration::dataset::{Loads, Recipe};
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::train::Options;
+use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 
 use super::data::rendered;
@@ -20,9 +21,12 @@ const STEPS: u8 = 1;
 /// Options of `default-model`.
 #[derive(Args)]
 pub struct DefaultModelArgs {
-    /// Pixel format: rgb565, yuv422 or mono.
-    #[arg(long, value_parser = pixel_format, default_value = "rgb565")]
-    format: PixelFormat,
+    /// Lens and camera: ov7725 (320 × 240), or mt9v034 (160 × 152, mono, black markers).
+    #[arg(long, value_parser = preset, default_value = "ov7725")]
+    preset: Preset,
+    /// Pixel format: rgb565, yuv422 or mono; the preset's own unless told.
+    #[arg(long, value_parser = pixel_format)]
+    format: Option<PixelFormat>,
     /// Where default.weights and default.hvtm go.
     #[arg(long, default_value = "calibration/models")]
     out_dir: PathBuf,
@@ -30,9 +34,10 @@ pub struct DefaultModelArgs {
 
 impl DefaultModelArgs {
     pub fn run(&self) -> Result<()> {
+        let usual = Recipe::of(self.preset);
         let recipe = Recipe {
-            format: self.format,
-            ..Recipe::default()
+            format: self.format.unwrap_or(usual.format),
+            ..usual
         };
         let noise = Recipe {
             loads: Loads::Random(6_000),

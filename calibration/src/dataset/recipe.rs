@@ -74,6 +74,25 @@ fn random(count: &str) -> Result<Loads, String> {
     Ok(Loads::Random(count))
 }
 
+impl Recipe {
+    /// The frames that the default model of a preset learns from.
+    pub fn of(preset: Preset) -> Self {
+        let usual = Self {
+            preset,
+            ..Self::default()
+        };
+        match preset {
+            Preset::Paper | Preset::Ov7725 => usual,
+            Preset::Mt9v034 => Self {
+                width: 160,
+                height: 152,
+                format: PixelFormat::Mono,
+                ..usual
+            },
+        }
+    }
+}
+
 impl Default for Recipe {
     /// The frames that the default model's network learns from.
     fn default() -> Self {
@@ -174,6 +193,7 @@ impl Recipe {
         let preset = match self.preset {
             Preset::Paper => ScenePreset::Paper,
             Preset::Ov7725 => ScenePreset::Ov7725,
+            Preset::Mt9v034 => ScenePreset::Mt9v034,
         };
         let scene = Scene::preset(
             "rest",
@@ -184,6 +204,7 @@ impl Recipe {
         )?;
         let session = Session::numbered(session, self.seed);
         let mut options = session.options(self.width);
+        options.markers = preset.usual_markers();
         options.film.contact = self.contact;
         options.format = match self.format {
             PixelFormat::Rgb565 => Format::Rgb565,
