@@ -6,10 +6,13 @@ use std::path::Path;
 fn main() {
     println!("cargo:rerun-if-changed=../memory.x");
     println!("cargo:rerun-if-env-changed=HIVTAC_MODEL");
+    let second_board = std::env::var_os("CARGO_FEATURE_BOARD_OPENMV_H7").is_some();
+    let (usual_model, usual_rate) = match second_board {
+        false => ("calibration/models/default.hvtm", "156"),
+        true => ("calibration/models/mt9v034/default.hvtm", "244"),
+    };
     let model = std::env::var("HIVTAC_MODEL");
-    let named = model
-        .as_deref()
-        .unwrap_or("calibration/models/default.hvtm");
+    let named = model.as_deref().unwrap_or(usual_model);
     let root = Path::new(&std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("..");
     let file = root.join(named);
     let file = file.canonicalize().unwrap_or_else(|error| {
@@ -21,6 +24,6 @@ fn main() {
     println!("cargo:rerun-if-changed={}", file.display());
     println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());
     println!("cargo:rerun-if-env-changed=HIVTAC_FRAME_RATE");
-    let rate = std::env::var("HIVTAC_FRAME_RATE").unwrap_or_else(|_| "156".into());
+    let rate = std::env::var("HIVTAC_FRAME_RATE").unwrap_or_else(|_| usual_rate.into());
     println!("cargo:rustc-env=HIVTAC_FRAME_RATE={rate}");
 }

@@ -12,7 +12,7 @@
 //! them; it writes DTCM, which is never cached. A barrier keeps the core from reading ahead of the
 //! end of a copy.
 
-use crate::bands::{self, BAND_PIXELS, SHAPE};
+use crate::bands::{self, BAND_LENGTH, SHAPE};
 use embassy_stm32::pac::mdma::{Ch, regs, vals};
 use embassy_stm32::pac::{MDMA, RCC};
 use embassy_stm32::{Peri, peripherals};
@@ -28,13 +28,13 @@ const PATIENCE: u32 = 100_000;
 
 #[derive(Clone, Copy)]
 #[repr(C, align(128))]
-struct Rows([u16; BAND_PIXELS]);
+struct Rows([u16; BAND_LENGTH]);
 
 /// The one being scanned, the one before it, and the next.
 const COUNT: usize = 3;
 
 static BUFFERS: ConstStaticCell<[Rows; COUNT]> =
-    ConstStaticCell::new([Rows([0; BAND_PIXELS]); COUNT]);
+    ConstStaticCell::new([Rows([0; BAND_LENGTH]); COUNT]);
 
 /// The channel and its buffers.
 pub struct BandCopy {

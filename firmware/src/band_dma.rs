@@ -8,15 +8,15 @@
 //! # Note
 //! The ring lies in AXI SRAM: this DMA reaches neither DTCM nor ITCM.
 
-use crate::bands::{self, BAND_PIXELS};
+use crate::bands::{self, BAND_LENGTH};
 use crate::seeded_bugs;
 use embassy_stm32::pac::dma::{St, regs, vals};
 use embassy_stm32::pac::{DMA1, DMAMUX1};
 use embassy_stm32::{Peri, peripherals};
 
 const STREAM: usize = 0;
-/// Words of a band: DCMI packs two pixels into one.
-const WORDS: u16 = (BAND_PIXELS / 2) as u16 / seeded_bugs::BAND_DIVISOR;
+/// Words of a band: DCMI packs four bytes into one.
+const WORDS: u16 = (BAND_LENGTH / 2) as u16 / seeded_bugs::BAND_DIVISOR;
 
 /// The stream.
 pub struct BandDma {

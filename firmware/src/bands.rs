@@ -2,7 +2,7 @@
 //!
 //! The DMA writes it and the MDMA reads it; the core touches it once, at boot.
 
-use crate::camera::{HEIGHT, WIDTH};
+use crate::camera::{HEIGHT, USUAL_FORMAT, WIDTH};
 use core::mem::MaybeUninit;
 use hivtac_capture::Shape;
 
@@ -13,13 +13,14 @@ pub const ROWS: u16 = 8;
 pub const SLOTS: u16 = 32;
 /// How frames, bands and slots relate.
 pub const SHAPE: Shape = Shape::new(HEIGHT / ROWS, SLOTS);
-/// Pixels of a band: the size of a slot.
-pub const BAND_PIXELS: usize = WIDTH as usize * ROWS as usize;
+/// `u16`s of a band, whatever pixels they hold: the size of a slot. All of a camera's formats have
+/// rows of the same length.
+pub const BAND_LENGTH: usize = USUAL_FORMAT.pixels().row_length(WIDTH) * ROWS as usize;
 
 const _: () = {
     assert!(HEIGHT.is_multiple_of(ROWS));
     // What the DMA moves at once (`band_copy`).
-    assert!((BAND_PIXELS * size_of::<u16>()).is_multiple_of(128));
+    assert!((BAND_LENGTH * size_of::<u16>()).is_multiple_of(128));
     // The widest rows that the pipeline takes fit, too.
     assert!(ring_bytes(800) <= 512 * 1024);
 };
@@ -30,7 +31,7 @@ const fn ring_bytes(width: usize) -> usize {
 }
 
 #[repr(C, align(128))]
-struct Ring(MaybeUninit<[[u16; BAND_PIXELS]; SLOTS as usize]>);
+struct Ring(MaybeUninit<[[u16; BAND_LENGTH]; SLOTS as usize]>);
 
 #[unsafe(link_section = ".axisram.bands")]
 static mut RING: Ring = Ring(MaybeUninit::uninit());
@@ -38,7 +39,7 @@ static mut RING: Ring = Ring(MaybeUninit::uninit());
 /// Address of a slot.
 pub fn address(slot: u16) -> u32 {
     let base = &raw const RING as u32;
-    base + u32::from(slot % SLOTS) * (BAND_PIXELS * size_of::<u16>()) as u32
+    base + u32::from(slot % SLOTS) * (BAND_LENGTH * size_of::<u16>()) as u32
 }
 
 /// Writes every word once, which gives the memory's error correction codes a defined start. Call

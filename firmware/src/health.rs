@@ -7,9 +7,9 @@
 //! | blinks five times a second | no camera |
 //! | two flashes a second | silicon too old: `board/silicon.rs` |
 
+use crate::board::StatusLed;
 use crate::shared::CONDITION;
 use core::sync::atomic::Ordering;
-use embassy_stm32::gpio::Output;
 use embassy_time::{Duration, Instant, Timer};
 use micromath::F32Ext;
 
@@ -38,15 +38,15 @@ pub fn set(condition: Condition) {
 
 /// Drives the LED for ever.
 #[embassy_executor::task]
-pub async fn run(mut led: Output<'static>) {
+pub async fn run(mut led: StatusLed) {
     loop {
         let lit = lit_time(Instant::now());
         if lit > Duration::MIN {
-            led.set_high();
+            led.set(true);
             Timer::after(lit).await;
         }
         if lit < PERIOD {
-            led.set_low();
+            led.set(false);
             Timer::after(PERIOD - lit).await;
         }
     }

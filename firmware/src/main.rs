@@ -39,16 +39,14 @@ mod tare;
 mod usb;
 mod vsync;
 
-use board::Board;
 use camera::Format;
 use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
 use hivtac_sensing::model::Model;
-use hivtac_sensing::motion::Motion;
 use hivtac_sensing::settings::Settings;
-use hivtac_terms::threshold::ByteOrder;
+use hivtac_terms::threshold::{ByteOrder, Threshold};
 use pipeline_task::Sensor;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -68,7 +66,7 @@ fn main() -> ! {
     caches::enable(&mut core);
     bands::clear();
     priorities::set();
-    let board = Board::start();
+    let board = board::start();
     faults::report_reset();
     vsync::start();
     let model = model::embedded();
@@ -93,8 +91,8 @@ fn main() -> ! {
 }
 
 /// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to
-/// red markers in RGB565, and says what pixels it asks for. A model for pixels that the camera does
-/// not send gives no force then, and every sample says so.
+/// the usual one of its pixels, and says what pixels it asks for. A model for pixels that the
+/// camera does not send gives no force then, and every sample says so.
 fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;
@@ -104,15 +102,18 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
             geometry,
             ..model.conditions.settings(order)
         },
-        _ => Settings::usual(geometry, order),
+        _ => Settings {
+            threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
+            ..Settings::usual(geometry, order)
+        },
     };
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
     }
-    sensor.set_motion(Motion::rolling(camera::LINES));
+    sensor.set_motion(camera::MOTION);
     info::set_settings(sensor.settings());
     // Always one that the camera sends.
-    Format::of(sensor.threshold().format()).unwrap_or(Format::Rgb565)
+    Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

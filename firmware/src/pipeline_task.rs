@@ -241,7 +241,8 @@ impl PipelineTask {
         Sample {
             sequence: self.sequence,
             frame: delivery.edge.number,
-            time_us: delivery.edge.time_us + u64::from(camera::exposure_middle_us()),
+            time_us: (delivery.edge.time_us)
+                .saturating_add_signed(camera::exposure_middle_us().into()),
             status,
             force: measurement.force,
             markers: measurement.markers.filter(|_| session::wants_markers()),

@@ -16,8 +16,9 @@ pub const DCMI_DMA_REQUEST: u8 = if cfg!(feature = "bug-dmamux-request") {
 /// for data.
 pub const INVERTED_POLARITIES: bool = cfg!(feature = "bug-polarity");
 
-/// True when the camera's format register is left at YUV.
-pub const YUV_FORMAT: bool = cfg!(feature = "bug-camera-register");
+/// True when the camera's register for its format is wrong: an OV7725 left at YUV, an MT9V034 that
+/// does not bin.
+pub const CAMERA_REGISTER: bool = cfg!(feature = "bug-camera-register");
 
 /// The part of a band that the DMA is told to transfer: one in this many.
 pub const BAND_DIVISOR: u16 = if cfg!(feature = "bug-half-buffer") {

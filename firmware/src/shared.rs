@@ -18,14 +18,14 @@
 //! Not shared: memory with one owner, which takes it once (`main::SENSOR`, `near_table::TABLE`),
 //! and constants (`model`).
 
-use crate::camera::Format;
+use crate::camera::{Format, USUAL_FORMAT};
 use crate::capture::{CaptureEvent, Running};
 use crate::health::Condition;
 use crate::pipeline_task::Order;
 use crate::session::Asked;
 use crate::stats;
 use core::cell::{Cell, RefCell};
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32};
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
@@ -58,7 +58,7 @@ pub static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
 /// Pixels of the frames that are captured. Written by the capture task while the capture is
 /// stopped; read by the capture handlers and the capture task (`capture`).
 pub static CAPTURED_FORMAT: CriticalSectionMutex<Cell<Format>> =
-    CriticalSectionMutex::new(Cell::new(Format::Rgb565));
+    CriticalSectionMutex::new(Cell::new(USUAL_FORMAT));
 
 /// Bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by the
 /// pipeline.
@@ -84,9 +84,9 @@ pub static REQUESTED_EXPOSURE: Request<Asked> = Request::new();
 /// Such a request is under way. Set by the USB tasks, cleared by the capture task (`capture_task`).
 pub static EXPOSING: AtomicBool = AtomicBool::new(false);
 
-/// From VSYNC back to the middle of the exposure, µs. Written by the capture task; read by the
-/// pipeline (`camera`).
-pub static EXPOSURE_MIDDLE_US: AtomicU32 = AtomicU32::new(0);
+/// From VSYNC to the middle of the exposure, µs. Written by the capture task; read by the pipeline
+/// (`camera`).
+pub static EXPOSURE_MIDDLE_US: AtomicI32 = AtomicI32::new(0);
 
 /// Number of the newest frame before the camera's set-up, while that lasts. Written by the capture
 /// task; read by the USB tasks (`stats`).

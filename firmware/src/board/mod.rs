@@ -1,7 +1,21 @@
-//! The board in use: all of its pins and clocks. A second board is one more file with the same
-//! names.
+//! The board in use: all of its pins and clocks. A cargo feature says which; each is one file with
+//! the same names.
 
 mod free_bus;
+mod parts;
 mod silicon;
+pub use parts::{BUS_CLOCK, CameraLines, StatusLed, UsbPort, free_camera_bus};
+
+#[cfg(feature = "board-openmv-h7")]
+mod openmv_h7;
+#[cfg(feature = "board-openmv-h7")]
+pub use openmv_h7::*;
+#[cfg(feature = "board-weact")]
 mod weact;
+#[cfg(feature = "board-weact")]
 pub use weact::*;
+
+#[cfg(not(any(feature = "board-weact", feature = "board-openmv-h7")))]
+compile_error!("no board: build with --features board-weact or board-openmv-h7");
+#[cfg(all(feature = "board-weact", feature = "board-openmv-h7"))]
+compile_error!("two boards: build board-openmv-h7 with --no-default-features");

@@ -1,5 +1,6 @@
 //! Which revision of the silicon this is, and the end of the program on one that is too old.
 
+use embassy_stm32::gpio::Level;
 use embassy_stm32::pac::gpio::{Gpio, vals::Moder};
 use embassy_stm32::pac::{DBGMCU, RCC};
 
@@ -9,12 +10,24 @@ const FIRST_REVISION: u16 = 0x2001;
 /// Tenth of a second, core cycles at the 64 MHz after a reset.
 const TENTH: u32 = 6_400_000;
 
-/// The LED's pin, high = on.
+/// The LED's pin.
 pub struct Led {
     /// Its port.
     pub port: Gpio,
     /// Its number.
     pub pin: usize,
+    /// The level at which it is on.
+    pub on: Level,
+}
+
+impl Led {
+    fn set(&self, on: bool) {
+        let high = (self.on == Level::High) == on;
+        self.port.bsrr().write(|w| match high {
+            true => w.set_bs(self.pin, true),
+            false => w.set_br(self.pin, true),
+        });
+    }
 }
 
 /// Returns on silicon that runs this program. Before it the core has no more than 400 MHz, setting
@@ -35,17 +48,21 @@ pub fn refuse_old(led: &Led) {
 
 /// Two flashes a second.
 fn flash_for_ever(led: &Led) -> ! {
-    RCC.ahb4enr().modify(|w| w.set_gpioeen(true));
+    RCC.ahb4enr().modify(|w| {
+        w.set_gpiocen(true);
+        w.set_gpioeen(true);
+    });
     // The clock runs after this.
     let _ = RCC.ahb4enr().read();
+    led.set(false);
     led.port
         .moder()
         .modify(|w| w.set_moder(led.pin, Moder::OUTPUT));
     loop {
         for _ in 0..2 {
-            led.port.bsrr().write(|w| w.set_bs(led.pin, true));
+            led.set(true);
             cortex_m::asm::delay(TENTH);
-            led.port.bsrr().write(|w| w.set_br(led.pin, true));
+            led.set(false);
             cortex_m::asm::delay(TENTH);
         }
         cortex_m::asm::delay(6 * TENTH);

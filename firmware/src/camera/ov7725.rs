@@ -1,23 +1,25 @@
 //! OmniVision OV7725: 320 × 240, RGB565 or YUV422, over SCCB (I²C with a stop between address and
 //! read).
 
-use super::Sccb;
-use super::ov7725_registers::{
-    AUTOMATIC, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, PID, TABLE, VER,
-};
-use crate::board::XCLK_HZ;
+use super::identity::{self, Identity};
+use super::ov7725_registers::{AUTOMATIC, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, TABLE};
+use super::{Bus, Error};
+use crate::board::{CameraLines, XCLK_HZ};
 use crate::shared::EXPOSURE_MIDDLE_US;
-use core::fmt;
 use core::sync::atomic::Ordering;
-use embassy_stm32::gpio::Output;
 use embassy_stm32::i2c;
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_terms::geometry::Preset;
+use hivtac_sensing::motion::Motion;
 
+/// What it says it is.
+pub const IDENTITY: Identity = identity::OV7725;
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";
 /// Its lens and pixels.
 pub const PRESET: Preset = Preset::Ov7725;
+/// What it sends unless it is told otherwise.
+pub const USUAL_FORMAT: Format = Format::Rgb565;
 /// Columns of a frame, px.
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
@@ -29,7 +31,9 @@ pub const FRAMES_PER_SECOND: u32 = match u32::from_str_radix(env!("HIVTAC_FRAME_
     Err(_) => panic!("HIVTAC_FRAME_RATE must be 156, 78 or 39"),
 };
 /// Lines from frame to frame, blank ones included.
-pub const LINES: u16 = 278;
+const LINES: u16 = 278;
+/// When its rows are exposed: one after the other.
+pub const MOTION: Motion = Motion::rolling(LINES);
 /// Clocks from frame to frame: lines of 576 pixels of two bytes, one byte per PCLK.
 const FRAME_CLOCKS: u64 = LINES as u64 * 576 * 2;
 /// From the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the rows.
@@ -61,76 +65,25 @@ const PATIENCE: Duration = Duration::from_millis(300);
 /// Between two register writes: lets tasks of lower priority run.
 const PAUSE: Duration = Duration::from_micros(100);
 
-/// From the VSYNC edge that begins a frame to the middle of its middle row's exposure, µs.
-pub fn exposure_middle_us() -> u32 {
-    EXPOSURE_MIDDLE_US.load(Ordering::Relaxed)
-}
-
-/// Why a camera cannot be used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Error {
-    /// It does not acknowledge, or the bus does not work.
-    Bus(i2c::Error),
-    /// Another part answers.
-    WrongId {
-        /// Register `PID` and `VER` as read.
-        found: [u8; 2],
-    },
-    /// A register does not hold what was written.
-    Register {
-        /// Its address.
-        address: u8,
-        /// What it holds.
-        found: u8,
-    },
-}
-
-impl From<i2c::Error> for Error {
-    fn from(error: i2c::Error) -> Self {
-        Error::Bus(error)
-    }
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Error::Bus(error) => write!(f, "no OV7725 on I2C1 ({error}); check its cable"),
-            Error::WrongId { found: [p, v] } => {
-                write!(
-                    f,
-                    "ID {p:02X} {v:02X}, an OV7725 has 77 21; fit that camera"
-                )
-            }
-            Error::Register { address, found } => {
-                write!(f, "register {address:02X} reads {found:02X} after a write")
-            }
-        }
-    }
-}
-
 /// The camera's control side.
 pub struct Camera {
-    sccb: Sccb,
-    standby: Output<'static>,
+    bus: Bus,
+    lines: CameraLines,
 }
 
 impl Camera {
-    /// `sccb` at 100 kHz or up to 400 kHz; `standby` high stops the camera, whose registers stay.
-    /// XCLK must already run.
-    pub fn new(sccb: Sccb, standby: Output<'static>) -> Self {
-        Self { sccb, standby }
+    /// The bus at 100 kHz or up to 400 kHz. XCLK must already run.
+    pub fn new(bus: Bus, lines: CameraLines) -> Self {
+        Self { bus, lines }
     }
 
     /// Has the camera run, checks that it is the right one, and resets its registers: nothing else
     /// does.
     pub async fn reset(&mut self) -> Result<(), Error> {
-        self.standby.set_low();
+        self.lines.wake().await;
         Timer::after(SETTLE).await;
-        let found = [self.sccb.read(PID.0)?, self.sccb.read(VER.0)?];
-        if found != [PID.1, VER.1] {
-            return Err(Error::WrongId { found });
-        }
-        Ok(self.sccb.write(COM7, COM7_RESET)?)
+        identity::check(&mut self.bus)?;
+        Ok(self.write(COM7, COM7_RESET)?)
     }
 
     /// Writes the register table after a reset; returns when the camera sends well exposed frames
@@ -155,7 +108,7 @@ impl Camera {
     /// Lets exposure and gain find what the light needs, and keeps that: markers do not change
     /// their brightness with what presses the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
-        self.sccb.write(COM8, AUTOMATIC)?;
+        self.write(COM8, AUTOMATIC)?;
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
@@ -164,31 +117,35 @@ impl Camera {
             steady = if now == found { steady + 1 } else { 1 };
             found = now;
         }
-        self.sccb.write(COM8, LOCKED)?;
+        self.write(COM8, LOCKED)?;
         for (register, value) in EXPOSURE.into_iter().zip(found) {
-            self.sccb.write(register, value)?;
+            self.write(register, value)?;
         }
         let [_, low, high] = found;
         let lines = u32::from(u16::from_le_bytes([low, high])).min(u32::from(LINES));
         let half_lines = 2 * LINES_TO_MIDDLE_ROW - lines;
         let middle_us = half_lines * FRAME_TIME.as_micros() as u32 / (2 * u32::from(LINES));
-        EXPOSURE_MIDDLE_US.store(middle_us, Ordering::Relaxed);
+        EXPOSURE_MIDDLE_US.store(middle_us as i32, Ordering::Relaxed);
         Ok(())
     }
 
     /// What [`EXPOSURE`]'s registers hold.
     fn exposure(&mut self) -> Result<[u8; 3], Error> {
         let [gain, low, high] = EXPOSURE;
-        Ok([
-            self.sccb.read(gain)?,
-            self.sccb.read(low)?,
-            self.sccb.read(high)?,
-        ])
+        Ok([self.read(gain)?, self.read(low)?, self.read(high)?])
+    }
+
+    fn write(&mut self, register: u8, value: u8) -> Result<(), i2c::Error> {
+        self.bus.write(IDENTITY.address, &[register, value])
+    }
+
+    fn read(&mut self, register: u8) -> Result<u8, i2c::Error> {
+        self.bus.read_byte(IDENTITY.address, register)
     }
 
     async fn write_all(&mut self, table: &[(u8, u8)]) -> Result<(), Error> {
         for (register, value) in table {
-            self.sccb.write(*register, *value)?;
+            self.write(*register, *value)?;
             Timer::after(PAUSE).await;
         }
         Ok(())
@@ -197,8 +154,9 @@ impl Camera {
     /// Reads a table back.
     async fn check(&mut self, table: &[(u8, u8)]) -> Result<(), Error> {
         for (address, value) in table {
-            let (address, found) = (*address, self.sccb.read(*address)?);
+            let (address, found) = (*address, self.read(*address)?);
             if found != *value {
+                let found = found.into();
                 return Err(Error::Register { address, found });
             }
             Timer::after(PAUSE).await;

@@ -7,11 +7,6 @@ use super::FRAMES_PER_SECOND;
 use crate::seeded_bugs;
 use hivtac_terms::threshold::PixelFormat;
 
-/// Product number, high and low byte.
-pub const PID: (u8, u8) = (0x0A, 0x77);
-/// Version.
-pub const VER: (u8, u8) = (0x0B, 0x21);
-
 /// Output format, size and register reset.
 pub const COM7: u8 = 0x12;
 /// [`COM7`]: every register back to its power-up value.
@@ -58,7 +53,7 @@ impl Format {
     /// Register, value: what makes the camera send it. Everything else is the same for all formats.
     pub const fn registers(self) -> &'static [(u8, u8)] {
         match self {
-            _ if seeded_bugs::YUV_FORMAT => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
+            _ if seeded_bugs::CAMERA_REGISTER => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
             // High byte of each pixel first. The pipeline unswaps the bytes in its threshold table.
             Format::Rgb565 => &[(COM7, COM7_QVGA_RGB565), (COM3, 0)],
             // Cb before Cr, as DSP_CTRL3 (0x66) is set.

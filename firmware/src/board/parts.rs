@@ -1,0 +1,164 @@
+//! What boards have in common: an STM32H743 with a camera on DCMI and I²C1, a crystal, USB and an
+//! LED.
+
+use super::free_bus::{self, Lines};
+use crate::band_copy::BandCopy;
+use crate::camera::Camera;
+use crate::capture::Capture;
+use crate::seeded_bugs;
+use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull};
+use embassy_stm32::i2c;
+use embassy_stm32::rcc::*;
+use embassy_stm32::time::Hertz;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{Peri, pac, peripherals};
+use embassy_time::{Duration, Timer};
+
+/// Of the camera's control bus. The pins' own pull-ups help those on the board.
+pub const BUS_CLOCK: Hertz = Hertz::khz(100);
+/// The watchdog resets a program whose thread mode stood still for so long.
+pub const WATCHDOG: Duration = Duration::from_secs(2);
+
+/// DCMI's alternate function on each of its pins.
+const DCMI_FUNCTION: u8 = 13;
+/// How long the camera's reset line is held: thousands of its clocks.
+const RESET_PULSE: Duration = Duration::from_millis(1);
+
+/// The board's parts, set up and idle.
+pub struct Board {
+    /// The camera's control side; its clock runs.
+    pub camera: Camera,
+    /// The camera's data side.
+    pub capture: Capture,
+    /// Where the pipeline gets its rows from.
+    pub bands: BandCopy,
+    /// What the USB task needs to make its driver.
+    pub usb: UsbPort,
+    /// The status LED, off.
+    pub led: StatusLed,
+    /// Not yet started.
+    pub watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
+}
+
+/// USB full speed on the OTG_FS core.
+pub struct UsbPort {
+    /// The core.
+    pub core: Peri<'static, peripherals::USB_OTG_FS>,
+    /// D+.
+    pub plus: Peri<'static, peripherals::PA12>,
+    /// D−.
+    pub minus: Peri<'static, peripherals::PA11>,
+}
+
+/// The status LED.
+pub struct StatusLed {
+    /// Its pin.
+    pub pin: Output<'static>,
+    /// The level at which it is on.
+    pub on: Level,
+}
+
+impl StatusLed {
+    /// Turns it on or off.
+    pub fn set(&mut self, on: bool) {
+        let high = (self.on == Level::High) == on;
+        self.pin.set_level(high.into());
+    }
+}
+
+/// The camera's lines besides its buses.
+pub struct CameraLines {
+    /// High = standby: the registers keep their values.
+    pub standby: Output<'static>,
+    /// Low = reset, where the microcontroller has that line.
+    pub reset: Option<Output<'static>>,
+}
+
+impl CameraLines {
+    /// Has the camera run, out of a reset where there is the line for one.
+    pub async fn wake(&mut self) {
+        self.standby.set_low();
+        if let Some(reset) = &mut self.reset {
+            reset.set_low();
+            Timer::after(RESET_PULSE).await;
+            reset.set_high();
+        }
+    }
+}
+
+/// A crystal of so many Hz, divided to what PLL1 multiplies by `mul`: 960 MHz, of which half is for
+/// the core, 240 MHz for the buses, 120 MHz for the peripherals.
+pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32::Config {
+    let mut config = embassy_stm32::Config::default();
+    config.rcc.hse = Some(Hse {
+        freq: Hertz(crystal_hz),
+        mode: HseMode::Oscillator,
+    });
+    config.rcc.pll1 = Some(Pll {
+        source: PllSource::HSE,
+        prediv,
+        mul,
+        fracn: None,
+        divp: Some(PllDiv::DIV2),
+        divq: (!seeded_bugs::USB_FROM_HSI48).then_some(PllDiv::DIV20),
+        divr: None,
+    });
+    // 480 MHz needs the highest core voltage.
+    config.rcc.voltage_scale = VoltageScale::Scale0;
+    config.rcc.sys = Sysclk::PLL1_P;
+    config.rcc.d1c_pre = AHBPrescaler::DIV1;
+    config.rcc.ahb_pre = AHBPrescaler::DIV2;
+    config.rcc.apb1_pre = APBPrescaler::DIV2;
+    config.rcc.apb2_pre = APBPrescaler::DIV2;
+    config.rcc.apb3_pre = APBPrescaler::DIV2;
+    config.rcc.apb4_pre = APBPrescaler::DIV2;
+    clock_usb(&mut config.rcc);
+    config
+}
+
+/// USB runs from the crystal, too: 960 MHz / 20 = 48 MHz. The internal 48 MHz oscillator is off by
+/// more than the 0.25 % that full speed allows until it is trimmed to the host's packets, and the
+/// HAL has it trimmed to those of the other USB core, OTG_HS: its source is write-protected from
+/// then on (RM0433, CRS_CFGR).
+fn clock_usb(rcc: &mut Config) {
+    rcc.mux.usbsel = mux::Usbsel::PLL1_Q;
+    if seeded_bugs::USB_FROM_HSI48 {
+        rcc.hsi48 = Some(Hsi48Config {
+            sync_from_usb: true,
+        });
+        rcc.mux.usbsel = mux::Usbsel::HSI48;
+    }
+}
+
+/// Gives the pins to DCMI for good.
+pub fn connect_camera(pins: [Peri<'static, AnyPin>; 11]) {
+    for pin in pins {
+        let mut pin = Flex::new(pin);
+        // Pulled down: with no camera fitted, an open VSYNC pin must not make interrupts.
+        pin.set_as_af_unchecked(DCMI_FUNCTION, AfType::input(Pull::Down));
+        // Dropping it would disconnect the pin.
+        core::mem::forget(pin);
+    }
+}
+
+/// Has a camera that holds the control bus let go of it, and brings I²C1 to its state after a
+/// reset.
+pub fn free_camera_bus() {
+    let lines = Lines {
+        port: pac::GPIOB,
+        clock: 8,
+        data: 9,
+    };
+    lines.free();
+    free_bus::reset_i2c1();
+}
+
+pub fn bus_config() -> i2c::Config {
+    let mut config = i2c::Config::default();
+    config.frequency = BUS_CLOCK;
+    config.sda_pullup = true;
+    config.scl_pullup = true;
+    // A byte takes 90 µs. A bus that hangs must not hold up the tasks below for long.
+    config.timeout = Duration::from_millis(5);
+    config
+}
