@@ -1,24 +1,29 @@
 //! The board's wiring: which pins carry the camera's power, clock and signals, and what USB needs.
 //!
-//! WeAct MiniSTM32H743 with an OV7725: XCLK from MCO1 on PA8, camera power on PA7 (low is on), SCCB
-//! on PB8 and PB9, D0–D7 on PC6 PC7 PE0 PE1 PE4 PD3 PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB
-//! on PA11 and PA12, 25 MHz crystal.
+//! On both boards: the camera's control bus on PB8 and PB9, D0–D4 on PC6 PC7 PE0 PE1 PE4, D6 and D7
+//! on PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB on PA11 and PA12.
+//!
+//! | | WeAct MiniSTM32H743 | OpenMV Cam H7 |
+//! |---|---|---|
+//! | XCLK | MCO1 on PA8 | TIM1's channel 1 on PA8 |
+//! | camera's power-down (low is on) | PA7 | PD7 |
+//! | camera's reset (low) | – | PA10 |
+//! | D5 | PD3 | PB6 |
+//! | LED | PE3, high is on | PC1, low is on |
+//! | crystal | 25 MHz | 12 MHz |
 
 use rigless::device::{Level, RegisterFile};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
 use rigless::soc::stm32h743::generated::gpioa::Register as Port;
-use rigless::soc::stm32h743::generated::{pwr, rcc};
+use rigless::soc::stm32h743::generated::{pwr, rcc, tim1};
 use rigless::soc::stm32h743::peripherals::gpio::{Gpio, PORTS, Pin};
-use rigless::soc::stm32h743::peripherals::rcc::{HSI_HZ, HSI48_HZ, Pll, Tap};
+use rigless::soc::stm32h743::peripherals::rcc::{HSI_HZ, HSI48_HZ, Pll, Tap, TimerBus};
 use rigless::soc::{Bus, Error};
 
-use crate::camera::Supply;
+use crate::camera::{Supply, part};
 use crate::crs;
 use crate::dcmi::Pins;
-
-/// The crystal on OSC_IN, Hz.
-pub const CRYSTAL_HZ: u64 = 25_000_000;
 
 /// Port numbers as the part counts them.
 const A: usize = 0;
@@ -31,21 +36,91 @@ pub const VSYNC_PORT: usize = B;
 
 /// Alternate functions.
 const AF_MCO: u8 = 0;
+const AF_TIM1: u8 = 1;
 const AF_I2C1: u8 = 4;
 const AF_USB: u8 = 10;
 const AF_DCMI: u8 = 13;
 
-/// D0 to D7.
-const DATA: [(usize, u8); 8] = [
-    (C, 6),
-    (C, 7),
-    (E, 0),
-    (E, 1),
-    (E, 4),
-    (D, 3),
-    (E, 5),
-    (E, 6),
-];
+/// A port and the number of a pin.
+type At = (usize, u8);
+
+/// The boards that there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Kind {
+    /// WeAct MiniSTM32H743 with its camera connector.
+    #[default]
+    Weact,
+    /// OpenMV Cam H7.
+    OpenmvH7,
+}
+
+impl Kind {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Weact => "weact-h743",
+            Kind::OpenmvH7 => "openmv-h7",
+        }
+    }
+
+    /// The camera that it usually has.
+    pub fn usual_camera(self) -> part::Kind {
+        match self {
+            Kind::Weact => part::Kind::Ov7725,
+            Kind::OpenmvH7 => part::Kind::Mt9v034,
+        }
+    }
+
+    /// The crystal on OSC_IN, Hz.
+    pub fn crystal_hz(self) -> u64 {
+        match self {
+            Kind::Weact => 25_000_000,
+            Kind::OpenmvH7 => 12_000_000,
+        }
+    }
+
+    /// D0 to D7.
+    fn data(self) -> [At; 8] {
+        let fifth = match self {
+            Kind::Weact => (D, 3),
+            Kind::OpenmvH7 => (B, 6),
+        };
+        [
+            (C, 6),
+            (C, 7),
+            (E, 0),
+            (E, 1),
+            (E, 4),
+            fifth,
+            (E, 5),
+            (E, 6),
+        ]
+    }
+
+    /// The camera's power-down, low is on.
+    fn power_down(self) -> At {
+        match self {
+            Kind::Weact => (A, 7),
+            Kind::OpenmvH7 => (D, 7),
+        }
+    }
+
+    /// The camera's reset, active low, where the microcontroller has it.
+    fn camera_reset(self) -> Option<At> {
+        match self {
+            Kind::Weact => None,
+            Kind::OpenmvH7 => Some((A, 10)),
+        }
+    }
+
+    /// The LED, and its level while it is on.
+    fn led(self) -> (At, Level) {
+        match self {
+            Kind::Weact => ((E, 3), Level::High),
+            Kind::OpenmvH7 => ((C, 1), Level::Low),
+        }
+    }
+}
 
 /// The pin of VSYNC, PB7.
 pub fn vsync_pin() -> Pin {
@@ -72,8 +147,11 @@ pub struct Wiring {
 /// Where the part keeps the registers that decide the wiring.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots {
+    board: Kind,
     ports: [usize; 5],
     rcc: usize,
+    /// Of the timer that may be the camera's clock.
+    pub tim1: usize,
     pwr: usize,
     crs: usize,
     /// Of the identity.
@@ -85,14 +163,16 @@ impl Slots {
     ///
     /// # Errors
     /// When the part is not laid out as expected.
-    pub fn of(bus: &Bus) -> Result<Self, Error> {
+    pub fn of(bus: &Bus, board: Kind) -> Result<Self, Error> {
         let mut ports = [0; 5];
         for (slot, name) in ports.iter_mut().zip(PORTS) {
             *slot = bus.slot(name)?;
         }
         Ok(Self {
+            board,
             ports,
             rcc: bus.slot("RCC")?,
+            tim1: bus.slot("TIM1")?,
             pwr: bus.slot("PWR")?,
             crs: bus.slot("CRS")?,
             dbgmcu: bus.slot("DBGMCU")?,
@@ -112,19 +192,22 @@ impl Slots {
         let bit = |(i, &(port, number)): (usize, &(usize, u8))| {
             u8::from(carries(port, number, AF_DCMI)) << i
         };
-        let clock_hz = if carries(A, 8, AF_MCO) {
-            self.mco1_hz(part)
-        } else {
-            0
+        let clock_hz = match self.board {
+            Kind::Weact if carries(A, 8, AF_MCO) => self.mco1_hz(part),
+            Kind::OpenmvH7 if carries(A, 8, AF_TIM1) => self.tim1_hz(part),
+            _ => 0,
         };
+        let (led, on) = self.board.led();
         Wiring {
             supply: Supply {
-                powered: self.camera_powered(part),
+                powered: self.driven(part, self.board.power_down()) == Some(Level::Low),
                 clock_hz,
                 sccb: carries(B, 8, AF_I2C1) && carries(B, 9, AF_I2C1),
+                reset: (self.board.camera_reset())
+                    .is_some_and(|pin| self.driven(part, pin) != Some(Level::High)),
             },
             pins: Pins {
-                data: DATA.iter().enumerate().map(bit).sum(),
+                data: self.board.data().iter().enumerate().map(bit).sum(),
                 clock: carries(A, 6, AF_DCMI),
                 hsync: carries(A, 4, AF_DCMI),
                 vsync: carries(B, 7, AF_DCMI),
@@ -132,28 +215,21 @@ impl Slots {
             hclk_hz: part.rcc.hclk(registers(part, self.rcc)),
             usb: carries(A, 11, AF_USB) && carries(A, 12, AF_USB) && self.usb_supplied(part),
             usb_hz: self.usb_hz(part),
-            led: self.led(part),
+            led: self.driven(part, led) == Some(on),
         }
     }
 
-    /// PE3, driven high.
-    fn led(&self, part: &Stm32h743) -> bool {
+    /// The level that a pin is driven to, if it is. What the board pulls the camera's lines to
+    /// counts for nothing: firmware has to drive them.
+    fn driven(&self, part: &Stm32h743, (port, number): At) -> Option<Level> {
         const OUTPUT: u64 = 1;
-        let port = self.port(part, E);
-        port.get(Port::Moder) >> 6 & 3 == OUTPUT && part.gpio[E].level(pin(3), port) == Level::High
+        let registers = self.port(part, port);
+        let driven = registers.get(Port::Moder) >> (2 * number) & 3 == OUTPUT;
+        driven.then(|| part.gpio[port].level(pin(number), registers))
     }
 
     fn port<'a>(&self, part: &'a Stm32h743, port: usize) -> &'a RegisterFile {
         registers(part, self.ports[port])
-    }
-
-    /// PA7 high is power-down; the rig has the camera run only while PA7 is driven low, though the
-    /// board pulls it down.
-    fn camera_powered(&self, part: &Stm32h743) -> bool {
-        const OUTPUT: u64 = 1;
-        let port = self.port(part, A);
-        let driven = port.get(Port::Moder) >> 14 & 3 == OUTPUT;
-        driven && part.gpio[A].level(pin(7), port) == Level::Low
     }
 
     /// PWR_CR3: USB33DEN, which the firmware sets once the 3.3 V are there.
@@ -184,12 +260,29 @@ impl Slots {
         let running = |ready_bit: u32, hz: u64| if cr >> ready_bit & 1 == 1 { hz } else { 0 };
         let source = match cfgr >> 22 & 7 {
             0 => running(2, HSI_HZ >> (cr >> 3 & 3)),
-            2 => running(17, CRYSTAL_HZ),
+            2 => running(17, self.board.crystal_hz()),
             3 => running(25, part.rcc.pll_output(registers, Pll::One, Tap::Q)),
             4 => running(13, HSI48_HZ),
             _ => 0,
         };
         source.checked_div(cfgr >> 18 & 15).unwrap_or(0)
+    }
+
+    /// TIM1's channel 1 as a clock (RM0433, chapter 38): PWM mode 1 or 2, its output and the main
+    /// one enabled, and high for a part of the period.
+    fn tim1_hz(&self, part: &Stm32h743) -> u64 {
+        use tim1::Register as Timer;
+        let timer = registers(part, self.tim1);
+        let bit = |register, bit: u32| timer.get(register) >> bit & 1 == 1;
+        let mode = timer.get(Timer::Ccmr1Output) >> 4 & 7;
+        let (period, high) = (timer.get(Timer::Arr) + 1, timer.get(Timer::Ccr1));
+        let enabled = bit(Timer::Cr1, 0) && bit(Timer::Ccer, 0) && bit(Timer::Bdtr, 15);
+        let counts_up = timer.get(Timer::Cr1) >> 5 & 3 == 0;
+        if !enabled || !counts_up || !matches!(mode, 6 | 7) || !(1..period).contains(&high) {
+            return 0;
+        }
+        let kernel = (part.rcc).timer_clock(registers(part, self.rcc), TimerBus::Apb2);
+        kernel / (timer.get(Timer::Psc) + 1) / period
     }
 }
 
@@ -212,7 +305,7 @@ mod tests {
     const PORT_A: u64 = 0x5802_0000;
 
     fn wiring(part: &Stm32h743) -> Wiring {
-        Slots::of(part.bus()).unwrap().wiring(part)
+        Slots::of(part.bus(), Kind::Weact).unwrap().wiring(part)
     }
 
     fn write(part: &mut Stm32h743, address: u64, value: u64) {
@@ -222,7 +315,7 @@ mod tests {
 
     fn part() -> Stm32h743 {
         let mut part = Stm32h743::new().unwrap();
-        part.rcc.attach_crystals(CRYSTAL_HZ, 0);
+        part.rcc.attach_crystals(Kind::Weact.crystal_hz(), 0);
         part
     }
 

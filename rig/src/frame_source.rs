@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::camera::part::Kind;
 use crate::truth::Exposed;
 use anyhow::{Context, bail};
 use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
@@ -14,6 +15,8 @@ pub enum Coding {
     Rgb565,
     /// Luma in the low byte; in the high byte Cb in even columns, and Cr in odd ones, of the pair.
     Yuv422,
+    /// Luma in the low byte.
+    Mono,
 }
 
 /// A picture of the whole pixel array.
@@ -31,8 +34,8 @@ pub struct Picture {
 
 /// What stands before the camera.
 pub trait FrameSource: Send + std::fmt::Debug {
-    /// The picture of one exposure. `wanted` is what the sensor sends; a source that knows only
-    /// RGB565 gives that.
+    /// The picture of one exposure. `wanted` is what the sensor sends; a source that does not know
+    /// that gives what it knows.
     fn picture(&self, exposed: Exposed, wanted: Coding) -> Picture;
 
     /// What is true in the middle of it, for the truth log.
@@ -71,32 +74,65 @@ impl FrameSource for TestPicture {
     }
 }
 
-/// A simulated sensor, under the eyes of a camera that codes its pixels either way.
+/// A simulated sensor, under the eyes of a camera that codes its pixels in any way that it can.
 #[derive(Debug)]
 pub struct SceneSource {
-    rgb565: Scene,
-    yuv422: Scene,
+    /// In the first of its codings.
+    usual: Scene,
+    /// And in the second, if it has one.
+    yuv422: Option<Scene>,
+    /// Where in the picture the first pixel is that the firmware asks for: what is true of markers
+    /// is told in its frames.
+    window: [f64; 2],
+}
+
+/// The picture of a camera's whole array.
+struct Array {
+    preset: Preset,
+    size: (u32, u32),
+    window: [f64; 2],
+}
+
+impl Array {
+    fn of(camera: Kind) -> Self {
+        match camera {
+            Kind::Ov7725 => Self {
+                preset: Preset::Ov7725,
+                size: (320, 240),
+                window: [0.0; 2],
+            },
+            // Binned 2 × 2. The firmware asks for the 160 × 152 in its middle.
+            Kind::Mt9v034 => Self {
+                preset: Preset::Mt9v034,
+                size: (376, 240),
+                window: [108.0, 44.0],
+            },
+        }
+    }
 }
 
 impl SceneSource {
-    /// The scene of a file (`docs/scene-file.md`), whose frames must be 320 × 240.
+    /// The scene of a file (`docs/scene-file.md`), whose frames must be the camera's.
     ///
     /// # Errors
     /// When it cannot be read, is no scene, or has frames of another size.
-    pub fn load(path: &Path) -> anyhow::Result<Self> {
+    pub fn load(path: &Path, camera: Kind) -> anyhow::Result<Self> {
+        let array = Array::of(camera);
         let context = || format!("--scene {}", path.display());
         let text = std::fs::read_to_string(path).with_context(context)?;
         let scene = Scene::from_toml(&text).with_context(context)?;
         let frame = scene.frame(0, 0.0);
-        if (frame.width, frame.height) != (320, 240) {
+        if (frame.width, frame.height) != array.size {
             bail!(
-                "--scene {}: its frames are {} × {}, and this camera's are 320 × 240",
+                "--scene {}: its frames are {} × {}, and this camera's are {} × {}",
                 path.display(),
                 frame.width,
-                frame.height
+                frame.height,
+                array.size.0,
+                array.size.1
             );
         }
-        if frame.pixels.is_empty() || frame.format == Format::Yuv422 {
+        if frame.format != scene.camera().preset().usual_format() {
             bail!(
                 "--scene {}: the camera's registers say what its pixels are: leave `format` out",
                 path.display()
@@ -108,52 +144,70 @@ impl SceneSource {
                 path.display()
             );
         }
-        Self::of(scene).with_context(context)
+        Self::of(scene, array.window).with_context(context)
     }
 
-    /// A scene by name under a geometry preset, at 320 × 240.
+    /// A scene by name, under a geometry preset, or the camera's own.
     ///
     /// # Errors
     /// When there is no such scene or preset.
-    pub fn new(name: &str, preset: &str, seed: u64) -> anyhow::Result<Self> {
-        let preset: Preset = preset.parse().context("--preset")?;
-        let scene = Scene::preset(name, preset, 320, 240, seed);
-        Self::of(scene.context("--scene")?)
+    pub fn new(name: &str, preset: Option<&str>, seed: u64, camera: Kind) -> anyhow::Result<Self> {
+        let array = Array::of(camera);
+        let preset = match preset {
+            Some(preset) => preset.parse().context("--preset")?,
+            None => array.preset,
+        };
+        let (width, height) = array.size;
+        let scene = Scene::preset(name, preset, width, height, seed);
+        Self::of(scene.context("--scene")?, array.window)
     }
 
-    fn of(rgb565: Scene) -> anyhow::Result<Self> {
+    fn of(usual: Scene, window: [f64; 2]) -> anyhow::Result<Self> {
         let options = Options {
             format: Format::Yuv422,
-            ..rgb565.options().clone()
+            ..usual.options().clone()
         };
-        let yuv422 = rgb565.clone().with_options(options)?;
-        Ok(Self { rgb565, yuv422 })
+        let colours = usual.options().format != Format::Mono;
+        let yuv422 = colours.then(|| usual.clone().with_options(options));
+        Ok(Self {
+            yuv422: yuv422.transpose()?,
+            usual,
+            window,
+        })
     }
 }
 
 impl FrameSource for SceneSource {
     fn picture(&self, exposed: Exposed, wanted: Coding) -> Picture {
-        let scene = match wanted {
-            Coding::Rgb565 => &self.rgb565,
-            Coding::Yuv422 => &self.yuv422,
+        let scene = match (wanted, &self.yuv422) {
+            (Coding::Yuv422, Some(yuv422)) => yuv422,
+            _ => &self.usual,
         };
         let frame = scene.frame_by(&exposed.shutter(), exposed.exposure, exposed.time_s());
+        let (coding, pixels) = match frame.format {
+            Format::Mono => {
+                let luma = frame.mono.into_iter();
+                (Coding::Mono, luma.map(u16::from).collect())
+            }
+            Format::Yuv422 => (Coding::Yuv422, frame.pixels),
+            _ => (Coding::Rgb565, frame.pixels),
+        };
         Picture {
             width: frame.width,
             height: frame.height,
-            coding: wanted,
-            pixels: frame.pixels,
+            coding,
+            pixels,
         }
     }
 
     fn truth(&self, exposed: Exposed) -> Value {
-        let truth = self.rgb565.truth_by(&exposed.shutter(), exposed.time_s());
+        let truth = self.usual.truth_by(&exposed.shutter(), exposed.time_s());
         let force = truth.force.vector_n();
         let markers: Vec<Value> = (truth.markers.iter())
             .map(|marker| match marker {
                 Some(marker) => json!({
-                    "x": marker.centroid_px[0],
-                    "y": marker.centroid_px[1],
+                    "x": marker.centroid_px[0] - self.window[0],
+                    "y": marker.centroid_px[1] - self.window[1],
                     "area": marker.area_px2,
                 }),
                 None => Value::Null,
@@ -182,7 +236,7 @@ mod tests {
             middle_ns: 200_000_000,
             ..Exposed::default()
         };
-        let truth = SceneSource::of(scene).unwrap().truth(exposed);
+        let truth = SceneSource::of(scene, [0.0; 2]).unwrap().truth(exposed);
         ["magnitude_n", "place_x_mm", "place_y_mm"].map(|key| truth[key].clone())
     }
 

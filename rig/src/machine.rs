@@ -38,7 +38,7 @@ impl Store for Sensor {}
 
 impl Board for Sensor {
     fn name(&self) -> &'static str {
-        "weact-h743"
+        self.chip.board().name()
     }
 
     fn target_names(&self) -> Vec<&'static str> {

@@ -10,6 +10,8 @@ use std::sync::atomic::AtomicBool;
 use anyhow::Context;
 use clap::Parser;
 use hivtac_rig::arrivals::Arrivals;
+use hivtac_rig::board;
+use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::{Fault, Faults};
 use hivtac_rig::frame_source::{FrameSource, SceneSource, TestPicture};
@@ -36,9 +38,15 @@ struct Arguments {
     /// Decides the noise, where the demo starts, and what the camera's data sheets leave open.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Geometry of the simulated sensor: ov7725 or paper.
-    #[arg(long, default_value = "ov7725")]
-    preset: String,
+    /// The board.
+    #[arg(long, value_enum, default_value_t)]
+    board: board::Kind,
+    /// The camera on it; the board's usual one unless told.
+    #[arg(long, value_enum)]
+    camera: Option<part::Kind>,
+    /// Geometry of the simulated sensor: ov7725, mt9v034 or paper; the camera's own unless told.
+    #[arg(long)]
+    preset: Option<String>,
     /// Offer the serial port at this TCP port of 127.0.0.1; 0 takes a free one.
     #[arg(long, value_name = "PORT")]
     tcp: Option<u16>,
@@ -93,6 +101,12 @@ struct Arguments {
     stats_json: Option<PathBuf>,
 }
 
+impl Arguments {
+    fn camera(&self) -> part::Kind {
+        self.camera.unwrap_or(self.board.usual_camera())
+    }
+}
+
 fn main() -> ExitCode {
     match work(Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -127,6 +141,8 @@ fn options(arguments: &Arguments, interrupt: Arc<AtomicBool>) -> anyhow::Result<
     let rate = arguments.instructions_per_second;
     Ok(Options {
         elf: arguments.elf.clone(),
+        board: arguments.board,
+        camera: arguments.camera(),
         source: source(arguments)?,
         truth,
         arrivals,
@@ -153,12 +169,14 @@ fn source(arguments: &Arguments) -> anyhow::Result<Box<dyn FrameSource>> {
         return Ok(Box::new(TestPicture));
     }
     if arguments.scene.ends_with(".toml") {
-        return Ok(Box::new(SceneSource::load(Path::new(&arguments.scene))?));
+        let file = Path::new(&arguments.scene);
+        return Ok(Box::new(SceneSource::load(file, arguments.camera())?));
     }
     Ok(Box::new(SceneSource::new(
         &arguments.scene,
-        &arguments.preset,
+        arguments.preset.as_deref(),
         arguments.seed,
+        arguments.camera(),
     )?))
 }
 

@@ -14,7 +14,8 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
 use crate::arrivals::Arrivals;
-use crate::camera::{Camera, SharedCamera};
+use crate::board;
+use crate::camera::{Camera, SharedCamera, part};
 use crate::chip::{Chip, Revision};
 use crate::dma_reach;
 use crate::faults::Faults;
@@ -67,6 +68,10 @@ pub struct Limits {
 pub struct Options {
     /// The firmware.
     pub elf: PathBuf,
+    /// The board.
+    pub board: board::Kind,
+    /// The camera on it.
+    pub camera: part::Kind,
     /// What stands before the camera.
     pub source: Box<dyn FrameSource>,
     /// Where the truth goes.
@@ -108,6 +113,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
     let images = vec![load(&options.elf)?];
     let rules = Rules::default();
     let camera = SharedCamera::new(Camera::new(
+        options.camera,
         options.source,
         options.truth,
         options.faults.clone(),
@@ -120,6 +126,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         host.clone(),
         options.faults,
         rules.clone(),
+        options.board,
         options.revision,
         options.seed,
     )?;
@@ -206,6 +213,8 @@ fn settles_in(address: u64) -> Option<u64> {
         0x5802_0000..=0x5802_13FF => Some(0),
         // RCC, PWR
         0x5802_4400..=0x5802_4BFF => Some(SETTLING_NS),
+        // TIM1, which may be the camera's clock
+        0x4001_0000..=0x4001_03FF => Some(0),
         // CRS
         0x4000_8400..=0x4000_87FF => Some(0),
         _ => None,

@@ -7,6 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use hivtac_rig::arrivals::Arrivals;
+use hivtac_rig::board;
+use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
 use hivtac_rig::frame_source::TestPicture;
@@ -53,6 +55,8 @@ fn program(writes: &[(u32, u32)]) -> Vec<u8> {
 fn run_program(elf: &Path) -> anyhow::Result<Outcome> {
     run(Options {
         elf: elf.to_owned(),
+        board: board::Kind::Weact,
+        camera: part::Kind::Ov7725,
         source: Box::new(TestPicture),
         truth: TruthLog::default(),
         arrivals: Arrivals::default(),

@@ -20,9 +20,37 @@ pub const SEEDED_BUGS: [&str; 5] = [
 /// The profile of programs that run here, which is quick to build.
 const TOOLS: &str = "tools";
 
+/// The boards that there is firmware for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Board {
+    /// WeAct MiniSTM32H743VIT6 with an OV7725.
+    #[default]
+    Weact,
+    /// OpenMV Cam H7 with an MT9V034.
+    OpenmvH7,
+}
+
+impl Board {
+    /// Its name on command lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Board::Weact => "weact",
+            Board::OpenmvH7 => "openmv-h7",
+        }
+    }
+}
+
 /// The firmware, as it is flashed.
 pub fn firmware(toolchain: &Toolchain) -> Result<PathBuf> {
     build(&mut firmware_command(toolchain), "hivtac-firmware")
+}
+
+/// The firmware for a board, with one feature more, such as a seeded bug, or none.
+pub fn firmware_for(toolchain: &Toolchain, board: Board, feature: &str) -> Result<PathBuf> {
+    let mut command = firmware_command(toolchain);
+    let features = format!("board-{} {feature}", board.name());
+    command.args(["--no-default-features", "--features", &features]);
+    build(&mut command, "hivtac-firmware")
 }
 
 /// The firmware with one feature, such as a seeded bug.

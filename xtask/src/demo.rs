@@ -9,6 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
+use crate::artifacts::Board;
 use crate::rig::Rig;
 use crate::summary::{self, Summary};
 use crate::toolchain::Toolchain;
@@ -20,6 +21,9 @@ pub struct Demo {
     /// End after this many frames.
     #[arg(long, default_value_t = 150, value_parser = clap::value_parser!(u64).range(1..))]
     frames: u64,
+    /// The board and its camera: an OV7725 on the first, an MT9V034 on the second.
+    #[arg(long, value_enum, default_value_t)]
+    board: Board,
     /// Print one JSON object instead: frames, rate_hz, latency_ms, direction_deg, magnitude_mn,
     /// place_um.
     #[arg(long)]
@@ -28,6 +32,7 @@ pub struct Demo {
 
 /// What the demo runs, and where it writes.
 struct Stage {
+    board: Board,
     firmware: PathBuf,
     rig: PathBuf,
     tool: PathBuf,
@@ -43,7 +48,7 @@ impl Demo {
     /// When something cannot be built or fails; names the rig's log when it was running.
     pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
         let start = Instant::now();
-        let stage = Stage::build(toolchain)?;
+        let stage = Stage::build(toolchain, self.board)?;
         let built = start.elapsed();
         let outcome = match self.json {
             true => self.summarize(&stage),
@@ -69,9 +74,10 @@ impl Demo {
         let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
         process::run(&mut self.monitor(stage, rig.port()))?;
         rig.finish()?;
-        let latency_ms = stage.latency_ms()?;
+        let (rate_hz, latency_ms) = (stage.rate_hz()?, stage.latency_ms()?);
         println!(
-            "latency: {latency_ms:.2} ms from the middle of the exposure to the last byte on USB"
+            "rate: {rate_hz:.1} forces a second; latency: {latency_ms:.2} ms from the middle of \
+             the exposure to the last byte on USB"
         );
         Ok(())
     }
@@ -100,7 +106,7 @@ impl Demo {
 /// # Errors
 /// As the demo.
 pub fn json_lines(toolchain: &Toolchain, frames: u64) -> Result<String> {
-    let stage = Stage::build(toolchain)?;
+    let stage = Stage::build(toolchain, Board::default())?;
     let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
     let mut monitor = stage.monitor_command(rig.port(), frames);
     process::show(monitor.arg("--json"));
@@ -112,20 +118,21 @@ pub fn json_lines(toolchain: &Toolchain, frames: u64) -> Result<String> {
 
 impl Stage {
     /// Builds the firmware beside the rig, whose emulator takes longest, and the host tool.
-    fn build(toolchain: &Toolchain) -> Result<Stage> {
+    fn build(toolchain: &Toolchain, board: Board) -> Result<Stage> {
         eprintln!(
             "Building the firmware, the emulated board and the host tool: some four minutes the \
              first time on two cores, a second from then on."
         );
         let folder = workspace::work_folder("demo")?;
         let (firmware, tools) = std::thread::scope(|scope| {
-            let firmware = scope.spawn(|| artifacts::firmware(toolchain));
+            let firmware = scope.spawn(|| artifacts::firmware_for(toolchain, board, ""));
             let tools = artifacts::rig().and_then(|rig| Ok((rig, artifacts::host_tool()?)));
             (firmware.join(), tools)
         });
         let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))??;
         let (rig, tool) = tools?;
         Ok(Stage {
+            board,
             firmware,
             rig,
             tool,
@@ -138,7 +145,8 @@ impl Stage {
     fn rig_command(&self) -> Command {
         let mut command = Command::new(&self.rig);
         command
-            .args(["--scene", "demo", "--pty", "--exit-on-hangup", "--truth"])
+            .args(["--board", self.board.name(), "--scene", "demo"])
+            .args(["--pty", "--exit-on-hangup", "--truth"])
             .arg(&self.truth)
             .arg("--arrivals")
             .arg(&self.arrivals)
@@ -161,6 +169,12 @@ impl Stage {
             fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))
         };
         Ok([read(&self.truth)?, read(&self.arrivals)?])
+    }
+
+    /// Samples a second.
+    fn rate_hz(&self) -> Result<f64> {
+        let [truth, arrivals] = self.logs()?;
+        summary::rate_hz(&truth, &arrivals)
     }
 
     /// Mean latency of all samples, ms.

@@ -63,6 +63,25 @@ pub fn latency_ms(samples: &[Value], truth: &str, arrivals: &str) -> Result<f64>
     Ok(1e3 * mean.context("no sample's arrival is in the log")?)
 }
 
+/// Frames a second that samples arrived of, by the middles of their exposures.
+///
+/// # Errors
+/// When there are fewer than two.
+pub fn rate_hz(truth: &str, arrivals: &str) -> Result<f64> {
+    let exposed = times(truth).context("the truth log")?;
+    let arrived = times(arrivals).context("the log of arrivals")?;
+    let mut times: Vec<f64> = (arrived.keys())
+        .filter_map(|frame| exposed.get(frame).copied())
+        .collect();
+    times.sort_by(f64::total_cmp);
+    let span_s = times
+        .last()
+        .zip(times.first())
+        .map(|(last, first)| last - first);
+    let span_s = span_s.filter(|span_s| *span_s > 0.0);
+    Ok((times.len() - 1) as f64 / span_s.context("fewer than two samples arrived")?)
+}
+
 /// Lines of JSON.
 pub fn parsed(lines: &str) -> Result<Vec<Value>> {
     let line = |line| serde_json::from_str(line).with_context(|| format!("reading `{line}`"));

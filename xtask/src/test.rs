@@ -6,6 +6,7 @@ use std::process::Command;
 use anyhow::{Context, Result};
 use clap::Args;
 
+use crate::artifacts::Board;
 use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
 use crate::{artifacts, bench, columns, packages, process, workspace};
@@ -45,7 +46,8 @@ const TIMED: [&str; 4] = ["camera", "faults", "firmware", "threshold"];
 /// The programs that the tests of the rig and those across rooms run.
 struct Programs {
     firmware: PathBuf,
-    /// One ELF per seeded bug or feature, named by it, and those with the model for YUV422.
+    /// One ELF per seeded bug or feature, named by it, those with the model for YUV422, and those
+    /// for the second board.
     bugs: PathBuf,
 }
 
@@ -176,6 +178,15 @@ impl Programs {
         }
         let elf = artifacts::firmware_for_yuv422(toolchain)?;
         artifacts::copy(&elf, &bugs.join("yuv422.elf"))?;
+        let second = Board::OpenmvH7;
+        for (feature, name) in [
+            ("", "openmv-h7"),
+            ("bug-polarity", "openmv-h7-bug-polarity"),
+            ("bug-camera-register", "openmv-h7-bug-camera-register"),
+        ] {
+            let elf = artifacts::firmware_for(toolchain, second, feature)?;
+            artifacts::copy(&elf, &bugs.join(format!("{name}.elf")))?;
+        }
         // Last, so that what cargo leaves behind is the firmware without a bug.
         Ok(Programs {
             firmware: artifacts::firmware(toolchain)?,
@@ -227,8 +238,11 @@ fn host_lints() -> Result<()> {
 fn target_lints(toolchain: &Toolchain) -> Result<()> {
     let mut firmware = toolchain.clippy(workspace::root())?;
     firmware.args(["--package", "hivtac-firmware"]);
+    let mut second = toolchain.clippy(workspace::root())?;
+    second.args(["--package", "hivtac-firmware"]);
+    second.args(["--no-default-features", "--features", "board-openmv-h7"]);
     let mut image = toolchain.clippy(&workspace::folder("tests/qemu"))?;
-    for command in [&mut firmware, &mut image] {
+    for command in [&mut firmware, &mut second, &mut image] {
         process::run(command.args(["--release", "--", "-D", "warnings"]))?;
     }
     Ok(())

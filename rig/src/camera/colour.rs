@@ -98,6 +98,8 @@ impl Colour {
                     *pixel = rgb565(self.seen(rgb(*pixel)));
                 }
             }
+            // Only of a camera that sees no colours.
+            Coding::Mono => {}
             Coding::Yuv422 => {
                 for pair in picture.pixels.chunks_exact_mut(2) {
                     self.apply_to_pair(pair);

@@ -58,6 +58,7 @@ fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
         return BARS[(column * 8 / output.window.output[0]) as usize];
     }
     match place(output, picture, column, row) {
+        Some(place) if picture.coding == Coding::Mono => [picture.pixels[place] as u8; 3],
         Some(place) => rgb888(picture.pixels[place]),
         None => [0; 3],
     }
@@ -130,6 +131,7 @@ fn encode(output: &Output, pixels: &[[u8; 3]], row: u32) -> Vec<u8> {
             .enumerate()
             .flat_map(|(i, p)| [p[1], if i % 2 == 0 { p[2] } else { p[0] }])
             .collect(),
+        Format::Mono => pixels.iter().map(|pixel| pixel[1]).collect(),
         Format::Bayer => (pixels.iter().enumerate())
             .map(|(i, p)| match (i % 2, row % 2) {
                 (0, 0) => p[2],

@@ -1,35 +1,41 @@
-//! The OV7725: registers on SCCB, a clock from the microcontroller, and pixels that its registers
-//! describe.
+//! The camera, an OV7725 or an MT9V034: registers on its control bus, a clock from the
+//! microcontroller, and pixels that its registers describe.
 //!
 //! The sensor runs by itself. It never waits for the firmware, and what it sends follows from its
 //! registers, power-up values included. Geometry, format and clock are taken over at the start of a
 //! frame; a register reset, a change of the input clock and power-up start the frame timing afresh,
 //! and the first VSYNC edge comes one frame later.
 //!
-//! Exposure, gain and colours follow the registers (`exposure`, `colour`). Registers that sources
-//! disagree about hold other values for each seed after a reset; capturing a frame that depends on
-//! one that was never written breaks a rule. Not simulated: the zoom registers (the window is
-//! scaled to the output size by taking the nearest pixel), automatic frame rate, automatic white
-//! balance.
+//! OV7725: exposure, gain and colours follow the registers (`exposure`, `colour`). Registers that
+//! sources disagree about hold other values for each seed after a reset; capturing a frame that
+//! depends on one that was never written breaks a rule. Not simulated: the zoom registers (the
+//! window is scaled to the output size by taking the nearest pixel), automatic frame rate,
+//! automatic white balance. MT9V034: `mt9v034`.
 
 pub mod colour;
 pub mod encode;
 mod exposure;
+pub mod mt9v034;
+pub mod mt9v034_registers;
 pub mod output;
+mod ov7725;
+pub mod part;
 pub mod registers;
 mod sccb;
+mod two_wire;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::faults::{Faults, Kind};
-use crate::frame_source::{Coding, FrameSource, Picture};
+use crate::frame_source::{FrameSource, Picture};
 use crate::rules::Rules;
 use crate::truth::{Exposed, TruthLog};
-use colour::Colour;
-use exposure::Exposure;
-use output::{Format, Output, VSYNC_LINES};
-use registers::Registers;
+use mt9v034::Mt9v034;
+use output::Output;
+use ov7725::Ov7725;
+use part::Part;
 pub use sccb::Sccb;
+pub use two_wire::TwoWire;
 
 /// Rows that a frame has too many under [`Kind::FrameLong`]; there is room for eight before the
 /// next VSYNC.
@@ -44,15 +50,15 @@ pub struct Supply {
     pub clock_hz: u64,
     /// SCL and SDA reach the I2C peripheral.
     pub sccb: bool,
+    /// Its reset line is at its active level.
+    pub reset: bool,
 }
 
 /// The sensor.
 #[derive(Debug)]
 pub struct Camera {
-    registers: Registers,
-    exposing: Exposure,
-    /// Light of the frame under way, over what exposes it well.
-    light: f64,
+    kind: part::Kind,
+    part: Box<dyn Part>,
     supply: Supply,
     source: Box<dyn FrameSource>,
     truth: TruthLog,
@@ -86,21 +92,21 @@ impl SharedCamera {
 impl Camera {
     /// A sensor in power-down, looking at `source`. `seed` decides what no source agrees about.
     pub fn new(
+        kind: part::Kind,
         source: Box<dyn FrameSource>,
         truth: TruthLog,
         faults: Faults,
         rules: Rules,
         seed: u64,
     ) -> Self {
-        let registers = match faults.on(Kind::CameraUsed, 0) {
-            true => Registers::used(seed),
-            false => Registers::of_seed(seed),
-        };
+        let used = faults.on(Kind::CameraUsed, 0);
         Self {
-            exposing: Exposure::of(&registers),
-            light: 1.0,
+            kind,
+            part: match kind {
+                part::Kind::Ov7725 => Box::new(Ov7725::new(seed, used)),
+                part::Kind::Mt9v034 => Box::new(Mt9v034::new(used)),
+            },
             rules,
-            registers,
             supply: Supply::default(),
             source,
             truth,
@@ -115,13 +121,22 @@ impl Camera {
         }
     }
 
+    /// Which one it is.
+    pub fn kind(&self) -> part::Kind {
+        self.kind
+    }
+
     /// Takes over what the board gives the sensor. In power-down it stands by: its registers stay.
     pub fn supply(&mut self, supply: Supply) {
         if supply == self.supply {
             return;
         }
         let before = std::mem::replace(&mut self.supply, supply);
-        self.restarted |= (before.powered, before.clock_hz) != (supply.powered, supply.clock_hz);
+        if supply.reset {
+            self.part.reset();
+        }
+        let timed = |supply: Supply| (supply.powered, supply.clock_hz, supply.reset);
+        self.restarted |= timed(before) != timed(supply);
     }
 
     /// The frame timing starts afresh now.
@@ -149,10 +164,10 @@ impl Camera {
 
     /// What the sensor sends from `now_ns` on; `None` while it sends nothing.
     pub fn output(&self, now_ns: u64) -> Option<Output> {
-        if self.silenced(now_ns) || !self.supply.powered {
+        if self.silenced(now_ns) || !self.supply.powered || self.supply.reset {
             return None;
         }
-        let mut output = Output::new(&self.registers, self.supply.clock_hz)?;
+        let mut output = self.part.output(self.supply.clock_hz)?;
         if self.faults.on(Kind::FrameShort, now_ns) {
             output.rows /= 2;
         }
@@ -179,13 +194,10 @@ impl Camera {
             ..Exposed::default()
         };
         if let Some(output) = self.output(now_ns) {
-            self.light = self.exposing.next(&mut self.registers, &output);
-            let lines_ns = |lines: u64| output.clocks_ns(lines * u64::from(output.line_clocks));
-            exposed.exposure_ns = lines_ns(self.exposing.lines());
-            exposed.readout_ns = lines_ns(output.rows.into());
-            // A row's exposure ends when it is read, which is when it is sent.
-            let middle_row = output.first_row - VSYNC_LINES + output.rows / 2;
-            exposed.middle_ns = now_ns + lines_ns(middle_row.into()) - exposed.exposure_ns / 2;
+            let timing = self.part.expose(&output);
+            exposed.exposure_ns = timing.exposure_ns;
+            exposed.readout_ns = timing.readout_ns;
+            exposed.middle_ns = (now_ns + timing.ends_ns).saturating_sub(timing.exposure_ns / 2);
         }
         self.frame += u64::from(self.counting);
         self.exposure += 1;
@@ -204,23 +216,9 @@ impl Camera {
         }
     }
 
-    /// The picture of an exposure, for pixels that travel so.
-    pub fn picture(&self, exposed: Exposed, format: Format) -> Picture {
-        let wanted = match format {
-            Format::Yuv => Coding::Yuv422,
-            _ => Coding::Rgb565,
-        };
-        if let Some(address) = self.registers.unwritten() {
-            self.rules.broken(|| {
-                format!(
-                    "OV7725: a frame was captured that depends on register 0x{address:02X}, which \
-                     was never written and has no value after a reset that its data sheets agree \
-                     about"
-                )
-            });
-        }
-        let picture = self.source.picture(exposed, wanted);
-        Colour::of(&self.registers, self.light).apply(picture)
+    /// The picture of an exposure.
+    pub fn picture(&self, exposed: Exposed) -> Picture {
+        self.part.picture(&*self.source, exposed, &self.rules)
     }
 
     /// VSYNC edges since the run began.
@@ -228,7 +226,7 @@ impl Camera {
         self.exposure
     }
 
-    /// Registers written over SCCB since the run began.
+    /// Registers written since the run began.
     pub fn sccb_writes(&self) -> u64 {
         self.sccb_writes
     }
@@ -255,22 +253,22 @@ impl Camera {
 
     fn answers(&self, now_ns: u64) -> bool {
         self.supply.powered
+            && !self.supply.reset
             && self.supply.clock_hz != 0
             && self.supply.sccb
             && !self.faults.on(Kind::CameraAbsent, now_ns)
     }
 
-    fn read_register(&self, address: u8, now_ns: u64) -> u8 {
-        if address == registers::PID && self.faults.on(Kind::CameraWrongId, now_ns) {
-            return 0x76;
+    fn read_register(&self, address: u8, now_ns: u64) -> u16 {
+        match self.faults.on(Kind::CameraWrongId, now_ns) {
+            true => self.part.read_as_another(address),
+            false => self.part.read(address),
         }
-        self.registers.get(address)
     }
 
-    fn write_register(&mut self, address: u8, value: u8) {
+    fn write_register(&mut self, address: u8, value: u16) {
         self.sccb_writes += 1;
-        if self.registers.write(address, value) {
-            self.exposing = Exposure::of(&self.registers);
+        if self.part.write(address, value) {
             self.restarted = true;
             self.count_begins |= !self.counting;
         }
@@ -286,11 +284,13 @@ mod tests {
         powered: true,
         clock_hz: 24_000_000,
         sccb: true,
+        reset: false,
     };
 
     fn camera(faults: &[&str]) -> Camera {
         let faults = Faults::new(faults.iter().map(|fault| fault.parse().unwrap()).collect());
         Camera::new(
+            part::Kind::Ov7725,
             Box::new(TestPicture),
             TruthLog::default(),
             faults,

@@ -8,8 +8,8 @@
 
 use super::registers::{self as reg, Registers};
 
-/// Lines that VSYNC lasts.
-pub const VSYNC_LINES: u32 = 4;
+/// Lines that the OV7725's VSYNC lasts.
+const VSYNC_LINES: u32 = 4;
 /// Fastest pixel clock of the sensor, Hz. Its data sheet says 48 MHz; drivers run it up to 187
 /// frames per second of QVGA (Linux, gspca's `ov534.c`), which is 60 MHz.
 const FASTEST_PIXEL_CLOCK_HZ: u64 = 60_000_000;
@@ -31,6 +31,8 @@ pub enum Format {
     Gbr,
     /// One byte per pixel, B G / G R.
     Bayer,
+    /// One byte per pixel, without colour.
+    Mono,
 }
 
 /// The area of the pixel array that is read and how large it is sent.
@@ -55,6 +57,8 @@ pub struct Output {
     pub line_clocks: u32,
     /// Lines per frame, blank ones included.
     pub lines: u32,
+    /// Lines that VSYNC lasts, from the first one on.
+    pub vsync_lines: u32,
     /// The line of the first row.
     pub first_row: u32,
     /// Rows sent; none when the registers ask for what the sensor cannot do.
@@ -115,6 +119,7 @@ impl Output {
             pixel_clock_hz: pixel_clock_hz(registers, input_clock_hz),
             line_clocks: (total + dummy_pixels) * clocks,
             lines: lines + dummy_lines,
+            vsync_lines: VSYNC_LINES,
             first_row: VSYNC_LINES + blank_before,
             rows: window.output[1],
             row_bytes: window.output[0] * clocks,
@@ -184,7 +189,8 @@ fn pixel_clock_hz(registers: &Registers, input_clock_hz: u64) -> u64 {
     input_clock_hz * multiplier / divider
 }
 
-fn format(com7: u8) -> Format {
+/// How pixels travel, by COM7.
+pub(super) fn format(com7: u8) -> Format {
     match (com7 & 3, com7 >> 2 & 3) {
         (0, _) => Format::Yuv,
         (2, 0) => Format::Gbr,

@@ -58,7 +58,7 @@ impl Peer for Sccb {
                 self.expects = Expects::Value;
             }
             Expects::Value => {
-                self.camera.lock().write_register(self.register, byte);
+                (self.camera.lock()).write_register(self.register, byte.into());
                 self.expects = Expects::Nothing;
             }
             Expects::Nothing => return false,
@@ -67,9 +67,7 @@ impl Peer for Sccb {
     }
 
     fn read(&mut self, _last: bool, context: &mut Timeline<'_, '_>) -> u8 {
-        self.camera
-            .lock()
-            .read_register(self.register, context.now().0)
+        (self.camera.lock()).read_register(self.register, context.now().0) as u8
     }
 
     fn stop(&mut self, _context: &mut Timeline<'_, '_>) {

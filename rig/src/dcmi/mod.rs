@@ -222,8 +222,7 @@ impl Dcmi {
         };
         let at_stable_edge = frame.output.stable_at_rising == self.settings.has(control::RISING);
         let base = u64::from(run.line) << 32;
-        let format = frame.output.format;
-        let picture = |exposed| self.camera.lock().picture(exposed, format);
+        let picture = |exposed| self.camera.lock().picture(exposed);
         let bytes = frame.bytes(run, from, to, picture);
         for (i, byte) in (from..to).zip(bytes) {
             let sampled = if at_stable_edge {

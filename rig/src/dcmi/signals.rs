@@ -1,7 +1,7 @@
 //! One frame's signals in time, and which of them the camera interface takes for data.
 
 use crate::camera::encode;
-use crate::camera::output::{Output, VSYNC_LINES};
+use crate::camera::output::Output;
 use crate::frame_source::Picture;
 use crate::truth::Exposed;
 
@@ -61,7 +61,7 @@ impl Frame {
 
     /// Whether VSYNC is at its active level at an instant.
     pub fn in_vsync(&self, now_ns: u64) -> bool {
-        self.position(now_ns).0 < u64::from(VSYNC_LINES)
+        self.position(now_ns).0 < u64::from(self.output.vsync_lines)
     }
 
     /// Whether HREF is at its active level at an instant.

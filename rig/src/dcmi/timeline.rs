@@ -6,7 +6,7 @@ use rigless::time::{EventId, VirtualNanos};
 use super::receiver::control;
 use super::signals::{Frame, Run};
 use super::{Dcmi, GROUP, flag};
-use crate::camera::output::{Output, VSYNC_LINES};
+use crate::camera::output::Output;
 
 /// What the sensor does next.
 #[derive(Clone, Copy, Debug)]
@@ -43,11 +43,9 @@ impl Dcmi {
         let now = context.now().0;
         self.next = None;
         self.epoch = Epoch::default();
-        if self
-            .frame
-            .take()
-            .is_some_and(|frame| frame.exposed.is_none())
-        {
+        let pulse = (self.frame.take())
+            .is_some_and(|frame| frame.exposed.is_none() && frame.output.vsync_active_high);
+        if pulse {
             // VSYNC was at its active level. That it falls back is an edge like any other.
             self.camera.lock().count_edge(now);
         }
@@ -87,8 +85,9 @@ impl Dcmi {
     /// Plans what follows from the beginning of a line on.
     pub(super) fn plan_from(&mut self, line: u32, context: &mut DeviceContext<'_>) {
         let Some(frame) = &self.frame else { return };
-        let end = if line < VSYNC_LINES {
-            VSYNC_LINES
+        let vsync_lines = frame.output.vsync_lines;
+        let end = if line < vsync_lines {
+            vsync_lines
         } else {
             frame.output.lines
         };
@@ -99,8 +98,8 @@ impl Dcmi {
         };
         match run {
             Some(run) => self.plan_group(run, 0, context),
-            None if line < VSYNC_LINES => {
-                let at = frame.instant(VSYNC_LINES, 0);
+            None if line < vsync_lines => {
+                let at = frame.instant(vsync_lines, 0);
                 self.plan(Step::VsyncEnds, at, context);
             }
             None => {
@@ -161,8 +160,9 @@ impl Dcmi {
         let Some(frame) = &mut self.frame else { return };
         frame.exposed = Some(exposed);
         let level = Level::from(!frame.output.vsync_active_high);
+        let vsync_lines = frame.output.vsync_lines;
         self.set_vsync(level, registers, context);
         self.camera.lock().log_truth(exposed);
-        self.plan_from(VSYNC_LINES, context);
+        self.plan_from(vsync_lines, context);
     }
 }

@@ -1,8 +1,8 @@
 //! Runs the firmware under a scripted host, and decodes what it sends.
 //!
 //! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each
-//! seeded bug, and `yuv422.elf` with the model for YUV422. `HIVTAC_INSTRUCTIONS_PER_SECOND` lets
-//! every test run at another speed.
+//! seeded bug, `yuv422.elf` with the model for YUV422, and `openmv-h7.elf` for that board.
+//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -12,6 +12,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use hivtac_rig::arrivals::Arrivals;
+use hivtac_rig::board;
+use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
 use hivtac_rig::frame_source::SceneSource;
@@ -38,7 +40,16 @@ pub fn firmware() -> PathBuf {
     path_from("HIVTAC_ELF", "the firmware ELF")
 }
 
-/// The firmware with a seeded bug, another feature or another model.
+/// A run of the firmware for the OpenMV Cam H7 on that board.
+pub fn openmv(virtual_ms: u64) -> Setup {
+    Setup {
+        board: board::Kind::OpenmvH7,
+        camera: part::Kind::Mt9v034,
+        ..Setup::new(bug("openmv-h7"), virtual_ms)
+    }
+}
+
+/// The firmware with a seeded bug, another feature, another model, or for another board.
 pub fn bug(name: &str) -> PathBuf {
     let path = path_from(
         "HIVTAC_BUG_ELFS",
@@ -94,6 +105,8 @@ pub fn instructions_per_second() -> u64 {
 /// counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
+    pub board: board::Kind,
+    pub camera: part::Kind,
     /// A scene's name, or its file from the package's folder.
     pub scene: &'static str,
     pub seed: u64,
@@ -109,6 +122,8 @@ impl Setup {
     pub fn new(elf: PathBuf, virtual_ms: u64) -> Self {
         Self {
             elf,
+            board: board::Kind::Weact,
+            camera: part::Kind::Ov7725,
             scene: "demo",
             seed: 1,
             faults: Vec::new(),
@@ -134,21 +149,23 @@ impl Setup {
         let directory = tempfile::tempdir().unwrap();
         let truth = directory.path().join("truth.jsonl");
         let outcome = self.try_run(&truth).unwrap();
-        let truth = std::fs::read_to_string(truth).unwrap();
-        Run::new(
-            outcome,
-            truth
-                .lines()
+        let lines = |file: &Path| -> Vec<Value> {
+            let text = std::fs::read_to_string(file).unwrap();
+            let lines = text.lines();
+            lines
                 .map(|line| serde_json::from_str(line).unwrap())
-                .collect(),
-        )
+                .collect()
+        };
+        let arrivals = lines(&truth.with_extension("arrivals"));
+        Run::new(outcome, lines(&truth), arrivals)
     }
 
     fn source(&self) -> anyhow::Result<SceneSource> {
         if self.scene.ends_with(".toml") {
-            return SceneSource::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(self.scene));
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(self.scene);
+            return SceneSource::load(&file, self.camera);
         }
-        SceneSource::new(self.scene, "ov7725", self.seed)
+        SceneSource::new(self.scene, None, self.seed, self.camera)
     }
 
     pub fn try_run(self, truth: &Path) -> anyhow::Result<Outcome> {
@@ -167,6 +184,8 @@ impl Setup {
         actions.extend(self.actions);
         run(Options {
             elf: self.elf,
+            board: self.board,
+            camera: self.camera,
             source,
             truth: TruthLog::create(truth)?,
             arrivals: Arrivals::create(&truth.with_extension("arrivals"))?,
@@ -217,10 +236,11 @@ pub struct Run {
     pub rejected: Rejected,
     pub report: Report,
     pub truth: Vec<Value>,
+    pub arrivals: Vec<Value>,
 }
 
 impl Run {
-    fn new(outcome: Outcome, truth: Vec<Value>) -> Self {
+    fn new(outcome: Outcome, truth: Vec<Value>, arrivals: Vec<Value>) -> Self {
         let mut decoder = Decoder::<DEVICE_FRAME_LIMIT>::new();
         let mut rest = &outcome.bytes[..];
         let mut messages = Vec::new();
@@ -239,6 +259,7 @@ impl Run {
             rejected,
             report: outcome.report,
             truth,
+            arrivals,
         }
     }
 

@@ -1,0 +1,96 @@
+//! The OV7725: what its registers make of a scene.
+
+use super::colour::Colour;
+use super::exposure::Exposure;
+use super::output::{Format, Output};
+use super::part::{Part, Timing};
+use super::registers::{self, Registers};
+use crate::frame_source::{Coding, FrameSource, Picture};
+use crate::rules::Rules;
+use crate::truth::Exposed;
+
+/// The sensor's inside.
+#[derive(Debug)]
+pub struct Ov7725 {
+    registers: Registers,
+    exposing: Exposure,
+    /// Light of the frame under way, over what exposes it well.
+    light: f64,
+    seed: u64,
+}
+
+impl Ov7725 {
+    /// `seed` decides what no source agrees about; `used` has its registers begin with what another
+    /// program left in them.
+    pub fn new(seed: u64, used: bool) -> Self {
+        let registers = match used {
+            true => Registers::used(seed),
+            false => Registers::of_seed(seed),
+        };
+        Self {
+            exposing: Exposure::of(&registers),
+            registers,
+            light: 1.0,
+            seed,
+        }
+    }
+}
+
+impl Part for Ov7725 {
+    fn output(&self, clock_hz: u64) -> Option<Output> {
+        Output::new(&self.registers, clock_hz)
+    }
+
+    fn expose(&mut self, output: &Output) -> Timing {
+        self.light = self.exposing.next(&mut self.registers, output);
+        let lines_ns = |lines: u64| output.clocks_ns(lines * u64::from(output.line_clocks));
+        // A row's exposure ends when it is read, which is when it is sent.
+        let middle_row = output.first_row - output.vsync_lines + output.rows / 2;
+        Timing {
+            exposure_ns: lines_ns(self.exposing.lines()),
+            readout_ns: lines_ns(output.rows.into()),
+            ends_ns: lines_ns(middle_row.into()),
+        }
+    }
+
+    fn picture(&self, source: &dyn FrameSource, exposed: Exposed, rules: &Rules) -> Picture {
+        if let Some(address) = self.registers.unwritten() {
+            rules.broken(|| {
+                format!(
+                    "OV7725: a frame was captured that depends on register 0x{address:02X}, which \
+                     was never written and has no value after a reset that its data sheets agree \
+                     about"
+                )
+            });
+        }
+        let wanted = match super::output::format(self.registers.get(registers::COM7)) {
+            Format::Yuv => Coding::Yuv422,
+            _ => Coding::Rgb565,
+        };
+        let picture = source.picture(exposed, wanted);
+        Colour::of(&self.registers, self.light).apply(picture)
+    }
+
+    fn read(&self, address: u8) -> u16 {
+        self.registers.get(address).into()
+    }
+
+    fn read_as_another(&self, address: u8) -> u16 {
+        match address {
+            registers::PID => 0x76,
+            address => self.read(address),
+        }
+    }
+
+    fn write(&mut self, address: u8, value: u16) -> bool {
+        let reset = self.registers.write(address, value as u8);
+        if reset {
+            self.exposing = Exposure::of(&self.registers);
+        }
+        reset
+    }
+
+    fn reset(&mut self) {
+        *self = Self::new(self.seed, false);
+    }
+}

@@ -1,0 +1,224 @@
+//! The second board, an OpenMV Cam H7 with an MT9V034: what holds for the first one holds for it.
+
+mod common;
+
+use common::{Run, Setup, bug, command, firmware, openmv, set_threshold};
+use hivtac_rig::board;
+use hivtac_rig::camera::part;
+use hivtac_rig::chip::Revision;
+use hivtac_rig::script::Action;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
+use hivtac_wire::message::{Outcome, Request, Sample};
+
+/// All that a sample of an undisturbed scene says before a tare.
+const USUAL: Status = Status(Status::TARE_MISSING.0 | Status::NOT_CALIBRATED.0 | Status::CONTACT.0);
+
+/// When the middle of a frame was exposed, s.
+fn exposed_s(run: &Run, frame: u64) -> f64 {
+    let line = run.truth.iter().find(|line| line["frame"] == frame);
+    line.expect("exposed")["time_s"].as_f64().unwrap()
+}
+
+fn assert_good(run: &Run) {
+    let samples = run.samples();
+    assert!(samples.len() >= 6, "{}: {}", samples.len(), run.log());
+    for sample in &samples {
+        assert!(sample.force.is_some(), "{sample:?}");
+        let others = sample.status.0 & !USUAL.0 & !Status::CAMERA_RESTARTED.0;
+        assert_eq!(others & !Status::FRAME_DROPPED.0, 0, "{sample:?}");
+    }
+    run.assert_times();
+    run.assert_only_setup_drops();
+}
+
+/// At least 240 forces a second, each at most 7 ms after the middle of its exposure.
+#[test]
+fn every_frame_is_measured_at_240_a_second_within_7_ms() {
+    let run = openmv(420).run();
+    assert_good(&run);
+    assert_eq!(run.missing_frames(), Vec::<u32>::new());
+    let hello = run.hellos()[0];
+    assert_eq!((hello.width, hello.height), (160, 152));
+    assert_eq!(hello.board.as_str(), "openmv-h7 + mt9v034");
+    assert_eq!(hello.preset.as_str(), "mt9v034");
+    let frames: Vec<u64> = (run.arrivals.iter())
+        .map(|line| line["frame"].as_u64().unwrap())
+        .collect();
+    let [first, last] = [frames[0], frames[frames.len() - 1]];
+    let rate_hz = (last - first) as f64 / (exposed_s(&run, last) - exposed_s(&run, first));
+    assert!(rate_hz >= 240.0, "{rate_hz} forces a second");
+    for line in &run.arrivals {
+        let exposed_s = exposed_s(&run, line["frame"].as_u64().unwrap());
+        let latency_s = line["time_s"].as_f64().unwrap() - exposed_s;
+        assert!(latency_s <= 0.007, "{latency_s} s of {line}");
+    }
+}
+
+/// What the firmware says is what the tip did.
+#[test]
+fn forces_are_the_true_ones() {
+    let run = openmv(420).run();
+    let off_un = |sample: &&Sample| {
+        let truth = run.truth.iter().find(|line| line["frame"] == sample.frame);
+        let truth_n = truth.unwrap()["magnitude_n"].as_f64().unwrap();
+        (f64::from(sample.force.unwrap().magnitude.0) - 1e6 * truth_n).abs()
+    };
+    let worst_un = run.samples().iter().map(off_un).fold(0.0, f64::max);
+    assert!(worst_un < 600.0, "{worst_un} µN");
+}
+
+#[test]
+fn half_as_many_instructions_per_second_are_enough() {
+    let setup = openmv(420);
+    let instructions_per_second = setup.instructions_per_second / 2;
+    let run = Setup {
+        instructions_per_second,
+        ..setup
+    };
+    assert_good(&run.run());
+}
+
+/// A camera of the other kind is named as what it is, on either board, and nothing is written to
+/// it.
+#[test]
+fn a_camera_of_the_other_kind_is_named() {
+    for (setup, camera, name) in [
+        (openmv(700), part::Kind::Ov7725, "this is an OV7725"),
+        (
+            Setup::new(firmware(), 700),
+            part::Kind::Mt9v034,
+            "this is an MT9V034",
+        ),
+    ] {
+        let run = Setup { camera, ..setup }.run();
+        assert!(run.log().contains(name), "{}", run.log());
+        assert!(run.samples().is_empty());
+        assert_eq!(run.report.sccb_writes, 0);
+    }
+}
+
+/// An MT9V032 is none of those that this firmware drives.
+#[test]
+fn a_camera_with_another_version_is_refused() {
+    let run = openmv(700).fault("camera-wrong-id").run();
+    assert!(run.log().contains("ID 13 13"), "{}", run.log());
+    assert_eq!((run.samples().len(), run.report.sccb_writes), (0, 0));
+}
+
+#[test]
+fn an_absent_camera_is_reported_and_found_later() {
+    let run = openmv(1_300).fault("camera-absent@0-700").run();
+    assert!(run.log().contains("no MT9V034"), "{}", run.log());
+    assert!(run.samples().len() >= 6, "{:?}", run.stats());
+}
+
+/// Its reset line and its register reset take back what another program has left.
+#[test]
+fn what_another_program_left_in_the_camera_is_reset() {
+    assert_good(&openmv(420).fault("camera-used").run());
+}
+
+#[test]
+fn a_silent_camera_is_restarted() {
+    let run = openmv(840).fault("camera-silent@330-400").run();
+    let stats = run.stats();
+    assert!(
+        stats.camera_timeouts >= 1 && stats.camera_restarts >= 1,
+        "{stats:?}"
+    );
+    let told = |status: Status| status.contains(Status::CAMERA_RESTARTED);
+    let samples = run.samples();
+    let restarted = samples.iter().find(|sample| told(sample.status));
+    let restarted = restarted.expect("a sample says so").frame;
+    assert!(samples.iter().any(|sample| sample.frame > restarted + 3));
+    run.assert_times();
+}
+
+/// A frame of the wrong size costs itself and no other.
+#[test]
+fn a_short_frame_is_dropped() {
+    let run = openmv(420).fault("frame-short@340").run();
+    assert!(run.stats().dropped_size >= 1, "{:?}", run.stats());
+    let after = run.frames_after_a_loss();
+    assert_eq!(after.len(), 1, "{after:?}");
+}
+
+/// The camera sees no colours: a threshold of its luma is taken at once, others are refused.
+#[test]
+fn only_thresholds_of_its_luma_are_taken() {
+    let red = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+    let yuv = Threshold::Yuv422(Yuv422 { cr_low: 162 });
+    let mono = |high| Threshold::Mono(Mono { low: 0, high });
+    let run = openmv(420)
+        .at(340, set_threshold(61, red))
+        .at(345, set_threshold(62, yuv))
+        .at(350, set_threshold(63, mono(80)))
+        .at(355, set_threshold(64, mono(88)))
+        .run();
+    let outcomes = [61, 62, 63, 64].map(|id| run.answers(id)[0].0);
+    use Outcome::{Done, Unsupported};
+    assert_eq!(outcomes, [Unsupported, Unsupported, Done, Done]);
+    let last = run.samples().pop().unwrap().status;
+    assert!(!last.contains(Status::MODEL_MISMATCH), "{last:?}");
+}
+
+#[test]
+fn exposure_is_found_anew_on_command() {
+    let run = openmv(560)
+        .at(340, Action::Send(command(50, Request::Expose)))
+        .run();
+    assert_eq!(run.answers(50)[0].0, Outcome::Done);
+    let samples = run.samples();
+    assert!(samples.iter().all(|sample| sample.force.is_some()));
+    let missing = run.missing_frames();
+    assert_eq!(run.frames_after_a_loss(), [missing.last().unwrap() + 1]);
+    assert!(samples.last().unwrap().frame > missing.last().unwrap() + 3);
+    assert_eq!(run.stats().camera_restarts, 0);
+    run.assert_times();
+}
+
+/// Revision Y, which some of these boards have: the LED flashes and nothing is set up.
+#[test]
+fn an_old_revision_is_refused_with_a_flashing_led() {
+    let setup = Setup {
+        revision: Revision::Y,
+        ..openmv(1_600)
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let outcome = setup.try_run(&directory.path().join("truth")).unwrap();
+    assert_eq!((outcome.report.exposures, outcome.report.resets), (0, 0));
+    let flashes = outcome.report.led_flashes_ns;
+    assert!(flashes.len() >= 4, "{flashes:?}");
+}
+
+/// On the first board, whose crystal is twice as fast, this firmware sets clocks that are too fast.
+#[test]
+fn on_the_other_board_it_breaks_a_rule_of_the_chip() {
+    let setup = Setup {
+        board: board::Kind::Weact,
+        ..openmv(420)
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let error = setup.try_run(&directory.path().join("truth")).unwrap_err();
+    assert!(error.to_string().contains("HCLK"), "{error}");
+}
+
+/// DCMI takes blank rows for a frame; a camera that does not bin sends four times as much.
+#[test]
+fn seeded_bugs_are_noticed() {
+    for name in ["openmv-h7-bug-polarity", "openmv-h7-bug-camera-register"] {
+        let setup = openmv(420);
+        let run = Setup {
+            elf: bug(name),
+            ..setup
+        };
+        let run = run.run();
+        let samples = run.samples();
+        let forces = samples.iter().filter(|sample| sample.force.is_some());
+        assert_eq!(forces.count(), 0, "{name}");
+        let stats = run.stats();
+        assert!(stats.dropped_size >= 4, "{name}: {stats:?}");
+        assert_eq!(stats.frames_processed, 0, "{name}: {stats:?}");
+    }
+}
