@@ -1,6 +1,6 @@
 //! How rows of each pixel format are read: RGB565 through a table, YUV422 and mono by themselves.
 
-use crate::kernels::{threshold_cr, threshold_luma};
+use crate::kernels::{threshold_cr, threshold_luma, weigh_luma};
 use crate::runs::Run;
 use crate::tables::{FULL_WEIGHT, Pixels, Table, Weights};
 use hivtac_terms::threshold::{
@@ -16,6 +16,8 @@ const AT_THRESHOLD: i16 = 64;
 pub struct Formats<T> {
     table: T,
     threshold: Threshold,
+    /// The weight of each luma, while pixels are mono.
+    luma: [u8; 256],
 }
 
 impl<T: Table> Formats<T> {
@@ -23,6 +25,7 @@ impl<T: Table> Formats<T> {
     pub const CLOSED: Formats<T> = Formats {
         table: T::CLOSED,
         threshold: Threshold::Rgb565(HsvBox::RED),
+        luma: [0; 256],
     };
 
     /// Sets format and threshold. The byte order is that of RGB565; other formats have but one.
@@ -34,8 +37,26 @@ impl<T: Table> Formats<T> {
         if let Threshold::Rgb565(hsv_box) = threshold {
             self.table.set(hsv_box, order)?;
         }
+        if let Threshold::Mono(mono) = threshold {
+            for (luma, weight) in (0..=u8::MAX).zip(&mut self.luma) {
+                *weight = weight_of(mono, luma);
+            }
+        }
         self.threshold = *threshold;
         Ok(())
+    }
+
+    /// The weights of a run of mono pixels, as [`Mono`] has them.
+    #[inline(always)]
+    fn weigh_mono(&self, row: &[u16], run: Run) -> Weights {
+        let beyond = (usize::from(run.x1) + 1).min(2 * row.len());
+        let first = usize::from(run.x0).min(beyond);
+        let [sum, sums] = weigh_luma(&self.luma, row, first..beyond);
+        Weights {
+            sum,
+            // Σw·x = (x0 − 1)·Σw + Σw·(x − x0 + 1).
+            sum_x: u32::from(run.x0) * sum + sums - sum,
+        }
     }
 
     /// The threshold in use.
@@ -78,7 +99,7 @@ impl<T: Table> Pixels for Formats<T> {
         match &self.threshold {
             Threshold::Rgb565(_) => self.table.weigh(row, run),
             Threshold::Yuv422(yuv422) => yuv422.weigh(row, run),
-            Threshold::Mono(mono) => mono.weigh(row, run),
+            Threshold::Mono(_) => self.weigh_mono(row, run),
         }
     }
 }
@@ -116,6 +137,11 @@ impl Pixels for Yuv422 {
     }
 }
 
+/// The weight of a pixel of a luma.
+fn weight_of(mono: &Mono, luma: u8) -> u8 {
+    weight_inside(5 * depth(mono, luma))
+}
+
 /// How far a luma lies inside the nearer limit, in levels; below 0 outside.
 fn depth(mono: &Mono, luma: u8) -> i16 {
     let luma = i16::from(luma);
@@ -147,8 +173,7 @@ impl Pixels for Mono {
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         let pair = row.get(usize::from(column / 2));
         pair.map_or(0, |pair| {
-            let luma = pair.to_le_bytes()[usize::from(column % 2)];
-            weight_inside(5 * depth(self, luma))
+            weight_of(self, pair.to_le_bytes()[usize::from(column % 2)])
         })
     }
 }
@@ -156,6 +181,7 @@ impl Pixels for Mono {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tables::ByteTable;
     use proptest::prelude::*;
     use std::{vec, vec::Vec};
 
@@ -195,6 +221,25 @@ mod tests {
                 prop_assert_eq!(found, (low..=high).contains(&luma));
                 prop_assert_eq!(found, mono.weight(&row, x as u16) >= 64);
             }
+        }
+    }
+
+    proptest! {
+        /// Through the table of weights a run is weighed as pixel by pixel, also where it ends
+        /// beyond the row.
+        #[test]
+        fn mono_runs_are_weighed_as_their_pixels(
+            row in prop::collection::vec(any::<u16>(), 1..=400),
+            low in any::<u8>(),
+            high in any::<u8>(),
+            a in 0..800_u16,
+            b in 0..800_u16,
+        ) {
+            let mono = Mono { low: low.min(high), high: low.max(high) };
+            let mut formats = Formats::<ByteTable>::CLOSED;
+            formats.set(&Threshold::Mono(mono), ByteOrder::Native).unwrap();
+            let run = Run { x0: a.min(b), x1: a.max(b) };
+            prop_assert_eq!(formats.weigh(&row, run), mono.weigh(&row, run));
         }
     }
 

@@ -8,10 +8,13 @@
 #[allow(unsafe_code)]
 mod cortex_m7;
 #[cfg(armv7em)]
-pub use cortex_m7::{any_set, dilate_edges, weigh_bytes};
+pub use cortex_m7::{any_set, dilate_edges, weigh_bytes, weigh_luma};
 mod portable;
 #[cfg(not(armv7em))]
-pub use {crate::mask::any_set, portable::weigh_bytes};
+pub use {
+    crate::mask::any_set,
+    portable::{weigh_bytes, weigh_luma},
+};
 
 /// The mask of a row of pixels through a table of bytes: see `portable::threshold_bytes`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {

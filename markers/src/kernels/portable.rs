@@ -1,5 +1,8 @@
 //! The definition of every kernel, in portable Rust.
 
+#[cfg(not(armv7em))]
+use core::ops::Range;
+
 /// The mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w + i.
 /// `mask` has ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], first: usize) {
@@ -20,6 +23,22 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], firs
 #[cfg(not(armv7em))]
 pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
     let weights = run.iter().rev().map(|raw| table[usize::from(*raw)] >> 1);
+    weights.fold([0, 0], |[sum, sums], weight| {
+        let sum = sum + u32::from(weight);
+        [sum, sums + sum]
+    })
+}
+
+/// Of the weights that `table` has for the pixels of a run of a mono row, two in a `u16`: their
+/// sum, and the sum of all sums so far, as [`weigh_bytes`] has it. The run is `columns`; one that
+/// does not lie in the row has none.
+#[cfg(not(armv7em))]
+pub fn weigh_luma(table: &[u8; 256], row: &[u16], columns: Range<usize>) -> [u32; 2] {
+    if columns.end > 2 * row.len() {
+        return [0; 2];
+    }
+    let luma = |column: usize| row[column / 2].to_le_bytes()[column % 2];
+    let weights = columns.rev().map(|column| table[usize::from(luma(column))]);
     weights.fold([0, 0], |[sum, sums], weight| {
         let sum = sum + u32::from(weight);
         [sum, sums + sum]
