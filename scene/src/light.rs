@@ -27,6 +27,13 @@ const BLUE_COLOUR: [f64; 3] = [30.0, 75.0, 120.0];
 const FALLOFF_ANGLE_DEG: f64 = 75.0;
 
 impl Paint {
+    /// Its level to a camera of [`Format::Mono`](crate::Format::Mono) with these weights, in the
+    /// nominal light.
+    pub fn level(self, mono: [f64; 3]) -> f64 {
+        let colour = self.colour();
+        mono.iter().zip(colour).map(|(w, c)| w * c).sum()
+    }
+
     fn colour(self) -> [f64; 3] {
         match self {
             Paint::Red => RED_COLOUR,

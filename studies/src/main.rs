@@ -8,6 +8,7 @@ mod coverage;
 mod document;
 mod large;
 mod maps;
+mod mono;
 mod page;
 mod paper;
 mod peers;
@@ -45,6 +46,9 @@ enum Command {
     Coverage(coverage::Coverage),
     /// Make a model for frames of 800×600, and hold its errors against the Cramér–Rao bound.
     Large(large::Large),
+    /// Render black, red and blue markers under a camera that sees no colours, in white and in cyan
+    /// light, and find how many rows they reach.
+    Mono(mono::MonoStudy),
     /// Train the paper's network with the place as two more outputs, and judge it beside ours.
     Paper(paper::Paper),
     /// Compare with the paper's own pipeline (OpenCV, a float network 3×512) on the same rendered
@@ -77,6 +81,7 @@ fn main() -> Result<()> {
         Command::Convergence(study) => study.run(),
         Command::Coverage(study) => study.run(),
         Command::Large(study) => study.run(),
+        Command::Mono(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Peers(study) => study.run(),
         Command::Scene(command) => command.run(),

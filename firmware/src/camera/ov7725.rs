@@ -9,8 +9,8 @@ use crate::shared::EXPOSURE_MIDDLE_US;
 use core::sync::atomic::Ordering;
 use embassy_stm32::i2c;
 use embassy_time::{Duration, Instant, Timer};
-use hivtac_terms::geometry::Preset;
 use hivtac_sensing::motion::Motion;
+use hivtac_terms::geometry::Preset;
 
 /// What it says it is.
 pub const IDENTITY: Identity = identity::OV7725;
