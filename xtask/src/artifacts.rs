@@ -99,8 +99,8 @@ pub fn rig() -> Result<PathBuf> {
     build(command.args(["--bin", "hivtac-rig"]), "hivtac-rig")
 }
 
-/// Runs a workspace's tests past those that fail: in the profile in which the programs that they run
-/// are built, so that dependencies are built once.
+/// Runs a workspace's tests past those that fail: in the profile of the programs that they run, so
+/// that dependencies are built once.
 pub fn test(workspace: &Path) -> Command {
     let mut command = cargo("test", workspace);
     command.args(["--profile", TOOLS, "--no-fail-fast"]);
