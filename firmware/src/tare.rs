@@ -1,11 +1,13 @@
 //! A tare under way: which command it answers, what it has, and when it gives up.
 
 use crate::camera::FRAME_TIME;
+use crate::pipeline_task::Sensor;
 use crate::session;
 use embassy_time::{Duration, Instant};
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::rest::Rest;
-use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::tare::{Refusal, TareBuilder};
+use hivtac_wire::message::Outcome;
 
 /// Every second frame may be bad, and a camera may need some time to come back.
 const FRAME_TIMES_EACH: u32 = 2;
@@ -46,10 +48,27 @@ impl Taring {
         self.deadline
     }
 
-    /// Takes a frame if it shows the markers; gives the rest position once there were enough.
-    pub fn add(&mut self, measurement: &Measurement) -> Option<Rest> {
-        let markers = measurement.markers.as_ref()?;
-        let features = measurement.features.as_ref()?;
-        self.builder.add(markers, features)
+    /// Takes the frame that was measured; gives the rest position once there were enough good ones,
+    /// or why there is none.
+    pub fn add(
+        &mut self,
+        sensor: &Sensor,
+        measurement: &Measurement,
+    ) -> Option<Result<Rest, Outcome>> {
+        let outcome = sensor.tare_with(&mut self.builder, measurement)?;
+        Some(outcome.map_err(|refusal| match refusal {
+            Refusal::MarkersImplausible => Outcome::MarkersImplausible,
+            Refusal::Unsteady => Outcome::Unsteady,
+            Refusal::NotAtRest => Outcome::NotAtRest,
+        }))
+    }
+
+    /// Why there were not enough good frames in time.
+    pub fn given_up(&self) -> Outcome {
+        if self.builder.saw_implausible() {
+            Outcome::MarkersImplausible
+        } else {
+            Outcome::NoGoodFrames
+        }
     }
 }

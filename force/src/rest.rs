@@ -19,6 +19,14 @@ pub struct Rest {
 }
 
 impl Rest {
+    /// Of these markers.
+    pub fn of_markers(markers: &[Marker; 4]) -> Rest {
+        Rest {
+            features: Features::of_markers(markers),
+            areas: markers.map(|marker| marker.area),
+        }
+    }
+
     /// Its markers 0–3.
     pub fn markers(&self) -> [Marker; 4] {
         core::array::from_fn(|identity| {

@@ -250,6 +250,13 @@ fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
             "the markers are not where a film at rest has them; take away what touches it, and \
              check the film's distance"
         }
+        Outcome::MarkersImplausible => {
+            "the images at rest are not those of four whole, equal markers: one may be covered, \
+             cut, stained or glare; look at the film and its light, and clean it"
+        }
+        Outcome::Unsteady => {
+            "the markers moved meanwhile; take away what touches or shakes the film"
+        }
         Outcome::NoGoodFrames => {
             "not enough good frames came in time; does the camera see all four markers? (hivtac \
              monitor)"

@@ -182,7 +182,12 @@ pub fn rest_of(picture: &Picture, sensor: &mut Sensor<'_>) -> Rest {
     let seen = picture.feed(sensor);
     let mut builder = TareBuilder::new(1).unwrap();
     builder
-        .add(&seen.markers.unwrap(), &seen.features.unwrap())
+        .add(
+            &seen.markers.unwrap(),
+            &seen.features.unwrap(),
+            &sensor.settings().geometry,
+        )
+        .unwrap()
         .unwrap()
 }
 

@@ -1,11 +1,38 @@
 //! Tare: the rest position of this unit, measured as the mean of good frames.
+//!
+//! Every force is measured against it, so a rest position that is wrong makes all forces wrong and
+//! none of them look so. It is refused unless
+//!
+//! 1. the images are those of whole markers ([`Sensor::tare_with`](crate::pipeline::Sensor)): a
+//!    film at rest is flat, so that optics says what four equal discs look like;
+//! 2. nothing moves: the frames scatter no more than noise does;
+//! 3. the markers are as far from their centre as a film at rest shows them ([`Rest::fits`]).
 
 use hivtac_force::features::{FEATURES, Features};
 use hivtac_force::rest::Rest;
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 
 /// Most frames in a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
+
+/// Largest standard deviation of a marker's coordinate over the frames: 0.25 px, in px with 8
+/// fractional bits.
+const LARGEST_SCATTER: i64 = 64;
+/// What moved farther from where it was first is not steady, however far: 32 px.
+const FAR: i64 = 32 << 8;
+
+/// Why there is no rest position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Refusal {
+    /// As many frames as were wanted show markers that are cut, grown, stained or unlike each
+    /// other.
+    MarkersImplausible,
+    /// The markers moved from frame to frame.
+    Unsteady,
+    /// The markers are nearer to or farther from their centre than a film at rest shows them.
+    NotAtRest,
+}
 
 /// Sums up good frames until there are enough. All sums are exact; each mean is rounded once, half
 /// up.
@@ -13,8 +40,14 @@ pub const MAX_FRAMES: u16 = 256;
 pub struct TareBuilder {
     wanted: u16,
     taken: u16,
+    implausible: u16,
     features: [i64; FEATURES],
     areas: [u64; 4],
+    /// Coordinates of the first frame, px with 8 fractional bits; sums of what the others differ
+    /// by, and of its squares.
+    first: [i64; 8],
+    differences: [i64; 8],
+    squares: [i64; 8],
 }
 
 impl TareBuilder {
@@ -24,25 +57,35 @@ impl TareBuilder {
         let empty = TareBuilder {
             wanted,
             taken: 0,
+            implausible: 0,
             features: [0; FEATURES],
             areas: [0; 4],
+            first: [0; 8],
+            differences: [0; 8],
+            squares: [0; 8],
         };
         (1..=MAX_FRAMES).contains(&frames).then_some(empty)
     }
 
-    /// Takes the markers and features of a good frame. Gives the rest position once there were
-    /// enough, and from then on the same again.
-    pub fn add(&mut self, markers: &[Marker; 4], features: &Features) -> Option<Rest> {
+    /// Takes the markers and features of a good frame. Gives the rest position of frames of this
+    /// geometry once there were enough, or why it is refused, and from then on the same again.
+    pub fn add(
+        &mut self,
+        markers: &[Marker; 4],
+        features: &Features,
+        geometry: &Geometry,
+    ) -> Option<Result<Rest, Refusal>> {
         if self.taken < self.wanted {
-            self.taken += 1;
-            for (sum, feature) in self.features.iter_mut().zip(features.to_array()) {
-                *sum += feature;
-            }
-            for (sum, marker) in self.areas.iter_mut().zip(markers) {
-                *sum += u64::from(marker.area);
-            }
+            self.take(markers, features);
         }
-        (self.taken == self.wanted).then(|| self.mean())
+        (self.taken == self.wanted).then(|| self.judge(geometry))
+    }
+
+    /// Takes notice of a frame whose images are not those of whole markers. Says so once there were
+    /// as many as good ones are wanted.
+    pub fn add_implausible(&mut self) -> Option<Refusal> {
+        self.implausible = self.implausible.saturating_add(1);
+        (self.implausible >= self.wanted).then_some(Refusal::MarkersImplausible)
     }
 
     /// How many good frames are still wanted.
@@ -50,9 +93,58 @@ impl TareBuilder {
         self.wanted - self.taken
     }
 
+    /// Whether a frame's images were not those of whole markers.
+    pub fn saw_implausible(&self) -> bool {
+        self.implausible > 0
+    }
+
+    fn take(&mut self, markers: &[Marker; 4], features: &Features) {
+        let numbers = features.to_array();
+        for (sum, feature) in self.features.iter_mut().zip(numbers) {
+            *sum += feature;
+        }
+        for (sum, marker) in self.areas.iter_mut().zip(markers) {
+            *sum += u64::from(marker.area);
+        }
+        let sums = self.differences.iter_mut().zip(&mut self.squares);
+        for ((first, feature), (sum, square)) in self.first.iter_mut().zip(numbers).zip(sums) {
+            let coordinate = feature >> 8;
+            if self.taken == 0 {
+                *first = coordinate;
+            }
+            let difference = (coordinate - *first).clamp(-FAR, FAR);
+            *sum += difference;
+            *square += difference * difference;
+        }
+        self.taken += 1;
+    }
+
+    fn judge(&self, geometry: &Geometry) -> Result<Rest, Refusal> {
+        let rest = self.mean();
+        if !self.is_steady() {
+            Err(Refusal::Unsteady)
+        } else if !rest.fits(geometry) {
+            Err(Refusal::NotAtRest)
+        } else {
+            Ok(rest)
+        }
+    }
+
+    /// Whether no coordinate's variance, ΣΔ²/n − (ΣΔ/n)², is too large. All terms are below 2⁴².
+    fn is_steady(&self) -> bool {
+        let frames = i64::from(self.taken);
+        let mut sums = self.differences.iter().zip(&self.squares);
+        sums.all(|(sum, square)| square * frames - sum * sum <= (frames * LARGEST_SCATTER).pow(2))
+    }
+
     fn mean(&self) -> Rest {
         let frames = i64::from(self.taken);
-        let mean = |sum: i64| (2 * sum + frames).div_euclid(2 * frames);
+        // Of no frames there is no mean.
+        let mean = |sum: i64| {
+            (2 * sum + frames)
+                .checked_div_euclid(2 * frames)
+                .unwrap_or(0)
+        };
         Rest {
             features: Features::from_array(self.features.map(mean)),
             areas: self.areas.map(|sum| mean(sum as i64) as u32),
@@ -63,16 +155,37 @@ impl TareBuilder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::geometry::Preset;
     use hivtac_terms::units::Px;
 
-    fn frame(x: i32, area: u32) -> ([Marker; 4], Features) {
-        let at = |x, y| Marker {
-            x: Px(x),
-            y: Px(y),
+    const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
+
+    /// Markers of a film at rest, moved to the right by 1/65,536 px.
+    fn frame(right: i32, area: u32) -> ([Marker; 4], Features) {
+        let half = (f64::from(GEOMETRY.rest_distance().0) / 2.0_f64.sqrt()) as i32;
+        let at = |x: i32, y: i32| Marker {
+            x: Px((160 << 16) + x * half + right),
+            y: Px((120 << 16) + y * half),
             area,
         };
-        let markers = [at(x, 0), at(x + 50, 1), at(x + 51, 40), at(x, 41)];
+        let markers = [at(-1, -1), at(1, -1), at(1, 1), at(-1, 1)];
         (markers, Features::of_markers(&markers))
+    }
+
+    /// What a tare makes of frames that are so far to the right of the first one, 1/65,536 px.
+    fn tare_of(frames: impl Iterator<Item = i32> + Clone) -> Result<Rest, Refusal> {
+        let mut builder = TareBuilder::new(frames.clone().count() as u16).unwrap();
+        let mut outcome = None;
+        for right in frames {
+            assert_eq!(outcome, None);
+            let (markers, features) = frame(right, 100);
+            outcome = builder.add(&markers, &features, &GEOMETRY);
+        }
+        outcome.unwrap()
+    }
+
+    fn left_of(rest: &Rest) -> i32 {
+        rest.features.centroids[0].0.0 - frame(0, 1).0[0].x.0
     }
 
     #[test]
@@ -80,15 +193,15 @@ mod tests {
         let mut builder = TareBuilder::new(3).unwrap();
         for (x, area, remaining) in [(10, 100, 2), (10, 101, 1)] {
             let (markers, features) = frame(x, area);
-            assert_eq!(builder.add(&markers, &features), None);
+            assert_eq!(builder.add(&markers, &features, &GEOMETRY), None);
             assert_eq!(builder.remaining(), remaining);
         }
         let (markers, features) = frame(12, 101);
-        let rest = builder.add(&markers, &features).unwrap();
-        assert_eq!(rest.features.centroids[0], (Px(11), Px(0)), "32/3 = 10.67");
-        assert_eq!(rest.areas, [101; 4], "302/3 = 100.67");
+        let rest = builder.add(&markers, &features, &GEOMETRY).unwrap();
+        assert_eq!(left_of(&rest.unwrap()), 11, "32/3 = 10.67");
+        assert_eq!(rest.unwrap().areas, [101; 4], "302/3 = 100.67");
         assert_eq!(
-            builder.add(&markers, &features),
+            builder.add(&markers, &features, &GEOMETRY),
             Some(rest),
             "more frames change nothing"
         );
@@ -97,12 +210,8 @@ mod tests {
     #[test]
     fn halves_round_up_on_both_sides_of_zero() {
         for (first, second, mean) in [(1, 2, 2), (-1, -2, -1), (-1, 0, 0)] {
-            let mut builder = TareBuilder::new(2).unwrap();
-            let (markers, features) = frame(first, 5);
-            builder.add(&markers, &features);
-            let (markers, features) = frame(second, 5);
-            let rest = builder.add(&markers, &features).unwrap();
-            assert_eq!(rest.features.centroids[0].0, Px(mean));
+            let rest = tare_of([first, second].into_iter()).unwrap();
+            assert_eq!(left_of(&rest), mean);
         }
     }
 
@@ -111,7 +220,8 @@ mod tests {
         let (markers, features) = frame(123_456, 7);
         let rest = TareBuilder::new(1)
             .unwrap()
-            .add(&markers, &features)
+            .add(&markers, &features, &GEOMETRY)
+            .unwrap()
             .unwrap();
         assert_eq!((rest.features, rest.areas), (features, [7; 4]));
     }
@@ -121,6 +231,42 @@ mod tests {
         assert!(TareBuilder::new(0).is_none());
         assert!(TareBuilder::new(MAX_FRAMES + 1).is_none());
         assert!(TareBuilder::new(MAX_FRAMES).is_some());
+    }
+
+    /// A square wave's standard deviation is half of what it jumps.
+    #[test]
+    fn markers_that_move_are_refused_whether_they_jump_or_drift() {
+        let jumping = |px: f64| (0..64).map(move |i| (px * 65_536.0) as i32 * (i % 2));
+        assert!(tare_of(jumping(0.49)).is_ok());
+        assert_eq!(tare_of(jumping(0.51)), Err(Refusal::Unsteady));
+        assert_eq!(tare_of(jumping(400.0)), Err(Refusal::Unsteady));
+        let drifting = (0..256).map(|i| i * 260);
+        assert_eq!(tare_of(drifting), Err(Refusal::Unsteady), "1 px in all");
+    }
+
+    #[test]
+    fn a_pressed_film_is_not_at_rest() {
+        let (markers, _) = frame(0, 100);
+        let pressed = markers.map(|marker| Marker {
+            x: Px((marker.x.0 - (160 << 16)) / 5 * 6 + (160 << 16)),
+            y: Px((marker.y.0 - (120 << 16)) / 5 * 6 + (120 << 16)),
+            ..marker
+        });
+        let features = Features::of_markers(&pressed);
+        let mut builder = TareBuilder::new(1).unwrap();
+        let refused = builder.add(&pressed, &features, &GEOMETRY);
+        assert_eq!(refused, Some(Err(Refusal::NotAtRest)));
+    }
+
+    #[test]
+    fn as_many_implausible_frames_as_good_ones_are_wanted_end_it() {
+        let mut builder = TareBuilder::new(3).unwrap();
+        assert!(!builder.saw_implausible());
+        assert_eq!(builder.add_implausible(), None);
+        assert_eq!(builder.add_implausible(), None);
+        assert!(builder.saw_implausible());
+        let refused = builder.add_implausible();
+        assert_eq!(refused, Some(Refusal::MarkersImplausible));
     }
 
     #[test]
@@ -136,9 +282,13 @@ mod tests {
             area: u32::MAX,
         }; 4];
         let mut builder = TareBuilder::new(MAX_FRAMES).unwrap();
-        let rest = (0..MAX_FRAMES)
-            .find_map(|_| builder.add(&markers, &largest))
-            .unwrap();
+        (0..MAX_FRAMES).for_each(|_| builder.take(&markers, &largest));
+        let rest = builder.mean();
         assert_eq!((rest.features, rest.areas), (largest, [u32::MAX; 4]));
+        let mut builder = TareBuilder::new(MAX_FRAMES).unwrap();
+        let least = Features::from_array([i64::from(i32::MIN); FEATURES]);
+        builder.take(&markers, &least);
+        (1..MAX_FRAMES).for_each(|_| builder.take(&markers, &largest));
+        assert!(!builder.is_steady());
     }
 }

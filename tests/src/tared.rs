@@ -10,7 +10,7 @@ use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{self, Geometry};
 use hivtac_terms::status::Status;
@@ -223,15 +223,29 @@ impl TaredSensor {
 
     /// Where the markers of a scene rest.
     fn rest(&mut self, scene: &Scene) -> Result<Rest> {
-        let mut builder = TareBuilder::new(TARE_FRAMES).context("a number of frames")?;
-        let mut rest = None;
-        for number in 0..u64::from(TARE_FRAMES) {
-            let seen = self.sense(&scene.render_load(&Load::REST, number)?);
-            let markers = seen.markers.context("no markers at rest")?;
-            let features = seen.features.context("no features at rest")?;
-            rest = builder.add(&markers, &features);
+        let frames = (0..).map_while(|number| scene.render_load(&Load::REST, number).ok());
+        let rest = self.tare(TARE_FRAMES, frames)?;
+        rest.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))
+    }
+
+    /// Tares on frames, of which so many are to be good, and keeps the rest position.
+    ///
+    /// # Errors
+    /// When the frames end before there is an outcome.
+    pub fn tare(
+        &mut self,
+        wanted: u16,
+        frames: impl IntoIterator<Item = Frame>,
+    ) -> Result<Result<Rest, Refusal>> {
+        let mut tare = TareBuilder::new(wanted).context("a number of frames")?;
+        for frame in frames {
+            let measurement = self.sense(&frame);
+            if let Some(outcome) = self.sensor.tare_with(&mut tare, &measurement) {
+                self.sensor.set_tare(outcome.ok());
+                return Ok(outcome);
+            }
         }
-        rest.context("too few frames at rest")
+        Err(anyhow!("too few frames that show markers"))
     }
 
     /// The whole pipeline on a frame.

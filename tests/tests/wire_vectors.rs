@@ -199,6 +199,11 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
             reply(u16::MAX, Outcome::NoGoodFrames),
         ),
         ("reply-unsupported", reply(200, Outcome::Unsupported)),
+        (
+            "reply-markers-implausible",
+            reply(7, Outcome::MarkersImplausible),
+        ),
+        ("reply-unsteady", reply(7, Outcome::Unsteady)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()

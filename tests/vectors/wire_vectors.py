@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x5F4B9EBDD0ABA1AE
+SCHEMA = 0x7E5CDB39F688069B
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -197,6 +197,12 @@ DEVICE = {
         raw("outcome: NoGoodFrames", [3]),
     ],
     "reply-unsupported": [raw("Reply", [4]), unsigned("id", 200), raw("outcome: Unsupported", [5])],
+    "reply-markers-implausible": [
+        raw("Reply", [4]),
+        unsigned("id", 7),
+        raw("outcome: MarkersImplausible", [6]),
+    ],
+    "reply-unsteady": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Unsteady", [7])],
 }
 
 HOST = {

@@ -294,6 +294,8 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::Busy),
         Just(Outcome::NoGoodFrames),
         Just(Outcome::NotAtRest),
+        Just(Outcome::MarkersImplausible),
+        Just(Outcome::Unsteady),
         Just(Outcome::Unsupported),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })

@@ -219,4 +219,9 @@ pub enum Outcome {
     NotAtRest,
     /// Refused: this device's camera does not send that pixel format.
     Unsupported,
+    /// Refused: the images at rest are not those of four whole, equal markers. One is covered, cut,
+    /// grown, stained or glares.
+    MarkersImplausible,
+    /// Refused: the markers moved from frame to frame.
+    Unsteady,
 }

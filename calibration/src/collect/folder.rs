@@ -82,10 +82,7 @@ impl Folder {
             sample.frame,
             sample.sequence,
             pair(pose.map(|pose| pose.angles_deg)),
-            match &sample.markers {
-                Some(_) => String::new(),
-                None => reasons(sample.status),
-            }
+            reasons(sample)
         );
         match &sample.markers {
             Some(markers) => markers.iter().for_each(|m| {
@@ -143,13 +140,16 @@ fn pair(numbers: Option<[f64; 2]>) -> String {
     numbers.map_or(",".to_owned(), |[a, b]| format!("{a},{b}"))
 }
 
-/// The names of the bits that forbid a force; a missing or another model says nothing about the
-/// markers.
-fn reasons(status: Status) -> String {
-    let markers =
-        Status(Status::NO_FORCE.0 & !(Status::MODEL_MISSING | Status::MODEL_MISMATCH).0 & status.0);
-    let names: Vec<_> = markers.names().collect();
-    if names.is_empty() {
+/// What the model in use says: nothing about the markers.
+const OF_THE_MODEL: Status =
+    Status(Status::MODEL_MISSING.0 | Status::MODEL_MISMATCH.0 | Status::UNEXPLAINED.0);
+
+/// The names of the bits that forbid a force for what the frame shows: those of a frame without
+/// markers, or of one whose markers are implausible.
+fn reasons(sample: &Sample) -> String {
+    let frame = Status(Status::NO_FORCE.0 & !OF_THE_MODEL.0 & sample.status.0);
+    let names: Vec<_> = frame.names().collect();
+    if names.is_empty() && sample.markers.is_none() {
         // A sensor that sends no markers although they were found would be a bug of its firmware.
         return "markers_not_sent".to_owned();
     }
@@ -250,7 +250,7 @@ pub struct Kept {
     /// The pose, or nothing for the untouched film.
     pub pose: Option<Pose>,
     /// The markers' (x, y) in 1/65,536 px and area in px, or the status names that say why there
-    /// are none.
+    /// are none, or none to trust.
     pub seen: Result<[[i64; 3]; 4], String>,
 }
 
@@ -395,7 +395,7 @@ mod tests {
             frame,
             time_us: u64::from(frame) * 25_600,
             status: if found {
-                Status::MODEL_MISMATCH
+                Status::MODEL_MISMATCH | Status::UNEXPLAINED
             } else {
                 Status::MARKERS_MISSING | Status::TARE_MISSING
             },
@@ -445,6 +445,19 @@ mod tests {
         assert_eq!(recording.samples[1].pose, Some(tilted()));
         assert_eq!(recording.samples[1].seen, Err("markers_missing".into()));
         assert_eq!(recording.gauge_lines, [(0, 0.55, "+0.1\u{fffd}2,N".into())]);
+    }
+
+    #[test]
+    fn implausible_markers_are_kept_and_not_used() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut folder = Folder::open(directory.path(), &conditions()).unwrap();
+        let mut covered = sample(1, true);
+        covered.status |= Status::MARKERS_IMPLAUSIBLE;
+        folder.sample(0.5, None, &covered).unwrap();
+        let recording = Recording::read(directory.path()).unwrap();
+        assert_eq!(recording.samples[0].seen, Err("markers_implausible".into()));
+        let text = fs::read_to_string(directory.path().join(SAMPLES)).unwrap();
+        assert!(text.contains(",131072,-2,190,"), "{text}");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
+use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 
 use super::folder::{Folder, conditions_of};
@@ -49,6 +50,10 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// Fewer frames of the untouched film are no rest position.
 const FEWEST_AT_REST: usize = 8;
+
+/// Frames of the sensor's own rest position, and what they may take beyond its usual patience.
+const TARE_FRAMES: u16 = 64;
+const TARE_PATIENCE: Duration = Duration::from_secs(30);
 
 /// Records until the list is done, the person says so, or Ctrl-C.
 ///
@@ -108,6 +113,7 @@ impl Recorder {
         if self.person.ask(question)?.is_none() {
             bail!("standard input has ended: nothing was recorded");
         }
+        self.tare()?;
         let rest = self.take(None, args.rest_seconds)?;
         ensure!(
             rest.good >= FEWEST_AT_REST,
@@ -123,6 +129,17 @@ impl Recorder {
         while let Some(pose) = self.next_pose(left.as_mut())? {
             self.take(Some(pose), args.seconds)?;
         }
+        Ok(())
+    }
+
+    /// Has the sensor take its rest position: it refuses bad markers, and what it then says of
+    /// markers under a force is against their own places.
+    fn tare(&mut self) -> Result<()> {
+        let request = Request::Tare {
+            frames: TARE_FRAMES,
+        };
+        self.link
+            .request(request, self.patience + TARE_PATIENCE, |_| ())?;
         Ok(())
     }
 
@@ -229,7 +246,8 @@ impl Recorder {
 impl Take {
     fn count(&mut self, sample: &Sample) {
         self.samples += 1;
-        self.good += usize::from(sample.markers.is_some());
+        let implausible = Status::MARKERS_IMPLAUSIBLE;
+        self.good += usize::from(sample.markers.is_some() && !sample.status.contains(implausible));
         self.first_us.get_or_insert(sample.time_us);
         self.last_us = sample.time_us;
         if let Some(last) = self.last_sequence.replace(sample.sequence) {

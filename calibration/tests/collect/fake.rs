@@ -76,22 +76,28 @@ pub type Clock = Box<dyn FnMut() -> f64 + Send>;
 pub struct FakeSensor {
     pub port: String,
     pub pose: Arc<Mutex<[f64; 2]>>,
+    /// What a tare is answered with.
+    pub tare: Arc<Mutex<Outcome>>,
 }
 
 impl FakeSensor {
-    /// Every seventh frame misses a marker. `after` frames of a conversation it is gone.
+    /// Every seventh frame misses a marker, and in every eleventh one is half covered. `after`
+    /// frames of a conversation it is gone.
     pub fn start(mut clock: Clock, after: usize) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp:{}", listener.local_addr().unwrap());
         let pose = Arc::new(Mutex::new([0.0; 2]));
         let set = pose.clone();
+        let tare = Arc::new(Mutex::new(Outcome::Done));
+        let answered = tare.clone();
         std::thread::spawn(move || {
             let mut frame = 0;
             while let Ok((stream, _)) = listener.accept() {
-                talk(stream, &mut clock, &set, &mut frame, after);
+                let outcome = *answered.lock().unwrap();
+                talk(stream, &mut clock, &set, outcome, &mut frame, after);
             }
         });
-        Self { port, pose }
+        Self { port, pose, tare }
     }
 }
 
@@ -99,6 +105,7 @@ fn talk(
     mut stream: TcpStream,
     clock: &mut Clock,
     pose: &Mutex<[f64; 2]>,
+    tare: Outcome,
     frame: &mut u32,
     after: usize,
 ) {
@@ -117,7 +124,7 @@ fn talk(
                     let Received::Message(message) = message else {
                         return;
                     };
-                    answer(&mut stream, message, &mut streaming);
+                    answer(&mut stream, message, tare, &mut streaming);
                 }
             }
             Err(_) if !streaming => continue,
@@ -137,16 +144,17 @@ fn talk(
     }
 }
 
-fn answer(stream: &mut TcpStream, message: HostMessage, streaming: &mut bool) {
+fn answer(stream: &mut TcpStream, message: HostMessage, tare: Outcome, streaming: &mut bool) {
     match message {
         HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello())),
         HostMessage::Command(hivtac_wire::message::Command { id, request }) => {
+            let mut outcome = Outcome::Done;
             match request {
+                Request::Tare { .. } => outcome = tare,
                 Request::StartWithMarkers => *streaming = true,
                 Request::Stop => *streaming = false,
                 other => panic!("{other:?} was not expected"),
             }
-            let outcome = Outcome::Done;
             send(stream, &DeviceMessage::Reply(Reply { id, outcome }));
         }
     }
@@ -154,17 +162,22 @@ fn answer(stream: &mut TcpStream, message: HostMessage, streaming: &mut bool) {
 
 fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
     let found = !frame.is_multiple_of(7);
+    let covered = frame.is_multiple_of(11);
+    let mut seen = markers(force_n(press_n(time_s), pose));
+    if covered {
+        seen[2].x.0 -= 5 << 16;
+    }
     Sample {
         sequence: frame,
         frame,
         time_us: (time_s * 1e6) as u64,
-        status: if found {
-            Status::MODEL_MISSING
-        } else {
-            Status::MARKERS_MISSING
+        status: match (found, covered) {
+            (false, _) => Status::MARKERS_MISSING,
+            (true, true) => Status::MODEL_MISSING | Status::MARKERS_IMPLAUSIBLE,
+            (true, false) => Status::MODEL_MISSING,
         },
         force: None,
-        markers: found.then(|| markers(force_n(press_n(time_s), pose))),
+        markers: found.then_some(seen),
     }
 }
 

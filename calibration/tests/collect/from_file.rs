@@ -5,6 +5,8 @@ use std::path::Path;
 use hivtac_calibration::collect::simulated::SimulatedGauge;
 use hivtac_calibration::dataset::{Dataset, Loads};
 
+use hivtac_wire::message::Outcome;
+
 use crate::fake::*;
 
 /// 100 frames a second, whatever the computer does.
@@ -49,6 +51,19 @@ fn record<'a>(port: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&common[..], more].concat()
 }
 
+/// The rest position of a unit decides about every force of it.
+#[test]
+fn a_film_that_cannot_be_tared_is_not_recorded() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let sensor = FakeSensor::start(clock(), usize::MAX);
+    *sensor.tare.lock().unwrap() = Outcome::MarkersImplausible;
+    let (output, said) = run(here, &record(&sensor.port, &[]), "\n0, 0\n");
+    assert!(!output.status.success(), "{said}");
+    let why = "not those of four whole, equal markers";
+    assert!(said.contains(why) && !said.contains("samples ("), "{said}");
+}
+
 #[test]
 fn from_a_recording_to_a_model_for_the_unit() {
     let directory = tempfile::tempdir().unwrap();
@@ -78,6 +93,7 @@ fn from_a_recording_to_a_model_for_the_unit() {
     for words in [
         "ahead",
         "rejected by the sensor and kept: markers_missing",
+        "rejected by the sensor and kept: markers_implausible",
         "gauge at rest -4.0",
         "gauge lines were not used (no reading",
     ] {

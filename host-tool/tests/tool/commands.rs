@@ -214,6 +214,17 @@ fn a_tare_is_taken_refused_or_not_answered() {
         "hivtac: the device refused \"tare\": the markers are not where a film at rest has them; \
          take away what touches it, and check the film's distance\n"
     );
+    for (outcome, why) in [
+        (
+            Outcome::MarkersImplausible,
+            "not those of four whole, equal markers",
+        ),
+        (Outcome::Unsteady, "the markers moved meanwhile; take away"),
+    ] {
+        let refused = run(&["tare", "--port", &device(Some(outcome)).port]);
+        assert_eq!(refused.code, Some(6));
+        assert!(refused.stderr.contains(why), "{}", refused.stderr);
+    }
     let mute = run(&["tare", "--frames", "1", "--port", &device(None).port]);
     assert_eq!(mute.code, Some(6));
     assert_eq!(

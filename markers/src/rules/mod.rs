@@ -15,6 +15,10 @@
 //!    skewed, how alike their colours are, and how many of its pixels passed the threshold
 //!    themselves, bounds what may be cut off, grown, hidden or holed.
 //!
+//! A rest position has none to be compared with. What shall become one ([`Found::may_rest`]) is
+//! judged by 4 against itself, and by how alike the four are: they are punched alike, and a film at
+//! rest is flat.
+//!
 //! Exactly one set of four must pass 1 to 3; two are ambiguous, however different.
 //!
 //! What stays unseen at QVGA (`tests/tests/markers.rs` and `tests/tests/hard_cases.rs` assert it on
@@ -63,6 +67,14 @@ pub struct Found {
 }
 
 impl Found {
+    /// Whether these are the images of four whole markers on a film at rest, by themselves: against
+    /// the rest position that they would be.
+    pub fn may_rest(&self, settings: &Settings) -> bool {
+        let trust = Trust::new(settings, &self.markers, true, Reading::UNTOUCHED);
+        let areas = self.markers.map(|marker| marker.area);
+        trust.judge(self) == Status::OK && trust::are_equal(&settings.geometry, areas)
+    }
+
     /// The same images, whose markers make the pattern that they make elsewhere: little farther
     /// than they are wide.
     pub fn moved_to(&self, markers: [Marker; 4]) -> Found {
@@ -160,7 +172,11 @@ impl Finder {
         let mut found = None;
         let mut reason = Status::MARKERS_AMBIGUOUS;
         for set in sets_of_four(candidates.len()) {
-            match self.examine(set.map(|index| &candidates[index])) {
+            let [Some(a), Some(b), Some(c), Some(d)] = set.map(|index| candidates.get(index))
+            else {
+                continue;
+            };
+            match self.examine([a, b, c, d]) {
                 Ok(_) if found.is_some() => return Err(Status::MARKERS_AMBIGUOUS),
                 Ok(set) => found = Some(set),
                 Err(why) if why == Status::MARKERS_IMPLAUSIBLE => reason = why,

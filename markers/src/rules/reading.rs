@@ -121,6 +121,9 @@ const ANYWHERE: Reading = Reading {
 };
 
 impl Reading {
+    /// Of a film that nothing touches.
+    pub const UNTOUCHED: Reading = FORCE;
+
     /// The limits of a reading, or of a tip that may be anywhere.
     pub const fn of(contact: ContactReading, anywhere: bool) -> Reading {
         if anywhere {

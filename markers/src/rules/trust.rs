@@ -66,6 +66,9 @@ const LEAN: i32 = 19_661;
 /// in all). Striped, stained or glaring inside, where the dilated mask closes.
 const DENSITY: i32 = 983;
 const DENSITY_AREA: i32 = 12;
+/// What the mask adds to one marker's diameter at rest less what it adds to another's: 1 px (seen:
+/// 0.8 on units as people build them). One marker cut or grown.
+const EDGES_APART: i32 = 65_536;
 /// Centroid against bounding box: 0.6 px and 0.03 of its width (of 256). Cut or grown on one side.
 const LOPSIDED_PIXELS: i32 = 39_322;
 const LOPSIDED: i32 = 8;
@@ -243,6 +246,14 @@ impl Trust {
         let pixels = grid_of_means(self.grid, WIDTH_PIXELS);
         excess.abs() <= i64::from(expected) * self.reading.width / 256 + i64::from(pixels)
     }
+}
+
+/// Whether markers of these areas at rest are equal: discs of one size on a flat film, to whose
+/// diameters the mask adds the same.
+pub fn are_equal(geometry: &Geometry, areas: [u32; 4]) -> bool {
+    let edges = areas.map(|area| edge_at_rest(geometry, geometry.rest_distance(), area));
+    let least = edges.iter().copied().min().unwrap_or_default();
+    edges.iter().all(|edge| edge - least <= EDGES_APART)
 }
 
 /// Whether all markers are alike in their mean weight, to 0.015 of it and `more`. Always without

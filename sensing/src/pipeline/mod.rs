@@ -3,6 +3,7 @@
 mod ahead;
 #[cfg(test)]
 mod marker_tests;
+mod taring;
 #[cfg(test)]
 mod tests;
 
@@ -276,9 +277,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .as_ref()
             .filter(|model| model.conditions.are_of(settings));
         let rest = self.tare.or(fitting.map(|model| model.rest));
-        let reading = fitting.map_or(Reading::of(ContactReading::Force, false), |model| {
-            Reading::of(model.conditions.contact, model.output.tells_place())
-        });
+        // The same tip presses, whether or not the model is for these frames.
+        let reading = self
+            .model
+            .as_ref()
+            .map_or(Reading::of(ContactReading::Force, false), |model| {
+                Reading::of(model.conditions.contact, model.output.tells_place())
+            });
         let own_rest = self.tare.is_some();
         self.prepared = Some(Prepared {
             finder: Finder::new(settings),

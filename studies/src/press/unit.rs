@@ -138,20 +138,16 @@ impl TestedUnit {
 
     fn rest(&self, sensor: &mut Sensor<'_>) -> Result<Rest> {
         let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
-        let mut rest = None;
         for number in 0..TARE_FRAMES {
             let frame = self
                 .scene
                 .render_load(&Load::REST, 1_000_000 + u64::from(number))?;
             let seen = measure(sensor, &frame);
-            let found = seen.markers.zip(seen.features);
-            let (markers, features) = found.ok_or_else(|| {
-                let names: Vec<_> = seen.status.names().collect();
-                anyhow!("no markers at rest: {}", names.join(" "))
-            })?;
-            rest = tare.add(&markers, &features);
+            if let Some(outcome) = sensor.tare_with(&mut tare, &seen) {
+                return outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"));
+            }
         }
-        rest.ok_or_else(|| anyhow!("no rest position"))
+        Err(anyhow!("no rest position: too few frames show the markers"))
     }
 }
 

@@ -71,10 +71,11 @@ impl Pipeline {
         for number in (1 << 40).. {
             let frame = scene.render_load(&Load::REST, number)?;
             let measured = pipeline.sensor.measure_frame(&frame.to_rgb565());
-            let (Some(markers), Some(features)) = (measured.markers, measured.features) else {
+            if measured.markers.is_none() {
                 bail!("no tare: {}", reasons(measured.status));
-            };
-            if let Some(rest) = builder.add(&markers, &features) {
+            }
+            if let Some(outcome) = pipeline.sensor.tare_with(&mut builder, &measured) {
+                let rest = outcome.map_err(|refusal| anyhow!("no tare: {refusal:?}"))?;
                 pipeline.sensor.set_tare(Some(rest));
                 break;
             }

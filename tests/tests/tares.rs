@@ -1,0 +1,220 @@
+//! A tare of bad markers is refused, or harmless; honest units are tared.
+
+use std::collections::BTreeSet;
+use std::f64::consts::TAU;
+
+use hivtac_scene::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, Preset, Scene};
+use hivtac_sensing::tare::Refusal;
+use hivtac_tests::judged::{Contacts, Judged};
+use hivtac_tests::models;
+use hivtac_tests::pictures::Random;
+use hivtac_tests::tared::TaredSensor;
+
+const FRAMES: u16 = 16;
+
+/// What presses the film after a tare.
+const PRESSES: Contacts = Contacts {
+    force_n: [0.05, 0.2],
+    ratio: 0.14,
+    place_mm: 4.0,
+};
+
+fn sensor() -> TaredSensor {
+    TaredSensor::of_model(models::anywhere(1)).unwrap()
+}
+
+fn scene(options: &Options, seed: u64) -> Scene {
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, seed).unwrap();
+    scene.with_options(options.clone()).unwrap()
+}
+
+/// The untouched film of a scene.
+fn at_rest(scene: &Scene) -> impl Iterator<Item = Frame> {
+    (0..4 * u64::from(FRAMES)).map(|number| scene.render_load(&Load::REST, number).unwrap())
+}
+
+fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.between(0, 1 << 30) as f64 / f64::from(1 << 30)
+}
+
+/// The sum of twelve uniform numbers is nearly normal; limited to 2.5 standard deviations.
+fn normal(random: &mut Random, sigma: f64) -> f64 {
+    let sum: f64 = (0..12).map(|_| between(random, -0.5, 0.5)).sum();
+    sigma * sum.clamp(-2.5, 2.5)
+}
+
+/// A unit as people build them, in light that is not even.
+fn built(random: &mut Random) -> Options {
+    let longer = 1.0 + normal(random, 0.02);
+    Options {
+        mounting: Mounting {
+            shift_px: [normal(random, 3.0), normal(random, 3.0)],
+            roll_deg: normal(random, 2.0),
+        },
+        glued_mm: MARKERS.map(|_| [normal(random, 0.15), normal(random, 0.15)]),
+        lens: Lens {
+            pitch_um: Some(2100.0 / (175.0 * longer)),
+            blur_px: between(random, 0.0, 1.0),
+            ..Lens::default()
+        },
+        gain: between(random, 0.6, 1.2),
+        gradient: [between(random, -0.3, 0.3), between(random, -0.3, 0.3)],
+        ..Options::default()
+    }
+}
+
+fn honest_units_are_tared(units: u64) {
+    let mut sensor = sensor();
+    let mut random = Random::new(3);
+    for number in 0..units {
+        let options = built(&mut random);
+        let outcome = sensor.tare(FRAMES, at_rest(&scene(&options, number)));
+        assert!(outcome.unwrap().is_ok(), "{number}: {options:?}");
+    }
+}
+
+#[test]
+fn units_as_people_build_them_are_tared() {
+    honest_units_are_tared(40);
+}
+
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn a_thousand_units_as_people_build_them_are_tared() {
+    honest_units_are_tared(1_000);
+}
+
+/// A disc that covers each of these markers so far from one side, or grows on it.
+fn painted(random: &mut Random, markers: &[usize], depth_mm: f64, paint: Paint) -> Options {
+    let (sin, cos) = between(random, 0.0, TAU).sin_cos();
+    let radius_mm = [0.3, 0.5, 1.0, 3.0][random.between(0, 3) as usize];
+    let (radius_mm, away_mm) = match paint {
+        Paint::Red => (
+            0.5f64.min(radius_mm),
+            0.5 + depth_mm - 0.5f64.min(radius_mm),
+        ),
+        Paint::Film | Paint::Glare => (radius_mm, 0.5 + radius_mm - depth_mm),
+    };
+    let patch = |&identity: &usize| {
+        let [x, y] = MARKERS[identity].centre_mm;
+        Patch {
+            centre_mm: [x + away_mm * cos, y + away_mm * sin],
+            radius_mm,
+            paint,
+        }
+    };
+    Options {
+        patches: markers.iter().map(patch).collect(),
+        ..Options::default()
+    }
+}
+
+/// The forces after a tare, of the scene that was tared and of the clean one.
+fn wrong_after(sensor: &mut TaredSensor, tared: &Scene, random: &mut Random) -> Vec<String> {
+    let clean = scene(&Options::default(), 1);
+    let mut wrong = Vec::new();
+    for number in 0..12 {
+        let load = PRESSES.draw(random).unwrap();
+        for shown in [tared, &clean] {
+            let frame = shown.render_load(&load, number).unwrap();
+            if let Judged::Wrong(how) = Judged::of(&sensor.sense(&frame), &frame.truth) {
+                wrong.push(how);
+            }
+        }
+    }
+    wrong
+}
+
+/// Markers that are covered from one side, glare or have red grown on them: refused as soon as it
+/// matters.
+fn painted_markers_are_refused_or_harmless(tares: u64) {
+    let mut sensor = sensor();
+    let mut random = Random::new(5);
+    let (mut taken, mut refusals, mut wrong) = (0, BTreeSet::new(), Vec::new());
+    for number in 0..tares {
+        let paint = Paint::ALL[number as usize % 3];
+        let markers: &[usize] = if number % 2 == 0 { &[0, 1, 2, 3] } else { &[1] };
+        let depth_mm = between(&mut random, 0.02, 0.4);
+        let painted = scene(&painted(&mut random, markers, depth_mm, paint), number);
+        // Markers that are not found at all give no tare.
+        match sensor.tare(FRAMES, at_rest(&painted)) {
+            Ok(Ok(_)) => taken += 1,
+            Ok(Err(refusal)) => {
+                refusals.insert(format!("{refusal:?}"));
+                continue;
+            }
+            Err(_) => continue,
+        }
+        let found = wrong_after(&mut sensor, &painted, &mut random);
+        wrong.extend(
+            found
+                .iter()
+                .map(|how| format!("{paint:?} {depth_mm:.2} mm: {how}")),
+        );
+    }
+    println!("{taken} of {tares} were taken");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert_eq!(Vec::from_iter(refusals), ["MarkersImplausible"]);
+    assert!(taken > 0, "nothing was asserted");
+}
+
+#[test]
+fn a_tare_of_painted_markers_is_refused_or_harmless() {
+    painted_markers_are_refused_or_harmless(120);
+}
+
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn thousands_of_tares_of_painted_markers_are_refused_or_harmless() {
+    painted_markers_are_refused_or_harmless(3_000);
+}
+
+/// Film colour over a quarter of a millimetre of every marker, all from the same side: the four
+/// markers move alike, so that nothing in their pattern shows it.
+#[test]
+fn markers_that_are_all_covered_from_the_same_side_are_refused() {
+    let mut sensor = sensor();
+    let mut found = 0;
+    for depth_mm in [0.2, 0.25, 0.3, 0.4] {
+        for direction in 0..8 {
+            let (sin, cos) = (TAU * f64::from(direction) / 8.0).sin_cos();
+            let patch = |marker: &hivtac_scene::Disc| Patch {
+                centre_mm: [
+                    marker.centre_mm[0] + (1.5 - depth_mm) * cos,
+                    marker.centre_mm[1] + (1.5 - depth_mm) * sin,
+                ],
+                radius_mm: 1.0,
+                paint: Paint::Film,
+            };
+            let options = Options {
+                patches: MARKERS.iter().map(patch).collect(),
+                ..Options::default()
+            };
+            // Too few frames come of markers that are not even found.
+            if let Ok(outcome) = sensor.tare(FRAMES, at_rest(&scene(&options, 7))) {
+                let refused = Err(Refusal::MarkersImplausible);
+                assert_eq!(outcome, refused, "{depth_mm} mm, {direction}/8");
+                found += 1;
+            }
+        }
+    }
+    assert!(found >= 16, "{found} of 32");
+}
+
+/// A finger that trembles on the film, and one that lies still on it.
+#[test]
+fn a_film_that_moves_or_is_pressed_is_refused() {
+    let mut sensor = sensor();
+    let clean = scene(&Options::default(), 7);
+    let pressed = |newton: fn(u64) -> f64| {
+        let load = move |number| Load::from_angles(newton(number), 0.0, 0.0).unwrap();
+        (0..u64::from(FRAMES)).map(move |number| (load(number), number))
+    };
+    let mut tare = |newton: fn(u64) -> f64| {
+        let frames = pressed(newton).map(|(load, number)| clean.render_load(&load, number));
+        sensor.tare(FRAMES, frames.map(Result::unwrap)).unwrap()
+    };
+    assert_eq!(tare(|n| 0.002 * (n % 4) as f64), Err(Refusal::Unsteady));
+    assert_eq!(tare(|_| 0.2), Err(Refusal::NotAtRest));
+    assert!(tare(|_| 0.0).is_ok());
+}
