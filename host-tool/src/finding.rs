@@ -135,7 +135,10 @@ impl<'a> Finding<'a> {
         if self.force.is_some() {
             lines.push(format!("  contact   {}", contact_text(self.contact)));
         }
-        lines.push(format!("  status    {}", status_text(&self.status)));
+        lines.push(format!(
+            "  status    {}",
+            status_text(&self.status, self.force.is_some())
+        ));
         lines.join("\n")
     }
 

@@ -5,6 +5,7 @@ use crate::output::{note, print};
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
+use hivtac_host::shown::shown;
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::Threshold;
@@ -108,15 +109,17 @@ impl<'a> Info<'a> {
         let mut lines = vec![
             format!("port       {}", self.port),
             format!("device     {}", self.device_id),
-            format!("board      {}", self.board),
-            format!("firmware   {}", self.firmware),
+            format!("board      {}", shown(self.board)),
+            format!("firmware   {}", shown(self.firmware)),
             format!("protocol   {}, schema {}", self.protocol, self.schema),
             format!("model      {}", self.model_text()),
             format!("frame      {} × {} px", self.width, self.height),
             format!("threshold  {}", text(&self.threshold)),
             format!(
                 "markers    preset {}, dilations {}, centroids {}",
-                self.preset, self.dilations, self.centroid
+                shown(self.preset),
+                self.dilations,
+                self.centroid
             ),
         ];
         let model = self.model.as_ref().map(|model| &model.threshold);
@@ -138,7 +141,11 @@ impl<'a> Info<'a> {
                 } else {
                     "this unit"
                 };
-                format!("{}, CRC {}, trained on: {origin}", model.name, model.crc)
+                format!(
+                    "{}, CRC {}, trained on: {origin}",
+                    shown(model.name),
+                    model.crc
+                )
             }
             None => "none".to_owned(),
         }

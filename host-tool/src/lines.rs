@@ -3,6 +3,7 @@
 use crate::decimal::{Millionths, Thousandths};
 use crate::force_json::{ForceJson, PlaceJson};
 use crate::truth::Truth;
+use hivtac_host::shown::shown_json;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
@@ -94,15 +95,16 @@ fn human_row(row: &Row) -> String {
     if let Some(truth) = row.truth {
         line += &human_truth(truth);
     }
-    format!("{line}  {}", status_text(&names(*status)))
+    let status = status_text(&names(*status), force.is_some());
+    format!("{line}  {status}")
 }
 
 /// Names of status bits for a person, who is told of a contact elsewhere.
-pub fn status_text(names: &[&str]) -> String {
+pub fn status_text(names: &[&str], has_force: bool) -> String {
     let other = |name: &&str| *name != "contact";
     let names: Vec<_> = names.iter().copied().filter(other).collect();
     if names.is_empty() {
-        return "ok".to_owned();
+        return if has_force { "ok" } else { "no force" }.to_owned();
     }
     names.join(" ")
 }
@@ -187,7 +189,7 @@ fn json_row(row: &Row) -> String {
 pub fn to_json(value: &impl Serialize) -> String {
     // Only maps with odd keys and failing `Serialize` implementations give an error; there are none
     // here.
-    serde_json::to_string(value).expect("plain data becomes JSON")
+    shown_json(&serde_json::to_string(value).expect("plain data becomes JSON"))
 }
 
 fn csv_header(truth: bool) -> String {
@@ -339,6 +341,12 @@ mod tests {
         let expected = r"      41      42     1.400000   -5.000    2.500  100.000   -8.707    4.362  -99.525        –        –        –       no   -5.250    2.500  101.500        –        –  ok";
         let truth = Some(Some(truth()));
         assert_eq!(row(Format::Human, &without_place, truth), expected);
+    }
+
+    #[test]
+    fn a_person_is_told_that_there_is_no_force_though_nothing_says_why() {
+        let line = row(Format::Human, &sample(None, Status::default()), None);
+        assert!(line.ends_with("        –  no force"), "{line}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, Kind};
 use crate::port::{Address, Port};
+use crate::shown::shown;
 use crate::stop;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
@@ -273,5 +274,5 @@ pub fn log_text(line: &LogLine) -> String {
         LogLevel::Info => "info",
     };
     let seconds = line.time_us as f64 / 1e6;
-    format!("device, {seconds:.3} s, {level}: {}", line.text)
+    format!("device, {seconds:.3} s, {level}: {}", shown(&line.text))
 }

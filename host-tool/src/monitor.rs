@@ -1,7 +1,7 @@
 //! `hivtac monitor`: the forces as they come, and a summary at the end.
 
 use crate::lines::{Format, Row};
-use crate::output::{Reader, note, print};
+use crate::output::{self, Reader, note, print};
 use crate::tally::Tally;
 use crate::truth::TruthFile;
 use hivtac_host::failure::{Failure, Kind};
@@ -159,6 +159,7 @@ impl<'o> Monitor<'o> {
     fn converse(&mut self, link: &mut Link) -> Result<End, Failure> {
         self.request(link, Request::GetInfo, self.options.patience)?;
         self.started.get_or_insert_with(Instant::now);
+        self.end().into_iter().for_each(output::limit);
         self.print_header()?;
         let started = self.request(link, Request::Start, self.options.patience)?;
         let end = match started {
@@ -261,8 +262,10 @@ impl<'o> Monitor<'o> {
             self.tally.compare(force, truth);
         }
         self.reader = print(&self.options.format.row(&Row { sample, truth }))?;
-        if self.reader == Reader::Gone {
-            return Ok(Some(End::ReaderGone));
+        match self.reader {
+            Reader::There => (),
+            Reader::Gone => return Ok(Some(End::ReaderGone)),
+            Reader::Stalled => return stop::check().map(|()| Some(End::Enough)),
         }
         self.tally.shown += 1;
         let enough = self
@@ -302,7 +305,8 @@ impl<'o> Monitor<'o> {
     fn print_summary(&self) {
         let summary = self.tally.summary(self.truth.is_some());
         let for_a_person = self.options.format == Format::Human && self.reader == Reader::There;
-        if !for_a_person || print(&format!("\n{}", summary.trim_end())).is_err() {
+        let printed = for_a_person.then(|| print(&format!("\n{}", summary.trim_end())));
+        if !matches!(printed, Some(Ok(Reader::There | Reader::Gone))) {
             note(summary.trim_end());
         }
     }

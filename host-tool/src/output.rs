@@ -1,7 +1,16 @@
-//! Writing to standard output and standard error so that a closed pipe is an end, not a crash.
+//! Writing to standard output and standard error: whole lines, a closed pipe is an end and no
+//! crash, and a reader that stalls holds nobody up once the program is to end.
+//!
+//! A stream is written by a thread of its own, one text at a time. Whoever prints waits for it, but
+//! no longer than [`GRACE`] once the program was interrupted or its [`limit`] has passed.
 
 use hivtac_host::failure::{Failure, Kind};
-use std::io::{self, ErrorKind, Write};
+use hivtac_host::stop;
+use std::fs::File;
+use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Whether there is still a reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,22 +19,159 @@ pub enum Reader {
     There,
     /// The pipe is closed: nobody wants more.
     Gone,
+    /// The program is to end, and nobody has read the text yet.
+    Stalled,
 }
 
-/// Writes a line to standard output and flushes it.
+/// How long a text may take once the program is to end.
+const GRACE: Duration = Duration::from_millis(50);
+/// How often is looked whether it is.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+
+static OUTPUT: LazyLock<Mutex<Stream>> = LazyLock::new(|| Mutex::new(Stream::new(Target::Output)));
+static NOTES: LazyLock<Mutex<Stream>> = LazyLock::new(|| Mutex::new(Stream::new(Target::Notes)));
+static END: Mutex<Option<Instant>> = Mutex::new(None);
+
+/// Nobody waits for a reader after this.
+pub fn limit(end: Instant) {
+    *lock(&END) = Some(end);
+}
+
+/// Writes a line to standard output.
 pub fn print(line: &str) -> Result<Reader, Failure> {
-    let mut output = io::stdout().lock();
-    match writeln!(output, "{line}").and_then(|()| output.flush()) {
-        Ok(()) => Ok(Reader::There),
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(Reader::Gone),
-        Err(error) => {
-            let message = format!("cannot write to standard output: {error}");
-            Err(Failure::new(Kind::Input, message))
+    lock(&OUTPUT).write(format!("{line}\n")).or_else(|error| {
+        if error.kind() == ErrorKind::BrokenPipe {
+            return Ok(Reader::Gone);
         }
-    }
+        let message = format!("cannot write to standard output: {error}");
+        Err(Failure::new(Kind::Input, message))
+    })
 }
 
 /// Writes a line for a person to standard error; there is nothing to do when that fails.
 pub fn note(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = lock(&NOTES).write(format!("{line}\n"));
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Whether the program is to end.
+fn is_over() -> bool {
+    stop::requested() || lock(&END).is_some_and(|end| Instant::now() >= end)
+}
+
+/// Where texts go.
+#[derive(Clone, Copy)]
+enum Target {
+    Output,
+    Notes,
+}
+
+/// A thread that writes, and what it has not yet answered.
+struct Stream {
+    texts: SyncSender<String>,
+    done: Receiver<io::Result<()>>,
+    /// A text was handed over, and what became of it is not known.
+    under_way: bool,
+}
+
+impl Stream {
+    fn new(target: Target) -> Stream {
+        let (texts, to_write) = sync_channel::<String>(0);
+        let (written, done) = sync_channel(1);
+        std::thread::spawn(move || {
+            for text in to_write {
+                if written.send(target.write(&text)).is_err() {
+                    return;
+                }
+            }
+        });
+        Stream {
+            texts,
+            done,
+            under_way: false,
+        }
+    }
+
+    fn write(&mut self, text: String) -> io::Result<Reader> {
+        if self.under_way && self.wait()? == Reader::Stalled {
+            return Ok(Reader::Stalled);
+        }
+        let gone = || io::Error::other("its thread has ended");
+        self.texts.send(text).map_err(|_| gone())?;
+        self.under_way = true;
+        self.wait()
+    }
+
+    fn wait(&mut self) -> io::Result<Reader> {
+        let patience = Instant::now() + GRACE;
+        loop {
+            match self.done.recv_timeout(LOOK_EVERY) {
+                Ok(result) => {
+                    self.under_way = false;
+                    return result.map(|()| Reader::There);
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(io::Error::other("its thread has ended"));
+                }
+                Err(RecvTimeoutError::Timeout) if Instant::now() >= patience && is_over() => {
+                    return Ok(Reader::Stalled);
+                }
+                Err(RecvTimeoutError::Timeout) => (),
+            }
+        }
+    }
+}
+
+impl Target {
+    fn write(self, text: &str) -> io::Result<()> {
+        match self {
+            Target::Output => match regular_output() {
+                Some(mut file) => write_whole(&mut file, text.as_bytes()),
+                None => {
+                    let mut output = io::stdout().lock();
+                    output.write_all(text.as_bytes())?;
+                    output.flush()
+                }
+            },
+            Target::Notes => io::stderr().write_all(text.as_bytes()),
+        }
+    }
+}
+
+/// Standard output when it is a file on a disk.
+fn regular_output() -> Option<File> {
+    #[cfg(unix)]
+    let owned = std::os::fd::AsFd::as_fd(&io::stdout()).try_clone_to_owned();
+    #[cfg(windows)]
+    let owned = std::os::windows::io::AsHandle::as_handle(&io::stdout()).try_clone_to_owned();
+    let file = File::from(owned.ok()?);
+    file.metadata().ok()?.is_file().then_some(file)
+}
+
+/// Writes a text to a file, or nothing of it: a disk that is full would keep its beginning.
+fn write_whole(file: &mut File, text: &[u8]) -> io::Result<()> {
+    let mut written = 0;
+    while written < text.len() {
+        match file.write(&text[written..]) {
+            Ok(0) => return take_back(file, written, ErrorKind::WriteZero.into()),
+            Ok(count) => written += count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => (),
+            Err(error) => return take_back(file, written, error),
+        }
+    }
+    Ok(())
+}
+
+/// Cuts the last bytes off a file, unless somebody else has gone on with it; gives the error.
+fn take_back(file: &mut File, count: usize, error: io::Error) -> io::Result<()> {
+    let end = file.stream_position()?;
+    if count > 0 && file.metadata()?.len() == end {
+        let whole = end - count as u64;
+        file.set_len(whole)?;
+        file.seek(SeekFrom::Start(whole))?;
+    }
+    Err(error)
 }

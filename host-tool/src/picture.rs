@@ -43,18 +43,35 @@ struct Rgb {
     pixels: Vec<[u8; 3]>,
 }
 
+/// The largest file that is read: a picture of the largest frame has a fiftieth of it.
+#[cfg(feature = "pictures")]
+const LARGEST_FILE: u64 = 100 << 20;
+
+/// Turned as its EXIF data say it was taken.
 #[cfg(feature = "pictures")]
 fn decode(path: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
-    use image::ImageReader;
-    use std::fs::File;
-    use std::io::{self, BufReader};
+    use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+    use std::io::{Cursor, Read};
 
-    let reader = ImageReader::new(BufReader::new(File::open(path)?)).with_guessed_format()?;
-    if reader.format().is_none() {
-        let message = "it is no PNG, JPEG or PPM file";
-        return Err(io::Error::new(io::ErrorKind::InvalidData, message).into());
+    let mut bytes = Vec::new();
+    let file = std::fs::File::open(path)?;
+    file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(format!("it has more than {LARGEST_FILE} bytes").into());
     }
-    let image = reader.decode()?.into_rgb8();
+    let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
+    match reader.format() {
+        None => return Err("it is no PNG, JPEG or PPM file".into()),
+        Some(ImageFormat::Jpeg) if !is_whole_jpeg(&bytes) => {
+            return Err("it is cut: a JPEG file without its end".into());
+        }
+        Some(_) => (),
+    }
+    let mut decoder = reader.into_decoder()?;
+    let orientation = decoder.orientation()?;
+    let mut image = DynamicImage::from_decoder(decoder)?;
+    image.apply_orientation(orientation);
+    let image = image.into_rgb8();
     Ok(Rgb {
         width: image.width(),
         height: image.height(),
@@ -65,6 +82,32 @@ fn decode(path: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
 #[cfg(not(feature = "pictures"))]
 fn decode(_: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
     Err("this build does without: `cargo install --path host-tool` makes one that can".into())
+}
+
+/// Whether a JPEG file goes on to its end-of-image marker: decoders paint what is missing grey.
+///
+/// Segments have their length; after a start of scan come coded bytes, in which FF is followed by 0
+/// or the number of a restart. A thumbnail's end lies within a segment.
+#[cfg(feature = "pictures")]
+fn is_whole_jpeg(bytes: &[u8]) -> bool {
+    const END: u8 = 0xD9;
+    let mut at = 2;
+    while let Some(rest) = bytes.get(at..) {
+        let Some(marker) = rest
+            .windows(2)
+            .position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF | 0xD0..=0xD8 | 0x01))
+        else {
+            return false;
+        };
+        match rest[marker + 1..] {
+            [END, ..] => return true,
+            [_, high, low, ..] => {
+                at += marker + 2 + usize::from(u16::from_be_bytes([high, low]));
+            }
+            _ => return false,
+        }
+    }
+    false
 }
 
 fn size(path: &str, image: &Rgb) -> Result<(u16, u16), Failure> {

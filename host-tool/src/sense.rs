@@ -4,20 +4,26 @@ use crate::finding::Finding;
 use crate::output::{Reader, note, print};
 use crate::picture::Picture;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::stop;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat};
+use std::fs::File;
+use std::io::Read;
 
 /// The sensing, with the table that is fastest on a computer.
 type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
 
 /// The model that the firmware has, too.
 static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
+
+/// Bytes of a model file at most; the sensor's flash has 2 MiB.
+const LARGEST_MODEL: u64 = 16 << 20;
 
 /// What to do.
 pub struct Options {
@@ -61,8 +67,8 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     for path in &options.images {
         match bench.look(path, tare.as_ref()) {
             Ok(text) => {
-                if print(&text)? == Reader::Gone {
-                    return Ok(());
+                if print(&text)? != Reader::There {
+                    return stop::check();
                 }
             }
             Err(failure) => {
@@ -85,7 +91,18 @@ fn failure(message: String) -> Failure {
 }
 
 fn read_model(path: &str) -> Result<Vec<u8>, Failure> {
-    std::fs::read(path).map_err(|error| failure(format!("cannot read the model {path}: {error}")))
+    let cannot = |error| failure(format!("cannot read the model {path}: {error}"));
+    let file = File::open(path).map_err(cannot)?;
+    let mut bytes = Vec::new();
+    let most = LARGEST_MODEL + 1;
+    file.take(most).read_to_end(&mut bytes).map_err(cannot)?;
+    if bytes.len() as u64 == most {
+        return Err(failure(format!(
+            "cannot read the model {path}: it has more than {LARGEST_MODEL} bytes, which no model \
+             has"
+        )));
+    }
+    Ok(bytes)
 }
 
 /// A rest position and the size of the picture it comes from.
@@ -114,13 +131,6 @@ impl<'a> Bench<'a> {
                     picture.width, picture.height
                 )));
             }
-            if !tare.rest.fits(&sensor.settings().geometry) {
-                return Err(failure(format!(
-                    "the tare's picture does not show a film at rest for {path}: its markers are \
-                     more than 15 % nearer to or farther from their centre than the preset has \
-                     them; use a picture without a press, or another --preset"
-                )));
-            }
             sensor.set_tare(Some(tare.rest));
         }
         let measurement = sensor.measure_frame(&picture.pixels);
@@ -137,20 +147,25 @@ impl<'a> Bench<'a> {
         let picture = Picture::load(path)?;
         let mut sensor = self.sensor(path, &picture)?;
         let measurement = sensor.measure_frame(&picture.pixels);
-        let found = measurement.markers.zip(measurement.features);
-        let rest =
-            found.and_then(|(markers, features)| TareBuilder::new(1)?.add(&markers, &features));
-        let status: Vec<_> = measurement.status.names().collect();
+        let rest = TareBuilder::new(1)
+            .and_then(|mut builder| sensor.tare_with(&mut builder, &measurement));
         match rest {
-            Some(rest) => Ok(Tare {
+            Some(Ok(rest)) => Ok(Tare {
                 rest,
                 size: (picture.width, picture.height),
             }),
-            None => Err(failure(format!(
-                "the tare picture {path} does not show the four markers ({}); look at it with \
-                 `hivtac sense {path}`",
-                status.join(" ")
+            Some(Err(refusal)) => Err(failure(format!(
+                "the tare picture {path} {}",
+                complaint(refusal)
             ))),
+            None => {
+                let status: Vec<_> = measurement.status.names().collect();
+                Err(failure(format!(
+                    "the tare picture {path} does not show the four markers ({}); look at it with \
+                     `hivtac sense {path}`",
+                    status.join(" ")
+                )))
+            }
         }
     }
 
@@ -186,5 +201,20 @@ impl<'a> Bench<'a> {
         };
         settings.min_area = self.options.min_area.unwrap_or(settings.min_area);
         settings
+    }
+}
+
+/// What is wrong with a tare's picture, and what to do.
+fn complaint(refusal: Refusal) -> &'static str {
+    match refusal {
+        Refusal::MarkersImplausible | Refusal::Unsteady => {
+            "does not show four whole, equal markers: one may be covered, cut, stained or glare; \
+             use a picture of a clean film in even light"
+        }
+        Refusal::NotAtRest => {
+            "does not show a film at rest: its markers are more than 15 % nearer to or farther \
+             from their centre than the preset has them; use a picture without a press, or another \
+             --preset"
+        }
     }
 }

@@ -70,12 +70,12 @@ impl Tally {
     /// Takes in what the decoder of a connection threw away, once, when it ends.
     pub fn rejected(&mut self, of_connection: Rejected) {
         let sum = &mut self.rejected;
-        sum.overlong += of_connection.overlong;
-        sum.cobs += of_connection.cobs;
-        sum.crc += of_connection.crc;
-        sum.body += of_connection.body;
-        sum.trailing += of_connection.trailing;
-        sum.bytes += of_connection.bytes;
+        sum.overlong = sum.overlong.saturating_add(of_connection.overlong);
+        sum.cobs = sum.cobs.saturating_add(of_connection.cobs);
+        sum.crc = sum.crc.saturating_add(of_connection.crc);
+        sum.body = sum.body.saturating_add(of_connection.body);
+        sum.trailing = sum.trailing.saturating_add(of_connection.trailing);
+        sum.bytes = sum.bytes.saturating_add(of_connection.bytes);
     }
 
     /// The summary for a person; with `truth`, the errors too.
@@ -429,6 +429,18 @@ mod tests {
         assert_eq!(line(&errors), "RMSE of the place: 5.0 µm over 1 frames");
         errors.count(&place(0, 7), &truth(Some(0.0), Some(0.0)));
         assert_eq!(line(&errors), "RMSE of the place: 6.1 µm over 2 frames");
+    }
+
+    #[test]
+    fn counters_end_at_their_largest() {
+        let mut tally = Tally::default();
+        let most = Rejected {
+            overlong: u32::MAX,
+            bytes: u32::MAX,
+            ..Rejected::default()
+        };
+        (0..2).for_each(|_| tally.rejected(most));
+        assert_eq!(tally.rejected, most);
     }
 
     #[test]

@@ -13,6 +13,12 @@ const PATIENCE: Duration = Duration::from_millis(300);
 /// Time between two looks at a file that grows.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
+/// Bytes of the longest line, and of what is read at once.
+const LONGEST_LINE: usize = 1 << 16;
+const READ_AT_ONCE: u64 = 1 << 16;
+/// The most frames that were read and not yet asked for: some hours of them.
+const MOST_WAITING: usize = 1 << 22;
+
 /// One line of the log. A line without a force, as of a test picture, is that of a frame without a
 /// truth.
 #[derive(Deserialize)]
@@ -47,6 +53,25 @@ pub struct Truth {
 }
 
 impl Truth {
+    /// A value that is no truth, with its name: a summary would be of that alone.
+    fn impossible(&self) -> Option<(&'static str, f64)> {
+        let place = [self.place_x_mm, self.place_y_mm].map(Option::unwrap_or_default);
+        let values = [
+            ("alpha_deg", self.alpha_deg, 180.0),
+            ("beta_deg", self.beta_deg, 180.0),
+            ("magnitude_n", self.magnitude_n, 1e3),
+            ("x_n", self.x_n, 1e3),
+            ("y_n", self.y_n, 1e3),
+            ("z_n", self.z_n, 1e3),
+            ("place_x_mm", place[0], 1e3),
+            ("place_y_mm", place[1], 1e3),
+        ];
+        let mut impossible = values
+            .iter()
+            .filter(|(_, value, most)| value.is_nan() || value.abs() > *most);
+        impossible.next().map(|(name, value, _)| (*name, *value))
+    }
+
     /// Where the tip touches the film, mm along x and y from its middle.
     pub fn place_mm(&self) -> Option<[f64; 2]> {
         Some([self.place_x_mm?, self.place_y_mm?])
@@ -91,7 +116,7 @@ impl TruthFile {
     pub fn take(&mut self, frame: u32) -> Result<Option<Truth>, Failure> {
         let end = Instant::now() + PATIENCE;
         loop {
-            self.read_on()?;
+            self.read_on(frame)?;
             match self.frames.remove(&frame) {
                 Some(truth) => return Ok(truth),
                 None if Instant::now() >= end => return Ok(None),
@@ -101,24 +126,50 @@ impl TruthFile {
         }
     }
 
-    fn read_on(&mut self) -> Result<(), Failure> {
-        self.file
+    /// Reads to the file's end, or until there is a frame.
+    fn read_on(&mut self, frame: u32) -> Result<(), Failure> {
+        while !self.frames.contains_key(&frame) && self.read_some()? {}
+        Ok(())
+    }
+
+    /// Reads a little more; false at the end.
+    fn read_some(&mut self) -> Result<bool, Failure> {
+        let before = self.partial.len();
+        (&self.file)
+            .take(READ_AT_ONCE)
             .read_to_end(&mut self.partial)
             .map_err(|error| self.failure(&format!("cannot be read: {error}")))?;
-        let Some(end) = self.partial.iter().rposition(|byte| *byte == b'\n') else {
-            return Ok(());
-        };
-        let rest = self.partial.split_off(end + 1);
-        let whole = std::mem::replace(&mut self.partial, rest);
-        whole[..end]
-            .split(|byte| *byte == b'\n')
-            .try_for_each(|line| self.keep(line))
+        if let Some(end) = self.partial.iter().rposition(|byte| *byte == b'\n') {
+            let rest = self.partial.split_off(end + 1);
+            let whole = std::mem::replace(&mut self.partial, rest);
+            let mut lines = whole[..end].split(|byte| *byte == b'\n');
+            lines.try_for_each(|line| self.keep(line))?;
+            return Ok(true);
+        }
+        if self.partial.len() > LONGEST_LINE {
+            let what = format!(
+                "line {} is longer than {LONGEST_LINE} bytes: this is no log of a simulated sensor",
+                self.lines + 1
+            );
+            return Err(self.failure(&what));
+        }
+        Ok(self.partial.len() > before)
     }
 
     fn keep(&mut self, line: &[u8]) -> Result<(), Failure> {
         self.lines += 1;
         let line: Line = serde_json::from_slice(line)
             .map_err(|error| self.failure(&format!("line {}: {error}", self.lines)))?;
+        let number = self.lines;
+        if let Some((name, value)) = line.truth.as_ref().and_then(Truth::impossible) {
+            let what = format!("line {number}: {name} is {value:e}, which no sensor measures");
+            return Err(self.failure(&what));
+        }
+        if self.frames.len() >= MOST_WAITING {
+            let what =
+                format!("line {number}: {MOST_WAITING} frames before it were never received");
+            return Err(self.failure(&what));
+        }
         self.frames.insert(line.frame, line.truth);
         Ok(())
     }
@@ -228,5 +279,22 @@ mod tests {
             "{error}"
         );
         assert!(TruthFile::open("/nowhere").is_err());
+    }
+
+    #[test]
+    fn what_is_no_log_is_not_read_to_its_end() {
+        let error = |path: &str| TruthFile::open(path).unwrap().take(1).unwrap_err();
+        let endless = error("/dev/zero").to_string();
+        assert!(
+            endless.contains("line 1 is longer than 65536 bytes"),
+            "{endless}"
+        );
+        let mut log = tempfile::NamedTempFile::new().unwrap();
+        writeln!(log, "{}", line(1, 1.0).replace("0.1", "1e308")).unwrap();
+        let impossible = error(log.path().to_str().unwrap()).to_string();
+        assert!(
+            impossible.contains("line 1: magnitude_n is 1e308"),
+            "{impossible}"
+        );
     }
 }

@@ -2,7 +2,9 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_wire::message::{Command, DeviceMessage, HostMessage, LogLevel, LogLine, Outcome};
 use std::io::{BufRead, BufReader, Read};
+use std::time::{Duration, Instant};
 
 #[test]
 fn a_pulled_cable_is_an_error_after_the_summary() {
@@ -198,4 +200,132 @@ fn a_slow_reader_gets_everything() {
             .eq(0..u64::from(COUNT))
     );
     assert_eq!(run.code, Some(0));
+}
+
+/// A device that sends for as long as somebody listens.
+fn endless() -> FakeDevice {
+    FakeDevice::on_tcp([Box::new(|device| {
+        device.until_start();
+        for number in 0.. {
+            device.send(sample(number, number));
+            if device.host_is_gone {
+                return;
+            }
+        }
+    })])
+}
+
+/// A busy computer may take longer than the tenth of a second that the tool does.
+const SOON: Duration = Duration::from_millis(500);
+
+/// Nobody reads either pipe; the first is full after some hundred lines.
+#[test]
+fn ctrl_c_ends_it_though_its_reader_stalls() {
+    for format in [&["--json"][..], &[]] {
+        let device = endless();
+        let mut run = start(&[&["monitor", "--port", &device.port], format].concat());
+        std::thread::sleep(Duration::from_millis(700));
+        signal(run.child().id(), "INT");
+        let asked = Instant::now();
+        let status = run.child().wait().unwrap();
+        assert!(asked.elapsed() < SOON, "{format:?}: {:?}", asked.elapsed());
+        assert_eq!(status.code(), Some(130));
+        let run = run.finish();
+        assert!(run.stderr.contains(" frames shown, "), "{}", run.stderr);
+        assert!(run.stdout.ends_with('\n'), "whole lines");
+    }
+}
+
+#[test]
+fn its_time_is_over_though_its_reader_stalls() {
+    let device = FakeDevice::on_tcp([streaming(samples(0..20_000))]);
+    let begun = Instant::now();
+    let mut run = start(&["monitor", "--seconds", "0.6", "--port", &device.port]);
+    let status = run.child().wait().unwrap();
+    assert!(
+        begun.elapsed() < Duration::from_millis(600) + SOON,
+        "{:?}",
+        begun.elapsed()
+    );
+    assert_eq!(status.code(), Some(0));
+    let run = run.finish();
+    assert!(run.stderr.contains(" frames shown, "), "{}", run.stderr);
+}
+
+/// A file may have a few thousand bytes here: what is cut of a line on a full disk is taken back,
+/// also where lines are added to a file.
+#[test]
+fn a_full_disk_leaves_whole_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    for to in [">", ">>"] {
+        let file = folder.path().join("samples.csv");
+        let before = "kept\n";
+        std::fs::write(&file, before).unwrap();
+        let device = endless();
+        let script = format!(
+            "trap '' XFSZ; ulimit -f 8; exec {} monitor --csv --port {} {to} {}",
+            env!("CARGO_BIN_EXE_hivtac"),
+            device.port,
+            file.display()
+        );
+        let output = std::process::Command::new("sh")
+            .args(["-c", &script])
+            .output()
+            .unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("cannot write to standard output: "), "{said}");
+        let text = std::fs::read_to_string(&file).unwrap();
+        assert_eq!(text.starts_with(before), to == ">>", "{text}");
+        assert!(text.ends_with('\n') && text.lines().count() > 3, "{text}");
+        let rows = text.strip_prefix(before).unwrap_or(&text).lines();
+        let fields: Vec<usize> = rows.map(|row| row.matches(',').count()).collect();
+        assert!(fields.iter().all(|count| *count == fields[0]), "{text}");
+    }
+}
+
+/// A device that says what would colour a terminal, clear it, or look like another line.
+#[test]
+fn nothing_that_a_device_says_acts_on_the_terminal() {
+    let evil = "\x1b[31m\r\nhivtac: all is well\u{9b}2J\u{202e}";
+    let script = |device: &mut Conversation| {
+        let mut hello = hello();
+        hello.board = "\x1b]0;x\x07".try_into().unwrap();
+        hello.preset = "\u{9b}2J".try_into().unwrap();
+        hello.model.as_mut().unwrap().name = "a\r\nb".try_into().unwrap();
+        while let Some(message) = device.next() {
+            match message {
+                HostMessage::Hello(_) => device.send(DeviceMessage::Hello(hello.clone())),
+                HostMessage::Command(Command { id, .. }) => {
+                    device.send(DeviceMessage::Log(LogLine {
+                        level: LogLevel::Info,
+                        time_us: 1,
+                        text: evil.try_into().unwrap(),
+                    }));
+                    device.send(DeviceMessage::Hello(hello.clone()));
+                    device.reply(id, Outcome::Done);
+                }
+            }
+        }
+    };
+    for arguments in [
+        &["info"][..],
+        &["info", "--json"],
+        &["monitor", "--seconds", "0.3"],
+    ] {
+        let device = FakeDevice::on_tcp([Box::new(script)]);
+        let run = run(&[arguments, &["--port", &device.port]].concat());
+        assert_eq!(run.code, Some(0), "{run:?}");
+        let text = format!("{}{}", run.stdout, run.stderr);
+        let acts = |c: char| c != '\n' && c.is_control() || c == '\u{202e}';
+        assert!(!text.chars().any(acts), "{text:?}");
+        assert!(
+            !text.lines().any(|line| line.starts_with("hivtac: all")),
+            "{text:?}"
+        );
+        assert!(
+            text.contains(r"\u{1b}[31m\u{d}\u{a}hivtac: all is well\u{9b}2J"),
+            "{text:?}"
+        );
+    }
 }

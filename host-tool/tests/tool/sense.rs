@@ -1,7 +1,7 @@
 //! `hivtac sense` on pictures that are drawn here.
 
 use crate::run::*;
-use hivtac_scene::{Frame, Load, Preset, Scene};
+use hivtac_scene::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
@@ -60,6 +60,22 @@ fn frame(is_pressed: bool) -> Frame {
     let press = press.with_offset_mm([1.0, -0.5]).unwrap();
     let load = if is_pressed { press } else { Load::REST };
     scene.render_load(&load, 7).unwrap()
+}
+
+/// The untouched film with film colour over a quarter of a millimetre of every marker.
+fn covered() -> Frame {
+    let patch = |marker: &hivtac_scene::Disc| Patch {
+        centre_mm: [marker.centre_mm[0] + 1.25, marker.centre_mm[1]],
+        radius_mm: 1.0,
+        paint: Paint::Film,
+    };
+    let options = Options {
+        patches: MARKERS.iter().map(patch).collect(),
+        ..Options::default()
+    };
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
+    let scene = scene.with_options(options).unwrap();
+    scene.render_load(&Load::REST, 7).unwrap()
 }
 
 fn photograph(frame: &Frame) -> RgbImage {
@@ -183,6 +199,58 @@ fn png_and_ppm_give_the_same_and_jpeg_is_read() {
     assert_eq!(jpeg["blobs"].as_array().unwrap().len(), 4);
 }
 
+/// Decoders paint what is missing of a JPEG file in grey.
+#[test]
+fn a_jpeg_that_was_cut_anywhere_is_refused() {
+    let folder = Folder::new();
+    let whole = std::fs::read(folder.save("a.jpg", &picture(320, 240, &at_rest()))).unwrap();
+    let cut = folder.path("cut.jpg");
+    for part in [0.3, 0.5, 0.8, 0.99] {
+        std::fs::write(&cut, &whole[..(part * whole.len() as f64) as usize]).unwrap();
+        let found = run(&["sense", &cut]);
+        assert_eq!(found.code, Some(1), "{part}");
+        assert!(
+            found.stderr.contains("cannot read the picture"),
+            "{}",
+            found.stderr
+        );
+    }
+}
+
+/// EXIF data of one entry, the orientation: 6 is a quarter turn to the right.
+const TURNED: &[u8] = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\
+    \x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+
+/// A camera that was held sideways says so: what lies below to the left was above to the left.
+#[test]
+fn a_picture_is_turned_as_its_exif_data_say() {
+    let folder = Folder::new();
+    let path = folder.save("turned.jpg", &picture(120, 160, &[(60.0, 120.0, 8.0)]));
+    let jpeg = std::fs::read(&path).unwrap();
+    std::fs::write(&path, [&jpeg[..2], TURNED, &jpeg[2..]].concat()).unwrap();
+    let found = json_of(&run(&["sense", "--json", &path]));
+    assert_eq!(
+        (&found["width"], &found["height"]),
+        (&json!(160), &json!(120))
+    );
+    let [x, y] = ["cx", "cy"].map(|part| found["blobs"][0][part].as_f64().unwrap().round());
+    assert_eq!([x, y], [39.0, 60.0], "{found}");
+}
+
+/// A model that never ends.
+#[test]
+fn a_model_file_is_read_no_farther_than_a_model_can_be_long() {
+    let folder = Folder::new();
+    let image = folder.save("a.png", &picture(320, 240, &[]));
+    let endless = run(&["sense", "--model", "/dev/zero", &image]);
+    assert_eq!(endless.code, Some(1));
+    assert!(
+        endless.stderr.contains("which no model has"),
+        "{}",
+        endless.stderr
+    );
+}
+
 #[test]
 fn a_tare_takes_its_status_bit_away() {
     let folder = Folder::new();
@@ -192,6 +260,11 @@ fn a_tare_takes_its_status_bit_away() {
     let status = found["status"].as_array().unwrap();
     assert!(!status.contains(&json!("tare_missing")), "{found}");
     assert!(found["force"].is_object(), "{found}");
+    let covered = folder.save("covered.png", &photograph(&covered()));
+    let failed = run(&["sense", "--tare", &covered, &press]);
+    assert_eq!(failed.code, Some(1));
+    let why = "does not show four whole, equal markers";
+    assert!(failed.stderr.contains(why), "{}", failed.stderr);
     let empty = folder.save("empty.png", &picture(320, 240, &[]));
     let failed = run(&["sense", "--tare", &empty, &press]);
     assert_eq!(failed.code, Some(1));
