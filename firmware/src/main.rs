@@ -37,6 +37,7 @@ mod shared;
 mod stats;
 mod tare;
 mod usb;
+mod usb_guard;
 mod vsync;
 
 use camera::Format;

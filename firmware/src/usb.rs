@@ -15,6 +15,7 @@
 //! when the next host resets the bus, or closes the port.
 
 use crate::board::UsbPort;
+use crate::usb_guard::Guarded;
 use crate::{commands, outbox, session, stats};
 use embassy_futures::join::join5;
 use embassy_stm32::usb::{self, Driver};
@@ -41,7 +42,7 @@ bind_interrupts!(struct Irqs {
     OTG_FS => usb::InterruptHandler<peripherals::USB_OTG_FS>;
 });
 
-type Port<'d> = Driver<'d, peripherals::USB_OTG_FS>;
+type Port<'d> = Guarded<Driver<'d, peripherals::USB_OTG_FS>>;
 
 /// Runs for ever at the USB executor's priority. `model` is for the device's hello.
 #[embassy_executor::task]
@@ -62,7 +63,7 @@ pub async fn run(port: UsbPort, model: Option<Model<'static>>) {
         otg,
     );
     let mut builder = Builder::new(
-        driver,
+        Guarded::new(driver),
         identity(),
         &mut config_descriptor,
         &mut bos_descriptor,

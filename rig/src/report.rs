@@ -121,6 +121,7 @@ impl Report {
                 "port": format!("{:?}", self.port),
                 "enumerations": self.usb.enumerations,
                 "failed_transfers": self.usb.failed_transfers,
+                "repeated_packets": self.usb.repeated_packets,
                 "bytes_in": self.usb.bytes_in,
                 "packets_in": self.usb.packets_in,
                 "bytes_out": self.usb.bytes_out,

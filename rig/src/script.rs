@@ -11,6 +11,7 @@
 //! 600   read
 //! 800   unplug
 //! 900   plug
+//! 950   request 82 00 00 00 0f 00 02 00   a control transfer, by its SETUP; written data are zeros
 //! 1200  close
 //! ```
 
@@ -37,6 +38,8 @@ pub enum Action {
     Plug,
     /// Pull it.
     Unplug,
+    /// A control transfer, by its SETUP packet.
+    Request([u8; 8]),
 }
 
 /// Actions in the order of their times.
@@ -92,6 +95,7 @@ impl Script {
                 Action::StopReading => host.set_reading(false),
                 Action::Plug => host.set_cable(true),
                 Action::Unplug => host.set_cable(false),
+                Action::Request(setup) => host.request(setup),
             }
         }
     }
@@ -118,11 +122,16 @@ fn action(line: &str) -> anyhow::Result<(u64, Action)> {
         "stop-reading" => Action::StopReading,
         "plug" => Action::Plug,
         "unplug" => Action::Unplug,
+        "request" => {
+            let bytes = hexadecimal(argument)?;
+            Action::Request(bytes.try_into().ok().context("a SETUP has eight bytes")?)
+        }
         _ => bail!(
-            "no action is called `{word}`: use open, close, send, read, stop-reading, plug, unplug"
+            "no action is called `{word}`: use open, close, send, read, stop-reading, plug, \
+             unplug, request"
         ),
     };
-    if !argument.is_empty() && word != "send" {
+    if !argument.is_empty() && word != "send" && word != "request" {
         bail!("`{word}` takes no argument");
     }
     Ok(((ms * 1e6) as u64, action))
@@ -165,6 +174,7 @@ mod tests {
             ("1 send 1", "pairs"),
             ("1 send zz", "zz"),
             ("1 open now", "argument"),
+            ("1 request 80 06", "eight"),
         ] {
             let error = format!("{:#}", Script::parse(text).unwrap_err());
             assert!(error.contains(word), "{text}: {error}");

@@ -109,7 +109,7 @@ impl Core {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Answer;
+    use super::super::{Answer, Packet};
     use super::*;
 
     /// A device set up as far as the transceiver and the connection.
@@ -175,7 +175,7 @@ mod tests {
         core.write_device(0x00, 5 << 4);
         assert_eq!(core.setup(5, [0; 8]), Answer::Silence);
         core.write_device(0x100, 1 << 31 | 1 << 26);
-        assert_eq!(core.transmit(0, 0), Answer::Ack(vec![]));
+        assert_eq!(core.transmit(0, 0), Answer::Ack(Packet::default()));
         assert_eq!(core.setup(0, [0; 8]), Answer::Silence);
         assert_eq!(core.setup(5, [0; 8]), Answer::Ack(()));
         core.suspend();

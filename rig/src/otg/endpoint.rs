@@ -10,7 +10,8 @@ mod bit {
     pub const STALL: u32 = 1 << 21;
     pub const CLEAR_NAK: u32 = 1 << 26;
     pub const SET_NAK: u32 = 1 << 27;
-    pub const TOGGLE_COMMANDS: u32 = 3 << 28;
+    pub const NEXT_IS_DATA0: u32 = 1 << 28;
+    pub const NEXT_IS_DATA1: u32 = 1 << 29;
     pub const DISABLE: u32 = 1 << 30;
     pub const ENABLE: u32 = 1 << 31;
 }
@@ -25,7 +26,8 @@ mod event {
 
 /// Control bits after a write: commands act and do not stay.
 fn controlled(old: u32, written: u32) -> u32 {
-    let commands = bit::CLEAR_NAK | bit::SET_NAK | bit::TOGGLE_COMMANDS | bit::DISABLE;
+    let toggles = bit::NEXT_IS_DATA0 | bit::NEXT_IS_DATA1;
+    let commands = bit::CLEAR_NAK | bit::SET_NAK | toggles | bit::DISABLE;
     let mut now = written & !(commands | bit::NAK_STATUS) | old & (bit::NAK_STATUS | bit::ENABLE);
     if written & bit::CLEAR_NAK != 0 {
         now &= !bit::NAK_STATUS;
@@ -39,6 +41,12 @@ fn controlled(old: u32, written: u32) -> u32 {
     now
 }
 
+/// A data toggle, whether the next packet is DATA1, after a write of the control register. A bus
+/// reset leaves it: drivers set it. The core sees to that of endpoint 0 by itself.
+fn toggled(data1: bool, written: u32) -> bool {
+    (data1 || written & bit::NEXT_IS_DATA1 != 0) && written & bit::NEXT_IS_DATA0 == 0
+}
+
 /// An IN endpoint: device to host.
 #[derive(Clone, Debug, Default)]
 pub struct In {
@@ -47,6 +55,7 @@ pub struct In {
     pub interrupts: u32,
     /// DIEPTSIZ.
     pub size: u32,
+    data1: bool,
     fifo: VecDeque<u32>,
 }
 
@@ -62,6 +71,7 @@ impl In {
             self.interrupts |= event::DISABLED;
         }
         self.control = controlled(self.control, value);
+        self.data1 = toggled(self.data1, value);
         if value & bit::SET_NAK != 0 {
             self.interrupts |= event::NAK_EFFECTIVE;
         }
@@ -108,8 +118,8 @@ impl In {
         self.control & bit::STALL != 0
     }
 
-    /// The packet that is ready, if one is wholly in the FIFO.
-    pub fn packet(&mut self, number: usize) -> Option<Vec<u8>> {
+    /// The packet that is ready, if one is wholly in the FIFO, and whether it is DATA1.
+    pub fn packet(&mut self, number: usize) -> Option<(Vec<u8>, bool)> {
         let ready = self.control(number) & (bit::ENABLE | bit::NAK_STATUS | bit::ACTIVE)
             == bit::ENABLE | bit::ACTIVE;
         let length = (self.size & if number == 0 { 0x7F } else { 0x7_FFFF }) as usize;
@@ -122,7 +132,9 @@ impl In {
         self.control &= !bit::ENABLE;
         self.size = 0;
         self.interrupts |= event::TRANSFER_DONE;
-        Some(packet)
+        let data1 = self.data1;
+        self.data1 = !data1;
+        Some((packet, data1))
     }
 }
 
@@ -134,6 +146,7 @@ pub struct Out {
     pub interrupts: u32,
     /// DOEPTSIZ.
     pub size: u32,
+    data1: bool,
     was_enabled: bool,
 }
 
@@ -149,6 +162,7 @@ impl Out {
             self.interrupts |= event::DISABLED;
         }
         self.control = controlled(self.control, value);
+        self.data1 = toggled(self.data1, value);
         self.was_enabled =
             self.control & bit::ACTIVE != 0 && (self.was_enabled || value & bit::ENABLE != 0);
     }
@@ -174,6 +188,14 @@ impl Out {
         let open = self.control & bit::NAK_STATUS == 0;
         let packets = self.size >> 19 & 0x3FF;
         open && (number == 0 || self.was_enabled && packets > 0)
+    }
+
+    /// Whether a packet is the next one, not one that it has already; the host takes its
+    /// acknowledgement for that of the next one all the same.
+    pub fn is_next(&mut self, data1: bool) -> bool {
+        let next = self.data1 == data1;
+        self.data1 ^= next;
+        next
     }
 
     /// It took a packet: NAK until the firmware is ready for the next one.
@@ -208,10 +230,28 @@ mod tests {
         assert!(endpoint.push(0x4433_2211, 16));
         assert_eq!(endpoint.packet(1), None);
         assert!(endpoint.push(0x55, 16));
-        assert_eq!(endpoint.packet(1), Some(vec![0x11, 0x22, 0x33, 0x44, 0x55]));
+        let bytes = vec![0x11, 0x22, 0x33, 0x44, 0x55];
+        assert_eq!(endpoint.packet(1), Some((bytes, false)));
         assert_eq!(endpoint.packet(1), None);
         assert_eq!((endpoint.control(1) & bit::ENABLE, endpoint.size), (0, 0));
         assert_eq!(endpoint.interrupts & event::TRANSFER_DONE, 1);
+    }
+
+    #[test]
+    fn toggles_alternate_and_begin_anew_where_they_are_set() {
+        let mut endpoint = In::default();
+        let mut sent = |command: u32| {
+            endpoint.size = 1 << 19;
+            endpoint.write_control(bit::ACTIVE | bit::ENABLE | bit::CLEAR_NAK | command);
+            endpoint.packet(1).unwrap().1
+        };
+        let commands = [0, 0, 0, bit::NEXT_IS_DATA0, 0, bit::NEXT_IS_DATA0];
+        let expected = [false, true, false, false, true, false];
+        assert_eq!(commands.map(&mut sent), expected);
+        let mut out = Out::default();
+        assert!(out.is_next(false) && !out.is_next(false) && out.is_next(true));
+        out.write_control(bit::NEXT_IS_DATA1);
+        assert!(!out.is_next(false) && out.is_next(true));
     }
 
     #[test]

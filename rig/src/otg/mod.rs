@@ -5,7 +5,7 @@
 //! firmware reads and writes. Bytes leave the device only through its transmit FIFOs.
 //!
 //! Simulated: soft connect, bus reset, enumeration at full speed, suspend, resume, address, stall,
-//! NAK, FIFO depths. Not simulated: isochronous transfers, remote wake-up, host mode, data toggles,
+//! NAK, FIFO depths, data toggles. Not simulated: isochronous transfers, remote wake-up, host mode,
 //! and timing below a transaction. An OUT endpoint counts as armed when it is active, its NAK
 //! status is clear and its packet count is not zero; EPENA must have been set once since it became
 //! active. That is what drivers for this core rely on.
@@ -67,6 +67,15 @@ pub enum Answer<T> {
     Stall,
     /// Nobody has this address.
     Silence,
+}
+
+/// A packet of data.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Packet {
+    /// What it carries.
+    pub bytes: Vec<u8>,
+    /// Whether it is DATA1. Means nothing on endpoint 0, whose toggles the core sees to.
+    pub data1: bool,
 }
 
 /// An entry of the receive FIFO: its status word and its data.
@@ -235,8 +244,9 @@ impl Core {
         Answer::Ack(())
     }
 
-    /// An OUT transaction.
-    pub fn receive(&mut self, address: u8, endpoint: usize, packet: &[u8]) -> Answer<()> {
+    /// An OUT transaction. A packet that is not the next one by its toggle is acknowledged, and
+    /// nobody sees it.
+    pub fn receive(&mut self, address: u8, endpoint: usize, packet: &Packet) -> Answer<()> {
         let room = self.receive_room();
         if !self.answers(address) {
             return Answer::Silence;
@@ -245,17 +255,21 @@ impl Core {
         if out.stalled() {
             return Answer::Stall;
         }
-        if !out.armed(endpoint) || room < packet.len().div_ceil(4) + 2 {
+        let bytes = &packet.bytes;
+        if !out.armed(endpoint) || room < bytes.len().div_ceil(4) + 2 {
             return Answer::Nak;
         }
-        out.packet_received(packet.len());
-        self.push(packet_status::OUT_DATA, endpoint, packet);
+        if endpoint != 0 && !out.is_next(packet.data1) {
+            return Answer::Ack(());
+        }
+        out.packet_received(bytes.len());
+        self.push(packet_status::OUT_DATA, endpoint, bytes);
         self.push(packet_status::OUT_DONE, endpoint, &[]);
         Answer::Ack(())
     }
 
     /// An IN transaction.
-    pub fn transmit(&mut self, address: u8, endpoint: usize) -> Answer<Vec<u8>> {
+    pub fn transmit(&mut self, address: u8, endpoint: usize) -> Answer<Packet> {
         if !self.answers(address) {
             return Answer::Silence;
         }
@@ -269,7 +283,10 @@ impl Core {
             // before.
             self.address = self.dcfg_address();
         }
-        packet.map_or(Answer::Nak, Answer::Ack)
+        match packet {
+            Some((bytes, data1)) => Answer::Ack(Packet { bytes, data1 }),
+            None => Answer::Nak,
+        }
     }
 
     fn dcfg_address(&self) -> u32 {

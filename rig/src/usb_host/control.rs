@@ -1,6 +1,6 @@
 //! Control transfers: SETUP, data, status, one transaction at a time.
 
-use crate::otg::{Answer, Core};
+use crate::otg::{Answer, Core, Packet};
 
 /// The address the host gives the device.
 pub const ADDRESS: u8 = 7;
@@ -8,6 +8,8 @@ pub const ADDRESS: u8 = 7;
 pub const SET_ADDRESS: &str = "SET_ADDRESS";
 /// Name of the transfer that reads the whole configuration.
 pub const CONFIGURATION: &str = "GET_DESCRIPTOR configuration";
+/// Name of a request that a script made up.
+pub const ANY: &str = "control";
 /// Largest packet of endpoint 0.
 const PACKET: usize = 64;
 
@@ -30,6 +32,17 @@ pub enum Progress {
     Done(Vec<u8>),
     /// Over without success.
     Failed(&'static str),
+}
+
+/// Endpoints whose next packet is DATA0 after a transfer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begins {
+    /// No endpoint.
+    None,
+    /// The one of this address.
+    Endpoint(u8),
+    /// All.
+    All,
 }
 
 /// A control transfer.
@@ -61,6 +74,39 @@ impl Transfer {
         }
     }
 
+    /// Any request, with zeros for its data.
+    pub fn any(setup: [u8; 8]) -> Self {
+        let transfer = Self::read(ANY, setup);
+        match transfer.is_read() {
+            true => transfer,
+            false => Self {
+                data: vec![0; transfer.wanted().min(PACKET)],
+                ..transfer
+            },
+        }
+    }
+
+    /// For the log: its name, or its bytes.
+    pub fn title(&self) -> String {
+        match self.name {
+            ANY => {
+                let bytes = self.setup.map(|byte| format!("{byte:02x}"));
+                format!("{ANY} {}", bytes.join(" "))
+            }
+            name => name.to_owned(),
+        }
+    }
+
+    /// Of which endpoint it clears the halt, which has its toggle begin anew on both sides; any
+    /// configuration that is set does so for all.
+    pub fn begins_anew(&self) -> Begins {
+        match self.setup {
+            [2, 1, 0, 0, endpoint, ..] => Begins::Endpoint(endpoint),
+            [0, 9, ..] => Begins::All,
+            _ => Begins::None,
+        }
+    }
+
     /// Starts; fails at the deadline.
     pub fn begin(&mut self, deadline: u64) {
         self.deadline = deadline;
@@ -82,10 +128,10 @@ impl Transfer {
         match self.stage {
             Stage::Setup => self.send_setup(address, device),
             Stage::DataIn => match device.transmit(address, 0) {
-                Answer::Ack(packet) => self.data_in(&packet),
+                Answer::Ack(packet) => self.data_in(&packet.bytes),
                 other => waiting(other),
             },
-            Stage::DataOut => match device.receive(address, 0, &self.data) {
+            Stage::DataOut => match device.receive(address, 0, &packet(&self.data)) {
                 Answer::Ack(()) => self.go(Stage::StatusIn),
                 other => waiting(other),
             },
@@ -93,7 +139,7 @@ impl Transfer {
                 Answer::Ack(_) => Progress::Done(Vec::new()),
                 other => waiting(other),
             },
-            Stage::StatusOut => match device.receive(address, 0, &[]) {
+            Stage::StatusOut => match device.receive(address, 0, &packet(&[])) {
                 Answer::Ack(()) => Progress::Done(std::mem::take(&mut self.data)),
                 other => waiting(other),
             },
@@ -123,6 +169,14 @@ impl Transfer {
     fn go(&mut self, stage: Stage) -> Progress {
         self.stage = stage;
         Progress::Going
+    }
+}
+
+/// The core sees to the toggles of endpoint 0.
+fn packet(bytes: &[u8]) -> Packet {
+    Packet {
+        bytes: bytes.to_vec(),
+        data1: true,
     }
 }
 

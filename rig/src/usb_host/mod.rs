@@ -12,8 +12,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::arrivals::Arrivals;
 use crate::faults::{Faults, Kind};
-use crate::otg::{Answer, Core};
-use control::{Progress, Transfer};
+use crate::otg::{Answer, Core, Packet};
+use control::{Begins, Progress, Transfer};
 use descriptors::Function;
 
 /// One transaction, ns.
@@ -65,6 +65,9 @@ pub struct Counters {
     pub enumerations: u64,
     /// Control transfers that timed out or stalled.
     pub failed_transfers: u64,
+    /// Bulk packets from the device that were thrown away for their toggle: taken for one that the
+    /// host has.
+    pub repeated_packets: u64,
 }
 
 /// The host.
@@ -86,6 +89,8 @@ pub struct Host {
     /// Whether the program reads.
     reading: bool,
     bulk_turn_in: bool,
+    /// Whether the next bulk packet is DATA1: from the device, and to it.
+    data1: [bool; 2],
     next_frame_ns: u64,
     /// Bytes from the device.
     pub from_device: VecDeque<u8>,
@@ -129,6 +134,7 @@ impl Host {
             told_open: false,
             reading: true,
             bulk_turn_in: true,
+            data1: [false; 2],
             next_frame_ns: 0,
             from_device: VecDeque::new(),
             to_device: VecDeque::new(),
@@ -170,6 +176,11 @@ impl Host {
     /// The program reads, or does not.
     pub fn set_reading(&mut self, reading: bool) {
         self.reading = reading;
+    }
+
+    /// A control transfer, once the device is configured.
+    pub fn request(&mut self, setup: [u8; 8]) {
+        self.queue.push_back(Transfer::any(setup));
     }
 
     /// The cable is plugged in, or not.
@@ -267,16 +278,27 @@ impl Host {
         match transfer.step(now, self.address, device) {
             Progress::Going => {}
             Progress::Done(data) => {
-                let name = transfer.name;
-                self.note(now, &format!("{name}: {} bytes", data.len()));
+                let (name, title, anew) = (transfer.name, transfer.title(), transfer.begins_anew());
+                self.note(now, &format!("{title}: {} bytes", data.len()));
+                self.begin_anew(anew);
                 self.transferred(now, name, &data);
             }
             Progress::Failed(why) => {
-                let message = format!("{}: {why}", transfer.name);
+                let message = format!("{}: {why}", transfer.title());
                 self.note(now, &message);
                 self.counters.failed_transfers += 1;
                 self.transfer_failed(now, device);
             }
+        }
+    }
+
+    fn begin_anew(&mut self, which: Begins) {
+        let Some(function) = self.function else {
+            return;
+        };
+        let endpoints = [function.bulk_in as u8 | 0x80, function.bulk_out as u8];
+        for (data1, endpoint) in self.data1.iter_mut().zip(endpoints) {
+            *data1 &= which != Begins::All && which != Begins::Endpoint(endpoint);
         }
     }
 
@@ -317,6 +339,9 @@ impl Host {
         if self.transfer.is_none() && self.open != self.told_open {
             self.tell_open(now);
         }
+        if self.transfer.is_none() {
+            self.next_transfer(now);
+        }
         if self.transfer.is_some() {
             return self.control(now, device);
         }
@@ -340,7 +365,7 @@ impl Host {
             .function
             .map_or(0, |function| function.control_interface);
         self.told_open = self.open;
-        self.queue = control::line(interface, self.open).into();
+        self.queue.extend(control::line(interface, self.open));
         self.next_transfer(now);
     }
 
@@ -355,10 +380,15 @@ impl Host {
         let Answer::Ack(packet) = device.transmit(self.address, function.bulk_in) else {
             return false;
         };
-        self.counters.bytes_in += packet.len() as u64;
+        if packet.data1 != self.data1[0] {
+            self.counters.repeated_packets += 1;
+            return true;
+        }
+        self.data1[0] = !self.data1[0];
+        self.counters.bytes_in += packet.bytes.len() as u64;
         self.counters.packets_in += 1;
-        self.arrivals.packet(&packet, now + TRANSACTION_NS);
-        self.from_device.extend(packet);
+        self.arrivals.packet(&packet.bytes, now + TRANSACTION_NS);
+        self.from_device.extend(packet.bytes);
         true
     }
 
@@ -366,14 +396,18 @@ impl Host {
         let Some(function) = self.function else {
             return false;
         };
-        let packet: Vec<u8> = self.to_device.iter().take(PACKET).copied().collect();
-        if packet.is_empty()
+        let packet = Packet {
+            bytes: self.to_device.iter().take(PACKET).copied().collect(),
+            data1: self.data1[1],
+        };
+        if packet.bytes.is_empty()
             || device.receive(self.address, function.bulk_out, &packet) != Answer::Ack(())
         {
             return false;
         }
-        self.to_device.drain(..packet.len());
-        self.counters.bytes_out += packet.len() as u64;
+        self.data1[1] = !self.data1[1];
+        self.to_device.drain(..packet.bytes.len());
+        self.counters.bytes_out += packet.bytes.len() as u64;
         true
     }
 
