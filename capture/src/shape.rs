@@ -27,7 +27,8 @@ impl Shape {
 
     /// Where a band lies.
     pub const fn slot(&self, sequence: u32) -> u16 {
-        (sequence % self.slots as u32) as u16
+        // A power of two: the remainder is its lower bits.
+        sequence as u16 & (self.slots - 1)
     }
 
     /// Whether the band `sequence` was still whole at a moment *after which* [`Tracker::finished`]

@@ -101,7 +101,10 @@ impl Tracker {
             edge,
         }));
         self.finished = self.finished.wrapping_add(1);
-        self.index = (self.index + 1) % self.shape.bands();
+        self.index += 1;
+        if self.index >= self.shape.bands() {
+            self.index = 0;
+        }
         interface.aim(self.shape.slot(self.finished.wrapping_add(1)));
     }
 

@@ -91,20 +91,19 @@ impl BandCopy {
             return None;
         }
         self.before = Some(band.sequence);
-        let above = match before {
-            Some(sequence) if sequence.wrapping_add(1) == band.sequence => {
-                &self.buffers[buffer_before].0[..]
-            }
-            _ => &[],
-        };
+        let follows = before.is_some_and(|before| before.wrapping_add(1) == band.sequence);
+        let above = self.buffers.get(buffer_before).filter(|_| follows);
         Some(Fetched {
-            rows: &self.buffers[buffer].0,
-            above,
+            rows: &self.buffers.get(buffer)?.0,
+            above: above.map_or(&[], |rows| &rows.0),
         })
     }
 
     /// Begins to copy a band into the next buffer. What was under way is given up.
     fn start(&mut self, sequence: u32) {
+        let Some(buffer) = self.buffers.get_mut(self.next) else {
+            return;
+        };
         let channel = registers();
         channel.cr().write_value(regs::Cr(0));
         while channel.cr().read().en() {}
@@ -115,8 +114,9 @@ impl BandCopy {
             .write(|w| w.set_bndt(size_of::<Rows>() as u32));
         let source = bands::address(SHAPE.slot(sequence));
         channel.sar().write_value(regs::Sar(source));
-        let buffer = &raw mut self.buffers[self.next];
-        channel.dar().write_value(regs::Dar(buffer as u32));
+        channel
+            .dar()
+            .write_value(regs::Dar(&raw mut *buffer as u32));
         channel.tbr().write(|w| {
             w.set_sbus(vals::Bus::SYSTEM);
             w.set_dbus(vals::Bus::AHB);

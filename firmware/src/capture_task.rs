@@ -49,7 +49,8 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
         match select3(format, exposure, frame_time).await {
             Either3::First(format) => task.change_format(format).await,
             Either3::Second(asked) => task.expose(asked).await,
-            Either3::Third(()) => task.listen().await,
+            Either3::Third(()) if task.is_silent() => task.silent().await,
+            Either3::Third(()) => {}
         }
     }
 }
@@ -68,8 +69,9 @@ struct CaptureTask {
 }
 
 impl CaptureTask {
-    /// Looks whether something has come during the last frame time.
-    async fn listen(&mut self) {
+    /// Looks whether something has come during the last frame time; whether nothing has for too
+    /// long.
+    fn is_silent(&mut self) -> bool {
         let activity = self.capture.activity();
         if activity != self.activity {
             (self.quiet, self.silences) = (0, 0);
@@ -77,10 +79,11 @@ impl CaptureTask {
             self.quiet += 1;
         }
         self.activity = activity;
-        if self.quiet >= SILENCE {
+        let silent = self.quiet >= SILENCE;
+        if silent {
             self.quiet = 0;
-            self.silent().await;
         }
+        silent
     }
 
     async fn silent(&mut self) {

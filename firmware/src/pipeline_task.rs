@@ -54,8 +54,22 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
         first: true,
         taring: None,
     };
+    // Nothing but this loop waits: an async function that ends could be polled again, and panic.
     loop {
-        task.step().await;
+        if task.follower.is_scanning() {
+            if !task.deliver_early() {
+                let event = CAPTURE_EVENTS.receive().await;
+                task.take(event);
+            }
+            continue;
+        }
+        // Orders wait for the end of a frame.
+        let deadline = Timer::at(task.deadline());
+        match select3(ORDERS.receive(), CAPTURE_EVENTS.receive(), deadline).await {
+            Either3::First(order) => task.obey(order),
+            Either3::Second(event) => task.take(event),
+            Either3::Third(()) => task.give_up_tare(),
+        }
     }
 }
 
@@ -77,31 +91,22 @@ struct PipelineTask {
 }
 
 impl PipelineTask {
-    /// Does the next thing there is to do. Orders wait for the end of a frame.
-    async fn step(&mut self) {
-        if self.follower.is_scanning() {
-            return self.go_on().await;
-        }
+    /// When a tare gives up that is still wanted.
+    fn deadline(&mut self) -> Instant {
         self.taring.take_if(|taring| !taring.is_wanted());
-        let deadline = self.taring.as_ref().map_or(Instant::MAX, Taring::deadline);
-        let (order, event) = (ORDERS.receive(), CAPTURE_EVENTS.receive());
-        match select3(order, event, Timer::at(deadline)).await {
-            Either3::First(order) => self.obey(order),
-            Either3::Second(event) => self.take(event),
-            Either3::Third(()) => self.give_up_tare(),
-        }
+        self.taring.as_ref().map_or(Instant::MAX, Taring::deadline)
     }
 
-    /// Goes on with the frame under way. One that has all its rows need not wait for its end.
-    async fn go_on(&mut self) {
+    /// Delivers the frame under way when it has all its rows and need not wait for its end; tells
+    /// whether it did.
+    fn deliver_early(&mut self) -> bool {
         let complete = self.follower.is_complete();
-        if complete && CAPTURE_EVENTS.is_empty() && !capture::has_begun_a_band() {
+        let early = complete && CAPTURE_EVENTS.is_empty() && !capture::has_begun_a_band();
+        if early {
             let action = self.follower.deliver();
             self.act(action);
-        } else {
-            let event = CAPTURE_EVENTS.receive().await;
-            self.take(event);
         }
+        early
     }
 
     /// Takes what the capture tells, and does what follows from it.
@@ -253,28 +258,19 @@ impl PipelineTask {
         let Some(taring) = &mut self.taring else {
             return;
         };
-        if let Some(rest) = taring.add(measurement) {
-            let at_rest = rest.fits(&self.sensor.settings().geometry);
-            if at_rest {
+        if let Some(outcome) = taring.add(self.sensor, measurement) {
+            if let Ok(rest) = outcome {
                 self.sensor.set_tare(Some(rest));
             }
-            reply(taring.id(), tare_outcome(at_rest));
+            reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
             self.taring = None;
         }
     }
 
     fn give_up_tare(&mut self) {
         if let Some(taring) = self.taring.take() {
-            reply(taring.id(), Outcome::NoGoodFrames);
+            reply(taring.id(), taring.given_up());
         }
-    }
-}
-
-fn tare_outcome(at_rest: bool) -> Outcome {
-    if at_rest {
-        Outcome::Done
-    } else {
-        Outcome::NotAtRest
     }
 }
 

@@ -56,7 +56,7 @@ impl Dilation {
         self.occupied = 0;
         self.set_rows = 0;
         let kept = self.kept();
-        self.mask[..kept].fill(0);
+        self.mask.iter_mut().take(kept).for_each(|word| *word = 0);
     }
 
     /// Rows that the dilated ones are behind: as many empty rows bring out the last.
@@ -69,12 +69,13 @@ impl Dilation {
     #[inline(always)]
     pub fn incoming(&mut self, rows: usize) -> &mut [u32] {
         let kept = self.kept();
-        &mut self.mask[kept..][..rows * self.words]
+        let incoming = self.mask.get_mut(kept..kept + rows * self.words);
+        incoming.unwrap_or_default()
     }
 
     /// Looks at the rows that were written.
     pub fn look(&mut self, rows: usize) {
-        let row_words = self.words;
+        let row_words = self.words.max(1);
         let incoming = self.incoming(rows);
         if !any_set(incoming) {
             // As most are.
@@ -121,11 +122,13 @@ impl Dilation {
 
     /// The edges of row `i` within its words `near`.
     fn spread(&self, i: usize, near: &Near, edges: &mut Edges) {
-        let rows = self.mask[i * self.words..].chunks_exact(self.words);
+        let rows = self.mask.get(i * self.words..).unwrap_or_default();
+        let rows = rows.chunks_exact(self.words.max(1));
         let mut columns = [0; MAX_WORDS];
-        let columns = &mut columns[..near.words];
+        let columns = columns.get_mut(..near.words).unwrap_or_default();
         for row in rows.take(2 * usize::from(self.radius) + 1) {
-            let all = columns.iter_mut().zip(&row[near.first..]);
+            let row = row.get(near.first..).unwrap_or_default();
+            let all = columns.iter_mut().zip(row);
             all.for_each(|(all, word)| *all |= word);
         }
         let mut left = 0;
@@ -200,9 +203,13 @@ impl Dilation {
         let first = self.occupied.trailing_zeros() as usize;
         let end = 32 - self.occupied.leading_zeros() as usize;
         for row in 0..self.kept_rows() {
-            let (to, from) = self.mask.split_at_mut((row + rows) * self.words);
-            let to = to[row * self.words..].iter_mut().skip(first);
-            to.zip(&from[first..end]).for_each(|(to, from)| *to = *from);
+            let split = (row + rows) * self.words;
+            let Some((to, from)) = self.mask.split_at_mut_checked(split) else {
+                break;
+            };
+            let to = to.get_mut(row * self.words + first..).unwrap_or_default();
+            let from = from.get(first..end).unwrap_or_default();
+            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
         }
         self.set_rows >>= rows;
         if self.is_empty() {

@@ -80,7 +80,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped. After a row with
     /// which it has more than `max_runs` runs, nothing more of it is taken.
     pub fn begin(&mut self, min_area: u32, max_runs: u32) {
-        self.rows[self.last].edges.clear();
+        self.rows.iter_mut().for_each(|row| row.edges.clear());
         self.forest.clear();
         self.kept.clear();
         self.min_area = min_area;
@@ -120,12 +120,12 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Weighs the runs of row `y`, which was pushed last.
     #[inline(always)]
     pub fn weigh(&mut self, y: u16, weigh: impl Fn(Run) -> Weights) {
-        let Row { edges, labels } = &self.rows[self.last];
+        let (_, Row { edges, labels }) = last_two(&mut self.rows, self.last);
         for (&[x0, end], label) in edges.runs().iter().zip(labels) {
             let weights = weigh(Run { x0, x1: end - 1 });
-            self.forest.slots[usize::from(*label)]
-                .moments
-                .weigh(weights, y);
+            if let Some(slot) = self.forest.slots.get_mut(usize::from(*label)) {
+                slot.moments.weigh(weights, y);
+            }
         }
     }
 
@@ -142,7 +142,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Finishes the blobs that reach the last row, `height` − 1.
     pub fn finish(&mut self, height: u16) {
         self.last = 1 - self.last;
-        self.rows[self.last].edges.clear();
+        last_two(&mut self.rows, self.last).1.edges.clear();
         self.idle = true;
         self.label_row(height, |_| 0);
     }
@@ -171,7 +171,8 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
                 first += 1;
             }
             let run = Run { x0, x1: end - 1 };
-            let touched = above[first..].iter().zip(&above_labels[first..]);
+            let touched = above.get(first..).unwrap_or_default().iter();
+            let touched = touched.zip(above_labels.get(first..).unwrap_or_default());
             let mut touched = touched.take_while(|(above, _)| above[0] <= end);
             let Some((_, touched_label)) = touched.next() else {
                 let mut moments = Moments::of_run(run, y);
@@ -186,15 +187,16 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
                 self.forest.join(root, *other);
                 joined = true;
             }
-            let moments = &mut self.forest.slots[usize::from(root)].moments;
-            moments.add_run(run, y);
-            moments.passed += passed([x0, end]);
+            if let Some(Slot { moments, .. }) = self.forest.slots.get_mut(usize::from(root)) {
+                moments.add_run(run, y);
+                moments.passed += passed([x0, end]);
+            }
             *label = root;
         }
         if joined {
             // Nothing may point at labels that were joined to others.
             let count = current.edges.runs().len();
-            for label in &mut current.labels[..count] {
+            for label in current.labels.iter_mut().take(count) {
                 *label = self.forest.find(*label);
             }
         }
@@ -204,9 +206,11 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// Frees the labels of the row before the last, `y`, that were joined to others, and those that
     /// it did not touch.
     fn finish_untouched(&mut self, y: u16) {
-        let Row { edges, labels } = &self.rows[1 - self.last];
-        for &label in &labels[..edges.runs().len()] {
-            let slot = &mut self.forest.slots[usize::from(label)];
+        let (Row { edges, labels }, _) = last_two(&mut self.rows, self.last);
+        for &mut label in labels.iter_mut().take(edges.runs().len()) {
+            let Some(slot) = self.forest.slots.get_mut(usize::from(label)) else {
+                continue;
+            };
             let root = slot.parent == label;
             if slot.parent == FREE || root && slot.moments.y1 == y {
                 continue;
@@ -255,9 +259,10 @@ fn continue_blobs(
     for (&[x0, end], (label, above)) in runs.iter().zip(labels) {
         *label = *above;
         let run = Run { x0, x1: end - 1 };
-        let moments = &mut forest.slots[usize::from(*above)].moments;
-        moments.add_run(run, y);
-        moments.passed += passed([x0, end]);
+        if let Some(Slot { moments, .. }) = forest.slots.get_mut(usize::from(*above)) {
+            moments.add_run(run, y);
+            moments.passed += passed([x0, end]);
+        }
     }
     true
 }
@@ -299,30 +304,43 @@ impl Forest {
             return self.slots.push(slot).ok().map(|()| parent);
         };
         let parent = label;
-        self.slots[usize::from(label)] = Slot { parent, moments };
+        *self.slots.get_mut(usize::from(label))? = Slot { parent, moments };
         Some(label)
     }
 
     /// Joins the blob of a label to that of a root, which remains.
     fn join(&mut self, root: Label, label: Label) {
         let other = self.find(label);
-        if root != other {
-            let joined = &mut self.slots[usize::from(other)];
-            joined.parent = root;
-            let moments = joined.moments;
-            self.slots[usize::from(root)].moments.add(&moments);
+        if root == other {
+            return;
+        }
+        let Some(joined) = self.slots.get_mut(usize::from(other)) else {
+            return;
+        };
+        joined.parent = root;
+        let moments = joined.moments;
+        if let Some(slot) = self.slots.get_mut(usize::from(root)) {
+            slot.moments.add(&moments);
         }
     }
 
     /// The root of a label; halves the path to it.
     fn find(&mut self, mut label: Label) -> Label {
+        let parent = |slots: &[Slot], label: Label| {
+            // A label that there is not is its own root.
+            slots
+                .get(usize::from(label))
+                .map_or(label, |slot| slot.parent)
+        };
         loop {
-            let parent = self.slots[usize::from(label)].parent;
-            if parent == label {
+            let above = parent(&self.slots, label);
+            if above == label {
                 return label;
             }
-            let grandparent = self.slots[usize::from(parent)].parent;
-            self.slots[usize::from(label)].parent = grandparent;
+            let grandparent = parent(&self.slots, above);
+            if let Some(slot) = self.slots.get_mut(usize::from(label)) {
+                slot.parent = grandparent;
+            }
             label = grandparent;
         }
     }

@@ -115,10 +115,10 @@ impl Weights {
 pub const fn redness(pixel: u16) -> u8 {
     let [red, green, blue] = rgb888(pixel);
     let excess = 2 * red as i32 - green as i32 - blue as i32;
-    if excess <= 0 {
+    // Where twice r is above g + b r is not 0; the quotient is at most 160.
+    if excess <= 0 || red == 0 {
         return 0;
     }
-    // Twice r is above g + b, so that r is not 0; the quotient is at most 160.
     let weight = 80 * excess / red as i32 - 28;
     if weight <= 0 {
         0

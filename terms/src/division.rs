@@ -133,7 +133,8 @@ pub fn limited(value: i64) -> i32 {
 /// ⌊(B² − 1)/d⌋ − B = ⌊((B − 1 − d)·B + B − 1) / d⌋ for d of B/2 or more, a half word at a time.
 #[inline(always)]
 fn reciprocal(divisor: u32) -> u32 {
-    let (upper, lower) = (divisor >> 16, divisor & 0xffff);
+    // The upper half has its highest bit set, which the compiler is told here.
+    let (upper, lower) = (divisor >> 16 | 1 << 15, divisor & 0xffff);
     // A digit from the divisor's upper half is at most 2 too large.
     let digit = |rest: u32| {
         let mut digit = rest / upper;

@@ -59,7 +59,7 @@ impl Axis {
 
     /// Its first and last node, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
-        [self.nodes_mm[0], self.nodes_mm[self.count - 1]]
+        [self.node(0), self.node(self.count - 1)]
     }
 
     /// What slopes' weights are in parts of, 1/mm.
@@ -104,11 +104,16 @@ impl Axis {
     /// node.
     fn knot(&self, k: usize) -> f32 {
         let last = self.count - 1;
-        self.nodes_mm[match k {
+        self.node(match k {
             0..SPAN => 0,
             _ if k > last => last,
             _ => k - 2,
-        }]
+        })
+    }
+
+    /// There are as many as the axis counts.
+    fn node(&self, k: usize) -> f32 {
+        self.nodes_mm.get(k).copied().unwrap_or_default()
     }
 }
 

@@ -3,7 +3,7 @@
 use super::Forward;
 use super::estimate::{Estimate, Observed, UNEXPLAINED};
 use super::mounting::Mounting;
-use super::pose::Pose;
+use super::pose::{Pose, limited};
 use super::predict::{CORNERS, Prediction};
 use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
 
@@ -184,9 +184,9 @@ fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
     let too_steep = (pose.angle() / forward.limits.tilt).max(1.0);
     let [from, to] = forward.tables.moved.axis().ends_mm();
     Pose {
-        size: pose.size.clamp(0.0, forward.limits.size),
+        size: limited(pose.size, 0.0, forward.limits.size),
         tilt: pose.tilt.map(|part| part / too_steep),
-        place_mm: pose.place_mm.map(|part| part.clamp(from, to)),
+        place_mm: pose.place_mm.map(|part| limited(part, from, to)),
     }
 }
 

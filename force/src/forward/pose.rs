@@ -42,7 +42,18 @@ impl Stiffness {
         for _ in 0..SIZE_STEPS {
             size -= (self.magnitude_n(size) - magnitude_n) / self.per_size_n(size);
         }
-        size.clamp(0.0, largest)
+        limited(size, 0.0, largest)
+    }
+}
+
+/// `f32::clamp` between limits that a model file tells, which panics unless they are in order.
+pub fn limited(value: f32, least: f32, most: f32) -> f32 {
+    if value < least {
+        least
+    } else if value > most {
+        most
+    } else {
+        value
     }
 }
 

@@ -31,7 +31,10 @@ pub struct Solved {
 impl Solved {
     /// The covariance of two unknowns.
     pub fn covariance(&self, a: usize, b: usize) -> f32 {
-        let pairs = self.spread[a].iter().zip(&self.spread[b]);
+        let [Some(a), Some(b)] = [a, b].map(|unknown| self.spread.get(unknown)) else {
+            return 0.0;
+        };
+        let pairs = a.iter().zip(b);
         pairs.fold(0.0, |sum, (a, b)| sum + a * b)
     }
 
@@ -49,7 +52,11 @@ impl Solved {
             a * along[0] + b * along[1]
         };
         let variance = with(first) * along[0] + with(first + 1) * along[1];
-        core::array::from_fn(|k| unknowns[k] - less * with(k) / variance)
+        let mut held = unknowns;
+        for (k, held) in held.iter_mut().enumerate() {
+            *held -= less * with(k) / variance;
+        }
+        held
     }
 }
 

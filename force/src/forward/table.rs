@@ -144,10 +144,12 @@ impl<'a> Table<'a> {
             y: core::array::from_fn(|j| [place.y.values[j], place.y.slopes[j]]),
             x: [place.x.values, place.x.slopes],
         };
-        let sums = &mut sums.0[..count];
+        let sums = sums.0.get_mut(..count).unwrap_or_default();
         let line = self.outputs * count * node;
-        spline(&self.steps[before..], line, node, &parts, sums);
-        (sums, &self.sizes[output * count..(output + 1) * count])
+        let steps = self.steps.get(before..).unwrap_or_default();
+        spline(steps, line, node, &parts, sums);
+        let sizes = self.sizes.get(output * count..(output + 1) * count);
+        (sums, sizes.unwrap_or_default())
     }
 }
 

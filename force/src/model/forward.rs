@@ -113,10 +113,10 @@ fn table<'a>(reader: &mut Reader<'a>, outputs: usize) -> Result<Table<'a>, Model
     };
     let terms = terms.ok_or(wrong("table", "6 to 16 nodes and 1 to 88 terms"))?;
     let mut nodes_mm = [0.0; *NODES.end()];
-    for node in &mut nodes_mm[..count] {
+    for node in nodes_mm.iter_mut().take(count) {
         *node = f32::from_le_bytes(reader.array()?);
     }
-    let axis = Axis::new(&nodes_mm[..count]);
+    let axis = Axis::new(nodes_mm.get(..count).unwrap_or_default());
     let axis = axis.ok_or(wrong("table's nodes", "growing from -100 to 100 mm"))?;
     let [sizes, steps] = Table::lengths(&axis, &terms, outputs);
     let (sizes, steps) = (reader.take(sizes)?, reader.take(steps)?);

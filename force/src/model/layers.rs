@@ -17,7 +17,7 @@ pub(super) fn layers<'a>(
 ) -> Result<[Layer<'a>; MAX_LAYERS], ModelError> {
     let mut layers = [Layer::default(); MAX_LAYERS];
     let (mut fed, mut largest) = (FEATURES, LARGEST_INPUT);
-    for (index, slot) in layers[..count].iter_mut().enumerate() {
+    for (index, slot) in layers.iter_mut().take(count).enumerate() {
         let layer = layer(reader, index + 1 == count)?;
         if layer.inputs != fed {
             return Err(ModelError::Chain {

@@ -138,7 +138,7 @@ impl<'a> Model<'a> {
 
     /// Its layers, first to last: at least one.
     pub fn layers(&self) -> &[Layer<'a>] {
-        &self.layers[..self.layer_count]
+        self.layers.get(..self.layer_count).unwrap_or_default()
     }
 
     /// True when its file lies at a multiple of four, so that kernels can run it. Every layer then

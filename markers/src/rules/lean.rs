@@ -77,7 +77,8 @@ pub fn lean(
         let parts = [direction.along(third), direction.across(third)].map(|it| i64::from(it) << 20);
         limited(by[0].times(parts[0]) + by[1].times(parts[1]))
     };
-    let lean = length([0, 1].map(|side| rounded(parts.map(|part| part[side]))));
+    let [[xx, yx], [xy, yy], [xz, yz]] = parts;
+    let lean = length([[xx, xy, xz], [yx, yy, yz]].map(rounded));
     scaled(lean, deviation, 16)
 }
 
