@@ -4,8 +4,8 @@ mod common;
 
 use common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
-use hivtac_wire::message::{Outcome, Request};
 use hivtac_terms::status::Status;
+use hivtac_wire::message::{Outcome, Request};
 
 const ASKED: u16 = 40;
 

@@ -1,0 +1,171 @@
+//! What in the firmware could panic, read from the very ELF that is flashed: nothing of the sensing,
+//! of the capture and of the pipeline's task, and of the rest what this list has with its reasons.
+
+mod branches;
+
+use std::fs;
+
+use branches::{Branch, branches};
+use hivtac_tests::artifact;
+
+/// Parts of the mangled names of what panics.
+const PANICS: [&str; 9] = [
+    "9panicking",
+    "unwrap_failed",
+    "expect_failed",
+    "panic_already",
+    "index_fail",
+    "slice_error_fail",
+    "len_mismatch",
+    "defmt_panic",
+    "defmt_default_panic",
+];
+
+/// Code in which there shall be none.
+const NEVER: [&str; 8] = [
+    "hivtac_terms",
+    "hivtac_markers",
+    "hivtac_force",
+    "hivtac_sensing",
+    "hivtac_capture",
+    "hivtac_wire",
+    "9band_copy",
+    "8band_dma",
+];
+
+/// Functions that may panic: a part of their mangled names, the most sites, and why none is
+/// reached. The first that fits counts.
+const REASONS: [(&str, usize, &str); 17] = [
+    (
+        "embassy_usb_synopsys_otg",
+        37,
+        "the driver's assertions about its own endpoints: requests about others are stalled \
+         before (`usb_guard`), and the interrupt has one bit for each endpoint that there is",
+    ),
+    (
+        "embassy_usb",
+        58,
+        "descriptors are written at the start, into buffers that hold them; answers fit the \
+         control buffer of 64 bytes; a USB task ends never, so that no future of it is polled \
+         after its end",
+    ),
+    (
+        "embassy_futures",
+        50,
+        "the USB task: its five parts never end, and of what they wait for nothing is polled \
+         after its end",
+    ),
+    (
+        "hivtac_firmware5board",
+        4,
+        "at the start only: pins that are constants, and what is taken once",
+    ),
+    (
+        "hivtac_firmware6camera",
+        1,
+        "set-up of the camera: what has ended is not polled again",
+    ),
+    (
+        "hivtac_firmware12capture_task",
+        9,
+        "set-up of the camera: what has ended is not polled again",
+    ),
+    (
+        "hivtac_firmware13pipeline_task",
+        1,
+        "a queue's cell, in a critical section and so never borrowed twice",
+    ),
+    (
+        "hivtac_firmware",
+        3,
+        "at the start only: tasks are spawned once, and the settings are constants that the \
+         model's proof fits",
+    ),
+    (
+        "embassy_executor",
+        10,
+        "the same of the capture and USB tasks, compiled into their executor; executors start \
+         once",
+    ),
+    (
+        "embassy_sync",
+        13,
+        "cells of queues and signals, in a critical section and so never borrowed twice",
+    ),
+    (
+        "embassy_stm32",
+        58,
+        "clocks, pins and timings that are constants, at the start; the time driver's cells, in \
+         a critical section and so never borrowed twice",
+    ),
+    (
+        "embassy_time",
+        14,
+        "sums of times that 64 bits of microseconds hold for 500,000 years",
+    ),
+    (
+        "poll_fn..PollFn",
+        3,
+        "the USB driver's waits for an endpoint, by the number of an endpoint that there is",
+    ),
+    ("static_cell", 2, "at the start only: each is taken once"),
+    (
+        "defmt",
+        2,
+        "the log takes itself once: in a critical section",
+    ),
+    (
+        "cobs",
+        2,
+        "indices that its own loop keeps below the length; random frames are tested",
+    ),
+    (
+        "postcard",
+        1,
+        "the checksum's place in a buffer that holds the longest frame; every message is tested",
+    ),
+];
+
+fn panics(names: &[String]) -> bool {
+    let panics = |name: &String| PANICS.iter().any(|part| name.contains(part));
+    names.iter().any(panics)
+}
+
+/// Calls of what panics, but for those in it, and the linker's bridges to it.
+fn sites() -> Vec<Branch> {
+    let bytes = fs::read(artifact::named_by("HIVTAC_ELF")).unwrap();
+    let branches = branches(&bytes).unwrap();
+    assert!(branches.len() > 1_000, "the ELF has its symbols");
+    let outside = |branch: &Branch| {
+        let from = std::slice::from_ref(&branch.from);
+        panics(&branch.to) && !panics(from) && !branch.from.contains("Thunk")
+    };
+    branches.into_iter().filter(outside).collect()
+}
+
+#[test]
+fn nothing_of_the_sensing_and_the_capture_can_panic() {
+    for Branch { address, from, to } in sites() {
+        let never = NEVER.iter().any(|part| from.contains(part));
+        assert!(!never, "{address:#x} in {from} calls {to:?}");
+    }
+}
+
+#[test]
+fn whatever_else_could_panic_has_its_reason() {
+    let mut counts = [0; REASONS.len()];
+    for Branch { address, from, to } in sites() {
+        let known = REASONS.iter().position(|(part, ..)| from.contains(part));
+        let known = known.unwrap_or_else(|| panic!("{address:#x} in {from} calls {to:?}: why?"));
+        counts[known] += 1;
+    }
+    println!("{} sites", counts.iter().sum::<usize>());
+    for (count, (part, most, reason)) in counts.into_iter().zip(REASONS) {
+        println!("{count:>4} {part}: {reason}");
+        assert!(
+            count <= most,
+            "{part}: {count} sites, of which {most} are known"
+        );
+        assert!(count > 0, "{part} has none any more: take it off the list");
+    }
+}
