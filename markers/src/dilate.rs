@@ -56,7 +56,9 @@ impl Dilation {
         self.occupied = 0;
         self.set_rows = 0;
         let kept = self.kept();
-        self.mask.iter_mut().take(kept).for_each(|word| *word = 0);
+        if let Some(kept) = self.mask.get_mut(..kept) {
+            kept.fill(0);
+        }
     }
 
     /// Rows that the dilated ones are behind: as many empty rows bring out the last.
@@ -69,8 +71,8 @@ impl Dilation {
     #[inline(always)]
     pub fn incoming(&mut self, rows: usize) -> &mut [u32] {
         let kept = self.kept();
-        let incoming = self.mask.get_mut(kept..kept + rows * self.words);
-        incoming.unwrap_or_default()
+        let incoming = self.mask.get_mut(kept..).unwrap_or_default();
+        incoming.get_mut(..rows * self.words).unwrap_or_default()
     }
 
     /// Looks at the rows that were written.

@@ -161,19 +161,16 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
     /// `passed` says how many pixels of a run were set before dilation.
     fn label_row(&mut self, y: u16, mut passed: impl FnMut([u16; 2]) -> u32) {
         let (before, current) = last_two(&mut self.rows, self.last);
-        let (above, above_labels) = (before.edges.runs(), &before.labels);
-        // The first run above that can touch this one or a later one.
-        let mut first = 0;
+        // From the first run above on that can touch this one or a later one.
+        let mut above = before.edges.runs().iter().zip(&before.labels);
         let mut joined = false;
         for (&[x0, end], label) in current.edges.runs().iter().zip(&mut current.labels) {
             // Columns at most one apart touch, straight or across a corner.
-            while above.get(first).is_some_and(|above| above[1] < x0) {
-                first += 1;
+            while above.clone().next().is_some_and(|(above, _)| above[1] < x0) {
+                above.next();
             }
             let run = Run { x0, x1: end - 1 };
-            let touched = above.get(first..).unwrap_or_default().iter();
-            let touched = touched.zip(above_labels.get(first..).unwrap_or_default());
-            let mut touched = touched.take_while(|(above, _)| above[0] <= end);
+            let mut touched = above.clone().take_while(|(above, _)| above[0] <= end);
             let Some((_, touched_label)) = touched.next() else {
                 let mut moments = Moments::of_run(run, y);
                 moments.passed = passed([x0, end]);
@@ -326,19 +323,19 @@ impl Forest {
 
     /// The root of a label; halves the path to it.
     fn find(&mut self, mut label: Label) -> Label {
-        let parent = |slots: &[Slot], label: Label| {
-            // A label that there is not is its own root.
-            slots
-                .get(usize::from(label))
-                .map_or(label, |slot| slot.parent)
-        };
+        // A label that there is not is its own root.
         loop {
-            let above = parent(&self.slots, label);
-            if above == label {
+            let slots = &mut self.slots;
+            let Some(parent) = slots.get(usize::from(label)).map(|slot| slot.parent) else {
+                return label;
+            };
+            if parent == label {
                 return label;
             }
-            let grandparent = parent(&self.slots, above);
-            if let Some(slot) = self.slots.get_mut(usize::from(label)) {
+            let Some(grandparent) = slots.get(usize::from(parent)).map(|slot| slot.parent) else {
+                return label;
+            };
+            if let Some(slot) = slots.get_mut(usize::from(label)) {
                 slot.parent = grandparent;
             }
             label = grandparent;
