@@ -16,6 +16,10 @@ pub enum Kind {
     Lost,
     /// The device refused a command, or did not answer it.
     Refused,
+    /// Fewer samples a second than asked for.
+    Rate,
+    /// More frames lost than allowed.
+    Loss,
     /// Ctrl-C or a termination signal.
     Interrupted,
 }
@@ -29,6 +33,8 @@ impl Kind {
             Kind::Version => 4,
             Kind::Lost => 5,
             Kind::Refused => 6,
+            Kind::Rate => 7,
+            Kind::Loss => 8,
             Kind::Interrupted => 130,
         }
     }

@@ -1,5 +1,6 @@
 //! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
 
+mod check;
 mod command;
 mod decimal;
 mod finding;
@@ -10,6 +11,8 @@ mod lines;
 mod monitor;
 mod output;
 mod picture;
+mod record;
+mod replay;
 mod sense;
 mod tally;
 mod truth;
@@ -22,6 +25,7 @@ use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
 use lines::Format;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -34,6 +38,8 @@ Exit codes:
   4    the device speaks another version of the protocol
   5    the connection was lost
   6    the device refused a command or did not answer it
+  7    `check`: fewer samples a second than --min-rate
+  8    `check`: more frames lost than --max-loss
   130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
 
 /// Shows the forces of a HiVTac sensor.
@@ -48,6 +54,43 @@ struct Arguments {
 enum Command {
     /// Show forces as they come, and a summary at the end
     Monitor(MonitorArguments),
+    /// Measure rate, jitter, losses and latency for a while, and hold them against limits
+    ///
+    /// Example: hivtac check --seconds 10 --min-rate 150 --max-loss 0
+    Check(CheckArguments),
+    /// Record everything that the device says, with both clocks, until Ctrl-C
+    ///
+    /// FILE.mcap has ROS 2's profile: `ros2 bag play`, Foxglove and PlotJuggler read it, and
+    /// `hivtac replay`. FILE.csv has a row a sample, with units in its header. Until its end it is
+    /// FILE.partial; it keeps that name when the connection was lost.
+    ///
+    /// Example: hivtac record press.mcap --seconds 60
+    Record {
+        #[command(flatten)]
+        device: Device,
+        /// The file to make, ….mcap or ….csv
+        file: PathBuf,
+        /// End after so many seconds
+        #[arg(long, value_name = "S", value_parser = seconds)]
+        seconds: Option<Duration>,
+    },
+    /// Play a recording as if it were a device, for any other command, on a TCP port of this
+    /// computer
+    ///
+    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording.
+    ///
+    /// Example: hivtac replay press.mcap --tcp 7000, and elsewhere hivtac monitor --port
+    /// tcp:127.0.0.1:7000
+    Replay {
+        /// What `record` made; also one that was cut
+        file: PathBuf,
+        /// The port; one that is free when not given
+        #[arg(long, value_name = "PORT", default_value_t = 0)]
+        tcp: u16,
+        /// As fast as the other program reads, not as it was recorded
+        #[arg(long)]
+        fast: bool,
+    },
     /// Show what the device is and how it fares
     Info {
         #[command(flatten)]
@@ -111,6 +154,24 @@ impl Device {
     fn address(&self) -> Address {
         self.port.as_deref().map_or(Address::Find, Address::parse)
     }
+}
+
+#[derive(Args)]
+struct CheckArguments {
+    #[command(flatten)]
+    device: Device,
+    /// How long to measure
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
+    seconds: Duration,
+    /// Fewest samples a second, by the device's clock
+    #[arg(long, value_name = "HZ")]
+    min_rate: Option<f64>,
+    /// Most frames without a sample
+    #[arg(long, value_name = "N")]
+    max_loss: Option<u64>,
+    /// One JSON object instead of lines
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
@@ -245,6 +306,25 @@ fn run(command: Command) -> Result<(), Failure> {
     match command {
         Command::Sense(arguments) => sense::run(&arguments.options()),
         Command::Monitor(arguments) => monitor::run(&arguments.options()),
+        Command::Check(arguments) => check::run(&check::Options {
+            address: arguments.device.address(),
+            patience: arguments.device.timeout,
+            duration: arguments.seconds,
+            min_rate_hz: arguments.min_rate,
+            max_loss: arguments.max_loss,
+            json: arguments.json,
+        }),
+        Command::Record {
+            device,
+            file,
+            seconds,
+        } => record::run(&record::Options {
+            address: device.address(),
+            patience: device.timeout,
+            duration: seconds,
+            file,
+        }),
+        Command::Replay { file, tcp, fast } => replay::run(&file, tcp, fast),
         Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
         Command::Tare { device, frames } => {
             command::tare(&device.address(), device.timeout, frames)

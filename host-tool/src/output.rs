@@ -152,7 +152,7 @@ fn regular_output() -> Option<File> {
 }
 
 /// Writes a text to a file, or nothing of it: a disk that is full would keep its beginning.
-fn write_whole(file: &mut File, text: &[u8]) -> io::Result<()> {
+pub fn write_whole(file: &mut File, text: &[u8]) -> io::Result<()> {
     let mut written = 0;
     while written < text.len() {
         match file.write(&text[written..]) {

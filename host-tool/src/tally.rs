@@ -80,8 +80,57 @@ impl Tally {
 
     /// The summary for a person; with `truth`, the errors too.
     pub fn summary(&self, truth: bool) -> String {
+        let shown = format!("{} frames shown, ", self.shown);
+        shown + &self.summary_of_received(truth)
+    }
+
+    /// The same of samples that were recorded.
+    pub fn summary_of_recorded(&self) -> String {
+        "recorded: ".to_owned() + &self.summary_of_received(false)
+    }
+
+    /// How many samples came, and how many frames have none.
+    pub fn received_line(&self) -> String {
+        format!("{} received, {} lost", self.received, self.lost())
+    }
+
+    /// Frames without a sample, whatever the cause.
+    pub fn lost(&self) -> u64 {
+        self.gaps.samples + self.gaps.frames
+    }
+
+    /// Losses by cause: on the way, and as the device counts them.
+    pub fn causes(&self) -> BTreeMap<&'static str, u64> {
+        let [_, _, busy, overrun, size, setup, usb, ..] = self.device.grown;
+        [
+            ("on the way", self.gaps.samples),
+            ("not processed", self.gaps.frames),
+            ("busy", busy),
+            ("overrun", overrun),
+            ("size", size),
+            ("set-up", setup),
+            ("usb", usb),
+        ]
+        .into()
+    }
+
+    /// What a recording says of itself.
+    pub fn counts(&self) -> BTreeMap<String, String> {
+        let counts = [
+            ("samples", self.received),
+            ("samples_lost_on_the_way", self.gaps.samples),
+            ("frames_not_processed", self.gaps.frames),
+            ("samples_without_force", self.without_force),
+            ("messages_rejected", self.rejected.frames().into()),
+            ("device_restarts", self.gaps.restarts),
+        ];
+        let text = counts.map(|(name, count)| (name.to_owned(), count.to_string()));
+        text.into()
+    }
+
+    fn summary_of_received(&self, truth: bool) -> String {
         let mut lines = vec![
-            self.frames_line(),
+            self.received_line(),
             self.loss_line(),
             self.device.to_string(),
         ];
@@ -101,15 +150,8 @@ impl Tally {
         lines.join("\n") + "\n"
     }
 
-    fn frames_line(&self) -> String {
-        let lost = self.gaps.samples + self.gaps.frames;
-        format!(
-            "{} frames shown, {} received, {lost} lost",
-            self.shown, self.received
-        )
-    }
-
-    fn loss_line(&self) -> String {
+    /// Losses by cause.
+    pub fn loss_line(&self) -> String {
         let Rejected {
             overlong,
             cobs,

@@ -92,6 +92,11 @@ impl Conversation {
         message.map(|message| self.answer(message)).is_some()
     }
 
+    /// Answers this message like a good device.
+    pub fn answer_to(&mut self, message: HostMessage) {
+        self.answer(message);
+    }
+
     /// Answers one message; true for start.
     fn answer(&mut self, message: HostMessage) -> bool {
         let HostMessage::Command(Command { id, request }) = message else {

@@ -5,5 +5,6 @@ mod commands;
 mod endings;
 mod fake;
 mod monitor;
+mod recordings;
 mod run;
 mod sense;

@@ -1,5 +1,5 @@
-//! What in the firmware could panic, read from the very ELF that is flashed: nothing of the sensing,
-//! of the capture and of the pipeline's task, and of the rest what this list has with its reasons.
+//! What in the firmware could panic, read from the very ELF that is flashed: nothing of the
+//! sensing and of the capture, and of the rest what this list has with its reasons.
 
 mod branches;
 

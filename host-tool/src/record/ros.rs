@@ -1,0 +1,242 @@
+//! Messages as ROS 2 has them: their definitions, and CDR, which is how they are coded.
+
+use hivtac_terms::force::Force;
+use hivtac_terms::marker::Marker;
+
+/// A kind of message: name and definition, with those of the messages in it.
+pub struct Definition {
+    /// Such as `std_msgs/msg/Bool`.
+    pub name: &'static str,
+    /// In ROS's own language.
+    pub text: &'static str,
+}
+
+/// |F| along x, y and z, N, and about the film's middle, N·m.
+pub const WRENCH: Definition = Definition {
+    name: "geometry_msgs/msg/WrenchStamped",
+    text: "\
+std_msgs/Header header
+geometry_msgs/Wrench wrench
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Wrench
+geometry_msgs/Vector3 force
+geometry_msgs/Vector3 torque
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+",
+};
+
+/// Where the tip touches the film, m from its middle.
+pub const POINT: Definition = Definition {
+    name: "geometry_msgs/msg/PointStamped",
+    text: "\
+std_msgs/Header header
+geometry_msgs/Point point
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+",
+};
+
+/// Markers 0–3: column and row of each, px, and its area, px, as z.
+pub const POLYGON: Definition = Definition {
+    name: "geometry_msgs/msg/PolygonStamped",
+    text: "\
+std_msgs/Header header
+geometry_msgs/Polygon polygon
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+MSG: geometry_msgs/Polygon
+geometry_msgs/Point32[] points
+================================================================================
+MSG: geometry_msgs/Point32
+float32 x
+float32 y
+float32 z
+",
+};
+
+/// Whether something touches the film.
+pub const BOOL: Definition = Definition {
+    name: "std_msgs/msg/Bool",
+    text: "bool data\n",
+};
+
+/// Names of status bits.
+pub const STRING: Definition = Definition {
+    name: "std_msgs/msg/String",
+    text: "string data\n",
+};
+
+/// Bytes.
+pub const BYTES: Definition = Definition {
+    name: "std_msgs/msg/UInt8MultiArray",
+    text: "\
+std_msgs/MultiArrayLayout layout
+uint8[] data
+================================================================================
+MSG: std_msgs/MultiArrayLayout
+std_msgs/MultiArrayDimension[] dim
+uint32 data_offset
+================================================================================
+MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+",
+};
+
+/// Bytes of a [`BYTES`] message before its data: the encoding, no dimensions, no offset, a length.
+pub const BEFORE_BYTES: usize = 16;
+
+/// Little-endian CDR: numbers lie at multiples of their size, counted from behind its first four
+/// bytes.
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    fn new() -> Cdr {
+        Cdr(vec![0, 1, 0, 0])
+    }
+
+    fn number<const N: usize>(&mut self, bytes: [u8; N]) {
+        let used = self.0.len() - 4;
+        self.0.resize(4 + used.next_multiple_of(N), 0);
+        self.0.extend(bytes);
+    }
+
+    fn string(&mut self, text: &str) {
+        self.number((text.len() as u32 + 1).to_le_bytes());
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
+    }
+
+    /// A time since 1970, ns, and the frame that coordinates are in.
+    fn header(&mut self, stamp_ns: u64, frame: &str) {
+        self.number(((stamp_ns / 1_000_000_000) as i32).to_le_bytes());
+        self.number(((stamp_ns % 1_000_000_000) as u32).to_le_bytes());
+        self.string(frame);
+    }
+
+    fn vector(&mut self, parts: [f64; 3]) {
+        parts
+            .into_iter()
+            .for_each(|part| self.number(part.to_le_bytes()));
+    }
+}
+
+/// A [`WRENCH`]. The torque is that of the force where it touches, none where that is not known.
+pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
+    let [fx, fy, fz] = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    let [x, y] = force.place.map_or([0.0; 2], |place| {
+        [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
+    });
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    cdr.vector([fx, fy, fz]);
+    cdr.vector([y * fz, -x * fz, x * fy - y * fx]);
+    cdr.0
+}
+
+/// A [`POINT`], when the force has a place.
+pub fn point(stamp_ns: u64, frame: &str, force: &Force) -> Option<Vec<u8>> {
+    let place = force.place?;
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    let [x, y] = [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6);
+    cdr.vector([x, y, 0.0]);
+    Some(cdr.0)
+}
+
+/// A [`POLYGON`].
+pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker; 4]) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    cdr.number(4u32.to_le_bytes());
+    for marker in markers {
+        let numbers = [
+            marker.x.to_f64() as f32,
+            marker.y.to_f64() as f32,
+            marker.area as f32,
+        ];
+        numbers
+            .into_iter()
+            .for_each(|number| cdr.number(number.to_le_bytes()));
+    }
+    cdr.0
+}
+
+/// A [`BOOL`].
+pub fn bool(value: bool) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.0.push(u8::from(value));
+    cdr.0
+}
+
+/// A [`STRING`].
+pub fn string(text: &str) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.string(text);
+    cdr.0
+}
+
+/// [`BYTES`].
+pub fn bytes(bytes: &[u8]) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.number(0u32.to_le_bytes());
+    cdr.number(0u32.to_le_bytes());
+    cdr.number((bytes.len() as u32).to_le_bytes());
+    cdr.0.extend(bytes);
+    cdr.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_aligned_behind_the_encoding() {
+        let mut cdr = Cdr::new();
+        cdr.header(1_500_000_000, "ab");
+        cdr.vector([1.0, 0.0, 0.0]);
+        let header = [
+            0, 1, 0, 0, 1, 0, 0, 0, 0, 0x65, 0xcd, 0x1d, 3, 0, 0, 0, b'a', b'b', 0,
+        ];
+        assert_eq!(cdr.0[..19], header);
+        // 15 bytes are used: the next multiple of 8 is 16.
+        assert_eq!(cdr.0[19..28], [0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
+        assert_eq!(cdr.0.len(), 20 + 24);
+    }
+
+    #[test]
+    fn bytes_lie_where_replay_looks_for_them() {
+        assert_eq!(bytes(b"xyz")[BEFORE_BYTES..], *b"xyz");
+    }
+}

@@ -1,0 +1,230 @@
+//! `hivtac check`, `record` and `replay`, end to end.
+
+use crate::fake::*;
+use crate::run::*;
+use hivtac_wire::message::{DeviceMessage, Request, Stats};
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
+use std::time::Duration;
+
+/// A device that sends these numbers as samples, one every 5 ms, and its counters; then waits.
+fn paced(numbers: Vec<u32>) -> Script {
+    Box::new(move |device| {
+        while let Some(message) = device.next() {
+            if let hivtac_wire::message::HostMessage::Command(command) = &message
+                && matches!(command.request, Request::Start | Request::StartWithMarkers)
+            {
+                device.reply(command.id, hivtac_wire::message::Outcome::Done);
+                for number in &numbers {
+                    device.send(sample(*number, *number));
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+                device.send(DeviceMessage::Stats(Stats {
+                    uptime_us: 10,
+                    latency_us: 4_785,
+                    ..Stats::default()
+                }));
+                continue;
+            }
+            device.answer_to(message);
+        }
+    })
+}
+
+#[test]
+fn check_measures_and_its_exit_code_says_which_limit_failed() {
+    let check = |numbers: Vec<u32>, limits: &[&str]| {
+        let device = FakeDevice::on_tcp([paced(numbers)]);
+        let common = [
+            "check",
+            "--json",
+            "--seconds",
+            "0.6",
+            "--port",
+            &device.port,
+        ];
+        run(&[&common, limits].concat())
+    };
+    let all: Vec<u32> = (0..60).collect();
+    let good = check(all.clone(), &["--min-rate", "29", "--max-loss", "0"]);
+    assert_eq!(good.code, Some(0), "{good:?}");
+    let report: Value = serde_json::from_str(&good.stdout).unwrap();
+    assert_eq!(report["samples"], 60);
+    assert!(
+        (report["rate_hz"].as_f64().unwrap() - 30.0).abs() < 0.1,
+        "{report}"
+    );
+    // Every frame of 33.333 ms comes after 5 ms.
+    let jitter = report["jitter_p50_ms"].as_f64().unwrap();
+    assert!((20.0..30.0).contains(&jitter), "{report}");
+    assert_eq!(report["latency_ms"], 4.785);
+    let slow = check(all, &["--min-rate", "150", "--max-loss", "0"]);
+    assert_eq!(slow.code, Some(7), "{slow:?}");
+    let gaps: Vec<u32> = (0..60).filter(|n| n % 20 != 7).collect();
+    let lossy = check(gaps, &["--max-loss", "2"]);
+    assert_eq!(lossy.code, Some(8), "{lossy:?}");
+    let report: Value = serde_json::from_str(&lossy.stdout).unwrap();
+    assert_eq!(
+        (&report["lost"], &report["causes"]["on the way"]),
+        (&json!(3), &json!(3))
+    );
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Folder {
+        Folder(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.path().join(name).to_str().unwrap().to_owned()
+    }
+}
+
+/// What `monitor` shows of a recording, as fast as it reads.
+fn replayed(file: &str, frames: &str) -> Vec<u64> {
+    let mut replay = start(&["replay", "--fast", file]);
+    let mut said = String::new();
+    let stdout = replay.child().stdout.take().unwrap();
+    BufReader::new(stdout).read_line(&mut said).unwrap();
+    let port = said.trim().replace("ready tcp=", "tcp:");
+    let monitor = run(&["monitor", "--json", "--frames", frames, "--port", &port]);
+    let replay = replay.finish();
+    assert_eq!(replay.code, Some(0), "{replay:?}");
+    sequence_numbers(&monitor.stdout)
+}
+
+#[test]
+fn what_was_recorded_is_played_as_it_came() {
+    let folder = Folder::new();
+    let file = folder.path("a.mcap");
+    let device = FakeDevice::on_tcp([paced((3..40).collect())]);
+    let recorded = run(&["record", &file, "--seconds", "0.5", "--port", &device.port]);
+    assert_eq!(recorded.code, Some(0), "{recorded:?}");
+    assert!(
+        recorded.stderr.contains("recorded: 37 received, 0 lost"),
+        "{recorded:?}"
+    );
+    assert!(!std::path::Path::new(&format!("{file}.partial")).exists());
+    assert!(replayed(&file, "37").into_iter().eq(3..40));
+    let again = run(&["record", &file, "--port", &device.port]);
+    assert_eq!(again.code, Some(1));
+    assert!(
+        again.stderr.contains("there is such a file already"),
+        "{again:?}"
+    );
+}
+
+/// Cut anywhere, a recording plays as far as it goes; what is none says so.
+#[test]
+fn a_recording_that_was_cut_plays_to_the_cut() {
+    let folder = Folder::new();
+    let file = folder.path("a.mcap");
+    let device = FakeDevice::on_tcp([paced((0..40).collect())]);
+    run(&["record", &file, "--seconds", "0.5", "--port", &device.port]);
+    let whole = std::fs::read(&file).unwrap();
+    let cut = folder.path("cut.mcap");
+    // Before the index at its end.
+    std::fs::write(&cut, &whole[..whole.len() / 3]).unwrap();
+    let mut replay = start(&["replay", "--fast", &cut]);
+    let mut said = String::new();
+    let stdout = replay.child().stdout.take().unwrap();
+    BufReader::new(stdout).read_line(&mut said).unwrap();
+    if let Some(port) = said.trim().strip_prefix("ready tcp=") {
+        run(&[
+            "monitor",
+            "--json",
+            "--frames",
+            "40",
+            "--port",
+            &format!("tcp:{port}"),
+        ]);
+        let replay = replay.finish();
+        assert_eq!(replay.code, Some(0), "{replay:?}");
+        assert!(
+            replay.stderr.contains("is cut: it ends before its end"),
+            "{replay:?}"
+        );
+    } else {
+        assert_eq!(replay.finish().code, Some(1), "not even its hello is left");
+    }
+    std::fs::write(&cut, b"no recording").unwrap();
+    let none = run(&["replay", &cut]);
+    assert_eq!(none.code, Some(1));
+    assert!(
+        none.stderr.contains("is no recording of `hivtac record`"),
+        "{none:?}"
+    );
+}
+
+#[test]
+fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
+    let folder = Folder::new();
+    let file = folder.path("a.mcap");
+    let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| {
+        // Until it has been asked and started.
+        device.answer_one();
+        device.answer_one();
+        device.answer_one();
+        samples(0..30)
+            .into_iter()
+            .for_each(|message| device.send(message));
+        std::thread::sleep(Duration::from_millis(200));
+    })]);
+    let recorded = run(&["record", &file, "--port", &device.port]);
+    assert_eq!(recorded.code, Some(5), "{recorded:?}");
+    let partial = format!("{file}.partial");
+    let told = format!("what came until then is in {partial}");
+    assert!(recorded.stderr.contains(&told), "{recorded:?}");
+    assert!(!std::path::Path::new(&file).exists());
+    assert!(replayed(&partial, "30").into_iter().eq(0..30));
+}
+
+#[test]
+fn ctrl_c_ends_a_recording_cleanly() {
+    let folder = Folder::new();
+    let file = folder.path("a.csv");
+    let device = FakeDevice::on_tcp([paced((0..200).collect())]);
+    let mut recording = start(&["record", &file, "--port", &device.port]);
+    std::thread::sleep(Duration::from_millis(600));
+    signal(recording.child().id(), "INT");
+    let recorded = recording.finish();
+    assert_eq!(recorded.code, Some(130), "{recorded:?}");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(
+        text.starts_with("host_time_s,seq,frame,time_us,alpha_deg,"),
+        "{text}"
+    );
+    let fields: Vec<_> = text.lines().map(|line| line.matches(',').count()).collect();
+    assert!(
+        fields.len() > 20 && fields.iter().all(|n| *n == fields[0]),
+        "{text}"
+    );
+}
+
+/// A file may have a few thousand bytes here: what was flushed before is whole.
+#[test]
+fn a_full_disk_ends_a_recording_with_what_fits() {
+    let folder = Folder::new();
+    let file = folder.path("a.csv");
+    let device = FakeDevice::on_tcp([paced((0..2_000).collect())]);
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 100; exec {} record {file} --port {}",
+        env!("CARGO_BIN_EXE_hivtac"),
+        device.port
+    );
+    let output = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot record into "), "{said}");
+    let text = std::fs::read_to_string(format!("{file}.partial")).unwrap();
+    assert!(
+        text.ends_with('\n') && text.lines().count() > 100,
+        "{}",
+        text.len()
+    );
+}
