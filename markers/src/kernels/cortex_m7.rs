@@ -18,6 +18,7 @@ global_asm!(include_str!("any_set.s"), options(raw));
 global_asm!(include_str!("dilate_edges.s"), options(raw));
 global_asm!(include_str!("threshold_bytes.s"), options(raw));
 global_asm!(include_str!("threshold_cr.s"), options(raw));
+global_asm!(include_str!("threshold_dark.s"), options(raw));
 global_asm!(include_str!("threshold_luma.s"), options(raw));
 global_asm!(include_str!("weigh_bytes.s"), options(raw));
 global_asm!(include_str!("weigh_luma.s"), options(raw));
@@ -89,6 +90,17 @@ unsafe extern "C" {
     /// cycle.
     fn hivtac_threshold_luma(row: *const u16, low: u32, mask: *mut u32, end: *const u32, span: u32);
 
+    /// Equals `portable::threshold_luma` for whole words of the mask, from a luma of 0 to a highest
+    /// one below 255, of which there are `limit` in all four bytes, with 0 among them.
+    ///
+    /// *No overflow.* UHSUB8 halves a difference of nine bits, so that its top bit is the sign. The
+    /// products that are added up have bits 0 and 4 of a byte in different places of the word.
+    ///
+    /// *Contract.* As [`hivtac_threshold_luma`].
+    ///
+    /// *Schedule.* 32 pixels: 43 instructions in 24 cycles, 0.75 a pixel.
+    fn hivtac_threshold_dark(row: *const u16, limit: u32, mask: *mut u32, end: *const u32);
+
     /// Equals `portable::weigh_bytes`: gives Σw in the low word, and in the high one the sum of all
     /// sums so far, from right to left.
     ///
@@ -139,11 +151,20 @@ pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> usize {
 pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> usize {
     let whole = whole_words(row, mask, 16);
     let range = whole.as_mut_ptr_range();
-    let (low, span) = (in_all_bytes(low), in_all_bytes(span));
-    if !whole.is_empty() {
-        // SAFETY: the row has 32 pixels, two in a `u16`, for each of the words, of which there is
-        // one at least.
-        unsafe { hivtac_threshold_luma(row.as_ptr(), low, range.start, range.end, span) };
+    if whole.is_empty() {
+        return 0;
+    }
+    let row = row.as_ptr();
+    // SAFETY: the row has 32 pixels, two in a `u16`, for each of the words, of which there is one
+    // at least.
+    match (low, span.checked_add(1)) {
+        (0, Some(limit)) => unsafe {
+            hivtac_threshold_dark(row, in_all_bytes(limit), range.start, range.end);
+        },
+        _ => unsafe {
+            let (low, span) = (in_all_bytes(low), in_all_bytes(span));
+            hivtac_threshold_luma(row, low, range.start, range.end, span);
+        },
     }
     whole.len()
 }
