@@ -32,6 +32,8 @@ const RANGE: Range = Range {
 /// What the sensor makes of red, green and blue in each light (`mono.md`).
 const LIGHTS: [(&str, [f64; 3]); 2] = [("white", [0.31, 0.49, 0.20]), ("cyan", [0.03, 0.65, 0.32])];
 const PAINTS: [Paint; 3] = [Paint::Black, Paint::Red, Paint::Blue];
+/// A weak force, N.
+const WEAK_N: f64 = 0.03;
 /// Focal lengths, mm.
 const LENSES_MM: [f64; 4] = [2.1, 1.7, 1.4, 1.2];
 /// The camera's clock, Hz; clocks of a row; blank rows of a frame; rows of a band.
@@ -69,7 +71,7 @@ struct Seen {
     threshold: u8,
     /// In each condition of [`CONDITIONS`]: root mean square error of a marker's position, px, and
     /// frames in which not all four were found.
-    off_px: Vec<f64>,
+    off_px: Vec<Option<f64>>,
     lost: Vec<usize>,
 }
 
@@ -79,7 +81,8 @@ struct Reach {
     focal_mm: f64,
     /// Diameter of a marker at rest, px.
     marker_px: f64,
-    /// Rows that markers reach.
+    /// Rows that markers reach under [`WEAK_N`] in the middle, and in the calibrated range.
+    weak_rows: u32,
     rows: u32,
     /// Frames a second with as many.
     rate_hz: f64,
@@ -146,7 +149,7 @@ impl MonoStudy {
     }
 
     /// Root mean square error of markers' positions, px, and frames without them.
-    fn errors(&self, options: Options, threshold: u8) -> Result<(f64, usize)> {
+    fn errors(&self, options: Options, threshold: u8) -> Result<(Option<f64>, usize)> {
         let Recipe { width, height, .. } = Recipe::of(Preset::Mt9v034);
         let (columns, rows) = (width.into(), height.into());
         let scene = Scene::preset("rest", ScenePreset::Mt9v034, columns, rows, 3)?;
@@ -183,13 +186,13 @@ impl MonoStudy {
         });
         let off = off.collect::<Result<Vec<_>>>()?;
         let found: Vec<f64> = off.iter().copied().flatten().collect();
-        let mean = found.iter().sum::<f64>() / found.len().max(1) as f64;
-        Ok((mean.sqrt(), off.len() - found.len()))
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        let off_px = (!found.is_empty()).then(|| mean.sqrt());
+        Ok((off_px, off.len() - found.len()))
     }
 }
 
-/// How many rows the markers reach in the calibrated range, about the axis, and one more for what a
-/// dilation adds.
+/// How many rows the markers reach, about the axis.
 fn reach(focal_mm: f64) -> Result<Reach> {
     // Half as large as on its own pixels: nothing leaves the picture.
     let pitch_um = 2.0 * 12.0 * ScenePreset::Mt9v034.focal_length_mm() / focal_mm;
@@ -199,23 +202,32 @@ fn reach(focal_mm: f64) -> Result<Reach> {
         ..Lens::default()
     };
     let scene = Scene::preset("rest", ScenePreset::Mt9v034, 376, 240, 1)?.with_options(options)?;
-    let mut most = 0.0_f64;
-    for load in corners()? {
-        for marker in scene.truth_under(&load)?.markers.into_iter().flatten() {
-            let radius = (marker.area_px2 / std::f64::consts::PI).sqrt();
-            most = most.max(2.0 * ((marker.centroid_px[1] - 119.5).abs() + radius));
-        }
-    }
+    let weak = Load::from_angles(WEAK_N, 0.0, 0.0)?;
+    let weak_rows = rows(&scene, &[weak])?;
+    let rows = rows(&scene, &corners()?)?;
     let rest = scene.truth_under(&Load::REST)?.markers[0];
     let area = rest.map_or(0.0, |marker| 4.0 * marker.area_px2);
-    let rows = 2 * (most + 1.0).ceil() as u32;
     let read = rows.next_multiple_of(BAND_ROWS);
     Ok(Reach {
         focal_mm,
         marker_px: 2.0 * (area / std::f64::consts::PI).sqrt(),
+        weak_rows,
         rows,
         rate_hz: XCLK_HZ / (ROW_CLOCKS * f64::from(read + BLANK_ROWS)),
     })
+}
+
+/// Rows about the axis in which all of every marker's image lies, in a scene that shows it half as
+/// large.
+fn rows(scene: &Scene, loads: &[Load]) -> Result<u32> {
+    let mut most = 0.0_f64;
+    for load in loads {
+        for marker in scene.truth_under(load)?.markers.into_iter().flatten() {
+            let radius = (marker.area_px2 / std::f64::consts::PI).sqrt();
+            most = most.max(2.0 * ((marker.centroid_px[1] - 119.5).abs() + radius));
+        }
+    }
+    Ok(2 * most.ceil() as u32)
 }
 
 /// The strongest forces of the calibrated range, at its ends and between them.
@@ -254,19 +266,22 @@ impl Report {
             } = seen;
             write!(text, "| {paint} | {light} | {level:.0} | {threshold} |")?;
             for (off_px, lost) in seen.off_px.iter().zip(&seen.lost) {
-                write!(text, " {off_px:.3} px | {lost} |")?;
+                match off_px {
+                    Some(off_px) => write!(text, " {off_px:.3} px | {lost} |")?,
+                    None => write!(text, " – | {lost} |")?,
+                }
             }
             text.push('\n');
         }
         text.push_str(
-            "\n| lens | marker at rest | rows that markers reach | frames a second |\n\
-             |--:|--:|--:|--:|\n",
+            "\n| lens | marker at rest | rows that markers reach at 30 mN in the middle | in the \
+             calibrated range | frames a second with these |\n|--:|--:|--:|--:|--:|\n",
         );
         for reach in &self.lenses {
             writeln!(
                 text,
-                "| {:.1} mm | {:.1} px | {} | {:.0} |",
-                reach.focal_mm, reach.marker_px, reach.rows, reach.rate_hz
+                "| {:.1} mm | {:.1} px | {} | {} | {:.0} |",
+                reach.focal_mm, reach.marker_px, reach.weak_rows, reach.rows, reach.rate_hz
             )?;
         }
         Ok(text)
