@@ -2,6 +2,7 @@
 //!
 //! The DMA writes it and the MDMA reads it; the core touches it once, at boot.
 
+use crate::block_move::BUFFER_BYTES;
 use crate::camera::{HEIGHT, USUAL_FORMAT, WIDTH};
 use core::mem::MaybeUninit;
 use hivtac_capture::Shape;
@@ -16,11 +17,12 @@ pub const SHAPE: Shape = Shape::new(HEIGHT / ROWS, SLOTS);
 /// `u16`s of a band, whatever pixels they hold: the size of a slot. All of a camera's formats have
 /// rows of the same length.
 pub const BAND_LENGTH: usize = USUAL_FORMAT.pixels().row_length(WIDTH) * ROWS as usize;
+/// Bytes of a band.
+pub const BAND_BYTES: usize = BAND_LENGTH * size_of::<u16>();
 
 const _: () = {
     assert!(HEIGHT.is_multiple_of(ROWS));
-    // What the DMA moves at once (`band_copy`).
-    assert!((BAND_LENGTH * size_of::<u16>()).is_multiple_of(128));
+    assert!(BAND_BYTES.is_multiple_of(BUFFER_BYTES as usize));
     // The widest rows that the pipeline takes fit, too.
     assert!(ring_bytes(800) <= 512 * 1024);
 };
@@ -39,7 +41,7 @@ static mut RING: Ring = Ring(MaybeUninit::uninit());
 /// Address of a slot.
 pub fn address(slot: u16) -> u32 {
     let base = &raw const RING as u32;
-    base + u32::from(slot % SLOTS) * (BAND_LENGTH * size_of::<u16>()) as u32
+    base + u32::from(slot % SLOTS) * BAND_BYTES as u32
 }
 
 /// Writes every word once, which gives the memory's error correction codes a defined start. Call

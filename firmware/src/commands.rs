@@ -2,7 +2,7 @@
 
 use crate::pipeline_task::Order;
 use crate::shared::ORDERS;
-use crate::{capture_task, info, outbox, session, stats};
+use crate::{capture_task, info, outbox, session, snapshot, stats};
 use hivtac_sensing::model::Model;
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
@@ -59,6 +59,11 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
             Some(outcome) => outcome,
             None => return,
         },
+        // The sender replies itself, behind the last part.
+        Request::Snapshot => match snapshot::ask(id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
         Request::Tare { frames } => match order(Order::Tare { id, frames }) {
             Some(outcome) => outcome,
             None => return,
@@ -68,7 +73,7 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
 }
 
 /// Passes an order on; `Busy` when there are too many.
-fn order(order: Order) -> Option<Outcome> {
+pub fn order(order: Order) -> Option<Outcome> {
     match ORDERS.try_send(order) {
         Ok(()) => None,
         Err(_) => Some(Outcome::Busy),

@@ -15,6 +15,7 @@
 mod band_copy;
 mod band_dma;
 mod bands;
+mod block_move;
 mod board;
 mod caches;
 mod camera;
@@ -34,6 +35,8 @@ mod priorities;
 mod seeded_bugs;
 mod session;
 mod shared;
+mod snapshot;
+mod snapshot_copy;
 mod stats;
 mod tare;
 mod usb;
@@ -86,7 +89,11 @@ fn main() -> ! {
     THREAD_EXECUTOR
         .init(Executor::new())
         .run(|spawner: Spawner| {
-            spawner.spawn(token(pipeline_task::run(sensor, board.bands)));
+            spawner.spawn(token(pipeline_task::run(
+                sensor,
+                board.bands,
+                board.snapshots,
+            )));
             spawner.spawn(token(faults::feed_watchdog(board.watchdog)));
         })
 }

@@ -1,8 +1,9 @@
 //! What waits to be sent to the host. Bounded: nobody who measures ever waits for the host.
 
 use crate::shared::{ANSWERS, SAMPLES};
+use crate::snapshot::Outgoing;
 use crate::{session, stats};
-use embassy_futures::select::{Either, select};
+use embassy_futures::select::{Either3, select3};
 use hivtac_wire::message::{DeviceMessage, Sample};
 
 /// Queues an answer that the host waits for; waits for room. Only for tasks that serve the host.
@@ -22,11 +23,12 @@ pub fn offer_sample(sample: Sample) {
     }
 }
 
-/// The next message to send; answers go before samples.
-pub async fn next() -> DeviceMessage {
-    match select(ANSWERS.receive(), SAMPLES.receive()).await {
-        Either::First(answer) => answer,
-        Either::Second(sample) => DeviceMessage::Sample(sample),
+/// The next message to send; answers go before samples, and these before a snapshot's parts.
+pub async fn next(snapshot: &mut Outgoing) -> DeviceMessage {
+    match select3(ANSWERS.receive(), SAMPLES.receive(), snapshot.next()).await {
+        Either3::First(answer) => answer,
+        Either3::Second(sample) => DeviceMessage::Sample(sample),
+        Either3::Third(message) => message,
     }
 }
 

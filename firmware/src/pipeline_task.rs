@@ -9,6 +9,7 @@ use crate::near_table::NearTable;
 use crate::next_threshold::NextThreshold;
 use crate::session::Asked;
 use crate::shared::{CAPTURE_EVENTS, ORDERS};
+use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
 use crate::{info, outbox, session, stats, vsync};
 use embassy_futures::select::{Either3, select3};
@@ -35,6 +36,8 @@ pub enum Order {
         /// How many; unchecked.
         frames: u16,
     },
+    /// Keep the next whole frame and send it.
+    Snapshot(Asked),
 }
 
 /// The pipeline, its table in DTCM.
@@ -42,7 +45,7 @@ pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
 /// Runs for ever in thread mode. `sensor` is configured.
 #[embassy_executor::task]
-pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
+pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: SnapshotCopy) {
     let mut task = PipelineTask {
         sensor,
         next_threshold: NextThreshold::NONE,
@@ -53,6 +56,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
         sequence: 0,
         first: true,
         taring: None,
+        snapshots,
     };
     // Nothing but this loop waits: an async function that ends could be polled again, and panic.
     loop {
@@ -68,7 +72,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy) {
         match select3(ORDERS.receive(), CAPTURE_EVENTS.receive(), deadline).await {
             Either3::First(order) => task.obey(order),
             Either3::Second(event) => task.take(event),
-            Either3::Third(()) => task.give_up_tare(),
+            Either3::Third(()) => task.give_up_overdue(),
         }
     }
 }
@@ -88,13 +92,29 @@ struct PipelineTask {
     first: bool,
     /// A tare under way.
     taring: Option<Taring>,
+    snapshots: SnapshotCopy,
 }
 
 impl PipelineTask {
-    /// When a tare gives up that is still wanted.
+    /// When a tare gives up that is still wanted, or a snapshot.
     fn deadline(&mut self) -> Instant {
         self.taring.take_if(|taring| !taring.is_wanted());
+        self.tare_deadline().min(self.snapshots.deadline())
+    }
+
+    fn tare_deadline(&self) -> Instant {
         self.taring.as_ref().map_or(Instant::MAX, Taring::deadline)
+    }
+
+    /// Ends what has waited for too long.
+    fn give_up_overdue(&mut self) {
+        let now = Instant::now();
+        if self.tare_deadline() <= now {
+            self.give_up_tare();
+        }
+        if self.snapshots.deadline() <= now {
+            self.snapshots.give_up();
+        }
     }
 
     /// Delivers the frame under way when it has all its rows and need not wait for its end; tells
@@ -152,6 +172,8 @@ impl PipelineTask {
             self.sensor.begin_frame();
         }
         let fetched = self.bands.fetch(band, capture::finished);
+        let rows = fetched.as_ref().map(|fetched| fetched.rows);
+        self.snapshots.band(band.index, rows);
         if let Some(band) = &fetched {
             self.sensor.push_rows_below(band.above, band.rows);
         }
@@ -176,6 +198,7 @@ impl PipelineTask {
                 Some(taring) => self.taring = Some(taring),
                 None => reply(id, Outcome::InvalidArgument),
             },
+            Order::Snapshot(asked) => self.snapshots.begin(asked),
         }
     }
 
@@ -216,6 +239,7 @@ impl PipelineTask {
         let measurement = self.sensor.finish_frame();
         self.newest = delivery.edge.number;
         let sample = self.sample(delivery, &measurement);
+        let (frame, time_us) = (sample.frame, sample.time_us);
         self.busy_us += begun.elapsed().as_micros() as u32;
         stats::PROCESSING_US.set(self.busy_us);
         let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
@@ -229,6 +253,9 @@ impl PipelineTask {
             self.sequence = self.sequence.wrapping_add(1);
             outbox::offer_sample(sample);
         }
+        // Behind the sample, which goes first.
+        let threshold = self.sensor.threshold();
+        self.snapshots.frame(frame, time_us, threshold);
     }
 
     fn sample(&mut self, delivery: &Delivery, measurement: &Measurement) -> Sample {

@@ -63,4 +63,9 @@ impl Asked {
     pub fn id(self) -> Option<u16> {
         (self.conversation == number()).then_some(self.id)
     }
+
+    /// The conversation that the command came in.
+    pub fn conversation(self) -> u32 {
+        self.conversation
+    }
 }

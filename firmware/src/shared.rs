@@ -13,6 +13,7 @@
 //! | counters | `stats`, one for each field of the wire's statistics | see there | USB tasks |
 //! | `RING` | `bands`, in AXI SRAM | DMA of the camera; the core clears it at boot | MDMA |
 //! | `BUFFERS` | `band_copy`, in DTCM | MDMA | pipeline, which owns it from boot on |
+//! | `FRAME` | `snapshot`, in AXI SRAM | MDMA | USB tasks, once the pipeline says that it is whole |
 //! | `CAPTURE_EXECUTOR`, `USB_EXECUTOR` | `main` | embassy | embassy: boot and one handler each |
 //!
 //! Not shared: memory with one owner, which takes it once (`main::SENSOR`, `near_table::TABLE`),
@@ -23,6 +24,7 @@ use crate::capture::{CaptureEvent, Running};
 use crate::health::Condition;
 use crate::pipeline_task::Order;
 use crate::session::Asked;
+use crate::snapshot::Taken;
 use crate::stats;
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32};
@@ -105,6 +107,13 @@ pub static SETTINGS: CriticalSectionMutex<Cell<Option<Settings>>> =
 /// How the sensor is doing, a [`Condition`]. Written by the pipeline and the capture task; read by
 /// the LED task (`health`).
 pub static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
+
+/// The conversation that a snapshot is under way for; 0 when none is. Set by the USB tasks, cleared
+/// by them and the pipeline (`snapshot`).
+pub static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
+
+/// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
+pub static SNAPSHOT_TAKEN: Request<Taken> = Request::new();
 
 // The conversation with the host.
 

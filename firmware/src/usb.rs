@@ -15,6 +15,7 @@
 //! when the next host resets the bus, or closes the port.
 
 use crate::board::UsbPort;
+use crate::snapshot::Outgoing;
 use crate::usb_guard::Guarded;
 use crate::{commands, outbox, session, stats};
 use embassy_futures::join::join5;
@@ -113,8 +114,9 @@ async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
     // A zero byte before the first frame, and before one that follows a cut frame.
     let mut buffer = [0; 1 + MAX_DEVICE_FRAME];
     let mut cut = true;
+    let mut snapshot = Outgoing::NONE;
     loop {
-        let message = outbox::next().await;
+        let message = outbox::next(&mut snapshot).await;
         let Some(frame) = buffer.get_mut(1..) else {
             return;
         };
@@ -125,8 +127,12 @@ async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
         let length = 1 + frame.len();
         let bytes = buffer.get(usize::from(!cut)..length).unwrap_or(&[]);
         cut = !send_bytes(&mut sender, bytes).await;
-        if cut && matches!(message, DeviceMessage::Sample(_)) {
-            stats::USB_DROPPED.count();
+        match message {
+            DeviceMessage::Sample(_) if cut => stats::USB_DROPPED.count(),
+            DeviceMessage::Snapshot(_) | DeviceMessage::SnapshotPart(_) if cut => {
+                snapshot.give_up();
+            }
+            _ => {}
         }
     }
 }

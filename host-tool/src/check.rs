@@ -88,7 +88,7 @@ impl Measured {
                     .extend(Some(stats.latency_us).filter(|&us| us > 0));
             }
             DeviceMessage::Log(line) => note(&log_text(line)),
-            DeviceMessage::Hello(_) | DeviceMessage::Reply(_) => (),
+            _ => (),
         }
     }
 

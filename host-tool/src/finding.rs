@@ -6,6 +6,7 @@ use crate::lines::{contact_text, status_text, to_json};
 use hivtac_sensing::blob::Blob;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::settings::Settings;
+use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
@@ -38,12 +39,28 @@ struct BlobJson {
     y1: u16,
 }
 
+/// A marker: its number, its centroid and its pixels in the mask.
 #[derive(Serialize)]
-struct MarkerJson {
+pub struct MarkerJson {
     id: usize,
     x: f64,
     y: f64,
     area: u32,
+}
+
+impl MarkerJson {
+    /// The four of a sample.
+    pub fn all(markers: &[Marker; 4]) -> Vec<MarkerJson> {
+        let markers = markers.iter().enumerate();
+        markers
+            .map(|(id, marker)| MarkerJson {
+                id,
+                x: marker.x.to_f64(),
+                y: marker.y.to_f64(),
+                area: marker.area,
+            })
+            .collect()
+    }
 }
 
 impl From<&Blob> for BlobJson {
@@ -77,17 +94,7 @@ impl<'a> Finding<'a> {
         blobs: &[Blob],
         measurement: Measurement,
     ) -> Finding<'a> {
-        let markers = measurement.markers.map(|markers| {
-            let markers = markers.iter().enumerate();
-            markers
-                .map(|(id, marker)| MarkerJson {
-                    id,
-                    x: marker.x.to_f64(),
-                    y: marker.y.to_f64(),
-                    area: marker.area,
-                })
-                .collect()
-        });
+        let markers = measurement.markers.as_ref().map(MarkerJson::all);
         // 2¹⁶ steps a pixel; an area has at most 20 bits more, far below the 53 of an f64.
         let exact = |number: i64| number as f64 / 65_536.0;
         let features = measurement

@@ -36,7 +36,7 @@ fn ask(
         DeviceMessage::Hello(newer) => hello = newer,
         DeviceMessage::Stats(newer) => stats = Some(newer),
         DeviceMessage::Log(line) => note(&log_text(&line)),
-        DeviceMessage::Sample(_) | DeviceMessage::Reply(_) => (),
+        _ => (),
     })?;
     Ok((hello, stats))
 }

@@ -3,6 +3,7 @@
 //! texts are shown ([`shown`]), and how a program is interrupted ([`stop`]).
 
 pub mod failure;
+pub mod frame;
 pub mod link;
 pub mod port;
 pub mod shown;

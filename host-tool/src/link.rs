@@ -234,6 +234,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::Tare { .. } => "tare",
         Request::StartWithMarkers => "start with markers",
         Request::Expose => "expose",
+        Request::Snapshot => "snapshot",
     }
 }
 
@@ -241,12 +242,17 @@ fn refused(message: String) -> Failure {
     Failure::new(Kind::Refused, message)
 }
 
-fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
+/// What an outcome means for the command `what`.
+///
+/// # Errors
+/// [`Kind::Refused`] with the reason unless it is done.
+pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
     let why = match outcome {
         Outcome::Done => return Ok(()),
         Outcome::InvalidArgument => "an argument is outside its range",
         Outcome::Unsupported => "its camera does not send that pixel format; choose another",
         Outcome::Busy => "it is busy with the same thing; try again later",
+        Outcome::NotRead => "this computer took no bytes for 0.1 s; is it busy? try again",
         Outcome::NotAtRest => {
             "the markers are not where a film at rest has them; take away what touches it, and \
              check the film's distance"

@@ -4,17 +4,22 @@ mod check;
 mod command;
 mod decimal;
 mod finding;
+mod focus;
 mod force_json;
 mod hsv;
 mod info;
 mod lines;
+mod look;
 mod monitor;
 mod output;
 mod picture;
+mod raw;
 mod record;
 mod replay;
 mod sense;
+mod snapshot;
 mod tally;
+mod template;
 mod truth;
 
 use clap::{Args, Parser, Subcommand};
@@ -131,12 +136,46 @@ enum Command {
         #[command(flatten)]
         device: Device,
     },
+    /// Save a frame as the sensing saw it, while forces go on
+    ///
+    /// It says what the device itself found in it, too. `hivtac sense` on the picture or the raw
+    /// frame finds the same; on that of YUV422 only on the raw frame, with the device's model.
+    Snapshot {
+        #[command(flatten)]
+        device: Device,
+        #[command(flatten)]
+        files: SnapshotFiles,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
+    /// Show how sharp, bright and well placed the markers are, until all is right
+    ///
+    /// Picture after picture: the width of each marker's rim and of the marker, its colour and
+    /// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
+    /// everything is right.
+    Focus {
+        #[command(flatten)]
+        device: Device,
+        /// One JSON object a picture
+        #[arg(long)]
+        json: bool,
+    },
+    /// Write a template to print: where the film is punched and the dots are stuck, as SVG
+    Template {
+        /// File to write
+        #[arg(value_name = "FILE.svg")]
+        file: String,
+        /// Whose markers
+        #[arg(long, value_name = "paper|ov7725", default_value = "ov7725", value_parser = preset)]
+        preset: Preset,
+    },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
-    /// PNG, JPEG or PPM, up to 800 × 800 px. Eight bits a channel are rounded to RGB565, which is
-    /// what the sensor's camera delivers. There is a force only when size, preset and threshold are
-    /// those of the model; the status says so otherwise, and blobs, markers and features are there
-    /// all the same.
+    /// PNG, JPEG, PPM, or a raw frame of `hivtac snapshot`, up to 800 × 800 px. Eight bits a
+    /// channel are rounded to RGB565, which is what the sensor's camera delivers. There is a force
+    /// only when size, preset and threshold are those of the model; the status says so otherwise,
+    /// and blobs, markers and features are there all the same.
     Sense(SenseArguments),
 }
 
@@ -198,6 +237,27 @@ impl WantedThreshold {
         let hsv = self.hsv.map(Threshold::Rgb565);
         let cr = self.cr.map(|cr_low| Threshold::Yuv422(Yuv422 { cr_low }));
         hsv.or(cr).or(self.luma.map(Threshold::Mono))
+    }
+}
+
+#[derive(Args)]
+#[group(required = true, multiple = true)]
+struct SnapshotFiles {
+    /// The frame, as PNG
+    #[arg(value_name = "FILE.png")]
+    picture: Option<String>,
+    /// The frame's bytes as the camera sent them, as PAM with two bytes a pixel
+    #[arg(long, value_name = "FILE.pam")]
+    raw: Option<String>,
+    /// What passes the threshold, white, and what dilation adds, grey, as PNG
+    #[arg(long, value_name = "FILE.png")]
+    mask: Option<String>,
+}
+
+impl SnapshotFiles {
+    fn files(self) -> snapshot::Files {
+        let SnapshotFiles { picture, raw, mask } = self;
+        snapshot::Files { picture, raw, mask }
     }
 }
 
@@ -325,6 +385,13 @@ fn run(command: Command) -> Result<(), Failure> {
             file,
         }),
         Command::Replay { file, tcp, fast } => replay::run(&file, tcp, fast),
+        Command::Snapshot {
+            device,
+            files,
+            json,
+        } => snapshot::run(&device.address(), device.timeout, &files.files(), json),
+        Command::Template { file, preset } => template::run(&file, preset),
+        Command::Focus { device, json } => focus::run(&device.address(), device.timeout, json),
         Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
         Command::Tare { device, frames } => {
             command::tare(&device.address(), device.timeout, frames)

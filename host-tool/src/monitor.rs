@@ -242,7 +242,7 @@ impl<'o> Monitor<'o> {
             DeviceMessage::Stats(stats) => self.tally.stats(&stats),
             DeviceMessage::Log(line) => note(&log_text(&line)),
             // Late answers to a repeated hello, and to commands that were given up.
-            DeviceMessage::Hello(_) | DeviceMessage::Reply(_) => (),
+            _ => (),
         }
         Ok(None)
     }

@@ -1,35 +1,61 @@
-//! Pictures as a camera would deliver them: rows of RGB565.
+//! Pictures as a camera would deliver them: rows of pixels.
 
+use crate::raw;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::frame::pixels;
 use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
+use hivtac_terms::threshold::PixelFormat;
 
-/// A picture in RGB565, red in the high bits.
+/// A picture as the sensing takes it: RGB565 with red in the high bits, or a frame of the device.
 pub struct Picture {
     /// Columns, 1 to [`MAX_WIDTH`].
     pub width: u16,
     /// Rows, 1 to [`MAX_HEIGHT`].
     pub height: u16,
+    /// Its pixel format.
+    pub format: PixelFormat,
     /// Row after row from the top.
     pub pixels: Vec<u16>,
 }
 
 impl Picture {
-    /// Reads a PNG, JPEG or PPM file, told apart by content; 8 bits a channel are rounded to the
-    /// nearest of RGB565.
+    /// Reads a PNG, JPEG or PPM file, or a raw frame of `hivtac snapshot`, told apart by content;
+    /// 8 bits a channel are rounded to the nearest of RGB565.
     ///
     /// # Errors
     /// When the file cannot be read, is no such picture, or is larger than a frame can be.
     pub fn load(path: &str) -> Result<Picture, Failure> {
-        let image = decode(path)
-            .map_err(|error| failure(format!("cannot read the picture {path}: {error}")))?;
-        let (width, height) = size(path, &image)?;
-        let pixels = image.pixels.into_iter().map(rgb565).collect();
+        let unreadable =
+            |why: &dyn std::fmt::Display| failure(format!("cannot read the picture {path}: {why}"));
+        let file = read(path).map_err(|error| unreadable(&error))?;
+        if raw::is_one(&file) {
+            let raw = raw::parse(&file).map_err(|error| unreadable(&error))?;
+            let (width, height) = size(path, raw.width.into(), raw.height.into())?;
+            return Ok(Picture {
+                width,
+                height,
+                format: raw.format,
+                pixels: pixels(raw.format, raw.bytes),
+            });
+        }
+        let image = decode(&file).map_err(|error| unreadable(&error))?;
+        let (width, height) = size(path, image.width, image.height)?;
         Ok(Picture {
             width,
             height,
-            pixels,
+            format: PixelFormat::Rgb565,
+            pixels: image.pixels.into_iter().map(rgb565).collect(),
         })
     }
+}
+
+/// Channels of a picture that is written.
+#[derive(Clone, Copy, Debug)]
+pub enum Channels {
+    /// One byte a pixel.
+    Grey,
+    /// Red, green and blue, a byte each.
+    Colour,
 }
 
 fn failure(message: String) -> Failure {
@@ -44,25 +70,30 @@ struct Rgb {
 }
 
 /// The largest file that is read: a picture of the largest frame has a fiftieth of it.
-#[cfg(feature = "pictures")]
 const LARGEST_FILE: u64 = 100 << 20;
 
-/// Turned as its EXIF data say it was taken.
-#[cfg(feature = "pictures")]
-fn decode(path: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
-    use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
-    use std::io::{Cursor, Read};
-
+/// A file's bytes, as far as one is read.
+fn read(path: &str) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
+    use std::io::Read;
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path)?;
     file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(format!("it has more than {LARGEST_FILE} bytes").into());
     }
-    let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
+    Ok(bytes)
+}
+
+/// Turned as its EXIF data say it was taken.
+#[cfg(feature = "pictures")]
+fn decode(bytes: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {
+    use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+    use std::io::Cursor;
+
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
     match reader.format() {
         None => return Err("it is no PNG, JPEG or PPM file".into()),
-        Some(ImageFormat::Jpeg) if !is_whole_jpeg(&bytes) => {
+        Some(ImageFormat::Jpeg) if !is_whole_jpeg(bytes) => {
             return Err("it is cut: a JPEG file without its end".into());
         }
         Some(_) => (),
@@ -80,8 +111,8 @@ fn decode(path: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
 }
 
 #[cfg(not(feature = "pictures"))]
-fn decode(_: &str) -> Result<Rgb, Box<dyn std::error::Error>> {
-    Err("this build does without: `cargo install --path host-tool` makes one that can".into())
+fn decode(_: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {
+    Err(WITHOUT_PICTURES.into())
 }
 
 /// Whether a JPEG file goes on to its end-of-image marker: decoders paint what is missing grey.
@@ -110,8 +141,42 @@ fn is_whole_jpeg(bytes: &[u8]) -> bool {
     false
 }
 
-fn size(path: &str, image: &Rgb) -> Result<(u16, u16), Failure> {
-    let (width, height) = (image.width, image.height);
+#[cfg(not(feature = "pictures"))]
+const WITHOUT_PICTURES: &str =
+    "this build does without: `cargo install --path host-tool` makes one that can";
+
+/// A PNG file for `path`.
+///
+/// # Errors
+/// When this build makes none.
+#[cfg(feature = "pictures")]
+pub fn encode(
+    path: &str,
+    channels: Channels,
+    width: u16,
+    height: u16,
+    levels: &[u8],
+) -> Result<Vec<u8>, Failure> {
+    use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+    let color = match channels {
+        Channels::Grey => ExtendedColorType::L8,
+        Channels::Colour => ExtendedColorType::Rgb8,
+    };
+    let mut file = Vec::new();
+    PngEncoder::new(&mut file)
+        .write_image(levels, width.into(), height.into(), color)
+        .map_err(|error| failure(format!("cannot make the picture {path}: {error}")))?;
+    Ok(file)
+}
+
+/// None: this build makes no pictures.
+#[cfg(not(feature = "pictures"))]
+pub fn encode(path: &str, _: Channels, _: u16, _: u16, _: &[u8]) -> Result<Vec<u8>, Failure> {
+    let message = format!("cannot make the picture {path}: {WITHOUT_PICTURES}; --raw works here");
+    Err(failure(message))
+}
+
+fn size(path: &str, width: u32, height: u32) -> Result<(u16, u16), Failure> {
     if width == 0 || height == 0 {
         return Err(failure(format!("the picture {path} is empty")));
     }

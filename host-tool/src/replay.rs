@@ -261,10 +261,11 @@ impl Player {
                 self.streaming = None;
                 Outcome::Done
             }
-            // What was recorded cannot be changed.
-            Request::SetThreshold(_) | Request::Tare { .. } | Request::Expose => {
-                Outcome::Unsupported
-            }
+            // What was recorded cannot be changed, and has no pictures.
+            Request::SetThreshold(_)
+            | Request::Tare { .. }
+            | Request::Expose
+            | Request::Snapshot => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

@@ -12,7 +12,7 @@ use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat};
+use hivtac_terms::threshold::{ByteOrder, HsvBox};
 use std::fs::File;
 use std::io::Read;
 
@@ -50,14 +50,11 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let name = options.model.as_deref().unwrap_or("the built-in model");
     let model = Model::parse(file.as_deref().unwrap_or(MODEL))
         .map_err(|error| failure(format!("{name} is no usable model: {error}")))?;
-    let format = model.conditions.threshold.format();
-    if format != PixelFormat::Rgb565 {
-        return Err(failure(format!(
-            "{name} is for frames of {}, and pictures are read as rgb565; use a model for rgb565",
-            format.name()
-        )));
-    }
-    let bench = Bench { options, model };
+    let bench = Bench {
+        options,
+        model,
+        name,
+    };
     let tare = options
         .tare
         .as_deref()
@@ -115,6 +112,8 @@ struct Tare {
 struct Bench<'a> {
     options: &'a Options,
     model: Model<'a>,
+    /// The model's, for messages.
+    name: &'a str,
 }
 
 impl<'a> Bench<'a> {
@@ -171,6 +170,16 @@ impl<'a> Bench<'a> {
 
     /// A sensor for pictures like this one.
     fn sensor(&self, path: &str, picture: &Picture) -> Result<Box<Sensor<'a>>, Failure> {
+        let (made_for, format) = (self.model.conditions.threshold.format(), picture.format);
+        if format != made_for {
+            return Err(failure(format!(
+                "{} is for frames of {}, and {path} is read as {}; choose a model for that with \
+                 --model",
+                self.name,
+                made_for.name(),
+                format.name()
+            )));
+        }
         let mut sensor: Box<Sensor> = Box::default();
         sensor
             .configure(self.settings(picture), Some(self.model))

@@ -101,15 +101,18 @@ fn what_every_pixel_needs_lies_in_dtcm() {
 }
 
 #[test]
-fn the_ring_of_bands_has_axi_sram_for_itself() {
+fn axi_sram_has_the_ring_of_bands_and_a_snapshot_and_nothing_else() {
     let symbols = symbols();
-    for symbol in variables(&symbols, &["bands", "RING"]) {
-        assert!(symbol.lies_in(&AXI_SRAM), "{}", symbol.name);
+    let buffers = [["bands", "RING"], ["snapshot", "FRAME"]];
+    for words in buffers {
+        for symbol in variables(&symbols, &words) {
+            assert!(symbol.lies_in(&AXI_SRAM), "{}", symbol.name);
+        }
     }
     for symbol in &symbols {
-        let is_ring = symbol.name.contains("bands") && symbol.name.contains("RING");
+        let named = |words: &[&str; 2]| words.iter().all(|word| symbol.name.contains(word));
         assert!(
-            is_ring || !AXI_SRAM.contains(&symbol.address),
+            buffers.iter().any(named) || !AXI_SRAM.contains(&symbol.address),
             "{}",
             symbol.name
         );

@@ -168,6 +168,24 @@ fn reply(id: u16, outcome: Outcome) -> DeviceMessage {
     DeviceMessage::Reply(Reply { id, outcome })
 }
 
+fn snapshot() -> DeviceMessage {
+    DeviceMessage::Snapshot(Snapshot {
+        frame: 8,
+        time_us: 300_000,
+        width: 320,
+        height: 240,
+        threshold: RED,
+        bytes: 153_600,
+    })
+}
+
+fn snapshot_part() -> DeviceMessage {
+    DeviceMessage::SnapshotPart(SnapshotPart {
+        offset: 153_596,
+        bytes: [0xD8, 0xA3, 0xD8, 0xA3].as_slice().try_into().unwrap(),
+    })
+}
+
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
@@ -204,6 +222,9 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
             reply(7, Outcome::MarkersImplausible),
         ),
         ("reply-unsteady", reply(7, Outcome::Unsteady)),
+        ("reply-not-read", reply(300, Outcome::NotRead)),
+        ("snapshot", snapshot()),
+        ("snapshot-part", snapshot_part()),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -231,6 +252,7 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("tare", command(7, Request::Tare { frames: 128 })),
         ("start-with-markers", command(2, Request::StartWithMarkers)),
         ("expose", command(9, Request::Expose)),
+        ("take-snapshot", command(300, Request::Snapshot)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -282,7 +304,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 5);
+    assert_eq!(distinct.len(), 7);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -291,7 +313,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 7);
+    assert_eq!(requests.len(), 8);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

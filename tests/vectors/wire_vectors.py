@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x7E5CDB39F688069B
+SCHEMA = 0xA3B1A70975B79FD3
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -203,6 +203,22 @@ DEVICE = {
         raw("outcome: MarkersImplausible", [6]),
     ],
     "reply-unsteady": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Unsteady", [7])],
+    "reply-not-read": [raw("Reply", [4]), unsigned("id", 300), raw("outcome: NotRead", [8])],
+    "snapshot": [
+        raw("Snapshot", [5]),
+        unsigned("frame", 8),
+        unsigned("time_us", 300_000),
+        unsigned("width", 320),
+        unsigned("height", 240),
+        *RED,
+        unsigned("bytes", 153_600),
+    ],
+    "snapshot-part": [
+        raw("SnapshotPart", [6]),
+        unsigned("offset", 153_596),
+        raw("bytes: 4", [4]),
+        raw("two red pixels", [0xD8, 0xA3, 0xD8, 0xA3]),
+    ],
 }
 
 HOST = {
@@ -216,6 +232,7 @@ HOST = {
     "tare": COMMAND + [unsigned("id", 7), raw("Tare", [4]), unsigned("frames", 128)],
     "start-with-markers": COMMAND + [unsigned("id", 2), raw("StartWithMarkers", [5])],
     "expose": COMMAND + [unsigned("id", 9), raw("Expose", [6])],
+    "take-snapshot": COMMAND + [unsigned("id", 300), raw("Snapshot", [7])],
 }
 
 FOREIGN = {
@@ -240,7 +257,7 @@ def rejects():
         "bad-crc": ("crc", bad_crc()),
         "too-short-for-a-crc": ("crc", cobs(b"\4\7\0") + b"\0"),
         "cobs-past-the-end": ("cobs", bytes.fromhex("09 04 07 00")),
-        "unknown-variant": ("body", frame(b"\5\7\0")),
+        "unknown-variant": ("body", frame(b"\x64\7\0")),
         "string-too-long": ("body", frame(b"\3\0\0" + varint(97) + b"x" * 97)),
         "cut-body": ("body", frame(reply[:-1])),
         "trailing-byte": ("trailing", frame(reply + b"\0")),

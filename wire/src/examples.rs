@@ -2,7 +2,7 @@
 
 use crate::message::*;
 use crate::version::SCHEMA_HASH;
-use heapless::String;
+use heapless::{String, Vec as Bytes};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -71,6 +71,18 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             id: u16::MAX,
             outcome: Outcome::NoGoodFrames,
         }),
+        DeviceMessage::Snapshot(Snapshot {
+            frame: u32::MAX,
+            time_us: u64::MAX,
+            width: u16::MAX,
+            height: u16::MAX,
+            threshold: RED,
+            bytes: u32::MAX,
+        }),
+        DeviceMessage::SnapshotPart(SnapshotPart {
+            offset: u32::MAX,
+            bytes: Bytes::from_array([u8::MAX; SNAPSHOT_PART_BYTES]),
+        }),
     ]
 }
 
@@ -133,6 +145,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::Tare { frames: u16::MAX },
         Request::StartWithMarkers,
         Request::Expose,
+        Request::Snapshot,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -155,6 +168,8 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_stats().prop_map(DeviceMessage::Stats),
         any_log().prop_map(DeviceMessage::Log),
         any_reply().prop_map(DeviceMessage::Reply),
+        any_snapshot().prop_map(DeviceMessage::Snapshot),
+        any_part().prop_map(DeviceMessage::SnapshotPart),
     ]
 }
 
@@ -168,6 +183,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         any::<u16>().prop_map(|frames| Request::Tare { frames }),
         Just(Request::StartWithMarkers),
         Just(Request::Expose),
+        Just(Request::Snapshot),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -297,8 +313,30 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::MarkersImplausible),
         Just(Outcome::Unsteady),
         Just(Outcome::Unsupported),
+        Just(Outcome::NotRead),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
+}
+
+fn any_snapshot() -> impl Strategy<Value = Snapshot> {
+    (any::<(u32, u64, u16, u16, u32)>(), any_threshold()).prop_map(
+        |((frame, time_us, width, height, bytes), threshold)| Snapshot {
+            frame,
+            time_us,
+            width,
+            height,
+            threshold,
+            bytes,
+        },
+    )
+}
+
+fn any_part() -> impl Strategy<Value = SnapshotPart> {
+    let bytes = proptest::collection::vec(any::<u8>(), 0..=SNAPSHOT_PART_BYTES);
+    (any::<u32>(), bytes).prop_map(|(offset, bytes)| SnapshotPart {
+        offset,
+        bytes: Bytes::from_slice(&bytes).unwrap(),
+    })
 }
 
 fn any_threshold() -> impl Strategy<Value = Threshold> {

@@ -12,8 +12,8 @@ pub const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Bytes of the checksum.
 pub(crate) const CRC_BYTES: usize = 4;
 
-/// Longest body a device sends in this protocol version: a hello with full strings.
-pub const MAX_DEVICE_BODY: usize = 171;
+/// Longest body a device sends in this protocol version: a full part of a snapshot.
+pub const MAX_DEVICE_BODY: usize = 248;
 
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 144;

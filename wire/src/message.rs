@@ -1,6 +1,6 @@
 //! Every message, both ways.
 
-use heapless::String;
+use heapless::{String, Vec};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
@@ -26,6 +26,10 @@ pub enum DeviceMessage {
     Log(LogLine),
     /// Answer to a [`Command`].
     Reply(Reply),
+    /// A frame follows as it was captured, in [`SnapshotPart`]s.
+    Snapshot(Snapshot),
+    /// The next bytes of the frame that the newest [`Snapshot`] told of.
+    SnapshotPart(SnapshotPart),
 }
 
 /// What the host sends.
@@ -161,6 +165,35 @@ pub enum LogLevel {
     Info,
 }
 
+/// A frame as it was captured, which follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Snapshot {
+    /// Its number, that of its [`Sample`].
+    pub frame: u32,
+    /// That of its [`Sample`].
+    pub time_us: u64,
+    /// Columns, px.
+    pub width: u16,
+    /// Rows, px.
+    pub height: u16,
+    /// The threshold that it was read with, and with that its pixel format.
+    pub threshold: Threshold,
+    /// Bytes that follow: all rows from the top, as the camera sent them.
+    pub bytes: u32,
+}
+
+/// Most bytes of a frame in one [`SnapshotPart`]: a frame on the wire is then at most 254 bytes.
+pub const SNAPSHOT_PART_BYTES: usize = 240;
+
+/// The next bytes of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct SnapshotPart {
+    /// Bytes of the frame before these.
+    pub offset: u32,
+    /// The bytes.
+    pub bytes: Vec<u8, SNAPSHOT_PART_BYTES>,
+}
+
 /// A request with a number that its reply repeats.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Command {
@@ -192,6 +225,8 @@ pub enum Request {
     StartWithMarkers,
     /// Let exposure and gain find what the light needs, and keep that. Answered when done.
     Expose,
+    /// Send the next whole frame. Answered behind its last part.
+    Snapshot,
 }
 
 /// The answer to a command.
@@ -224,4 +259,6 @@ pub enum Outcome {
     MarkersImplausible,
     /// Refused: the markers moved from frame to frame.
     Unsteady,
+    /// A snapshot was given up: the host did not read.
+    NotRead,
 }

@@ -237,7 +237,7 @@ impl Recorder {
                 take.count(&sample);
             }
             DeviceMessage::Log(line) => eprintln!("{}", log_text(&line)),
-            DeviceMessage::Hello(_) | DeviceMessage::Stats(_) | DeviceMessage::Reply(_) => {}
+            _ => {}
         }
         Ok(())
     }

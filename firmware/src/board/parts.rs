@@ -6,6 +6,7 @@ use crate::band_copy::BandCopy;
 use crate::camera::Camera;
 use crate::capture::Capture;
 use crate::seeded_bugs;
+use crate::snapshot_copy::SnapshotCopy;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull};
 use embassy_stm32::i2c;
 use embassy_stm32::rcc::*;
@@ -32,6 +33,8 @@ pub struct Board {
     pub capture: Capture,
     /// Where the pipeline gets its rows from.
     pub bands: BandCopy,
+    /// What keeps a frame for the host.
+    pub snapshots: SnapshotCopy,
     /// What the USB task needs to make its driver.
     pub usb: UsbPort,
     /// The status LED, off.

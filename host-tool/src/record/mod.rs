@@ -156,7 +156,7 @@ impl Recording {
             DeviceMessage::Stats(stats) => self.tally.stats(stats),
             DeviceMessage::Log(line) => note(&log_text(line)),
             // An answer to this program: no part of what the device measured.
-            DeviceMessage::Hello(_) | DeviceMessage::Reply(_) => return Ok(()),
+            _ => return Ok(()),
         }
         let now_ns = self.begun_ns + self.begun.elapsed().as_nanos() as u64;
         let kept = match &mut self.sink {

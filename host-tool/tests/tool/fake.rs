@@ -14,6 +14,7 @@ use hivtac_wire::message::*;
 use hivtac_wire::version::SCHEMA_HASH;
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::OpenptFlags;
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -31,6 +32,8 @@ pub struct Conversation {
     pub commands: mpsc::Sender<Request>,
     /// What a tare is answered with; `None`: nothing.
     pub tare: Option<Outcome>,
+    /// What is sent for each snapshot in turn before it is said to be done.
+    pub snapshots: VecDeque<Vec<DeviceMessage>>,
     /// True when the host takes nothing any more.
     pub host_is_gone: bool,
 }
@@ -119,6 +122,10 @@ impl Conversation {
                 }
                 return false;
             }
+            Request::Snapshot => {
+                let messages = self.snapshots.pop_front().unwrap_or_default();
+                messages.into_iter().for_each(|message| self.send(message));
+            }
             _ => (),
         }
         self.reply(id, Outcome::Done);
@@ -188,6 +195,7 @@ fn conversation(stream: Box<dyn Stream>, commands: &mpsc::Sender<Request>) -> Co
         stats: Stats::default(),
         commands: commands.clone(),
         tare: Some(Outcome::Done),
+        snapshots: VecDeque::new(),
         host_is_gone: false,
     }
 }

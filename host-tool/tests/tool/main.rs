@@ -8,3 +8,4 @@ mod monitor;
 mod recordings;
 mod run;
 mod sense;
+mod snapshot;

@@ -6,6 +6,7 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -209,6 +210,15 @@ impl Setup {
     }
 }
 
+/// One JSON value a line.
+fn json_lines(file: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(file).unwrap();
+    let lines = text.lines();
+    lines
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
 /// A host's hello, with a zero byte before it.
 pub fn hello() -> Vec<u8> {
     frame(&HostMessage::Hello(HelloPrefix::OURS.into()))
@@ -384,6 +394,17 @@ impl Run {
             ahead.iter().all(|other| other.abs_diff(first) <= 10),
             "{ahead:?}"
         );
+    }
+
+    /// From the middle of a frame's exposure until its sample's last byte had left, s.
+    pub fn latencies(&self) -> BTreeMap<u64, f64> {
+        let number = |line: &Value| line["frame"].as_u64().unwrap();
+        let time = |line: &Value| line["time_s"].as_f64().unwrap();
+        let exposed = self.truth.iter().map(|line| (number(line), time(line)));
+        let exposed: BTreeMap<u64, f64> = exposed.collect();
+        let sent = self.arrivals.iter();
+        sent.map(|line| (number(line), time(line) - exposed[&number(line)]))
+            .collect()
     }
 
     fn true_time_us(&self, frame: u32) -> i64 {

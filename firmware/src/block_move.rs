@@ -1,0 +1,117 @@
+//! The MDMA: one block of memory to another place, on software request. It alone reaches DTCM.
+//!
+//! # Note
+//! Coherence: AXI SRAM is not cached (`caches`), nor is DTCM ever. A barrier on each side keeps the
+//! core's accesses to the blocks from moving past the start and the end.
+
+use embassy_stm32::pac::mdma::{Ch, regs, vals};
+use embassy_stm32::pac::{MDMA, RCC};
+
+/// Bytes that the MDMA reads and then writes at once: its whole buffer. Every block is a multiple
+/// of it, in size and place.
+pub const BUFFER_BYTES: u32 = 128;
+/// Looks at a move under way before it counts as failed: a few milliseconds.
+const PATIENCE: u32 = 100_000;
+/// TEIF to TCIF of IFCR.
+const ALL_FLAGS: u32 = 0x1F;
+
+/// One end of a move: the address of its first byte.
+#[derive(Clone, Copy)]
+pub enum End {
+    /// In AXI SRAM: words of 8 bytes.
+    Axi(u32),
+    /// In DTCM: words of 4 bytes, as more is not allowed there (RM0433, MDMA_CxTCR).
+    Tcm(u32),
+}
+
+/// One channel of the controller; of two that want to move, the lower number goes first.
+pub struct BlockMove(usize);
+
+impl BlockMove {
+    /// For who holds this channel's peripheral.
+    pub fn on(channel: usize) -> Self {
+        RCC.ahb3enr().modify(|w| w.set_mdmaen(true));
+        Self(channel)
+    }
+
+    /// Begins to move `bytes` bytes, at most 65,536. What was under way is given up.
+    pub fn start(&mut self, source: End, destination: End, bytes: usize) {
+        let channel = self.registers();
+        channel.cr().write_value(regs::Cr(0));
+        while channel.cr().read().en() {}
+        channel.ifcr().write_value(regs::Ifcr(ALL_FLAGS));
+        channel.tcr().write(|w| set_up(w, source, destination));
+        channel.bndtr().write(|w| w.set_bndt(bytes as u32));
+        channel.sar().write_value(regs::Sar(source.address()));
+        channel.dar().write_value(regs::Dar(destination.address()));
+        channel.tbr().write(|w| {
+            w.set_sbus(source.bus());
+            w.set_dbus(destination.bus());
+        });
+        channel.mar().write_value(regs::Mar(0));
+        // The core's last reads of the destination come before the MDMA's writes.
+        cortex_m::asm::dmb();
+        channel.cr().write(|w| w.set_en(true));
+        channel.cr().write(|w| {
+            w.set_en(true);
+            w.set_swrq(true);
+        });
+    }
+
+    /// Waits for the end of the move; says whether it went well.
+    pub fn wait(&self) -> bool {
+        for _ in 0..PATIENCE {
+            let state = self.registers().isr().read();
+            if state.teif() {
+                return false;
+            }
+            if state.ctcif() {
+                cortex_m::asm::dmb();
+                return true;
+            }
+        }
+        false
+    }
+
+    fn registers(&self) -> Ch {
+        MDMA.ch(self.0)
+    }
+}
+
+impl End {
+    fn address(self) -> u32 {
+        match self {
+            End::Axi(address) | End::Tcm(address) => address,
+        }
+    }
+
+    fn word(self) -> vals::Wordsize {
+        match self {
+            End::Axi(_) => vals::Wordsize::DOUBLE_WORD,
+            End::Tcm(_) => vals::Wordsize::WORD,
+        }
+    }
+
+    fn bus(self) -> vals::Bus {
+        match self {
+            End::Axi(_) => vals::Bus::SYSTEM,
+            End::Tcm(_) => vals::Bus::AHB,
+        }
+    }
+}
+
+/// One software request moves one block.
+fn set_up(w: &mut regs::Tcr, source: End, destination: End) {
+    w.set_sinc(vals::Incmode::INCREMENT);
+    w.set_ssize(source.word());
+    w.set_sincos(source.word());
+    w.set_sburst(vals::Burst::INCR16);
+    w.set_dinc(vals::Incmode::INCREMENT);
+    w.set_dsize(destination.word());
+    w.set_dincos(destination.word());
+    w.set_dburst(vals::Burst::INCR16);
+    w.set_tlen((BUFFER_BYTES - 1) as u8);
+    w.set_pke(true);
+    w.set_trgm(vals::Trgm::BLOCK);
+    w.set_swrm(true);
+}

@@ -1,0 +1,138 @@
+//! A frame for the host, as it was captured: who asks for it, where it lies, and how it is sent.
+//!
+//! # Design
+//! `snapshot_copy` keeps a frame in [`FRAME`]; the sender then makes a message of its next bytes
+//! whenever nothing else waits. One snapshot at a time: one that is asked for in the conversation
+//! of another is refused, and one whose conversation has ended is forgotten by pipeline and sender
+//! as soon as they look, so that it never stands in the next one's way.
+
+use crate::bands::{BAND_BYTES, SHAPE};
+use crate::commands;
+use crate::outbox;
+use crate::pipeline_task::Order;
+use crate::session::{self, Asked};
+use crate::shared::{SNAPSHOT_FOR, SNAPSHOT_TAKEN};
+use core::mem::MaybeUninit;
+use core::sync::atomic::Ordering;
+use heapless::Vec;
+use hivtac_wire::message::{
+    DeviceMessage, Outcome, Reply, SNAPSHOT_PART_BYTES, Snapshot, SnapshotPart,
+};
+
+/// Bytes of a frame.
+pub const FRAME_BYTES: usize = SHAPE.bands() as usize * BAND_BYTES;
+
+#[repr(C, align(128))]
+struct Frame(MaybeUninit<[u8; FRAME_BYTES]>);
+
+#[unsafe(link_section = ".axisram.snapshot")]
+static mut FRAME: Frame = Frame(MaybeUninit::uninit());
+
+/// Address of a band of the frame.
+pub fn address(index: u16) -> u32 {
+    let base = &raw const FRAME as u32;
+    base + u32::from(index % SHAPE.bands()) * BAND_BYTES as u32
+}
+
+/// A frame that lies in [`FRAME`], whole.
+pub struct Taken {
+    /// Who wants it.
+    pub asked: Asked,
+    /// What it is.
+    pub header: Snapshot,
+}
+
+/// Has the next whole frame sent for the command `id`; `Busy` while another one is under way.
+pub fn ask(id: u16) -> Option<Outcome> {
+    let conversation = session::number();
+    if SNAPSHOT_FOR.swap(conversation, Ordering::Relaxed) == conversation {
+        return Some(Outcome::Busy);
+    }
+    let asked = Asked::by(id);
+    let refused = commands::order(Order::Snapshot(asked));
+    if refused.is_some() {
+        end(asked);
+    }
+    refused
+}
+
+/// The snapshot is no longer under way.
+pub fn end(asked: Asked) {
+    let conversation = asked.conversation();
+    // Fails when another conversation's is under way by now.
+    let _ = SNAPSHOT_FOR.compare_exchange(conversation, 0, Ordering::Relaxed, Ordering::Relaxed);
+}
+
+/// The snapshot that is being sent, if any.
+pub struct Outgoing(Option<Sending>);
+
+struct Sending {
+    taken: Taken,
+    /// Bytes sent; nothing before the header was.
+    sent: Option<u32>,
+}
+
+impl Outgoing {
+    /// None is.
+    pub const NONE: Self = Self(None);
+
+    /// The next message of a snapshot; waits while there is none.
+    pub async fn next(&mut self) -> DeviceMessage {
+        loop {
+            if let Some(message) = self.message() {
+                return message;
+            }
+            let taken = SNAPSHOT_TAKEN.wait().await;
+            self.0 = Some(Sending { taken, sent: None });
+        }
+    }
+
+    /// Gives the snapshot up, as its host does not read.
+    pub fn give_up(&mut self) {
+        let Some(Sending { taken, .. }) = self.0.take() else {
+            return;
+        };
+        end(taken.asked);
+        if let Some(id) = taken.asked.id() {
+            let outcome = Outcome::NotRead;
+            outbox::offer(DeviceMessage::Reply(Reply { id, outcome }));
+        }
+    }
+
+    /// The header, then the parts, then the reply.
+    fn message(&mut self) -> Option<DeviceMessage> {
+        let sending = self.0.as_mut()?;
+        let asked = sending.taken.asked;
+        let Some(id) = asked.id() else {
+            self.0 = None;
+            return None;
+        };
+        let Some(offset) = sending.sent else {
+            sending.sent = Some(0);
+            return Some(DeviceMessage::Snapshot(sending.taken.header.clone()));
+        };
+        let bytes = part(offset as usize);
+        if bytes.is_empty() {
+            self.0 = None;
+            end(asked);
+            let outcome = Outcome::Done;
+            return Some(DeviceMessage::Reply(Reply { id, outcome }));
+        }
+        sending.sent = Some(offset + bytes.len() as u32);
+        Some(DeviceMessage::SnapshotPart(SnapshotPart { offset, bytes }))
+    }
+}
+
+/// The bytes of a part; none from the end of the frame on.
+fn part(offset: usize) -> Vec<u8, SNAPSHOT_PART_BYTES> {
+    let length = FRAME_BYTES.saturating_sub(offset).min(SNAPSHOT_PART_BYTES);
+    let mut bytes = Vec::new();
+    // Never fails: the length is at most that.
+    let _ = bytes.resize(length, 0);
+    let from = (&raw const FRAME).cast::<u8>().wrapping_add(offset);
+    // SAFETY: `offset + length` lies within `FRAME`, to which no reference is ever made. It was
+    // written whole before its `Taken` came, and is written again only for a later command, whose
+    // conversation is another one, or which came after this snapshot's end.
+    unsafe { from.copy_to_nonoverlapping(bytes.as_mut_ptr(), length) };
+    bytes
+}

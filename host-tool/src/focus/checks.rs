@@ -1,0 +1,228 @@
+//! What must be right about a picture before its forces are worth anything: each with its limit,
+//! the reason for that, and what to do.
+//!
+//! `docs/building-a-sensor.md` has the same limits for a builder.
+
+use super::seen::{Marker, NotSeen, Seen};
+use hivtac_host::frame::Frame;
+use hivtac_terms::threshold::Threshold;
+use serde::Serialize;
+
+/// Widest rim, px. A sharp lens makes one of 1.3, one that blurs every point by a pixel (standard
+/// deviation) one of 3, and by two pixels one of 5.3; of the hard cases of the simulated sensor,
+/// all frames are accepted at one pixel and most are refused at two (`docs/scene.md`, blur-1 and
+/// blur-2).
+const RIM_PX: f64 = 3.5;
+/// In YUV422, where two pixels share a colour.
+const RIM_OF_PAIRS_PX: f64 = 4.0;
+/// Farthest width from what the optics give, in parts of that: half of what the sensing takes as a
+/// marker; the other half is for threshold and light.
+const WIDTH_PART: f64 = 0.19;
+/// Steps of a colour that a marker must have beyond its threshold: eight standard deviations of the
+/// simulated camera's noise, 2.5 levels, so that no pixel inside it falls out.
+const COLOUR_MARGIN: f64 = 20.0;
+/// Darkest marker, in parts of the threshold's lowest value: at half of that light two thirds of
+/// its mask are lost, and with that its place, silently.
+const DARKEST_VALUES: f64 = 2.0;
+/// Brightest level: RGB565's last but one. Beyond it light is no longer in proportion to levels, by
+/// which rims are weighed.
+const BRIGHTEST: f64 = 247.0;
+/// Farthest of the pattern's middle from the picture's, px, and largest turn, degrees: three
+/// standard deviations of the units that the calibration was shown to make up for
+/// (`docs/results/units.md`).
+const SHIFT_PX: f64 = 9.0;
+/// See [`SHIFT_PX`].
+const TURN_DEG: f64 = 6.0;
+/// Farthest size of the pattern from the geometry's, in parts of it: a tare is refused beyond.
+const SIZE_PART: f64 = 0.15;
+
+/// One thing that must be right.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// What: `rim`, `width`, `colour`, `brightness`, `film`, `centre`, `turn`, `size`.
+    pub what: &'static str,
+    /// Which marker's; of the pattern when it is none.
+    pub marker: Option<usize>,
+    /// What it is; nothing when there is nothing to measure.
+    pub value: Option<f64>,
+    /// Its least value.
+    pub least: Option<f64>,
+    /// Its largest value.
+    pub most: Option<f64>,
+    /// Of these three.
+    pub unit: &'static str,
+    /// Whether it is right.
+    pub right: bool,
+    /// What to do; empty when it is right.
+    pub advice: String,
+}
+
+impl Check {
+    fn new(
+        what: &'static str,
+        marker: Option<usize>,
+        value: Option<f64>,
+        [least, most]: [Option<f64>; 2],
+        unit: &'static str,
+    ) -> Check {
+        let within = |value: f64| {
+            least.is_none_or(|least| value >= least) && most.is_none_or(|most| value <= most)
+        };
+        Check {
+            what,
+            marker,
+            value,
+            least,
+            most,
+            unit,
+            right: value.is_some_and(within),
+            advice: String::new(),
+        }
+    }
+
+    /// With what to do when it is too little and when it is too much.
+    fn or(mut self, too_little: &str, too_much: &str) -> Check {
+        let little = self
+            .value
+            .zip(self.least)
+            .is_none_or(|(value, least)| value < least);
+        self.advice = match (self.right, little && self.least.is_some()) {
+            (true, _) => String::new(),
+            (false, true) => too_little.to_owned(),
+            (false, false) => too_much.to_owned(),
+        };
+        self
+    }
+}
+
+/// All checks of a frame: four of each marker, one of the film beside it, three of the pattern.
+pub fn checks(frame: &Frame, seen: &Seen) -> Vec<Check> {
+    let markers = (0..).zip(&seen.markers);
+    let mut checks: Vec<Check> = markers
+        .flat_map(|(id, marker)| of_marker(frame, id, marker))
+        .collect();
+    checks.extend([of_place(seen), of_turn(seen), of_size(seen)]);
+    checks
+}
+
+/// What to do about a picture that does not show four markers.
+pub fn advice(not_seen: &NotSeen) -> String {
+    let NotSeen { blobs, status } = not_seen;
+    let why = status.join(" ");
+    match blobs {
+        0 => format!(
+            "no marker is seen ({why}): take the cap off the lens, switch the light on, and look \
+             with `hivtac snapshot`"
+        ),
+        1..4 => format!(
+            "{blobs} of four markers are seen ({why}): turn or move the camera until all are in \
+             the picture, and light all of them"
+        ),
+        _ => format!(
+            "no four of {blobs} things of the markers' colour lie on a square ({why}): take what \
+             else is red out of view"
+        ),
+    }
+}
+
+fn of_marker(frame: &Frame, id: usize, marker: &Marker) -> [Check; 5] {
+    let id = Some(id);
+    let rim = marker.edge.map(|edge| edge.rim_px);
+    let most = match frame.threshold {
+        Threshold::Yuv422(_) => RIM_OF_PAIRS_PX,
+        _ => RIM_PX,
+    };
+    let width = marker.edge.map(|edge| edge.diameter_px);
+    let widths = [1.0 - WIDTH_PART, 1.0 + WIDTH_PART];
+    let widths = widths.map(|part| Some(part * marker.expected_px));
+    let film = marker.film.into_iter().reduce(f64::max);
+    [
+        Check::new("rim", id, rim, [None, Some(most)], "px")
+            .or("", "turn the lens until it is sharp"),
+        Check::new("width", id, width, widths, "px").or(
+            "the dot is too small, or the film too far from the lens",
+            "the dot is too large, or the film too near to the lens",
+        ),
+        of_colour(frame, id, marker),
+        of_brightness(frame, id, marker),
+        Check::new("film", id, film, [None, Some(BRIGHTEST)], "").or(
+            "",
+            "the film is too bright there: less light, or spread it, then `hivtac expose`",
+        ),
+    ]
+}
+
+/// By what the threshold asks for: saturation, Cr or luma.
+fn of_colour(frame: &Frame, id: Option<usize>, marker: &Marker) -> Check {
+    let [red, green, blue] = marker.colour;
+    let high = red.max(green).max(blue);
+    let (value, limits) = match frame.threshold {
+        Threshold::Rgb565(it) => {
+            let saturation = 255.0 * (high - red.min(green).min(blue)) / high.max(1.0);
+            let least = f64::from(it.saturation_low) + COLOUR_MARGIN;
+            (saturation, [Some(least), None])
+        }
+        Threshold::Yuv422(it) => {
+            let cr = 128.0 + 0.5 * red - 0.419 * green - 0.081 * blue;
+            (cr, [Some(f64::from(it.cr_low) + COLOUR_MARGIN), None])
+        }
+        Threshold::Mono(it) => {
+            let above = |low: u8| (low > 0).then_some(f64::from(low) + COLOUR_MARGIN);
+            let below = |high: u8| (high < 255).then_some(f64::from(high) - COLOUR_MARGIN);
+            (red, [above(it.low), below(it.high)])
+        }
+    };
+    Check::new("colour", id, Some(value), limits, "").or(
+        "the dot is too pale: use a stronger red, white light, and no light from outside",
+        "the dot is too pale: use a darker one, and no light from outside",
+    )
+}
+
+fn of_brightness(frame: &Frame, id: Option<usize>, marker: &Marker) -> Check {
+    let value = marker.colour.into_iter().reduce(f64::max);
+    let least = match frame.threshold {
+        Threshold::Rgb565(it) => Some(DARKEST_VALUES * f64::from(it.value_low)),
+        Threshold::Yuv422(_) | Threshold::Mono(_) => None,
+    };
+    Check::new("brightness", id, value, [least, Some(BRIGHTEST)], "").or(
+        "too dark: more light, then `hivtac expose`",
+        "too bright: less light, then `hivtac expose`",
+    )
+}
+
+fn of_place(seen: &Seen) -> Check {
+    let [right, down] = seen.shift_px;
+    let check = Check::new(
+        "centre",
+        None,
+        Some(right.hypot(down)),
+        [None, Some(SHIFT_PX)],
+        "px",
+    );
+    let side = if right > 0.0 { "right" } else { "left" };
+    let height = if down > 0.0 { "below" } else { "above" };
+    let advice = format!(
+        "the pattern is {:.0} px to the {side} of the picture's middle and {:.0} px {height} it: \
+         move the camera or the film",
+        right.abs(),
+        down.abs()
+    );
+    check.or("", &advice)
+}
+
+fn of_turn(seen: &Seen) -> Check {
+    let limits = [Some(-TURN_DEG), Some(TURN_DEG)];
+    let check = Check::new("turn", None, Some(seen.turn_deg), limits, "°");
+    check.or(
+        "turn the camera counter-clockwise, seen from behind it",
+        "turn the camera clockwise, seen from behind it",
+    )
+}
+
+fn of_size(seen: &Seen) -> Check {
+    let limits = [Some(1.0 - SIZE_PART), Some(1.0 + SIZE_PART)];
+    Check::new("size", None, Some(seen.size), limits, "times the nominal").or(
+        "the film is too far from the lens, or the dots too near to each other",
+        "the film is too near to the lens or pressed, or the dots too far from each other",
+    )
+}

@@ -1,0 +1,188 @@
+//! `hivtac focus`: pictures again and again, until everything about them is right.
+
+pub mod checks;
+mod rim;
+pub mod seen;
+#[cfg(test)]
+mod tests;
+
+use crate::lines::to_json;
+use crate::output::{Reader, print};
+use crate::snapshot::snapshot;
+use checks::{Check, advice, checks};
+use hivtac_host::failure::Failure;
+use hivtac_host::frame::Frame;
+use hivtac_host::link::Link;
+use hivtac_host::port::Address;
+use hivtac_wire::message::DeviceHello;
+use seen::look;
+use serde::Serialize;
+use std::time::Duration;
+
+/// Shows what is right and wrong about each picture, until all is right or it is interrupted.
+pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
+    let (mut link, hello) = Link::connect(address, patience)?;
+    loop {
+        let taken = snapshot(&mut link, patience)?;
+        let focus = Focus::of(&taken.frame, &hello);
+        let text = match json {
+            true => to_json(&focus),
+            false => focus.text(),
+        };
+        if print(&text)? == Reader::Gone || focus.right {
+            return Ok(());
+        }
+    }
+}
+
+/// In which order things are put right: nothing is sharp in the dark.
+const ORDER: [&str; 8] = [
+    "brightness",
+    "film",
+    "colour",
+    "size",
+    "rim",
+    "width",
+    "centre",
+    "turn",
+];
+
+/// What is right and wrong about a picture.
+#[derive(Serialize)]
+pub struct Focus {
+    frame: u32,
+    /// Whether everything is.
+    pub right: bool,
+    /// Each thing; none when no four markers are seen.
+    pub checks: Vec<Check>,
+    /// What is wrong and what to do about it, in the order in which to do it.
+    pub wrong: Vec<String>,
+}
+
+impl Focus {
+    /// Of a frame of this device.
+    pub fn of(frame: &Frame, device: &DeviceHello) -> Focus {
+        let (checks, wrong) = match look(frame, device) {
+            Ok(seen) => {
+                let checks = checks(frame, &seen);
+                let wrong = ORDER.iter().filter_map(|what| said(&checks, what));
+                let wrong = wrong.collect();
+                (checks, wrong)
+            }
+            Err(not_seen) => (Vec::new(), vec![advice(&not_seen)]),
+        };
+        Focus {
+            frame: frame.number,
+            right: wrong.is_empty(),
+            checks,
+            wrong,
+        }
+    }
+
+    /// A table of the markers with the limits, a line of the pattern, and what to do.
+    pub fn text(&self) -> String {
+        let mut lines = vec![format!("frame {}", self.frame)];
+        if !self.checks.is_empty() {
+            lines.push(row(
+                "marker",
+                ["rim, px", "width, px", "colour", "brightness", "film"],
+            ));
+            lines.extend((0..4).map(|id| self.marker_row(id)));
+            lines.push(self.limits_row());
+            let pattern = self.checks.iter().filter(|check| check.marker.is_none());
+            let pattern: Vec<_> = pattern.map(of_pattern).collect();
+            lines.push(format!("  pattern  {}", pattern.join(", ")));
+        }
+        lines.extend(self.wrong.iter().map(|wrong| format!("  wrong    {wrong}")));
+        if self.right {
+            lines.push("  all is right".to_owned());
+        }
+        lines.join("\n")
+    }
+
+    fn of_marker(&self, id: usize) -> impl Iterator<Item = &Check> {
+        let own = move |check: &&Check| check.marker == Some(id);
+        self.checks.iter().filter(own)
+    }
+
+    fn marker_row(&self, id: usize) -> String {
+        row(
+            &id.to_string(),
+            self.of_marker(id).map(|check| {
+                let mark = if check.right { "" } else { "!" };
+                format!("{mark}{}", number(check.value))
+            }),
+        )
+    }
+
+    /// Those of the first marker: only the widths differ a little.
+    fn limits_row(&self) -> String {
+        row("right", self.of_marker(0).map(limits))
+    }
+}
+
+/// A row of the table of markers.
+fn row(name: &str, cells: impl IntoIterator<Item = impl ToString>) -> String {
+    let cells = cells
+        .into_iter()
+        .map(|cell| format!("{:>14}", cell.to_string()));
+    format!("  {name:<7}{}", cells.collect::<String>())
+}
+
+/// One decimal, which is what its limits have.
+fn number(value: Option<f64>) -> String {
+    value.map_or("–".into(), |value| format!("{value:.1}"))
+}
+
+/// "centre 2.3 px (≤ 9)".
+fn of_pattern(check: &Check) -> String {
+    let places = if check.what == "size" { 2 } else { 1 };
+    let value = check.value.unwrap_or(f64::NAN);
+    format!(
+        "{} {value:.places$}{} ({})",
+        check.what,
+        unit(check),
+        limits(check)
+    )
+}
+
+fn unit(check: &Check) -> String {
+    match check.unit {
+        "" | "°" => check.unit.to_owned(),
+        unit => format!(" {unit}"),
+    }
+}
+
+fn limits(check: &Check) -> String {
+    let short = |limit: f64| {
+        let text = format!("{limit:.2}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
+    match (check.least, check.most) {
+        (Some(least), Some(most)) => format!("{} to {}", short(least), short(most)),
+        (Some(least), None) => format!("≥ {}", short(least)),
+        (None, Some(most)) => format!("≤ {}", short(most)),
+        (None, None) => String::new(),
+    }
+}
+
+/// "rim of marker 0, 2: 4.1, 4.3 px (≤ 3.5): turn the lens"; nothing when none is wrong.
+fn said(checks: &[Check], what: &str) -> Option<String> {
+    let wrong = checks
+        .iter()
+        .filter(|check| check.what == what && !check.right);
+    let wrong: Vec<_> = wrong.collect();
+    let first = wrong.first()?;
+    let markers: Vec<_> = wrong.iter().filter_map(|check| check.marker).collect();
+    let markers: Vec<_> = markers.iter().map(usize::to_string).collect();
+    let of = match markers[..] {
+        [] => String::new(),
+        _ => format!(" of marker {}", markers.join(", ")),
+    };
+    let values: Vec<_> = wrong.iter().map(|check| number(check.value)).collect();
+    let (values, unit, limits) = (values.join(", "), unit(first), limits(first));
+    Some(format!(
+        "{what}{of}: {values}{unit} ({limits}): {}",
+        first.advice
+    ))
+}

@@ -1,0 +1,199 @@
+//! Pictures of the simulated sensor, right and wrong, and what is said of them.
+
+use super::*;
+use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
+
+const RED: [u8; 6] = [170, 10, 100, 255, 45, 255];
+
+fn device() -> DeviceHello {
+    DeviceHello {
+        protocol: 2,
+        schema: 0,
+        device_id: [0; 12],
+        board: "board".try_into().unwrap(),
+        firmware: "firmware".try_into().unwrap(),
+        model: None,
+        width: 320,
+        height: 240,
+        threshold: Threshold::Yuv422(Yuv422::RED),
+        preset: "ov7725".try_into().unwrap(),
+        dilations: 1,
+        centroid: CentroidEstimator::RednessWeighted,
+    }
+}
+
+/// The film at rest with some options changed.
+fn frame(change: impl Fn(&mut Options)) -> Frame {
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
+    let mut options = scene.options().clone();
+    change(&mut options);
+    let is_rgb = options.format == Format::Rgb565;
+    let scene = scene.with_options(options).unwrap();
+    let pixels = scene.render_load(&Load::REST, 7).unwrap().pixels;
+    let in_order = |pixel: u16| match is_rgb {
+        true => pixel.to_be_bytes(),
+        false => pixel.to_le_bytes(),
+    };
+    Frame {
+        number: 7,
+        time_us: 0,
+        width: 320,
+        height: 240,
+        threshold: match is_rgb {
+            true => Threshold::Rgb565(HsvBox::of_limits(RED)),
+            false => Threshold::Yuv422(Yuv422::RED),
+        },
+        bytes: pixels.into_iter().flat_map(in_order).collect(),
+    }
+}
+
+/// What is wrong with it, in the order in which it is said.
+fn wrong(frame: &Frame) -> Vec<String> {
+    let focus = Focus::of(frame, &device());
+    let checks = focus.checks.iter();
+    assert_eq!(focus.right, focus.wrong.is_empty());
+    let all_right = checks.clone().all(|check| check.right) && checks.len() == 23;
+    assert_eq!(focus.right, all_right, "{}", focus.text());
+    focus.wrong
+}
+
+/// Asserts that just one thing is wrong, and what is said of it.
+fn assert_wrong(frame: &Frame, words: &[&str]) {
+    let wrong = wrong(frame);
+    assert_eq!(wrong.len(), 1, "{wrong:?}");
+    for word in words {
+        assert!(wrong[0].contains(word), "no {word}: {}", wrong[0]);
+    }
+}
+
+#[test]
+fn the_nominal_sensor_is_right_in_both_formats() {
+    for format in [Format::Rgb565, Format::Yuv422] {
+        let frame = frame(|options| options.format = format);
+        assert_eq!(wrong(&frame), [""; 0]);
+    }
+}
+
+/// A blur that costs no frame is right, and one that costs most of them is not.
+#[test]
+fn a_blurred_picture_is_told_by_its_rims() {
+    for format in [Format::Rgb565, Format::Yuv422] {
+        let blurred = |blur_px| {
+            frame(|options| {
+                options.format = format;
+                options.lens.blur_px = blur_px;
+            })
+        };
+        assert_eq!(wrong(&blurred(1.0)), [""; 0]);
+        assert_wrong(
+            &blurred(1.5),
+            &["rim of marker 0, 1, 2, 3:", "turn the lens"],
+        );
+        assert_wrong(&blurred(2.5), &["rim of marker 0, 1, 2, 3:"]);
+    }
+}
+
+/// A lens of F/2.8 that is focused too near.
+#[test]
+fn a_defocused_lens_is_told() {
+    let focused = |focus_mm| {
+        frame(|options| {
+            options.lens.aperture_mm = 0.75;
+            options.lens.focus_mm = focus_mm;
+        })
+    };
+    assert_eq!(wrong(&focused(10.0)), [""; 0]);
+    assert_wrong(&focused(4.0), &["rim of marker"]);
+}
+
+#[test]
+fn a_turned_camera_is_told_with_the_way_back() {
+    for (roll_deg, way) in [(8.0, " clockwise"), (-8.0, "counter-clockwise")] {
+        let frame = frame(|options| options.mounting.roll_deg = roll_deg);
+        assert_wrong(&frame, &["turn: ", way]);
+    }
+    assert_eq!(
+        wrong(&frame(|options| options.mounting.roll_deg = 5.0)),
+        [""; 0]
+    );
+}
+
+#[test]
+fn a_shifted_camera_is_told_with_where_to() {
+    let off = frame(|options| options.mounting.shift_px = [12.0, -5.0]);
+    assert_wrong(
+        &off,
+        &["centre: 13.0 px", "12 px to the right", "5 px above"],
+    );
+    let little = frame(|options| options.mounting.shift_px = [-5.0, 6.0]);
+    assert_eq!(wrong(&little), [""; 0]);
+}
+
+#[test]
+fn too_little_and_too_much_light_are_told() {
+    assert_wrong(
+        &frame(|options| options.gain = 0.45),
+        &["brightness", "more light"],
+    );
+    let bright = wrong(&frame(|options| options.gain = 1.8));
+    assert!(bright[0].starts_with("brightness of"), "{bright:?}");
+    assert!(bright[0].contains("less light"), "{bright:?}");
+    assert_eq!(wrong(&frame(|options| options.gain = 0.7)), [""; 0]);
+    // On one side only.
+    let aslant = frame(|options| {
+        options.gain = 0.8;
+        options.gradient = [1.0, 0.0];
+    });
+    assert_wrong(&aslant, &["brightness of marker 0, 3:"]);
+}
+
+#[test]
+fn washed_out_colours_are_told() {
+    let hazy = wrong(&frame(|options| {
+        options.gain = 0.6;
+        options.haze = 120.0;
+    }));
+    assert!(
+        hazy[0].starts_with("colour of marker 0, 1, 2, 3"),
+        "{hazy:?}"
+    );
+}
+
+/// As a film 13 mm away, everything is smaller.
+#[test]
+fn a_film_too_far_away_is_told() {
+    let small = wrong(&frame(|options| options.lens.pitch_um = Some(15.0)));
+    assert!(small[0].starts_with("size: 0.8"), "{small:?}");
+    assert!(small[0].contains("too far from the lens"), "{small:?}");
+}
+
+#[test]
+fn a_picture_without_four_markers_is_told() {
+    let dark = wrong(&frame(|options| options.gain = 0.0));
+    assert!(
+        dark[0].contains("no marker is seen (image_dark"),
+        "{dark:?}"
+    );
+    let three = wrong(&frame(|options| options.missing[2] = true));
+    assert!(
+        three[0].starts_with("3 of four markers are seen"),
+        "{three:?}"
+    );
+}
+
+#[test]
+fn a_person_sees_a_table_with_the_limits() {
+    let text = Focus::of(&frame(|options| options.lens.blur_px = 1.5), &device()).text();
+    let lines: Vec<_> = text.lines().collect();
+    assert_eq!(lines[0], "frame 7");
+    assert!(lines[1].starts_with("  marker        rim, px"), "{text}");
+    assert!(lines[2].starts_with("  0                !4."), "{text}");
+    assert!(lines[6].starts_with("  right           ≤ 3.5"), "{text}");
+    assert!(
+        lines[7].starts_with("  pattern  centre 0.0 px (≤ 9), turn "),
+        "{text}"
+    );
+    assert!(lines[8].starts_with("  wrong    rim of marker"), "{text}");
+}

@@ -1,0 +1,295 @@
+//! A frame of the device as it was captured: taking a snapshot, and its pixels.
+
+use crate::failure::{Failure, Kind};
+use crate::link::{Link, judge};
+use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample, Snapshot, SnapshotPart};
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// What the device itself waits for a whole frame.
+const DEVICE_PATIENCE: Duration = Duration::from_secs(2);
+/// Samples that are kept until it is known which frame is meant: more than pass meanwhile.
+const SAMPLES_KEPT: usize = 64;
+/// Columns and rows of the largest frame that is believed.
+const LARGEST_SIDE: u16 = 800;
+
+/// A frame, pixel for pixel as the sensing read it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Its number.
+    pub number: u32,
+    /// Its sample's time, µs.
+    pub time_us: u64,
+    /// Columns, px.
+    pub width: u16,
+    /// Rows, px.
+    pub height: u16,
+    /// What it was read with, and with that its pixel format.
+    pub threshold: Threshold,
+    /// All rows from the top, as the camera sent them.
+    pub bytes: Vec<u8>,
+}
+
+impl Frame {
+    /// A frame of which no byte has come.
+    fn announced(header: &Snapshot) -> Result<Frame, String> {
+        let frame = Frame {
+            number: header.frame,
+            time_us: header.time_us,
+            width: header.width,
+            height: header.height,
+            threshold: header.threshold,
+            bytes: Vec::new(),
+        };
+        let sides = 1..=LARGEST_SIDE;
+        if !sides.contains(&header.width) || !sides.contains(&header.height) {
+            return Err(format!("{} × {} px is no frame", frame.width, frame.height));
+        }
+        match frame.length() == header.bytes as usize {
+            true => Ok(frame),
+            false => Err(format!(
+                "{} × {} px of {} are {} bytes, and it announces {}",
+                frame.width,
+                frame.height,
+                frame.format().name(),
+                frame.length(),
+                header.bytes
+            )),
+        }
+    }
+
+    /// Bytes that it has when it is whole.
+    fn length(&self) -> usize {
+        2 * self.format().row_length(self.width) * usize::from(self.height)
+    }
+
+    /// Its pixel format.
+    pub fn format(&self) -> PixelFormat {
+        self.threshold.format()
+    }
+
+    /// Its rows as the sensing takes them on this computer: RGB565 in native order, the others as
+    /// they lie in the device's memory.
+    pub fn pixels(&self) -> Vec<u16> {
+        pixels(self.format(), &self.bytes)
+    }
+
+    fn add(&mut self, part: &SnapshotPart) -> Result<(), String> {
+        let (have, offset) = (self.bytes.len(), part.offset as usize);
+        if offset != have {
+            return Err(format!("bytes {have} to {offset} of it are missing"));
+        }
+        if have + part.bytes.len() > self.length() {
+            return Err("more bytes came than it has".to_owned());
+        }
+        self.bytes.extend_from_slice(&part.bytes);
+        Ok(())
+    }
+}
+
+/// Rows of a format, as a camera sends them, as the sensing takes them on this computer.
+pub fn pixels(format: PixelFormat, bytes: &[u8]) -> Vec<u16> {
+    let pairs = bytes.as_chunks().0.iter();
+    match format {
+        PixelFormat::Rgb565 => pairs.map(|pair| u16::from_be_bytes(*pair)).collect(),
+        PixelFormat::Yuv422 | PixelFormat::Mono => {
+            pairs.map(|pair| u16::from_le_bytes(*pair)).collect()
+        }
+    }
+}
+
+/// A frame, and what the device itself made of it: nothing when it does not stream.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Taken {
+    /// The frame.
+    pub frame: Frame,
+    /// Its sample.
+    pub sample: Option<Sample>,
+}
+
+/// Has the device send its next whole frame, and waits for it; every other message goes to `other`.
+/// The device's patience comes on top of `patience`, the longest time without a message of it.
+///
+/// # Errors
+/// [`Kind::Refused`] when the device cannot or does not answer; [`Kind::Lost`] when a part was
+/// damaged on the way; those of [`Link::receive`].
+pub fn take(
+    link: &mut Link,
+    patience: Duration,
+    mut other: impl FnMut(DeviceMessage),
+) -> Result<Taken, Failure> {
+    let id = link.command(Request::Snapshot)?;
+    let mut collected = Collected::default();
+    let mut end = Instant::now() + DEVICE_PATIENCE + patience;
+    while let Some(message) = link.receive(end)? {
+        match message {
+            DeviceMessage::Reply(reply) if reply.id == id => {
+                return collected.whole(reply.outcome);
+            }
+            DeviceMessage::Snapshot(_) | DeviceMessage::SnapshotPart(_) => {
+                end = Instant::now() + patience;
+                collected.add(&message).map_err(|why| damaged(&why))?;
+            }
+            message => {
+                if let DeviceMessage::Sample(sample) = &message {
+                    collected.remember(sample.clone());
+                }
+                other(message);
+            }
+        }
+    }
+    let seconds = patience.as_secs_f32();
+    Err(Failure::new(
+        Kind::Refused,
+        format!("no part of the snapshot came for {seconds} s; try again"),
+    ))
+}
+
+fn damaged(why: &str) -> Failure {
+    Failure::new(
+        Kind::Lost,
+        format!("the snapshot came damaged: {why}; try again, with another cable when it repeats"),
+    )
+}
+
+/// What has come so far.
+#[derive(Default)]
+struct Collected {
+    frame: Option<Frame>,
+    samples: VecDeque<Sample>,
+}
+
+impl Collected {
+    fn add(&mut self, message: &DeviceMessage) -> Result<(), String> {
+        match (message, &mut self.frame) {
+            (DeviceMessage::Snapshot(header), None) => {
+                self.frame = Some(Frame::announced(header)?);
+                Ok(())
+            }
+            (DeviceMessage::SnapshotPart(part), Some(frame)) => frame.add(part),
+            (DeviceMessage::SnapshotPart(_), None) => Err("its beginning is missing".to_owned()),
+            _ => Err("a second one began amid it".to_owned()),
+        }
+    }
+
+    fn remember(&mut self, sample: Sample) {
+        let frame = self.frame.as_ref();
+        if frame.is_some_and(|frame| frame.number != sample.frame) {
+            return;
+        }
+        if self.samples.len() == SAMPLES_KEPT {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+    }
+
+    /// The frame, once the device says that this was all.
+    fn whole(self, outcome: Outcome) -> Result<Taken, Failure> {
+        if outcome == Outcome::NoGoodFrames {
+            let message = "the device has no whole frame to send: its camera sent none for 2 s; \
+                           see what `hivtac info` counts, and check the camera's cable";
+            return Err(Failure::new(Kind::Refused, message));
+        }
+        judge("snapshot", outcome)?;
+        let frame = self.frame.ok_or_else(|| damaged("nothing of it came"))?;
+        if frame.bytes.len() != frame.length() {
+            return Err(damaged("its end is missing"));
+        }
+        let own = |sample: &Sample| sample.frame == frame.number;
+        let sample = self.samples.into_iter().find(own);
+        Ok(Taken { frame, sample })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_terms::status::Status;
+    use hivtac_terms::threshold::Yuv422;
+
+    const HEADER: Snapshot = Snapshot {
+        frame: 9,
+        time_us: 77,
+        width: 4,
+        height: 2,
+        threshold: Threshold::Yuv422(Yuv422::RED),
+        bytes: 16,
+    };
+
+    fn part(offset: u32, bytes: &[u8]) -> DeviceMessage {
+        let bytes = bytes.try_into().unwrap();
+        DeviceMessage::SnapshotPart(SnapshotPart { offset, bytes })
+    }
+
+    fn sample(frame: u32) -> Sample {
+        Sample {
+            sequence: frame,
+            frame,
+            time_us: 0,
+            status: Status(0),
+            force: None,
+            markers: None,
+        }
+    }
+
+    /// What comes of these messages, or what is said of them.
+    fn collect(messages: &[DeviceMessage], outcome: Outcome) -> Result<Taken, String> {
+        let mut collected = Collected::default();
+        (0..80).for_each(|number| collected.remember(sample(number / 8)));
+        for message in messages {
+            collected.add(message)?;
+        }
+        let taken = collected.whole(outcome);
+        taken.map_err(|failure| failure.to_string())
+    }
+
+    #[test]
+    fn parts_make_the_frame_and_its_sample_is_found() {
+        let header = DeviceMessage::Snapshot(HEADER);
+        let messages = [header, part(0, &[1; 10]), part(10, &[2; 6])];
+        let taken = collect(&messages, Outcome::Done).unwrap();
+        assert_eq!(taken.sample, Some(sample(9)));
+        assert_eq!(taken.frame.bytes, [[1; 10].as_slice(), &[2; 6]].concat());
+        assert_eq!(taken.frame.pixels()[4..6], [0x0101, 0x0202]);
+    }
+
+    #[test]
+    fn whatever_is_missing_or_wrong_is_named() {
+        let header = || DeviceMessage::Snapshot(HEADER);
+        let of_size = |width, height, bytes| {
+            DeviceMessage::Snapshot(Snapshot {
+                width,
+                height,
+                bytes,
+                ..HEADER
+            })
+        };
+        let cases = [
+            (vec![header(), part(4, &[0; 4])], "bytes 0 to 4"),
+            (vec![header(), part(0, &[0; 17])], "more bytes"),
+            (vec![header(), part(0, &[0; 15])], "end is missing"),
+            (vec![part(0, &[0; 4])], "beginning is missing"),
+            (vec![header(), header()], "second one"),
+            (vec![], "nothing of it came"),
+            (vec![of_size(0, 2, 0)], "0 × 2 px"),
+            (vec![of_size(9, 801, 0)], "801 px"),
+            (vec![of_size(4, 2, 15)], "announces 15"),
+        ];
+        for (messages, word) in cases {
+            let error = collect(&messages, Outcome::Done).unwrap_err();
+            assert!(error.contains(word), "{error}");
+        }
+        let error = collect(&[], Outcome::NoGoodFrames).unwrap_err();
+        assert!(error.contains("camera"), "{error}");
+        let error = collect(&[header()], Outcome::NotRead).unwrap_err();
+        assert!(error.contains("snapshot"), "{error}");
+    }
+
+    #[test]
+    fn pixels_are_in_the_order_of_their_format() {
+        assert_eq!(pixels(PixelFormat::Rgb565, &[0xF8, 1]), [0xF801]);
+        assert_eq!(pixels(PixelFormat::Yuv422, &[16, 128]), [0x8010]);
+        assert_eq!(pixels(PixelFormat::Mono, &[16, 128]), [0x8010]);
+    }
+}

@@ -1,0 +1,143 @@
+//! `hivtac template`: where to punch the film and to stick the dots, to print at its true size.
+
+use crate::output::print;
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_terms::geometry::{Geometry, Preset};
+
+/// From the film's middle to each post, along x and y, mm: that of the simulated sensor.
+const POST_MM: f64 = 14.0;
+/// From the film's middle to its edge, along x and y, mm.
+const EDGE_MM: f64 = 20.0;
+/// Hole for an M3 screw, mm.
+const HOLE_MM: f64 = 3.2;
+/// The ruler that shows whether it was printed at its size, mm.
+const RULER_MM: u32 = 50;
+/// The page, mm.
+const PAGE_MM: [f64; 2] = [70.0, 76.0];
+/// The film's middle on it, mm.
+const MIDDLE_MM: [f64; 2] = [35.0, 26.0];
+
+/// Writes the template for a preset's markers.
+pub fn run(path: &str, preset: Preset) -> Result<(), Failure> {
+    // Sizes on the film do not depend on the frame's.
+    let svg = svg(&Geometry::preset(preset, 320, 240));
+    std::fs::write(path, svg).map_err(|error| {
+        let message = format!("cannot write the template {path}: {error}");
+        Failure::new(Kind::Input, message)
+    })?;
+    let told = format!("{path}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
+    print(&told).map(|_| ())
+}
+
+/// All lengths in millimetres, and so is the page's size.
+fn svg(geometry: &Geometry) -> String {
+    let [width, height] = PAGE_MM;
+    let body = [film(), marks(geometry), ruler()].concat();
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"{height}mm\" \
+         viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"2.6\" \
+         text-anchor=\"middle\" fill=\"none\" stroke=\"#000\" stroke-width=\"0.12\">\n{body}</svg>\n"
+    )
+}
+
+/// The film's edge, its middle and the holes for the posts.
+fn film() -> String {
+    let [x, y] = MIDDLE_MM;
+    let (left, top, side) = (x - EDGE_MM, y - EDGE_MM, 2.0 * EDGE_MM);
+    let edge = format!(
+        "<rect class=\"film\" x=\"{left}\" y=\"{top}\" width=\"{side}\" height=\"{side}\"/>\n\
+         <path d=\"M{} {y}h2M{x} {}v2\"/>\n",
+        x - 1.0,
+        y - 1.0
+    );
+    let hole = |[across, down]: [f64; 2]| {
+        let centre = [x + across * POST_MM, y + down * POST_MM];
+        circle("post", centre, HOLE_MM)
+    };
+    edge + &CORNERS.map(hole).concat()
+}
+
+/// The dots, each with a cross that sticks out from under it.
+fn marks(geometry: &Geometry) -> String {
+    let [x, y] = MIDDLE_MM;
+    let rest_mm = f64::from(geometry.marker_radius.0) / 1e3 / std::f64::consts::SQRT_2;
+    let diameter_mm = f64::from(geometry.marker_diameter.0) / 1e3;
+    let dot = |[across, down]: [f64; 2]| {
+        let [x, y] = [x + across * rest_mm, y + down * rest_mm];
+        let (left, top) = (x - 1.5, y - 1.5);
+        let cross = format!("<path d=\"M{left:.3} {y:.3}h3M{x:.3} {top:.3}v3\"/>\n");
+        cross + &circle("marker", [x, y], diameter_mm)
+    };
+    CORNERS.map(dot).concat()
+}
+
+/// From the upper left clockwise.
+const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+
+fn circle(class: &str, [x, y]: [f64; 2], diameter_mm: f64) -> String {
+    let radius = diameter_mm / 2.0;
+    format!("<circle class=\"{class}\" cx=\"{x:.3}\" cy=\"{y:.3}\" r=\"{radius:.3}\"/>\n")
+}
+
+fn ruler() -> String {
+    let (left, y) = (MIDDLE_MM[0] - f64::from(RULER_MM) / 2.0, 56.0);
+    let ticks = (0..=RULER_MM / 10).map(|tick| {
+        let x = left + f64::from(10 * tick);
+        format!("<path d=\"M{x} {}v2\"/>\n", y - 1.0)
+    });
+    let texts = [
+        (61.0, format!("{RULER_MM} mm when printed at 100 %")),
+        (65.0, "outer line: film, 40 × 40 mm".to_owned()),
+        (
+            69.0,
+            "large: holes for the posts; small: red dots, camera's side".to_owned(),
+        ),
+    ];
+    let texts = texts.map(|(y, text)| {
+        let x = MIDDLE_MM[0];
+        format!("<text x=\"{x}\" y=\"{y}\" fill=\"#000\" stroke=\"none\">{text}</text>\n")
+    });
+    let line = format!("<path class=\"ruler\" d=\"M{left} {y}h{RULER_MM}\"/>\n");
+    line + &ticks.collect::<String>() + &texts.concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_scene::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM};
+
+    /// Numbers of all circles of a class.
+    fn circles(svg: &str, class: &str) -> Vec<[f64; 3]> {
+        let opening = format!("<circle class=\"{class}\"");
+        let own = svg.lines().filter(|line| line.starts_with(&opening));
+        own.map(|line| {
+            ["cx", "cy", "r"].map(|name| {
+                let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
+                rest.split('"').next().unwrap().parse().unwrap()
+            })
+        })
+        .collect()
+    }
+
+    /// Dots and posts lie where the simulated sensor has them, and are as large.
+    #[test]
+    fn it_is_the_scenes_geometry_to_scale() {
+        for preset in Preset::ALL {
+            let svg = svg(&Geometry::preset(preset, 320, 240));
+            assert!(svg.contains("width=\"70mm\" height=\"76mm\" viewBox=\"0 0 70 76\""));
+            let [markers, posts] = ["marker", "post"].map(|class| circles(&svg, class));
+            assert_eq!((markers.len(), posts.len()), (4, 4));
+            for (i, [across, down]) in CORNERS.into_iter().enumerate() {
+                let there = |rest: f64| [35.0 + across * rest, 26.0 + down * rest];
+                let near = |found: [f64; 3], rest: f64| {
+                    let [x, y] = there(rest);
+                    (found[0] - x).hypot(found[1] - y) < 2e-3
+                };
+                assert!(near(markers[i], MARKER_REST_MM), "{markers:?}");
+                assert!(near(posts[i], HALF_SIDE_MM), "{posts:?}");
+                assert!((markers[i][2] - MARKER_RADIUS_MM).abs() < 1e-9);
+            }
+            assert!(svg.contains("class=\"ruler\" d=\"M10 56h50\""), "{svg}");
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! A snapshot of the firmware in the rig, through the host tool: what the tool's own sensing finds
+//! in it is what the device found, bit for bit.
+
+use hivtac_tests::artifact;
+use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+use std::string::String;
+
+/// Runs a rig with these options, and takes a raw snapshot.
+fn take(rig: &Rig, raw: &Path) -> Value {
+    let raw = raw.to_str().unwrap();
+    let output = tool(rig, "snapshot", &["--json", "--raw", raw]).unwrap();
+    assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+    json_lines(&output.out).unwrap().remove(0)
+}
+
+/// What `hivtac sense` finds in a file.
+fn sense(options: &[&str]) -> Value {
+    let output = Command::new(artifact::named_by("HIVTAC_TOOL"))
+        .args(["sense", "--json"])
+        .args(options)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    json_lines(&text).unwrap().remove(0)
+}
+
+#[test]
+fn sense_finds_the_devices_own_markers_in_its_snapshot() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("frame.pam");
+    let rig = Rig::start(&["--scene", "demo", "--seed", "5"]).unwrap();
+    let told = take(&rig, &file);
+    rig.finish().unwrap();
+    let found = sense(&[file.to_str().unwrap()]);
+    assert!(told["markers"].is_array(), "{told}");
+    assert_eq!(told["markers"], found["markers"]);
+    assert_eq!(
+        (&told["width"], &told["height"]),
+        (&found["width"], &found["height"])
+    );
+}
+
+/// In YUV422 too, by the raw frame and the model for it.
+#[test]
+fn so_it_does_in_yuv422() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("frame.pam");
+    let elf = artifact::named_by("HIVTAC_BUG_ELFS").join("yuv422.elf");
+    let rig = Rig::start_with(&elf, &["--scene", "demo", "--seed", "5"]).unwrap();
+    let told = take(&rig, &file);
+    rig.finish().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let model = root.join("calibration/models/yuv422/default.hvtm");
+    let found = sense(&["--model", model.to_str().unwrap(), file.to_str().unwrap()]);
+    assert!(told["markers"].is_array(), "{told}");
+    assert_eq!(told["markers"], found["markers"]);
+}
+
+/// The nominal sensor at rest: `focus` ends with its first picture.
+#[test]
+fn focus_finds_the_nominal_sensor_right() {
+    let rig = Rig::start(&["--scene", "rest"]).unwrap();
+    let output = tool(&rig, "focus", &["--json"]).unwrap();
+    rig.finish().unwrap();
+    assert_eq!(output.code, Some(0), "{output:?}");
+    let lines = json_lines(&output.out).unwrap();
+    assert_eq!((lines.len(), &lines[0]["right"]), (1, &true.into()));
+    let checks = lines[0]["checks"].as_array().unwrap();
+    assert_eq!(checks.len(), 23, "{checks:?}");
+}
+
+/// A camera that sends nothing: the tool says so, and nothing is written.
+#[test]
+fn without_a_camera_it_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("frame.pam");
+    let rig = Rig::start(&["--scene", "static", "--fault", "camera-absent"]).unwrap();
+    let path = file.to_str().unwrap();
+    let output: ToolOutput = tool(&rig, "snapshot", &["--raw", path]).unwrap();
+    rig.finish().unwrap();
+    assert_eq!(output.code, Some(6), "{output:?}");
+    assert!(output.err.contains("camera"), "{output:?}");
+    assert!(!file.exists());
+}
