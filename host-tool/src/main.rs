@@ -223,7 +223,7 @@ struct WantedThreshold {
     /// YUV422; lowest Cr, 0–255
     #[arg(long, value_name = "LOW")]
     cr: Option<u8>,
-    /// Mono; inclusive bounds of the luma, 0–255. An OV7725 does not send it
+    /// Mono; inclusive bounds of the luma, 0–255. An MT9V034 sends it, an OV7725 does not
     #[arg(long, value_name = "l0,l1", value_parser = hsv::parse_luma)]
     luma: Option<Mono>,
     /// The one that the device's model was made for
