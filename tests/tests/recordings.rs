@@ -1,4 +1,5 @@
-//! A recording of the firmware on the rig: what PyPI's readers find in it, and what is played of it.
+//! A recording of the firmware on the rig: what PyPI's readers find in it, and what is played of
+//! it.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;

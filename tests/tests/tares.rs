@@ -93,7 +93,7 @@ fn painted(random: &mut Random, markers: &[usize], depth_mm: f64, paint: Paint) 
             0.5f64.min(radius_mm),
             0.5 + depth_mm - 0.5f64.min(radius_mm),
         ),
-        Paint::Film | Paint::Glare => (radius_mm, 0.5 + radius_mm - depth_mm),
+        _ => (radius_mm, 0.5 + radius_mm - depth_mm),
     };
     let patch = |&identity: &usize| {
         let [x, y] = MARKERS[identity].centre_mm;
@@ -132,7 +132,7 @@ fn painted_markers_are_refused_or_harmless(tares: u64) {
     let mut random = Random::new(5);
     let (mut taken, mut refusals, mut wrong) = (0, BTreeSet::new(), Vec::new());
     for number in 0..tares {
-        let paint = Paint::ALL[number as usize % 3];
+        let paint = [Paint::Red, Paint::Film, Paint::Glare][number as usize % 3];
         let markers: &[usize] = if number % 2 == 0 { &[0, 1, 2, 3] } else { &[1] };
         let depth_mm = between(&mut random, 0.02, 0.4);
         let painted = scene(&painted(&mut random, markers, depth_mm, paint), number);

@@ -67,7 +67,7 @@ const REASONS: [(&str, usize, &str); 17] = [
     ),
     (
         "hivtac_firmware12capture_task",
-        9,
+        12,
         "set-up of the camera: what has ended is not polled again",
     ),
     (
