@@ -36,7 +36,8 @@ fn svg(geometry: &Geometry) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"{height}mm\" \
          viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"2.6\" \
-         text-anchor=\"middle\" fill=\"none\" stroke=\"#000\" stroke-width=\"0.12\">\n{body}</svg>\n"
+         text-anchor=\"middle\" fill=\"none\" stroke=\"#000\" stroke-width=\"0.12\">\n{body}\
+         </svg>\n"
     )
 }
 
