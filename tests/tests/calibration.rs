@@ -51,7 +51,7 @@ fn press(here: &Path, number: usize, [force_n, alpha, beta]: [f64; 3]) {
     let text = format!(
         "seed = {number}\n[load]\nmotion = \"press\"\n[load.press]\nforce_n = {force_n}\nalpha_deg \
          = {alpha:?}\nbeta_deg = {beta:?}\n\
-         start_s = 0.8\nrise_s = 0.35\nhold_s = 0.4\nfall_s = 0.35\n"
+         start_s = 1.15\nrise_s = 0.35\nhold_s = 0.4\nfall_s = 0.35\n"
     );
     fs::write(&scene, text).unwrap();
     let rig = Rig::start(&["--scene", scene.to_str().unwrap()]).unwrap();
