@@ -28,7 +28,7 @@ static BUFFERS: ConstStaticCell<[Rows; COUNT]> =
 /// The channel and its buffers.
 pub struct BandCopy {
     _channel: Peri<'static, peripherals::MDMA_CH0>,
-    mover: BlockMove,
+    mover: BlockMove<CHANNEL>,
     buffers: &'static mut [Rows; COUNT],
     /// The buffer of the copy under way, or the next one.
     next: usize,
@@ -51,7 +51,7 @@ impl BandCopy {
     pub fn new(channel: Peri<'static, peripherals::MDMA_CH0>) -> Self {
         Self {
             _channel: channel,
-            mover: BlockMove::on(CHANNEL),
+            mover: BlockMove::new(),
             buffers: BUFFERS.take(),
             next: 0,
             ahead: None,

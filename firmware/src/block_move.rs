@@ -25,13 +25,13 @@ pub enum End {
 }
 
 /// One channel of the controller; of two that want to move, the lower number goes first.
-pub struct BlockMove(usize);
+pub struct BlockMove<const CHANNEL: usize>;
 
-impl BlockMove {
+impl<const CHANNEL: usize> BlockMove<CHANNEL> {
     /// For who holds this channel's peripheral.
-    pub fn on(channel: usize) -> Self {
+    pub fn new() -> Self {
         RCC.ahb3enr().modify(|w| w.set_mdmaen(true));
-        Self(channel)
+        Self
     }
 
     /// Begins to move `bytes` bytes, at most 65,536. What was under way is given up.
@@ -74,7 +74,7 @@ impl BlockMove {
     }
 
     fn registers(&self) -> Ch {
-        MDMA.ch(self.0)
+        MDMA.ch(CHANNEL)
     }
 }
 

@@ -30,7 +30,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// The channel, and the snapshot that is wanted.
 pub struct SnapshotCopy {
     _channel: Peri<'static, peripherals::MDMA_CH1>,
-    mover: BlockMove,
+    mover: BlockMove<CHANNEL>,
     wanted: Option<Wanted>,
 }
 
@@ -47,7 +47,7 @@ impl SnapshotCopy {
     pub fn new(channel: Peri<'static, peripherals::MDMA_CH1>) -> Self {
         Self {
             _channel: channel,
-            mover: BlockMove::on(CHANNEL),
+            mover: BlockMove::new(),
             wanted: None,
         }
     }

@@ -35,7 +35,7 @@ const NEVER: [&str; 8] = [
 
 /// Functions that may panic: a part of their mangled names, the most sites, and why none is
 /// reached. The first that fits counts.
-const REASONS: [(&str, usize, &str); 17] = [
+const REASONS: [(&str, usize, &str); 18] = [
     (
         "embassy_usb_synopsys_otg",
         37,
@@ -57,7 +57,7 @@ const REASONS: [(&str, usize, &str); 17] = [
     ),
     (
         "hivtac_firmware5board",
-        4,
+        5,
         "at the start only: pins that are constants, and what is taken once",
     ),
     (
@@ -74,6 +74,11 @@ const REASONS: [(&str, usize, &str); 17] = [
         "hivtac_firmware13pipeline_task",
         1,
         "a queue's cell, in a critical section and so never borrowed twice",
+    ),
+    (
+        "hivtac_firmware8commands",
+        3,
+        "the USB tasks wait for each answer once: what has ended is not polled again",
     ),
     (
         "hivtac_firmware",
