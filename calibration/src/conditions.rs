@@ -1,6 +1,7 @@
 //! Under which conditions data was taken and a model holds, in words that files can carry.
 
 use anyhow::{Context, Result, ensure};
+use hivtac_host::shown::unit_number;
 use hivtac_scene::{Camera, Contact};
 use hivtac_sensing::model::{self, Origin};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
@@ -59,7 +60,7 @@ pub enum OriginName {
 impl OriginName {
     /// The unit with this number.
     pub fn unit(device_id: [u8; 12]) -> Self {
-        OriginName::Unit(device_id.iter().map(|byte| format!("{byte:02x}")).collect())
+        OriginName::Unit(unit_number(&device_id))
     }
 
     /// The same as the model file holds it.

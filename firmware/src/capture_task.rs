@@ -11,7 +11,7 @@ use core::sync::atomic::Ordering;
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
-use hivtac_wire::message::{DeviceMessage, LogLevel, Outcome, Reply};
+use hivtac_wire::message::{LogLevel, Outcome};
 
 /// So many frame times without a band or the end of a frame are a silence. Bands come all the
 /// time but for the vertical blanking, a seventh of a frame.
@@ -128,8 +128,7 @@ impl CaptureTask {
         self.go_on_when_set_up(from, answered).await;
         EXPOSING.store(false, Ordering::Relaxed);
         if let Some(id) = asked.id() {
-            let outcome = Outcome::Done;
-            outbox::offer(DeviceMessage::Reply(Reply { id, outcome }));
+            outbox::reply(id, Outcome::Done);
         }
     }
 

@@ -4,7 +4,7 @@ use crate::shared::{ANSWERS, SAMPLES};
 use crate::snapshot::Outgoing;
 use crate::{session, stats};
 use embassy_futures::select::{Either3, select3};
-use hivtac_wire::message::{DeviceMessage, Sample};
+use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Sample};
 
 /// Queues an answer that the host waits for; waits for room. Only for tasks that serve the host.
 pub async fn answer(message: DeviceMessage) {
@@ -14,6 +14,11 @@ pub async fn answer(message: DeviceMessage) {
 /// Queues a message when a host listens and there is room; says whether it did.
 pub fn offer(message: DeviceMessage) -> bool {
     session::is_open() && ANSWERS.try_send(message).is_ok()
+}
+
+/// Answers a command. With no room the host does not read, and the reply is of no use.
+pub fn reply(id: u16, outcome: Outcome) {
+    offer(DeviceMessage::Reply(Reply { id, outcome }));
 }
 
 /// Queues a sample, or drops and counts it.

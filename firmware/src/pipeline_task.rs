@@ -18,7 +18,7 @@ use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Sample};
+use hivtac_wire::message::{Outcome, Sample};
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
 pub enum Order {
@@ -187,16 +187,16 @@ impl PipelineTask {
                 match self.next_threshold.take(id, threshold, self.sensor) {
                     Ok(true) => {
                         self.threshold_changed();
-                        reply(id, Outcome::Done);
+                        outbox::reply(id, Outcome::Done);
                     }
                     Ok(false) => {}
-                    Err(outcome) => reply(id, outcome),
+                    Err(outcome) => outbox::reply(id, outcome),
                 }
             }
-            Order::Tare { id, .. } if self.taring.is_some() => reply(id, Outcome::Busy),
+            Order::Tare { id, .. } if self.taring.is_some() => outbox::reply(id, Outcome::Busy),
             Order::Tare { id, frames } => match Taring::begin(id, frames) {
                 Some(taring) => self.taring = Some(taring),
-                None => reply(id, Outcome::InvalidArgument),
+                None => outbox::reply(id, Outcome::InvalidArgument),
             },
             Order::Snapshot(asked) => self.snapshots.begin(asked),
         }
@@ -210,7 +210,7 @@ impl PipelineTask {
         self.give_up_tare();
         self.threshold_changed();
         if let Some(id) = asked.and_then(Asked::id) {
-            reply(id, Outcome::Done);
+            outbox::reply(id, Outcome::Done);
         }
     }
 
@@ -289,19 +289,14 @@ impl PipelineTask {
             if let Ok(rest) = outcome {
                 self.sensor.set_tare(Some(rest));
             }
-            reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
+            outbox::reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
             self.taring = None;
         }
     }
 
     fn give_up_tare(&mut self) {
         if let Some(taring) = self.taring.take() {
-            reply(taring.id(), taring.given_up());
+            outbox::reply(taring.id(), taring.given_up());
         }
     }
-}
-
-/// Answers a command. With no room the host does not read, and the reply is of no use.
-fn reply(id: u16, outcome: Outcome) {
-    outbox::offer(DeviceMessage::Reply(Reply { id, outcome }));
 }

@@ -94,8 +94,7 @@ impl Outgoing {
         };
         end(taken.asked);
         if let Some(id) = taken.asked.id() {
-            let outcome = Outcome::NotRead;
-            outbox::offer(DeviceMessage::Reply(Reply { id, outcome }));
+            outbox::reply(id, Outcome::NotRead);
         }
     }
 

@@ -21,7 +21,7 @@ use crate::snapshot::{self, FRAME_BYTES, Taken};
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::{Duration, Instant};
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Snapshot};
+use hivtac_wire::message::{Outcome, Snapshot};
 
 const CHANNEL: usize = 1;
 /// Longest wait for a whole frame: a camera that fell silent is back by then, or does not come.
@@ -117,8 +117,7 @@ impl SnapshotCopy {
         };
         snapshot::end(asked);
         if let Some(id) = asked.id() {
-            let outcome = Outcome::NoGoodFrames;
-            outbox::offer(DeviceMessage::Reply(Reply { id, outcome }));
+            outbox::reply(id, Outcome::NoGoodFrames);
         }
     }
 }

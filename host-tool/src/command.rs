@@ -60,9 +60,12 @@ fn of_model(hello: &DeviceHello) -> Result<Threshold, Failure> {
 }
 
 fn send(link: &mut Link, request: Request, wait: Duration) -> Result<(), Failure> {
-    link.request(request, wait, |message| {
-        if let DeviceMessage::Log(line) = message {
-            note(&log_text(&line));
-        }
-    })
+    link.request(request, wait, tell)
+}
+
+/// Shows a line that the device logs; of other messages nothing.
+pub fn tell(message: DeviceMessage) {
+    if let DeviceMessage::Log(line) = message {
+        note(&log_text(&line));
+    }
 }

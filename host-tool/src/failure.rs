@@ -56,6 +56,11 @@ impl Failure {
             message: message.into(),
         }
     }
+
+    /// A file, an image or an argument is not usable.
+    pub fn input(message: impl Into<String>) -> Failure {
+        Failure::new(Kind::Input, message)
+    }
 }
 
 impl fmt::Display for Failure {

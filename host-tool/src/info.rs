@@ -5,7 +5,7 @@ use crate::output::{note, print};
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_host::shown::shown;
+use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::Threshold;
@@ -79,11 +79,7 @@ impl<'a> Info<'a> {
             port,
             protocol: hello.protocol,
             schema: format!("{:#018x}", hello.schema),
-            device_id: hello
-                .device_id
-                .iter()
-                .map(|byte| format!("{byte:02x}"))
-                .collect(),
+            device_id: unit_number(&hello.device_id),
             board: &hello.board,
             firmware: &hello.firmware,
             model: hello.model.as_ref().map(|model| Model {

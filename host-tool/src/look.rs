@@ -4,6 +4,7 @@
 use hivtac_host::frame::Frame;
 use hivtac_sensing::formats::Formats;
 use hivtac_sensing::tables::{ByteTable, Pixels};
+use hivtac_terms::hsv::rgb888;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat};
 
 /// In the mask's picture: a pixel that passes the threshold.
@@ -16,23 +17,13 @@ pub const ADDED: u8 = 128;
 pub fn levels(frame: &Frame) -> Vec<u8> {
     let pixels = frame.pixels();
     match frame.format() {
-        PixelFormat::Rgb565 => pixels.into_iter().flat_map(of_rgb565).collect(),
+        PixelFormat::Rgb565 => pixels.into_iter().flat_map(rgb888).collect(),
         PixelFormat::Yuv422 => {
             let pairs = pixels.as_chunks().0.iter();
             pairs.flat_map(|pair| of_yuyv(*pair)).flatten().collect()
         }
         PixelFormat::Mono => frame.bytes.iter().flat_map(|&grey| [grey; 3]).collect(),
     }
-}
-
-fn of_rgb565(pixel: u16) -> [u8; 3] {
-    let (red, green, blue) = (pixel >> 11, pixel >> 5 & 63, pixel & 31);
-    let repeated = [
-        red << 3 | red >> 2,
-        green << 2 | green >> 4,
-        blue << 3 | blue >> 2,
-    ];
-    repeated.map(|level| level as u8)
 }
 
 /// By BT.601 in full range, as the camera's data sheet has it.
@@ -130,7 +121,7 @@ mod tests {
 
     #[test]
     fn levels_of_rgb565_fill_their_range() {
-        assert_eq!(of_rgb565(0xFFFF), [255; 3]);
-        assert_eq!(of_rgb565(0x8410), [132, 130, 132]);
+        assert_eq!(rgb888(0xFFFF), [255; 3]);
+        assert_eq!(rgb888(0x8410), [132, 130, 132]);
     }
 }

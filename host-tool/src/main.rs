@@ -3,6 +3,7 @@
 mod check;
 mod command;
 mod decimal;
+mod files;
 mod finding;
 mod focus;
 mod force_json;

@@ -4,7 +4,7 @@
 //! A stream is written by a thread of its own, one text at a time. Whoever prints waits for it, but
 //! no longer than [`GRACE`] once the program was interrupted or its [`limit`] has passed.
 
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use hivtac_host::stop;
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
@@ -44,7 +44,7 @@ pub fn print(line: &str) -> Result<Reader, Failure> {
             return Ok(Reader::Gone);
         }
         let message = format!("cannot write to standard output: {error}");
-        Err(Failure::new(Kind::Input, message))
+        Err(Failure::input(message))
     })
 }
 

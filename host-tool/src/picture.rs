@@ -1,7 +1,8 @@
 //! Pictures as a camera would deliver them: rows of pixels.
 
+use crate::files::read_at_most;
 use crate::raw;
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use hivtac_host::frame::pixels;
 use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use hivtac_terms::threshold::PixelFormat;
@@ -25,9 +26,12 @@ impl Picture {
     /// # Errors
     /// When the file cannot be read, is no such picture, or is larger than a frame can be.
     pub fn load(path: &str) -> Result<Picture, Failure> {
-        let unreadable =
-            |why: &dyn std::fmt::Display| failure(format!("cannot read the picture {path}: {why}"));
-        let file = read(path).map_err(|error| unreadable(&error))?;
+        let unreadable = |why: &dyn std::fmt::Display| {
+            Failure::input(format!("cannot read the picture {path}: {why}"))
+        };
+        let file = read_at_most(path, LARGEST_FILE).map_err(|error| unreadable(&error))?;
+        let too_long = || unreadable(&format_args!("it has more than {LARGEST_FILE} bytes"));
+        let file = file.ok_or_else(too_long)?;
         if raw::is_one(&file) {
             let raw = raw::parse(&file).map_err(|error| unreadable(&error))?;
             let (width, height) = size(path, raw.width.into(), raw.height.into())?;
@@ -58,10 +62,6 @@ pub enum Channels {
     Colour,
 }
 
-fn failure(message: String) -> Failure {
-    Failure::new(Kind::Input, message)
-}
-
 /// A decoded picture, 8 bits a channel.
 struct Rgb {
     width: u32,
@@ -73,17 +73,6 @@ struct Rgb {
 const LARGEST_FILE: u64 = 100 << 20;
 
 /// A file's bytes, as far as one is read.
-fn read(path: &str) -> Result<Vec<u8>, Box<dyn std::error::Error>> {
-    use std::io::Read;
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path)?;
-    file.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(format!("it has more than {LARGEST_FILE} bytes").into());
-    }
-    Ok(bytes)
-}
-
 /// Turned as its EXIF data say it was taken.
 #[cfg(feature = "pictures")]
 fn decode(bytes: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {
@@ -165,7 +154,7 @@ pub fn encode(
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
         .write_image(levels, width.into(), height.into(), color)
-        .map_err(|error| failure(format!("cannot make the picture {path}: {error}")))?;
+        .map_err(|error| Failure::input(format!("cannot make the picture {path}: {error}")))?;
     Ok(file)
 }
 
@@ -173,16 +162,16 @@ pub fn encode(
 #[cfg(not(feature = "pictures"))]
 pub fn encode(path: &str, _: Channels, _: u16, _: u16, _: &[u8]) -> Result<Vec<u8>, Failure> {
     let message = format!("cannot make the picture {path}: {WITHOUT_PICTURES}; --raw works here");
-    Err(failure(message))
+    Err(Failure::input(message))
 }
 
 fn size(path: &str, width: u32, height: u32) -> Result<(u16, u16), Failure> {
     if width == 0 || height == 0 {
-        return Err(failure(format!("the picture {path} is empty")));
+        return Err(Failure::input(format!("the picture {path} is empty")));
     }
     match (u16::try_from(width), u16::try_from(height)) {
         (Ok(columns @ ..=MAX_WIDTH), Ok(rows @ ..=MAX_HEIGHT)) => Ok((columns, rows)),
-        _ => Err(failure(format!(
+        _ => Err(Failure::input(format!(
             "the picture {path} has {width} × {height} px, more than the {MAX_WIDTH} × \
              {MAX_HEIGHT} px of the largest frame; scale it down, for example to 640 px wide"
         ))),

@@ -2,7 +2,7 @@
 
 use crate::output::{Reader, note, print};
 use crate::record::{BEFORE_BYTES, WIRE};
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use hivtac_host::stop;
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
@@ -27,13 +27,9 @@ const LONGEST_RECORD: usize = 1 << 24;
 pub fn run(file: &Path, port: u16, fast: bool) -> Result<(), Failure> {
     let mut recording = Recording::open(file)?;
     let hello = recording.hello()?;
-    let listener = TcpListener::bind(("127.0.0.1", port)).map_err(|error| {
-        Failure::new(
-            Kind::Input,
-            format!("cannot listen at port {port}: {error}"),
-        )
-    })?;
-    let failed = |error| Failure::new(Kind::Input, format!("cannot listen: {error}"));
+    let listener = TcpListener::bind(("127.0.0.1", port))
+        .map_err(|error| Failure::input(format!("cannot listen at port {port}: {error}")))?;
+    let failed = |error| Failure::input(format!("cannot listen: {error}"));
     let address = listener.local_addr().map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
     if print(&format!("ready tcp={address}"))? == Reader::Gone {
@@ -75,7 +71,7 @@ impl Recording {
     fn open(path: &Path) -> Result<Recording, Failure> {
         let name = path.display().to_string();
         let file = File::open(path)
-            .map_err(|error| Failure::new(Kind::Input, format!("cannot read {name}: {error}")))?;
+            .map_err(|error| Failure::input(format!("cannot read {name}: {error}")))?;
         let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
         Ok(Recording {
             name,
@@ -88,10 +84,7 @@ impl Recording {
 
     fn failure(&self, what: impl Display) -> Failure {
         let name = &self.name;
-        Failure::new(
-            Kind::Input,
-            format!("{name} is no recording of `hivtac record`: {what}"),
-        )
+        Failure::input(format!("{name} is no recording of `hivtac record`: {what}"))
     }
 
     /// The device's hello, which a recording begins with.
@@ -123,7 +116,7 @@ impl Recording {
                     let read = self.file.read(self.reader.insert(wanted));
                     let read = read.map_err(|error| {
                         let name = &self.name;
-                        Failure::new(Kind::Input, format!("cannot read {name}: {error}"))
+                        Failure::input(format!("cannot read {name}: {error}"))
                     })?;
                     self.reader.notify_read(read);
                 }

@@ -1,9 +1,10 @@
 //! `hivtac sense`: the sensor's own code on pictures, with everything it finds on the way.
 
+use crate::files::read_at_most;
 use crate::finding::Finding;
 use crate::output::{Reader, note, print};
 use crate::picture::Picture;
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use hivtac_host::stop;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline;
@@ -13,8 +14,6 @@ use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, HsvBox};
-use std::fs::File;
-use std::io::Read;
 
 /// The sensing, with the table that is fastest on a computer.
 type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
@@ -49,7 +48,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let file = options.model.as_deref().map(read_model).transpose()?;
     let name = options.model.as_deref().unwrap_or("the built-in model");
     let model = Model::parse(file.as_deref().unwrap_or(MODEL))
-        .map_err(|error| failure(format!("{name} is no usable model: {error}")))?;
+        .map_err(|error| Failure::input(format!("{name} is no usable model: {error}")))?;
     let bench = Bench {
         options,
         model,
@@ -76,30 +75,22 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     }
     match bad {
         0 => Ok(()),
-        _ => Err(failure(format!(
+        _ => Err(Failure::input(format!(
             "{bad} of {} pictures could not be used",
             options.images.len()
         ))),
     }
 }
 
-fn failure(message: String) -> Failure {
-    Failure::new(Kind::Input, message)
-}
-
 fn read_model(path: &str) -> Result<Vec<u8>, Failure> {
-    let cannot = |error| failure(format!("cannot read the model {path}: {error}"));
-    let file = File::open(path).map_err(cannot)?;
-    let mut bytes = Vec::new();
-    let most = LARGEST_MODEL + 1;
-    file.take(most).read_to_end(&mut bytes).map_err(cannot)?;
-    if bytes.len() as u64 == most {
-        return Err(failure(format!(
-            "cannot read the model {path}: it has more than {LARGEST_MODEL} bytes, which no model \
-             has"
-        )));
-    }
-    Ok(bytes)
+    let cannot = |why: String| Failure::input(format!("cannot read the model {path}: {why}"));
+    read_at_most(path, LARGEST_MODEL)
+        .map_err(|error| cannot(error.to_string()))?
+        .ok_or_else(|| {
+            cannot(format!(
+                "it has more than {LARGEST_MODEL} bytes, which no model has"
+            ))
+        })
 }
 
 /// A rest position and the size of the picture it comes from.
@@ -124,7 +115,7 @@ impl<'a> Bench<'a> {
         if let Some(tare) = tare {
             if tare.size != (picture.width, picture.height) {
                 let (width, height) = tare.size;
-                return Err(failure(format!(
+                return Err(Failure::input(format!(
                     "the picture {path} has {} × {} px, but the tare's has {width} × {height} px; \
                      use pictures of one size",
                     picture.width, picture.height
@@ -153,13 +144,13 @@ impl<'a> Bench<'a> {
                 rest,
                 size: (picture.width, picture.height),
             }),
-            Some(Err(refusal)) => Err(failure(format!(
+            Some(Err(refusal)) => Err(Failure::input(format!(
                 "the tare picture {path} {}",
                 complaint(refusal)
             ))),
             None => {
                 let status: Vec<_> = measurement.status.names().collect();
-                Err(failure(format!(
+                Err(Failure::input(format!(
                     "the tare picture {path} does not show the four markers ({}); look at it with \
                      `hivtac sense {path}`",
                     status.join(" ")
@@ -172,7 +163,7 @@ impl<'a> Bench<'a> {
     fn sensor(&self, path: &str, picture: &Picture) -> Result<Box<Sensor<'a>>, Failure> {
         let (made_for, format) = (self.model.conditions.threshold.format(), picture.format);
         if format != made_for {
-            return Err(failure(format!(
+            return Err(Failure::input(format!(
                 "{} is for frames of {}, and {path} is read as {}; choose a model for that with \
                  --model",
                 self.name,
@@ -183,7 +174,9 @@ impl<'a> Bench<'a> {
         let mut sensor: Box<Sensor> = Box::default();
         sensor
             .configure(self.settings(picture), Some(self.model))
-            .map_err(|error| failure(format!("the picture {path} cannot be looked at: {error}")))?;
+            .map_err(|error| {
+                Failure::input(format!("the picture {path} cannot be looked at: {error}"))
+            })?;
         Ok(sensor)
     }
 

@@ -19,6 +19,11 @@ pub fn shown_json(text: &str) -> String {
     text.chars().map(escaped).collect()
 }
 
+/// A microcontroller's unique number: 24 hexadecimal digits.
+pub fn unit_number(device_id: &[u8; 12]) -> String {
+    device_id.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// All of these are below U+10000.
 fn acts(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}');

@@ -1,17 +1,18 @@
 //! `hivtac snapshot`: one frame as the sensing saw it, into files.
 
+use crate::command::tell;
 use crate::finding::MarkerJson;
 use crate::lines::{status_text, to_json};
 use crate::look;
-use crate::output::{note, print};
+use crate::output::print;
 use crate::picture::{Channels, encode};
 use crate::raw;
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use hivtac_host::frame::{Frame, Taken, take};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::threshold;
-use hivtac_wire::message::{DeviceMessage, Request};
+use hivtac_wire::message::Request;
 use serde::Serialize;
 use serde_json::Value;
 use std::time::Duration;
@@ -53,17 +54,11 @@ pub fn snapshot(link: &mut Link, patience: Duration) -> Result<Taken, Failure> {
     Ok(taken)
 }
 
-fn tell(message: DeviceMessage) {
-    if let DeviceMessage::Log(line) = message {
-        note(&log_text(&line));
-    }
-}
-
 fn write_files(files: &Files, frame: &Frame, dilations: u8) -> Result<(), Failure> {
     let (width, height) = (frame.width, frame.height);
     if let Some(path) = &files.raw {
         let name = frame.format().name();
-        let no_file = || failure(format!("{path} cannot hold {name}; save a PNG instead"));
+        let no_file = || Failure::input(format!("{path} cannot hold {name}; save a PNG instead"));
         write(path, &raw::of(frame).ok_or_else(no_file)?)?;
     }
     if let Some(path) = &files.picture {
@@ -74,7 +69,7 @@ fn write_files(files: &Files, frame: &Frame, dilations: u8) -> Result<(), Failur
         )?;
     }
     if let Some(path) = &files.mask {
-        let nothing = || failure("the device's threshold means nothing".to_owned());
+        let nothing = || Failure::input("the device's threshold means nothing".to_owned());
         let mask = look::mask(frame, dilations).ok_or_else(nothing)?;
         write(path, &encode(path, Channels::Grey, width, height, &mask)?)?;
     }
@@ -82,11 +77,8 @@ fn write_files(files: &Files, frame: &Frame, dilations: u8) -> Result<(), Failur
 }
 
 fn write(path: &str, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|error| failure(format!("cannot write {path}: {error}")))
-}
-
-fn failure(message: String) -> Failure {
-    Failure::new(Kind::Input, message)
+    std::fs::write(path, bytes)
+        .map_err(|error| Failure::input(format!("cannot write {path}: {error}")))
 }
 
 /// What was taken, and what the device made of it.

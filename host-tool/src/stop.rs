@@ -8,7 +8,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// Catches Ctrl-C, SIGTERM and SIGHUP from now on.
 pub fn install() -> Result<(), Failure> {
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))
-        .map_err(|error| Failure::new(Kind::Input, format!("cannot catch Ctrl-C: {error}")))
+        .map_err(|error| Failure::input(format!("cannot catch Ctrl-C: {error}")))
 }
 
 /// True once it was asked to end.

@@ -1,7 +1,7 @@
 //! `hivtac template`: where to punch the film and to stick the dots, to print at its true size.
 
 use crate::output::print;
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use hivtac_terms::geometry::{Geometry, Preset};
 
 /// From the film's middle to each post, along x and y, mm: that of the simulated sensor.
@@ -23,7 +23,7 @@ pub fn run(path: &str, preset: Preset) -> Result<(), Failure> {
     let svg = svg(&Geometry::preset(preset, 320, 240));
     std::fs::write(path, svg).map_err(|error| {
         let message = format!("cannot write the template {path}: {error}");
-        Failure::new(Kind::Input, message)
+        Failure::input(message)
     })?;
     let told = format!("{path}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
     print(&told).map(|_| ())

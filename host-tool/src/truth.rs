@@ -1,7 +1,7 @@
 //! The true force of each frame and where it acts, from the log of a simulated sensor, joined by
 //! frame number.
 
-use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;
@@ -96,10 +96,7 @@ impl TruthFile {
                 ErrorKind::NotFound => "; start what writes it first",
                 _ => "",
             };
-            Failure::new(
-                Kind::Input,
-                format!("cannot open the truth file {path}: {error}{hint}"),
-            )
+            Failure::input(format!("cannot open the truth file {path}: {error}{hint}"))
         })?;
         let path = path.to_owned();
         Ok(TruthFile {
@@ -175,7 +172,7 @@ impl TruthFile {
     }
 
     fn failure(&self, what: &str) -> Failure {
-        Failure::new(Kind::Input, format!("truth file {}: {what}", self.path))
+        Failure::input(format!("truth file {}: {what}", self.path))
     }
 }
 

@@ -2,6 +2,7 @@
 //! and beside it every message of the device as it came, which `hivtac replay` reads.
 
 use super::ros::{self, Definition};
+use hivtac_host::shown::unit_number;
 use hivtac_terms::status::Status;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Sample};
@@ -49,11 +50,7 @@ impl Bag {
             .chunk_size(Some(CHUNK))
             .compression(None);
         let mut writer = options.create(BufWriter::new(file))?;
-        let unit: String = hello
-            .device_id
-            .iter()
-            .map(|byte| format!("{byte:02x}"))
-            .collect();
+        let unit = unit_number(&hello.device_id);
         let topics: [(&str, &Definition); 6] = [
             ("/wrench", &ros::WRENCH),
             ("/place", &ros::POINT),

@@ -244,8 +244,5 @@ fn finish(sink: Sink, summary: BTreeMap<String, String>) -> Result<(), mcap::Mca
 }
 
 fn input(file: &Path, what: impl Display) -> Failure {
-    Failure::new(
-        Kind::Input,
-        format!("cannot record into {}: {what}", file.display()),
-    )
+    Failure::input(format!("cannot record into {}: {what}", file.display()))
 }

@@ -11,13 +11,10 @@ pub struct Definition {
     pub text: &'static str,
 }
 
-/// |F| along x, y and z, N, and about the film's middle, N·m.
-pub const WRENCH: Definition = Definition {
-    name: "geometry_msgs/msg/WrenchStamped",
-    text: "\
-std_msgs/Header header
-geometry_msgs/Wrench wrench
-================================================================================
+/// What the definition of a message with a header has behind its own fields.
+macro_rules! header {
+    () => {
+        "\
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
@@ -26,6 +23,21 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 ================================================================================
+"
+    };
+}
+
+/// |F| along x, y and z, N, and about the film's middle, N·m.
+pub const WRENCH: Definition = Definition {
+    name: "geometry_msgs/msg/WrenchStamped",
+    text: concat!(
+        "\
+std_msgs/Header header
+geometry_msgs/Wrench wrench
+================================================================================
+",
+        header!(),
+        "\
 MSG: geometry_msgs/Wrench
 geometry_msgs/Vector3 force
 geometry_msgs/Vector3 torque
@@ -34,46 +46,40 @@ MSG: geometry_msgs/Vector3
 float64 x
 float64 y
 float64 z
-",
+"
+    ),
 };
 
 /// Where the tip touches the film, m from its middle.
 pub const POINT: Definition = Definition {
     name: "geometry_msgs/msg/PointStamped",
-    text: "\
+    text: concat!(
+        "\
 std_msgs/Header header
 geometry_msgs/Point point
 ================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
+",
+        header!(),
+        "\
 MSG: geometry_msgs/Point
 float64 x
 float64 y
 float64 z
-",
+"
+    ),
 };
 
 /// Markers 0–3: column and row of each, px, and its area, px, as z.
 pub const POLYGON: Definition = Definition {
     name: "geometry_msgs/msg/PolygonStamped",
-    text: "\
+    text: concat!(
+        "\
 std_msgs/Header header
 geometry_msgs/Polygon polygon
 ================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
+",
+        header!(),
+        "\
 MSG: geometry_msgs/Polygon
 geometry_msgs/Point32[] points
 ================================================================================
@@ -81,7 +87,8 @@ MSG: geometry_msgs/Point32
 float32 x
 float32 y
 float32 z
-",
+"
+    ),
 };
 
 /// Whether something touches the film.
