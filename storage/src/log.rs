@@ -1,0 +1,234 @@
+//! One record, kept through power cuts: a log of what it was, in two sectors.
+//!
+//! # Design
+//! Saving appends the record as a whole, and the last one that reads right is what is kept. Nothing
+//! is ever changed in place. When a sector is full the other one is erased, which has older records
+//! only, and the log goes on there with a higher *generation*, which each record carries: the
+//! sector with the newest record is never erased.
+//!
+//! A word whose programming was cut off may read right now and not tomorrow, or the other way
+//! round. So a record is followed by a *seal*, programmed once the record was: where anything but a
+//! blank word follows a record, all words of the record were programmed to their end. When the last
+//! record has no seal, or something follows that is no record, what was read is not *settled*: who
+//! opened the log saves it again, behind all that, and nothing older or unfinished counts any more.
+//!
+//! A word that does not read back as it was programmed is left behind, and the record is written
+//! anew behind it.
+
+use crate::flash::{self, BLANK, Failed, Flash, Place};
+use crate::record::{self, Header};
+
+pub use crate::record::PAYLOAD_LIMIT;
+
+/// Sectors of a log: the first two of its flash.
+const SECTORS: u32 = 2;
+/// So many blank words in a row are the end of what was written in a sector. A record without a
+/// seal leaves one.
+const BLANKS_AT_THE_END: u32 = 4;
+/// Attempts to write a record before it is given up.
+const ATTEMPTS: u32 = 8;
+
+/// Why a record was not saved. What was kept before still is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveError {
+    /// It is longer than [`PAYLOAD_LIMIT`].
+    TooLong,
+    /// The flash is worn: nowhere did it read back.
+    Worn,
+}
+
+/// A log in the first two sectors of a flash.
+#[derive(Debug)]
+pub struct Log<F> {
+    flash: F,
+    newest: Option<Newest>,
+    /// Of the sector that is written.
+    generation: u32,
+    /// The next word to program; nothing when the next record begins another sector.
+    end: Option<Place>,
+    settled: bool,
+    failures: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Newest {
+    sector: u32,
+    length: u8,
+}
+
+impl<F: Flash> Log<F> {
+    /// Reads what is kept into the front of `payload`; how long that is, or nothing when nothing
+    /// is.
+    pub fn open(flash: F, payload: &mut [u8; PAYLOAD_LIMIT]) -> (Self, Option<usize>) {
+        let mut log = Self {
+            flash,
+            newest: None,
+            generation: 0,
+            end: None,
+            settled: true,
+            failures: 0,
+        };
+        for sector in 0..SECTORS {
+            log.scan(sector, payload);
+        }
+        for sector in 0..SECTORS {
+            log.look_at_the_start(sector);
+        }
+        let length = log.newest.map(|newest| usize::from(newest.length));
+        (log, length)
+    }
+
+    /// False when what was read may not read so the next time: save it again.
+    pub fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Attempts to write a record that failed since the log was opened.
+    pub fn failures(&self) -> u32 {
+        self.failures
+    }
+
+    /// Sectors erased so far in the life of this log.
+    pub fn erases(&self) -> u32 {
+        self.generation
+    }
+
+    /// The flash, for its other sectors.
+    pub fn flash(&mut self) -> &mut F {
+        &mut self.flash
+    }
+
+    /// Keeps `payload` from now on.
+    ///
+    /// # Errors
+    /// When it cannot be; what was kept before still is.
+    pub async fn save(&mut self, payload: &[u8]) -> Result<(), SaveError> {
+        let length = u8::try_from(payload.len()).map_err(|_| SaveError::TooLong)?;
+        for _ in 0..ATTEMPTS {
+            match self.append(payload).await {
+                Ok(sector) => {
+                    self.settled = true;
+                    self.newest = Some(Newest { sector, length });
+                    return Ok(());
+                }
+                Err(Failed) => self.failures = self.failures.saturating_add(1),
+            }
+        }
+        Err(SaveError::Worn)
+    }
+
+    /// Writes a record and its seal behind what was written before; tells in which sector.
+    async fn append(&mut self, payload: &[u8]) -> Result<u32, Failed> {
+        let words = record::words(payload.len());
+        let first = self.room_for(words).await?;
+        let header = Header::new(self.generation, payload).ok_or(Failed)?;
+        for nth in 0..words {
+            let place = first.behind(nth);
+            // Whatever becomes of it, this word is not programmed again, and the next one is left
+            // for a seal, should the record read right one day.
+            self.end = Some(place.behind(2));
+            let word = record::word(&header, payload, nth);
+            flash::program(&mut self.flash, place, &word).await?;
+        }
+        let seal = first.behind(words);
+        self.end = Some(seal.behind(1));
+        // A seal that does not read back is one all the same: it is not blank.
+        let _ = self.flash.program(seal, &record::seal()).await;
+        Ok(first.sector)
+    }
+
+    /// Where a record of so many words and its seal fit: behind the last one, or in the other
+    /// sector, which is erased.
+    async fn room_for(&mut self, words: u32) -> Result<Place, Failed> {
+        let fits = |end: &Place| end.word + words < F::SECTOR_WORDS;
+        if let Some(end) = self.end.filter(fits) {
+            return Ok(end);
+        }
+        let last = match (self.newest, self.end) {
+            (Some(newest), _) => Some(newest.sector),
+            (None, end) => end.map(|end| end.sector),
+        };
+        let sector = last.map_or(0, |last| (last + 1) % SECTORS);
+        self.end = None;
+        self.flash.erase(sector).await?;
+        self.generation = self.generation.saturating_add(1);
+        let start = Place { sector, word: 0 };
+        self.end = Some(start);
+        Ok(start)
+    }
+
+    /// Looks for the last record of a sector, which is taken when its generation is the highest so
+    /// far.
+    fn scan(&mut self, sector: u32, payload: &mut [u8; PAYLOAD_LIMIT]) {
+        let (mut place, mut blanks) = (Place { sector, word: 0 }, 0);
+        while place.word < F::SECTOR_WORDS && blanks < BLANKS_AT_THE_END {
+            let read = self.flash.read(place);
+            let header = read.ok().as_ref().and_then(Header::of);
+            let record = header.filter(|header| self.take(place, header, payload));
+            blanks = if read == Ok(BLANK) { blanks + 1 } else { 0 };
+            if blanks == 0 && self.is_newest_in(sector) {
+                // Of what does not read right, this word may be the last; then that of a seal.
+                self.end = Some(place.behind(record.map_or(2, |header| header.words() + 1)));
+                self.settled &= record.is_some();
+            }
+            place = place.behind(record.map_or(1, |header| header.words() + 1));
+        }
+    }
+
+    fn is_newest_in(&self, sector: u32) -> bool {
+        self.newest.is_some_and(|newest| newest.sector == sector)
+    }
+
+    /// A sector without the newest record begins with an older one, or with a blank word. Anything
+    /// else is a record that was not finished: that sector is written next.
+    fn look_at_the_start(&mut self, sector: u32) {
+        if self.is_newest_in(sector) {
+            return;
+        }
+        let is_old = match self.flash.read(Place { sector, word: 0 }) {
+            Ok(BLANK) => true,
+            Ok(word) => Header::of(&word).is_some_and(|header| header.generation < self.generation),
+            Err(_) => false,
+        };
+        if !is_old {
+            self.settled = false;
+            self.end = None;
+        }
+    }
+
+    /// Takes the record that begins in a place, unless it is older; false when it does not read
+    /// right.
+    fn take(&mut self, at: Place, header: &Header, payload: &mut [u8; PAYLOAD_LIMIT]) -> bool {
+        let mut read = [0; PAYLOAD_LIMIT];
+        let Some(read) = read.get_mut(..usize::from(header.length)) else {
+            return false;
+        };
+        if !self.read_record(at, header, read) {
+            return false;
+        }
+        if header.generation >= self.generation {
+            self.generation = header.generation;
+            self.newest = Some(Newest {
+                sector: at.sector,
+                length: header.length,
+            });
+            let seal = at.behind(header.words());
+            self.settled = self.flash.read(seal) != Ok(BLANK);
+            for (byte, value) in payload.iter_mut().zip(read) {
+                *byte = *value;
+            }
+        }
+        true
+    }
+
+    fn read_record(&mut self, at: Place, header: &Header, payload: &mut [u8]) -> bool {
+        // With its seal it fits the sector.
+        let mut whole = at.word + header.words() < F::SECTOR_WORDS;
+        for nth in 0..header.words() {
+            whole = whole
+                && (self.flash.read(at.behind(nth)))
+                    .is_ok_and(|word| record::take(&word, nth, payload));
+        }
+        whole && header.fits(payload)
+    }
+}

@@ -1,0 +1,7 @@
+//! What is kept, on a flash whose power is cut at any operation.
+
+mod cuts;
+mod device;
+mod mock;
+mod random;
+mod worn;
