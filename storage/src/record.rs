@@ -1,6 +1,6 @@
-//! A record in words: one that begins it, with its sector's generation, its length and its checksum, and those that go
-//! on with its bytes. The first byte of each says which it is, so that none of them is ever blank,
-//! and none that goes on is taken for one that begins.
+//! A record in words: one that begins it, with its sector's generation, its length and its
+//! checksum, and those that go on with its bytes. The first byte of each says which it is, so that
+//! none of them is ever blank, and none that goes on is taken for one that begins.
 
 use crate::flash::{WORD_BYTES, Word};
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -140,9 +140,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_payload_comes_back(payload in proptest::collection::vec(any::<u8>(), 0..=255), generation: u32) {
+        fn a_payload_comes_back(
+            payload in proptest::collection::vec(any::<u8>(), 0..=255),
+            generation: u32,
+        ) {
             let header = Header::new(generation, &payload).unwrap();
-            let words: Vec<Word> = (0..header.words()).map(|nth| word(&header, &payload, nth)).collect();
+            let nth_word = |nth| word(&header, &payload, nth);
+            let words: Vec<Word> = (0..header.words()).map(nth_word).collect();
             prop_assert_eq!(Header::of(&words[0]), Some(header));
             let mut read = std::vec![0; payload.len()];
             for (nth, word) in (0..).zip(&words) {
