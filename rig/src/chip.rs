@@ -1,8 +1,9 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
 //! core that it lacks.
 //!
-//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for six slots itself:
-//! DCMI, MDMA, CRS, and the three blocks of OTG2; everything else goes to the part's own models.
+//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for seven slots itself:
+//! DCMI, MDMA, CRS, the flash, and the three blocks of OTG2; everything else goes to the part's own
+//! models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::Access;
@@ -19,6 +20,7 @@ use crate::crs::Crs;
 use crate::dcmi::Dcmi;
 use crate::dormant::Dormant;
 use crate::faults::Faults;
+use crate::flash::{Bank, Flash};
 use crate::late_line::LateLine;
 use crate::mdma::Mdma;
 use crate::otg::{Blocks, SharedCore};
@@ -66,6 +68,7 @@ pub struct Chip {
     /// The controller that reaches DTCM.
     pub mdma: Mdma,
     crs: Crs,
+    flash: Flash,
     control_bus: ControlBus,
     held_bus: HeldBus,
     late: LateLine,
@@ -82,6 +85,7 @@ pub struct Chip {
     dcmi_slot: usize,
     mdma_slot: usize,
     crs_slot: usize,
+    flash_slot: usize,
     vsync: Level,
     wiring: Wiring,
 }
@@ -91,11 +95,13 @@ impl Chip {
     ///
     /// # Errors
     /// When the emulator's part is not laid out as expected.
+    #[expect(clippy::too_many_arguments, reason = "all that a chip is connected to")]
     pub fn new(
         camera: SharedCamera,
         host: SharedHost,
         faults: Faults,
         rules: Rules,
+        bank: Bank,
         board: board::Kind,
         revision: Revision,
         seed: u64,
@@ -116,13 +122,16 @@ impl Chip {
         let dcmi_slot = part.bus().slot("DCMI")?;
         let mdma_slot = part.bus().slot("MDMA")?;
         let crs_slot = part.bus().slot("CRS")?;
+        let flash_slot = part.bus().slot("Flash")?;
         let i2c_slot = part.bus().slot("I2C1")?;
         let mut chip = Self {
             dormant: Dormant::new(part.bus()),
             dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone()),
             control_bus: ControlBus::new(faults.clone(), slots.vsync_port(), i2c_slot),
             held_bus: HeldBus,
-            mdma: Mdma::new(rules.clone(), faults.clone(), seed),
+            mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), seed),
+            flash: Flash::new(bank, rules.clone()),
+            flash_slot,
             rules,
             board,
             revision,
@@ -241,6 +250,7 @@ impl Mcu for Chip {
         self.dormant = Dormant::new(self.part.bus());
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crs);
+        Device::reset(&mut self.flash);
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);
@@ -269,6 +279,9 @@ impl Mcu for Chip {
         }
         if self.control_bus.holds(slot) {
             return (self.part.bus_mut(), Some(&mut self.held_bus));
+        }
+        if slot == self.flash_slot {
+            return (self.part.bus_mut(), Some(&mut self.flash));
         }
         if slot == self.crs_slot {
             return (self.part.bus_mut(), Some(&mut self.crs));

@@ -14,7 +14,7 @@
 //! | [`run`], [`report`] | one run from options to outcome |
 //! | [`chip`], [`board`], [`crs`], [`machine`], `rom`, `dormant` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`dcmi`], [`camera`], [`frame_source`], `control_bus` | the camera interface; the sensor; what it looks at; what goes wrong on its control bus |
-//! | [`mdma`] | the DMA controller that reaches DTCM |
+//! | [`mdma`], [`flash`] | the DMA controller that reaches DTCM; the flash's second bank, and cuts of the power |
 //! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
 //! | [`faults`], [`rules`], `late_line`, [`dma_reach`] | what goes wrong on request; what firmware must not do |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
@@ -29,6 +29,7 @@ pub mod dcmi;
 pub mod dma_reach;
 mod dormant;
 pub mod faults;
+pub mod flash;
 pub mod frame_source;
 mod late_line;
 pub mod link;

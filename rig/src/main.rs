@@ -14,6 +14,7 @@ use hivtac_rig::board;
 use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::{Fault, Faults};
+use hivtac_rig::flash::Cut;
 use hivtac_rig::frame_source::{FrameSource, SceneSource, TestPicture};
 use hivtac_rig::link::{Endpoint, Link, Pty, Tcp};
 use hivtac_rig::machine::Entry;
@@ -87,6 +88,13 @@ struct Arguments {
     /// dcmi-overrun, bus-busy, host-not-reading, cable-pulled. May be repeated.
     #[arg(long, value_name = "KIND[@MS[-MS]]")]
     fault: Vec<Fault>,
+    /// Keep the flash's second bank in this file, from run to run.
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
+    /// Cut the power at the N-th operation of the flash's second bank (the first is 0), which
+    /// leaves its word or sector as before, torn (the default), or as after it, and end.
+    #[arg(long, value_name = "N[:LEAVES]", requires = "flash")]
+    cut_power: Option<Cut>,
     /// Instructions per second of virtual time that the core is assumed to execute.
     #[arg(long, value_name = "N", default_value_t = INSTRUCTIONS_PER_SECOND)]
     instructions_per_second: u64,
@@ -147,6 +155,8 @@ fn options(arguments: &Arguments, interrupt: Arc<AtomicBool>) -> anyhow::Result<
         truth,
         arrivals,
         faults: Faults::new(arguments.fault.clone()),
+        flash: arguments.flash.clone(),
+        cut: arguments.cut_power,
         seed: arguments.seed,
         revision: arguments.silicon,
         entry: match arguments.by_loader {

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::camera::SharedCamera;
 use crate::chip::Chip;
 use crate::dcmi;
+use crate::flash::Bank;
 use crate::usb_host::{self, Port, SharedHost};
 
 /// Counters of a run.
@@ -34,6 +35,10 @@ pub struct Report {
     pub arrivals_failure: Option<String>,
     /// The camera interface.
     pub dcmi: dcmi::Counters,
+    /// Operations of the flash's second bank.
+    pub flash_operations: u64,
+    /// Whether the power was cut in one of them.
+    pub power_was_cut: bool,
     /// Bytes that the MDMA moved.
     pub mdma_bytes: u64,
     /// The USB port at the end.
@@ -57,6 +62,7 @@ impl Report {
         chip: &Chip,
         camera: &SharedCamera,
         host: &SharedHost,
+        bank: &Bank,
         wall: Duration,
         virtual_ns: u64,
     ) -> Self {
@@ -80,6 +86,8 @@ impl Report {
             truth_failure: camera.truth_failure().map(str::to_owned),
             arrivals_failure: host.arrivals_failure().map(str::to_owned),
             dcmi: chip.dcmi.counters(),
+            flash_operations: bank.operations(),
+            power_was_cut: bank.was_cut(),
             mdma_bytes: chip.mdma.bytes(),
             port: host.port(),
             usb: host.counters(),
@@ -115,6 +123,10 @@ impl Report {
                 "empty_frames": self.dcmi.empty_frames,
                 "words": self.dcmi.words,
                 "overruns": self.dcmi.overruns,
+            },
+            "flash": {
+                "operations": self.flash_operations,
+                "power_was_cut": self.power_was_cut,
             },
             "mdma": { "bytes": self.mdma_bytes },
             "usb": {

@@ -19,6 +19,7 @@ use crate::camera::{Camera, SharedCamera, part};
 use crate::chip::{Chip, Revision};
 use crate::dma_reach;
 use crate::faults::Faults;
+use crate::flash::{self, Bank, Contents, Cut};
 use crate::frame_source::FrameSource;
 use crate::link::Link;
 use crate::machine::{Entry, Sensor};
@@ -80,6 +81,11 @@ pub struct Options {
     pub arrivals: Arrivals,
     /// What goes wrong.
     pub faults: Faults,
+    /// The flash's second bank: its contents are read from this file, where there is one, and
+    /// written to it at the end.
+    pub flash: Option<PathBuf>,
+    /// When the power is cut, which ends the run.
+    pub cut: Option<Cut>,
     /// Decides what a data sheet leaves open.
     pub seed: u64,
     /// Of the silicon.
@@ -110,8 +116,13 @@ pub struct Outcome {
 /// # Errors
 /// When the firmware cannot be loaded, a rule of the chip was broken, or the emulator gave up.
 pub fn run(options: Options) -> anyhow::Result<Outcome> {
-    let images = vec![load(&options.elf)?];
+    let contents = match &options.flash {
+        Some(file) if file.exists() => Contents::load(file)?,
+        _ => Contents::default(),
+    };
+    let images = vec![load(&options.elf)?, flash::image(&contents)?];
     let rules = Rules::default();
+    let bank = Bank::new(contents, options.cut);
     let camera = SharedCamera::new(Camera::new(
         options.camera,
         options.source,
@@ -126,6 +137,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         host.clone(),
         options.faults,
         rules.clone(),
+        bank.clone(),
         options.board,
         options.revision,
         options.seed,
@@ -140,6 +152,8 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         host: host.clone(),
         camera: camera.clone(),
         rules: rules.clone(),
+        bank: bank.clone(),
+        array: Vec::new(),
         program: options.program,
         limits: options.limits,
         interrupt: options.interrupt.clone(),
@@ -155,11 +169,15 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
     if let Some(broken) = rules.first() {
         bail!("the firmware broke a rule of the chip: {broken}");
     }
+    if let Some(file) = &options.flash {
+        bank.left(finished.driver.array).save(file)?;
+    }
     let report = Report::new(
         &finished.session,
         &finished.session.board().chip,
         &camera,
         &host,
+        &bank,
         began.elapsed(),
         finished.driver.settled_at_ns,
     );
@@ -197,6 +215,9 @@ struct Conductor {
     host: SharedHost,
     camera: SharedCamera,
     rules: Rules,
+    bank: Bank,
+    /// The flash's second bank at the end of the run.
+    array: Vec<u8>,
     program: Program,
     limits: Limits,
     interrupt: Arc<AtomicBool>,
@@ -244,7 +265,7 @@ impl Driver<Sensor> for Conductor {
         if now.0 < self.settling_until || self.camera.lock().restarts() {
             session.board_mut().chip.rewire(now);
         }
-        if self.rules.are_broken() {
+        if self.rules.are_broken() || self.bank.was_cut() {
             session.run_until(now);
         }
     }
@@ -253,13 +274,15 @@ impl Driver<Sensor> for Conductor {
         &mut self,
         session: &mut Session<Sensor>,
         stop: Stop,
-        _host: &mut dyn emulator::Host,
+        host: &mut dyn emulator::Host,
     ) -> Option<VirtualNanos> {
         let now = stop.at.0;
         let frames = session.board().chip.dcmi.counters().frames;
         let full = self.limits.frames.is_some_and(|limit| frames >= limit);
         let late = self.limits.virtual_ns.is_some_and(|limit| now >= limit);
-        if full || late || self.rules.are_broken() || !self.serve(now) {
+        let over = full || late || self.rules.are_broken() || self.bank.was_cut();
+        if over || !self.serve(now) {
+            self.array = flash::read_array(host);
             return None;
         }
         let limit = self.limits.virtual_ns.unwrap_or(u64::MAX);

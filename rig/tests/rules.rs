@@ -11,6 +11,7 @@ use hivtac_rig::board;
 use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
+use hivtac_rig::flash::{Contents, Cut};
 use hivtac_rig::frame_source::TestPicture;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
@@ -52,8 +53,10 @@ fn program(writes: &[(u32, u32)]) -> Vec<u8> {
     elf
 }
 
-fn run_program(elf: &Path) -> anyhow::Result<Outcome> {
+fn run_program(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> anyhow::Result<Outcome> {
     run(Options {
+        flash: flash.map(Path::to_owned),
+        cut,
         elf: elf.to_owned(),
         board: board::Kind::Weact,
         camera: part::Kind::Ov7725,
@@ -77,7 +80,7 @@ fn run_program(elf: &Path) -> anyhow::Result<Outcome> {
 fn outcome(writes: &[(u32, u32)]) -> Result<Outcome, String> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), program(writes)).unwrap();
-    run_program(file.path()).map_err(|error| format!("{error:#}"))
+    run_program(file.path(), None, None).map_err(|error| format!("{error:#}"))
 }
 
 /// DMA1 stream 0, peripheral to memory, from DCMI_DR to an address.
@@ -138,4 +141,98 @@ fn registers_without_their_clock_are_refused_and_reported() {
         "{:?}",
         outcome.report.refused
     );
+}
+
+const FLASH_KEYR1: u32 = 0x5200_2004;
+const BANK_1: u32 = 0x0800_0000;
+const BANK_2: u32 = 0x0810_0000;
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// PG, and 64 bits at a time.
+const PROGRAM: u32 = 1 << 1 | 3 << 4;
+/// SER of sector 0, START, and 64 bits at a time.
+const ERASE: u32 = 1 << 2 | 1 << 7 | 3 << 4;
+
+/// Programs the 32 bytes of a word. `bank` is 0 for the first.
+fn program_word(bank: u32, address: u32) -> Vec<(u32, u32)> {
+    let stores = (0..8).map(|nth| (address + 4 * nth, 0x1111_1111 * nth));
+    let mut writes = unlocked(bank, PROGRAM);
+    writes.extend(stores);
+    writes
+}
+
+fn unlocked(bank: u32, control: u32) -> Vec<(u32, u32)> {
+    let keyr = FLASH_KEYR1 + 0x100 * bank;
+    vec![(keyr, KEYS[0]), (keyr, KEYS[1]), (keyr + 8, control)]
+}
+
+/// Longer than a word takes: writes that do nothing.
+fn pause() -> Vec<(u32, u32)> {
+    vec![(0x2000_0100, 0); 20_000]
+}
+
+fn with_flash(writes: &[(u32, u32)], flash: &Path, cut: Option<Cut>) -> (Outcome, Contents) {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), program(writes)).unwrap();
+    let outcome = run_program(file.path(), Some(flash), cut).unwrap();
+    (outcome, Contents::load(flash).unwrap())
+}
+
+#[test]
+fn what_is_programmed_is_there_in_the_next_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let flash = folder.path().join("flash");
+    let (outcome, contents) = with_flash(&program_word(1, BANK_2 + 64), &flash, None);
+    assert_eq!(outcome.report.flash_operations, 1);
+    assert_eq!(
+        contents.array[60..72],
+        [255, 255, 255, 255, 0, 0, 0, 0, 0x11, 0x11, 0x11, 0x11]
+    );
+    let (_, contents) = with_flash(&program_word(1, BANK_2), &flash, None);
+    assert_eq!(contents.array[4..8], contents.array[68..72]);
+    assert_eq!(contents.torn(), 0);
+}
+
+#[test]
+fn a_cut_leaves_a_word_before_torn_or_after() {
+    let folder = tempfile::tempdir().unwrap();
+    for (leaves, torn, byte) in [("before", 0, 0xFF), ("torn", 1, 0xFF), ("after", 0, 0x11)] {
+        let flash = folder.path().join(leaves);
+        let cut = format!("0:{leaves}").parse().unwrap();
+        let (outcome, contents) = with_flash(&program_word(1, BANK_2), &flash, Some(cut));
+        assert!(outcome.report.power_was_cut);
+        assert!(outcome.report.virtual_ns < 10_000_000, "it ends there");
+        assert_eq!(
+            (contents.torn(), contents.array[4]),
+            (torn, byte),
+            "{leaves}"
+        );
+    }
+}
+
+#[test]
+fn a_cut_erase_leaves_words_of_each_kind() {
+    let folder = tempfile::tempdir().unwrap();
+    let flash = folder.path().join("flash");
+    with_flash(&program_word(1, BANK_2 + 64), &flash, None);
+    let cut = "0".parse().unwrap();
+    let (_, contents) = with_flash(&unlocked(1, ERASE), &flash, Some(cut));
+    assert_eq!(contents.torn(), 1365);
+    assert_eq!(contents.array[68], 0x11, "the third word is as it was");
+}
+
+#[test]
+fn a_word_that_is_programmed_twice_ends_the_run() {
+    let word = program_word(1, BANK_2);
+    let again: Vec<_> = word.iter().skip(3).copied().collect();
+    let error = outcome(&[word, pause(), again].concat()).unwrap_err();
+    assert!(
+        error.contains("programmed twice") && error.contains("0x8100000"),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_bank_that_the_program_runs_from_is_not_written() {
+    let error = outcome(&program_word(0, BANK_1 + 0x8_0000)).unwrap_err();
+    assert!(error.contains("runs from"), "{error}");
 }

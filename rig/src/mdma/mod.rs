@@ -15,6 +15,7 @@ use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 
 use crate::faults::{Faults, Kind};
+use crate::flash::Bank;
 use crate::rules::Rules;
 use block::{Block, asked_for};
 
@@ -72,6 +73,7 @@ struct Channel {
 pub struct Mdma {
     rules: Rules,
     faults: Faults,
+    bank: Bank,
     /// Decides the next block's wait.
     chance: u64,
     channels: [Channel; CHANNELS],
@@ -82,10 +84,11 @@ pub struct Mdma {
 impl Mdma {
     /// A controller at rest.
     /// `seed` decides how long others hold the bus under [`Kind::BusBusy`].
-    pub fn new(rules: Rules, faults: Faults, seed: u64) -> Self {
+    pub fn new(rules: Rules, faults: Faults, bank: Bank, seed: u64) -> Self {
         Self {
             rules,
             faults,
+            bank,
             chance: seed,
             channels: Default::default(),
             interrupt: Level::Low,
@@ -140,11 +143,22 @@ impl Mdma {
     }
 
     /// Asks for the reads of a block; each answer becomes a write.
-    fn move_block(&mut self, nth: usize, context: &mut DeviceContext<'_>) {
+    fn move_block(
+        &mut self,
+        nth: usize,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
         let channel = &mut self.channels[nth];
         let Some((block, _)) = channel.under_way else {
             return;
         };
+        if self.bank.refuses(block.source, block.bytes, &self.rules) {
+            self.end(nth, flag::ERROR, registers);
+            self.drive(registers, context);
+            return;
+        }
+        let channel = &mut self.channels[nth];
         channel.generation += 1;
         channel.open = block.bytes / 8;
         for offset in (0..block.bytes).step_by(8) {
@@ -250,7 +264,7 @@ impl Device for Mdma {
     fn on_event(
         &mut self,
         event: EventId,
-        _registers: &mut RegisterFile,
+        registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
         for nth in 0..CHANNELS {
@@ -258,7 +272,7 @@ impl Device for Mdma {
                 .under_way
                 .is_some_and(|(_, end)| end == event)
             {
-                self.move_block(nth, context);
+                self.move_block(nth, registers, context);
             }
         }
     }

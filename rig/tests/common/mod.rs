@@ -17,6 +17,7 @@ use hivtac_rig::board;
 use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
+use hivtac_rig::flash::Cut;
 use hivtac_rig::frame_source::SceneSource;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::report::Report;
@@ -113,6 +114,9 @@ pub struct Setup {
     pub seed: u64,
     pub faults: Vec<&'static str>,
     pub actions: Vec<(u64, Action)>,
+    /// The flash's second bank, kept in this file.
+    pub flash: Option<PathBuf>,
+    pub cut: Option<Cut>,
     pub virtual_ms: u64,
     pub instructions_per_second: u64,
     pub revision: Revision,
@@ -129,6 +133,8 @@ impl Setup {
             seed: 1,
             faults: Vec::new(),
             actions: Vec::new(),
+            flash: None,
+            cut: None,
             virtual_ms,
             instructions_per_second: instructions_per_second(),
             revision: Revision::V,
@@ -196,6 +202,8 @@ impl Setup {
                     .map(|fault| fault.parse().unwrap())
                     .collect(),
             ),
+            flash: self.flash,
+            cut: self.cut,
             seed,
             revision: self.revision,
             entry: self.entry,

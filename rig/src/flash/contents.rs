@@ -1,0 +1,209 @@
+//! What the bank holds, in memory and in a file, and what a cut operation leaves of it.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::Path;
+use std::str::FromStr;
+
+use anyhow::{Context, bail};
+
+/// Addresses of the second bank.
+pub const BANK: Range<u32> = 0x0810_0000..0x0820_0000;
+/// Bytes of a sector.
+pub const SECTOR_BYTES: u32 = 128 << 10;
+/// Bytes of a word.
+pub const WORD_BYTES: u32 = 32;
+const BANK_BYTES: usize = (BANK.end - BANK.start) as usize;
+
+/// What an operation leaves that was cut off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Leaves {
+    /// What there was before.
+    Before,
+    /// A word that does not read; of a sector some of each.
+    Torn,
+    /// What there was to be.
+    After,
+}
+
+/// A cut of the power.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// At this operation, counted from 0.
+    pub operation: u64,
+    /// What it leaves.
+    pub leaves: Leaves,
+}
+
+impl FromStr for Cut {
+    type Err = String;
+
+    /// `N` or `N:before`, `N:torn`, `N:after`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, leaves) = text.split_once(':').unwrap_or((text, "torn"));
+        let operation = number
+            .parse()
+            .map_err(|_| format!("`{number}` is no number of a flash operation: use 0, 1, 2, …"))?;
+        let leaves = match leaves {
+            "before" => Leaves::Before,
+            "torn" => Leaves::Torn,
+            "after" => Leaves::After,
+            _ => return Err(format!("`{leaves}`: a cut leaves before, torn or after")),
+        };
+        Ok(Self { operation, leaves })
+    }
+}
+
+/// The bank's bytes, and which of its words do not read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contents {
+    /// The bytes.
+    pub array: Vec<u8>,
+    torn: BTreeSet<u32>,
+    /// Words that were programmed, by their addresses.
+    written: BTreeSet<u32>,
+}
+
+impl Default for Contents {
+    fn default() -> Self {
+        Self {
+            array: vec![0xFF; BANK_BYTES],
+            torn: BTreeSet::new(),
+            written: BTreeSet::new(),
+        }
+    }
+}
+
+impl Contents {
+    /// Reads a file: the bank's bytes, then the addresses of torn words, little-endian.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is no such file.
+    pub fn load(file: &Path) -> anyhow::Result<Self> {
+        let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
+        if bytes.len() < BANK_BYTES || !bytes.len().is_multiple_of(4) {
+            bail!(
+                "{}: no contents of a flash bank, which have {BANK_BYTES} bytes and the addresses \
+                 of torn words",
+                file.display()
+            );
+        }
+        let (array, torn) = bytes.split_at(BANK_BYTES);
+        let torn = torn
+            .as_chunks()
+            .0
+            .iter()
+            .map(|word| u32::from_le_bytes(*word));
+        let words = array.chunks(WORD_BYTES as usize);
+        let addresses = BANK.step_by(WORD_BYTES as usize);
+        let is_blank = |word: &[u8]| word.iter().all(|byte| *byte == 0xFF);
+        let written = addresses.zip(words).filter(|(_, word)| !is_blank(word));
+        Ok(Self {
+            array: array.to_vec(),
+            torn: torn.collect(),
+            written: written.map(|(address, _)| address).collect(),
+        })
+    }
+
+    /// Writes such a file.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn save(&self, file: &Path) -> anyhow::Result<()> {
+        let torn = self.torn.iter().flat_map(|address| address.to_le_bytes());
+        let bytes: Vec<u8> = self.array.iter().copied().chain(torn).collect();
+        std::fs::write(file, bytes).with_context(|| file.display().to_string())
+    }
+
+    /// Words that do not read.
+    pub fn torn(&self) -> usize {
+        self.torn.len()
+    }
+
+    pub(super) fn is_torn(&self, range: Range<u64>) -> bool {
+        let from = range.start as u32 / WORD_BYTES * WORD_BYTES;
+        self.torn.range(from..range.end as u32).next().is_some()
+    }
+
+    /// A word was programmed; whether it was blank.
+    pub(super) fn programmed(&mut self, word: u32) -> bool {
+        self.written.insert(word) && !self.torn.contains(&word)
+    }
+
+    pub(super) fn erased(&mut self, sector: u32) {
+        let words = sector..sector + SECTOR_BYTES;
+        self.torn.retain(|word| !words.contains(word));
+        self.written.retain(|word| !words.contains(word));
+    }
+
+    pub(super) fn tear_word(&mut self, word: u32) {
+        self.torn.insert(word);
+    }
+
+    /// Of three words one is blank, one does not read, and one is as it was.
+    pub(super) fn tear_sector(&mut self, sector: u32) {
+        let words = (sector..sector + SECTOR_BYTES).step_by(WORD_BYTES as usize);
+        for (nth, word) in words.enumerate() {
+            let at = (word - BANK.start) as usize;
+            match nth % 3 {
+                0 => {
+                    self.array[at..at + WORD_BYTES as usize].fill(0xFF);
+                    self.torn.remove(&word);
+                }
+                1 => self.tear_word(word),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contents_come_back_from_their_file() {
+        let mut contents = Contents::default();
+        contents.array[64] = 7;
+        contents.tear_word(BANK.start + 32);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        contents.save(file.path()).unwrap();
+        let read = Contents::load(file.path()).unwrap();
+        assert_eq!((&read.array, &read.torn), (&contents.array, &contents.torn));
+        let mut read = read;
+        assert!(!read.programmed(BANK.start + 64), "it is not blank");
+        assert!(!read.programmed(BANK.start + 32), "it is torn");
+        assert!(read.programmed(BANK.start));
+        assert!(read.is_torn(u64::from(BANK.start)..u64::from(BANK.start) + 128));
+        assert!(!read.is_torn(u64::from(BANK.start)..u64::from(BANK.start) + 32));
+    }
+
+    #[test]
+    fn an_erase_makes_torn_words_blank_and_a_cut_one_leaves_some_of_each() {
+        let mut contents = Contents::default();
+        contents.array[..SECTOR_BYTES as usize].fill(0);
+        contents.tear_sector(BANK.start);
+        assert_eq!(contents.torn(), 1365);
+        assert_eq!((contents.array[0], contents.array[64]), (0xFF, 0));
+        contents.erased(BANK.start);
+        assert_eq!(contents.torn(), 0);
+    }
+
+    #[test]
+    fn a_cut_that_makes_no_sense_is_explained() {
+        let cut: Cut = "12:after".parse().unwrap();
+        assert_eq!((cut.operation, cut.leaves), (12, Leaves::After));
+        assert_eq!("3".parse::<Cut>().unwrap().leaves, Leaves::Torn);
+        for (text, word) in [("x", "`x`"), ("1:half", "half")] {
+            let error = text.parse::<Cut>().unwrap_err();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_another_size_is_refused() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let error = Contents::load(file.path()).unwrap_err().to_string();
+        assert!(error.contains("bytes"), "{error}");
+    }
+}

@@ -1,0 +1,275 @@
+//! The second bank of the flash, where firmware keeps things: words of 256 bits with an error
+//! correcting code, contents that outlive a run, and power that is cut at an operation.
+//!
+//! Registers, keys, write buffer, queue and times are rigless' (RM0433 chapter 4, DS12110 table
+//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits). Here are the operations:
+//! which words are blank, which were torn by a cut, what firmware must not do to them. A torn word
+//! reads as a bus error, which the MDMA reports; a read by the core passes unseen, as the
+//! emulator's core reads flash by itself.
+
+mod contents;
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rigless::device::{Device, DeviceContext, RegisterFile};
+use rigless::emulator::Host;
+use rigless::image::Image;
+use rigless::soc::Width;
+use rigless::soc::stm32h743::generated::flash::Register;
+use rigless::soc::stm32h743::peripherals::flash;
+use rigless::time::EventId;
+
+use crate::rules::Rules;
+use contents::{BANK, SECTOR_BYTES, WORD_BYTES};
+pub use contents::{Contents, Cut, Leaves};
+
+/// SR bits: an operation runs, or waits.
+const BUSY: u64 = 1 << 0 | 1 << 2;
+/// CR2: the sector's number, three bits from here.
+const SECTOR_BIT: u32 = 8;
+
+/// The bank's contents, for the emulator to begin with.
+///
+/// # Errors
+/// Never: plain bytes are an image.
+pub fn image(contents: &Contents) -> anyhow::Result<Image> {
+    let (name, bytes) = (Path::new("flash"), contents.array.clone());
+    Ok(Image::new(name, bytes, Some(BANK.start.into()))?)
+}
+
+/// What the emulator has of the bank.
+pub fn read_array(host: &mut dyn Host) -> Vec<u8> {
+    let addresses = (u64::from(BANK.start)..u64::from(BANK.end)).step_by(8);
+    let words = addresses.map(|address| host.read(address, Width::W64).unwrap_or(u64::MAX));
+    words.flat_map(u64::to_le_bytes).collect()
+}
+
+/// An operation of the bank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Operation {
+    /// Of the word at this address.
+    Program(u32),
+    /// Of the sector that begins at this address.
+    Erase(u32),
+}
+
+/// The bank, as the interface, the MDMA and the run share it.
+#[derive(Clone, Debug)]
+pub struct Bank(Arc<Mutex<State>>);
+
+#[derive(Debug)]
+struct State {
+    contents: Contents,
+    cut: Option<Cut>,
+    operations: u64,
+    under_way: bool,
+    /// The power is cut when the operation under way has ended.
+    cut_at_its_end: Option<Operation>,
+    /// The operation that the power was cut in, and what it leaves.
+    was_cut: Option<(Operation, Leaves)>,
+}
+
+impl Bank {
+    /// A bank with these contents; the power is cut as asked for.
+    pub fn new(contents: Contents, cut: Option<Cut>) -> Self {
+        Self(Arc::new(Mutex::new(State {
+            contents,
+            cut,
+            operations: 0,
+            under_way: false,
+            cut_at_its_end: None,
+            was_cut: None,
+        })))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Programming and erasing operations so far, the one that was cut, too.
+    pub fn operations(&self) -> u64 {
+        self.lock().operations
+    }
+
+    /// Whether the power was cut.
+    pub fn was_cut(&self) -> bool {
+        self.lock().was_cut.is_some()
+    }
+
+    /// Whether a read of so many bytes is a bus error. Noted as a breach when it would wait for an
+    /// operation.
+    pub fn refuses(&self, address: u64, bytes: u64, rules: &Rules) -> bool {
+        let range = address..address + bytes;
+        if range.end <= u64::from(BANK.start) || range.start >= u64::from(BANK.end) {
+            return false;
+        }
+        let state = self.lock();
+        if state.under_way {
+            rules.broken(|| {
+                format!(
+                    "flash: {address:#x} is read while its bank is programmed or erased; the bus \
+                     waits for that (RM0433, FLASH read operations)"
+                )
+            });
+        }
+        state.contents.is_torn(range)
+    }
+
+    /// The contents at the end of a run; `array` is what the emulator has of the bank.
+    pub fn left(&self, array: Vec<u8>) -> Contents {
+        let state = self.lock();
+        let mut contents = state.contents.clone();
+        contents.array = array;
+        match state.was_cut {
+            Some((Operation::Program(word), Leaves::Torn)) => contents.tear_word(word),
+            Some((Operation::Erase(sector), Leaves::Torn)) => contents.tear_sector(sector),
+            _ => {}
+        }
+        contents
+    }
+}
+
+impl State {
+    /// An operation begins.
+    fn begin(&mut self, operation: Operation, rules: &Rules) {
+        let leaves = self.cut.filter(|cut| cut.operation == self.operations);
+        self.operations += 1;
+        self.under_way = true;
+        match leaves.map(|cut| cut.leaves) {
+            None => {}
+            Some(Leaves::After) => self.cut_at_its_end = Some(operation),
+            Some(leaves) => {
+                self.was_cut = Some((operation, leaves));
+                return;
+            }
+        }
+        match operation {
+            Operation::Program(word) => {
+                if !self.contents.programmed(word) {
+                    rules.broken(|| {
+                        format!(
+                            "flash: the word at {word:#x} is programmed twice without an erase, \
+                             which spoils its ECC (RM0433, single write sequence)"
+                        )
+                    });
+                }
+            }
+            Operation::Erase(sector) => self.contents.erased(sector),
+        }
+    }
+
+    fn end(&mut self) {
+        self.under_way = false;
+        if let Some(operation) = self.cut_at_its_end.take() {
+            self.was_cut = Some((operation, Leaves::After));
+        }
+    }
+}
+
+/// The flash interface.
+#[derive(Debug)]
+pub struct Flash {
+    interface: flash::Flash,
+    bank: Bank,
+    rules: Rules,
+    /// The word that was stored to last.
+    word: u32,
+}
+
+impl Flash {
+    /// Out of reset.
+    pub fn new(bank: Bank, rules: Rules) -> Self {
+        Self {
+            interface: flash::Flash::new(),
+            bank,
+            rules,
+            word: 0,
+        }
+    }
+
+    /// Looks whether an operation began or ended.
+    fn look(&mut self, registers: &RegisterFile, operation: Option<Operation>) {
+        if registers.get(Register::Sr1) & BUSY != 0 {
+            self.rules.broken(|| {
+                "flash: the bank that the program runs from is programmed or erased, for which \
+                 the core waits"
+                    .into()
+            });
+        }
+        let busy = registers.get(Register::Sr2) & BUSY != 0;
+        let mut state = self.bank.lock();
+        match (operation, busy, state.under_way) {
+            (Some(operation), true, false) => state.begin(operation, &self.rules),
+            (_, false, true) => state.end(),
+            _ => {}
+        }
+    }
+}
+
+impl Device for Flash {
+    type Register = Register;
+
+    fn write(
+        &mut self,
+        register: Register,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.interface.write(register, value, registers, context);
+        let number = (registers.get(Register::Cr2) >> SECTOR_BIT) as u32 & 7;
+        let sector = BANK.start + number * SECTOR_BYTES;
+        self.look(registers, Some(Operation::Erase(sector)));
+    }
+
+    fn write_region(
+        &mut self,
+        address: u64,
+        width: Width,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) -> bool {
+        self.word = address as u32 / WORD_BYTES * WORD_BYTES;
+        let taken = (self.interface).write_region(address, width, value, registers, context);
+        self.look(registers, Some(Operation::Program(self.word)));
+        taken
+    }
+
+    fn on_event(
+        &mut self,
+        event: EventId,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.interface.on_event(event, registers, context);
+        self.look(registers, None);
+    }
+
+    fn on_access(
+        &mut self,
+        token: u64,
+        value: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.interface.on_access(token, value, registers, context);
+        self.look(registers, None);
+    }
+
+    fn on_refused(
+        &mut self,
+        token: u64,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
+        self.interface.on_refused(token, registers, context);
+        self.look(registers, None);
+    }
+
+    fn reset(&mut self) {
+        Device::reset(&mut self.interface);
+        self.bank.lock().under_way = false;
+    }
+}
