@@ -1,17 +1,18 @@
 //! Keeps the camera going: sets it up, changes its pixel format or has it expose anew, and starts
 //! it again when it falls silent.
 
-use crate::camera::{self, Camera, FRAME_TIME, Format};
+use crate::board;
+use crate::camera::{self, Camera, FRAME_TIME, Format, Setting};
 use crate::capture::Capture;
 use crate::health::{self, Condition};
 use crate::session::Asked;
-use crate::shared::{EXPOSING, REQUESTED_EXPOSURE, REQUESTED_FORMAT};
+use crate::shared::{CAMERA_ORDER, CAMERA_ORDERED, REQUESTED_FORMAT};
 use crate::{log, outbox, stats, vsync};
 use core::sync::atomic::Ordering;
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
-use hivtac_wire::message::{LogLevel, Outcome};
+use hivtac_wire::message::{DeviceMessage, Inspection, LogLevel, Outcome};
 
 /// So many frame times without a band or the end of a frame are a silence. Bands come all the
 /// time but for the vertical blanking, a seventh of a frame.
@@ -21,13 +22,37 @@ const SILENCES: u32 = 3;
 /// Pause before the next attempt when the camera does not answer.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Has exposure and gain found anew for the command `id`; `Busy` while they are.
-pub fn expose(id: u16) -> Option<Outcome> {
-    if EXPOSING.swap(true, Ordering::Relaxed) {
+/// What a host asks of the camera, and who.
+pub struct CameraOrder {
+    action: Action,
+    asked: Asked,
+}
+
+/// What the camera is to do for a command.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// Find exposure and gain anew.
+    Expose,
+    /// Tell what it is set to.
+    Inspect,
+}
+
+/// Has the camera do something for the command `id`; `Busy` while it does.
+pub fn order(action: Action, id: u16) -> Option<Outcome> {
+    if CAMERA_ORDERED.swap(true, Ordering::Relaxed) {
         return Some(Outcome::Busy);
     }
-    REQUESTED_EXPOSURE.signal(Asked::by(id));
+    let asked = Asked::by(id);
+    CAMERA_ORDER.signal(CameraOrder { action, asked });
     None
+}
+
+/// The order has been carried out.
+fn end_order(asked: Asked, outcome: Outcome) {
+    CAMERA_ORDERED.store(false, Ordering::Relaxed);
+    if let Some(id) = asked.id() {
+        outbox::reply(id, outcome);
+    }
 }
 
 /// Runs for ever at the capture executor's priority. The camera begins with `format`.
@@ -45,10 +70,10 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
     task.start_camera().await;
     loop {
         let frame_time = Timer::after(FRAME_TIME);
-        let (format, exposure) = (REQUESTED_FORMAT.wait(), REQUESTED_EXPOSURE.wait());
-        match select3(format, exposure, frame_time).await {
+        let (format, order) = (REQUESTED_FORMAT.wait(), CAMERA_ORDER.wait());
+        match select3(format, order, frame_time).await {
             Either3::First(format) => task.change_format(format).await,
-            Either3::Second(asked) => task.expose(asked).await,
+            Either3::Second(order) => task.carry_out(order).await,
             Either3::Third(()) if task.is_silent() => task.silent().await,
             Either3::Third(()) => {}
         }
@@ -121,14 +146,35 @@ impl CaptureTask {
         self.go_on_when_set_up(from, answered).await;
     }
 
+    async fn carry_out(&mut self, CameraOrder { action, asked }: CameraOrder) {
+        let outcome = match action {
+            Action::Expose => self.expose().await,
+            Action::Inspect => self.inspect(asked).await,
+        };
+        end_order(asked, outcome);
+    }
+
     /// Has the camera find exposure and gain anew.
-    async fn expose(&mut self, asked: Asked) {
+    async fn expose(&mut self) -> Outcome {
         let from = self.stop();
         let answered = self.camera.lock_exposure().await;
         self.go_on_when_set_up(from, answered).await;
-        EXPOSING.store(false, Ordering::Relaxed);
-        if let Some(id) = asked.id() {
-            outbox::reply(id, Outcome::Done);
+        Outcome::Done
+    }
+
+    /// Tells what the camera is set to, while it goes on.
+    async fn inspect(&mut self, asked: Asked) -> Outcome {
+        match self.camera.setting(self.capture.format()).await {
+            Ok(setting) => {
+                if asked.id().is_some() {
+                    outbox::offer(DeviceMessage::Inspection(inspection(setting)));
+                }
+                Outcome::Done
+            }
+            Err(error) => {
+                log::say(LogLevel::Error, format_args!("camera: {error}"));
+                Outcome::NoCamera
+            }
         }
     }
 
@@ -166,6 +212,9 @@ impl CaptureTask {
         while let Err(error) = self.try_camera().await {
             health::set(Condition::NoCamera);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
+            if let Some(order) = CAMERA_ORDER.try_take() {
+                end_order(order.asked, Outcome::NoCamera);
+            }
             Timer::after(RETRY).await;
         }
     }
@@ -177,5 +226,18 @@ impl CaptureTask {
             vsync::restart_count();
         }
         self.camera.configure(self.capture.format()).await
+    }
+}
+
+fn inspection(setting: Setting) -> Inspection {
+    Inspection {
+        silicon: board::silicon_revision(),
+        camera_id: setting.id,
+        registers: setting.comparison.registers,
+        different: setting.comparison.different,
+        frame_time_us: FRAME_TIME.as_micros() as u32,
+        exposure_us: setting.exposure_us,
+        longest_exposure_us: setting.longest_exposure_us,
+        gain_sixteenths: setting.gain_sixteenths,
     }
 }

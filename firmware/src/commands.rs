@@ -1,8 +1,9 @@
 //! What the host asks for, and the answers.
 
+use crate::capture_task::{self, Action};
 use crate::pipeline_task::Order;
 use crate::shared::ORDERS;
-use crate::{capture_task, info, outbox, session, snapshot, stats};
+use crate::{info, outbox, session, snapshot, stats};
 use hivtac_sensing::model::Model;
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
@@ -55,7 +56,11 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
             None => return,
         },
         // The capture task replies itself, when the camera is ready.
-        Request::Expose => match capture_task::expose(id) {
+        Request::Expose => match capture_task::order(Action::Expose, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::Inspect => match capture_task::order(Action::Inspect, id) {
             Some(outcome) => outcome,
             None => return,
         },

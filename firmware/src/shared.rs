@@ -21,9 +21,9 @@
 
 use crate::camera::{Format, USUAL_FORMAT};
 use crate::capture::{CaptureEvent, Running};
+use crate::capture_task::CameraOrder;
 use crate::health::Condition;
 use crate::pipeline_task::Order;
-use crate::session::Asked;
 use crate::snapshot::Taken;
 use crate::stats;
 use core::cell::{Cell, RefCell};
@@ -80,11 +80,11 @@ pub static CAPTURE_EVENTS: Queue<CaptureEvent, CAPTURE_EVENTS_WAITING> = Queue::
 /// What pixels the camera shall send. From the pipeline to the capture task.
 pub static REQUESTED_FORMAT: Request<Format> = Request::new();
 
-/// Who asks for exposure and gain to be found anew. From the USB tasks to the capture task.
-pub static REQUESTED_EXPOSURE: Request<Asked> = Request::new();
+/// What a host asks of the camera. From the USB tasks to the capture task.
+pub static CAMERA_ORDER: Request<CameraOrder> = Request::new();
 
-/// Such a request is under way. Set by the USB tasks, cleared by the capture task (`capture_task`).
-pub static EXPOSING: AtomicBool = AtomicBool::new(false);
+/// Such an order is under way. Set by the USB tasks, cleared by the capture task (`capture_task`).
+pub static CAMERA_ORDERED: AtomicBool = AtomicBool::new(false);
 
 /// From VSYNC to the middle of the exposure, µs. Written by the capture task; read by the pipeline
 /// (`camera`).

@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 /// Time a tare may need besides.
-const TARE_PATIENCE: Duration = Duration::from_secs(10);
+pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Takes the mean of the next `frames` good frames (1–256) as the rest position.
 pub fn tare(address: &Address, patience: Duration, frames: u16) -> Result<(), Failure> {

@@ -26,7 +26,8 @@ pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Fail
     Ok(())
 }
 
-fn ask(
+/// The hello anew, and the counters.
+pub fn ask(
     link: &mut Link,
     patience: Duration,
     mut hello: DeviceHello,
@@ -41,8 +42,9 @@ fn ask(
     Ok((hello, stats))
 }
 
+/// What a device is and how it fares.
 #[derive(Serialize)]
-struct Info<'a> {
+pub struct Info<'a> {
     port: &'a str,
     protocol: u16,
     schema: String,
@@ -74,7 +76,8 @@ fn as_json<S: Serializer>(threshold: &Threshold, serializer: S) -> Result<S::Ok,
 }
 
 impl<'a> Info<'a> {
-    fn new(port: &'a str, hello: &'a DeviceHello, stats: Option<Stats>) -> Info<'a> {
+    /// Of a device at `port`.
+    pub fn new(port: &'a str, hello: &'a DeviceHello, stats: Option<Stats>) -> Info<'a> {
         Info {
             port,
             protocol: hello.protocol,

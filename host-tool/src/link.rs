@@ -235,6 +235,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::StartWithMarkers => "start with markers",
         Request::Expose => "expose",
         Request::Snapshot => "snapshot",
+        Request::Inspect => "inspect",
     }
 }
 
@@ -253,6 +254,9 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::Unsupported => "its camera does not send that pixel format; choose another",
         Outcome::Busy => "it is busy with the same thing; try again later",
         Outcome::NotRead => "this computer took no bytes for 0.1 s; is it busy? try again",
+        Outcome::NoCamera => {
+            "its camera does not answer, or is another one; `hivtac bring-up` says what to do"
+        }
         Outcome::NotAtRest => {
             "the markers are not where a film at rest has them; take away what touches it, and \
              check the film's distance"

@@ -258,7 +258,8 @@ impl Player {
             Request::SetThreshold(_)
             | Request::Tare { .. }
             | Request::Expose
-            | Request::Snapshot => Outcome::Unsupported,
+            | Request::Snapshot
+            | Request::Inspect => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

@@ -186,6 +186,24 @@ fn snapshot_part() -> DeviceMessage {
     })
 }
 
+fn inspection() -> DeviceMessage {
+    let green = DifferentRegister {
+        address: 0x03,
+        written: 0x40,
+        found: 0,
+    };
+    DeviceMessage::Inspection(Inspection {
+        silicon: 0x2003,
+        camera_id: 0x7721,
+        registers: 56,
+        different: [green].as_slice().try_into().unwrap(),
+        frame_time_us: 6_405,
+        exposure_us: 5_922,
+        longest_exposure_us: 6_405,
+        gain_sixteenths: 24,
+    })
+}
+
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
@@ -225,6 +243,8 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("reply-not-read", reply(300, Outcome::NotRead)),
         ("snapshot", snapshot()),
         ("snapshot-part", snapshot_part()),
+        ("reply-no-camera", reply(10, Outcome::NoCamera)),
+        ("inspection", inspection()),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -253,6 +273,7 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("start-with-markers", command(2, Request::StartWithMarkers)),
         ("expose", command(9, Request::Expose)),
         ("take-snapshot", command(300, Request::Snapshot)),
+        ("inspect", command(10, Request::Inspect)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -304,7 +325,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 7);
+    assert_eq!(distinct.len(), 8);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -313,7 +334,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 8);
+    assert_eq!(requests.len(), 9);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

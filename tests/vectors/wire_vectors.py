@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xA3B1A70975B79FD3
+SCHEMA = 0x6E77BE40EB041591
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -219,6 +219,21 @@ DEVICE = {
         raw("bytes: 4", [4]),
         raw("two red pixels", [0xD8, 0xA3, 0xD8, 0xA3]),
     ],
+    "reply-no-camera": [raw("Reply", [4]), unsigned("id", 10), raw("outcome: NoCamera", [9])],
+    "inspection": [
+        raw("Inspection", [7]),
+        unsigned("silicon", 0x2003),
+        unsigned("camera_id", 0x7721),
+        unsigned("registers", 56),
+        raw("different: 1", [1]),
+        raw("address 0x03", [3]),
+        unsigned("written", 0x40),
+        unsigned("found", 0),
+        unsigned("frame_time_us", 6_405),
+        unsigned("exposure_us", 5_922),
+        unsigned("longest_exposure_us", 6_405),
+        unsigned("gain_sixteenths", 24),
+    ],
 }
 
 HOST = {
@@ -233,6 +248,7 @@ HOST = {
     "start-with-markers": COMMAND + [unsigned("id", 2), raw("StartWithMarkers", [5])],
     "expose": COMMAND + [unsigned("id", 9), raw("Expose", [6])],
     "take-snapshot": COMMAND + [unsigned("id", 300), raw("Snapshot", [7])],
+    "inspect": COMMAND + [unsigned("id", 10), raw("Inspect", [8])],
 }
 
 FOREIGN = {

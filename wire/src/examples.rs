@@ -83,6 +83,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             offset: u32::MAX,
             bytes: Bytes::from_array([u8::MAX; SNAPSHOT_PART_BYTES]),
         }),
+        DeviceMessage::Inspection(longest_inspection()),
     ]
 }
 
@@ -116,6 +117,24 @@ pub fn longest_sample() -> Sample {
     }
 }
 
+fn longest_inspection() -> Inspection {
+    let register = DifferentRegister {
+        address: u8::MAX,
+        written: u16::MAX,
+        found: u16::MAX,
+    };
+    Inspection {
+        silicon: u16::MAX,
+        camera_id: u16::MAX,
+        registers: u16::MAX,
+        different: Bytes::from_array([register; DIFFERENT_REGISTERS]),
+        frame_time_us: u32::MAX,
+        exposure_us: u32::MAX,
+        longest_exposure_us: u32::MAX,
+        gain_sixteenths: u16::MAX,
+    }
+}
+
 fn longest_stats() -> Stats {
     Stats {
         frames_exposed: u32::MAX,
@@ -146,6 +165,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::StartWithMarkers,
         Request::Expose,
         Request::Snapshot,
+        Request::Inspect,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -170,6 +190,7 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_reply().prop_map(DeviceMessage::Reply),
         any_snapshot().prop_map(DeviceMessage::Snapshot),
         any_part().prop_map(DeviceMessage::SnapshotPart),
+        any_inspection().prop_map(DeviceMessage::Inspection),
     ]
 }
 
@@ -184,6 +205,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         Just(Request::StartWithMarkers),
         Just(Request::Expose),
         Just(Request::Snapshot),
+        Just(Request::Inspect),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -314,6 +336,7 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::Unsteady),
         Just(Outcome::Unsupported),
         Just(Outcome::NotRead),
+        Just(Outcome::NoCamera),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -337,6 +360,29 @@ fn any_part() -> impl Strategy<Value = SnapshotPart> {
         offset,
         bytes: Bytes::from_slice(&bytes).unwrap(),
     })
+}
+
+fn any_inspection() -> impl Strategy<Value = Inspection> {
+    let register =
+        any::<(u8, u16, u16)>().prop_map(|(address, written, found)| DifferentRegister {
+            address,
+            written,
+            found,
+        });
+    let different = proptest::collection::vec(register, 0..=DIFFERENT_REGISTERS);
+    let numbers = any::<(u16, u16, u16, u32, u32, u32, u16)>();
+    (numbers, different).prop_map(
+        |((silicon, camera_id, registers, frame, exposure, longest, gain), different)| Inspection {
+            silicon,
+            camera_id,
+            registers,
+            different: different.into_iter().collect(),
+            frame_time_us: frame,
+            exposure_us: exposure,
+            longest_exposure_us: longest,
+            gain_sixteenths: gain,
+        },
+    )
 }
 
 fn any_threshold() -> impl Strategy<Value = Threshold> {

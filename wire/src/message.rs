@@ -30,6 +30,8 @@ pub enum DeviceMessage {
     Snapshot(Snapshot),
     /// The next bytes of the frame that the newest [`Snapshot`] told of.
     SnapshotPart(SnapshotPart),
+    /// What the board and its camera are set to.
+    Inspection(Inspection),
 }
 
 /// What the host sends.
@@ -194,6 +196,41 @@ pub struct SnapshotPart {
     pub bytes: Vec<u8, SNAPSHOT_PART_BYTES>,
 }
 
+/// Most registers of an [`Inspection`] that differ.
+pub const DIFFERENT_REGISTERS: usize = 16;
+
+/// What the board and its camera are set to: registers are read back while frames flow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct Inspection {
+    /// The microcontroller's revision (REV_ID): 0x2001 is X, 0x2003 V.
+    pub silicon: u16,
+    /// The number by which the camera says what it is.
+    pub camera_id: u16,
+    /// The camera's registers that were read back: all that the firmware writes.
+    pub registers: u16,
+    /// Those that hold something else than what was written, the first of them.
+    pub different: Vec<DifferentRegister, DIFFERENT_REGISTERS>,
+    /// How long a frame should take, µs.
+    pub frame_time_us: u32,
+    /// How long a row is exposed, µs.
+    pub exposure_us: u32,
+    /// The longest that it can be, µs.
+    pub longest_exposure_us: u32,
+    /// The camera's gain, sixteenths.
+    pub gain_sixteenths: u16,
+}
+
+/// A register of the camera that does not hold what was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct DifferentRegister {
+    /// Its address.
+    pub address: u8,
+    /// What was written.
+    pub written: u16,
+    /// What it holds.
+    pub found: u16,
+}
+
 /// A request with a number that its reply repeats.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Command {
@@ -227,6 +264,8 @@ pub enum Request {
     Expose,
     /// Send the next whole frame. Answered behind its last part.
     Snapshot,
+    /// Read the camera's registers back and send an [`Inspection`]. Answered behind it.
+    Inspect,
 }
 
 /// The answer to a command.
@@ -261,4 +300,6 @@ pub enum Outcome {
     Unsteady,
     /// A snapshot was given up: the host did not read.
     NotRead,
+    /// The camera does not answer, or not as the one that this firmware is for.
+    NoCamera,
 }

@@ -5,6 +5,7 @@ mod free_bus;
 mod parts;
 mod silicon;
 pub use parts::{BUS_CLOCK, CameraLines, StatusLed, UsbPort, free_camera_bus};
+pub use silicon::revision as silicon_revision;
 
 #[cfg(feature = "board-openmv-h7")]
 mod openmv_h7;

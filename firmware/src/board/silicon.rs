@@ -30,11 +30,16 @@ impl Led {
     }
 }
 
+/// REV_ID of this one.
+pub fn revision() -> u16 {
+    DBGMCU.idc().read().rev_id()
+}
+
 /// Returns on silicon that runs this program. Before it the core has no more than 400 MHz, setting
 /// up 480 MHz would wait for ever for a voltage that is not there, and the DMA's memory is read
 /// wrongly (errata ES0396, "Reading from AXI SRAM may lead to data read corruption").
 pub fn refuse_old(led: &Led) {
-    let revision = DBGMCU.idc().read().rev_id();
+    let revision = revision();
     if revision >= FIRST_REVISION {
         return;
     }

@@ -25,9 +25,15 @@ impl Bus {
         Self(bus)
     }
 
-    /// Writes a device's register and its value, some bytes in all.
-    pub fn write(&mut self, device: u8, bytes: &[u8]) -> Result<(), i2c::Error> {
-        self.persist(|bus| bus.blocking_write(device, bytes))
+    /// Writes a device's register of one byte.
+    pub fn write_byte(&mut self, device: u8, register: u8, value: u8) -> Result<(), i2c::Error> {
+        self.persist(|bus| bus.blocking_write(device, &[register, value]))
+    }
+
+    /// Writes a device's register of two bytes, the high one first.
+    pub fn write_word(&mut self, device: u8, register: u8, value: u16) -> Result<(), i2c::Error> {
+        let [high, low] = value.to_be_bytes();
+        self.persist(|bus| bus.blocking_write(device, &[register, high, low]))
     }
 
     /// Reads a register of one byte as SCCB has it: with a stop between address and value.

@@ -106,7 +106,7 @@ impl fmt::Display for Error {
 /// # Errors
 /// What is there instead, as far as it can be told.
 pub fn check(bus: &mut Bus) -> Result<(), Error> {
-    let found = IDENTITY.ask(bus);
+    let found = id(bus);
     if found == Ok(IDENTITY.number) {
         return Ok(());
     }
@@ -120,6 +120,11 @@ pub fn check(bus: &mut Bus) -> Result<(), Error> {
         Ok(found) => Error::WrongId { found },
         Err(error) => Error::Bus(error),
     })
+}
+
+/// The number by which the camera in use says what it is.
+pub fn id(bus: &mut Bus) -> Result<u16, i2c::Error> {
+    IDENTITY.ask(bus)
 }
 
 impl Identity {

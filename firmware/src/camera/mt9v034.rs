@@ -6,11 +6,11 @@ use super::mt9v034_registers::{
     AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC, BLANK_ROWS, FOUND, Format, LOCKED, LONGEST_EXPOSURE,
     RESET, ROW_CLOCKS, SHUTTER_WIDTH, TABLE,
 };
-use super::{Bus, Error};
+use super::registers::Registers;
+use super::{Bus, Error, Setting};
 use crate::board::{CameraLines, XCLK_HZ};
 use crate::shared::EXPOSURE_MIDDLE_US;
 use core::sync::atomic::Ordering;
-use embassy_stm32::i2c;
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_sensing::motion::Motion;
 use hivtac_terms::geometry::Preset;
@@ -54,35 +54,41 @@ const SETTLE: Duration = Duration::from_millis(20);
 const STEADY_FRAMES: u32 = 9;
 /// Exposure and gain are taken as they are after this time.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// Between two register writes: lets tasks of lower priority run.
-const PAUSE: Duration = Duration::from_micros(100);
-
 /// The camera's control side.
 pub struct Camera {
-    bus: Bus,
+    registers: Registers,
     lines: CameraLines,
+    /// What gain and exposure are kept at.
+    locked: [(u8, u16); 3],
 }
 
 impl Camera {
     /// The bus at 100 kHz or up to 400 kHz. XCLK must already run.
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
-        Self { bus, lines }
+        Self {
+            registers: Registers(bus),
+            lines,
+            locked: [
+                (ANALOG_GAIN, 0),
+                (SHUTTER_WIDTH, 0),
+                (AEC_AGC_ENABLE, LOCKED),
+            ],
+        }
     }
 
     /// Has the camera run, checks that it is the right one, and resets its registers.
     pub async fn reset(&mut self) -> Result<(), Error> {
         self.lines.wake().await;
         Timer::after(SETTLE).await;
-        identity::check(&mut self.bus)?;
-        Ok(self.write(RESET, 1)?)
+        identity::check(&mut self.registers.0)?;
+        self.registers.write(RESET, 1_u16)
     }
 
     /// Writes the register table after a reset; returns when the camera sends well exposed frames
     /// so.
     pub async fn configure(&mut self, _format: Format) -> Result<(), Error> {
         Timer::after(SETTLE).await;
-        self.write_all(TABLE).await?;
-        self.check(TABLE).await?;
+        self.registers.set(TABLE).await?;
         self.lock_exposure().await
     }
 
@@ -94,7 +100,7 @@ impl Camera {
     /// Lets exposure and gain find what the light needs, and keeps that: markers do not change
     /// their brightness with what presses the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
-        self.write(AEC_AGC_ENABLE, AUTOMATIC)?;
+        self.registers.write(AEC_AGC_ENABLE, AUTOMATIC)?;
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
@@ -105,53 +111,36 @@ impl Camera {
         }
         let [gain, rows] = found;
         let rows = rows.clamp(1, LONGEST_EXPOSURE);
-        let locked = [
-            (ANALOG_GAIN, gain),
-            (SHUTTER_WIDTH, rows),
-            (AEC_AGC_ENABLE, LOCKED),
-        ];
-        self.write_all(&locked).await?;
-        self.check(&locked).await?;
+        let [(_, kept_gain), (_, kept_rows), _] = &mut self.locked;
+        (*kept_gain, *kept_rows) = (gain, rows);
+        self.registers.set(&self.locked).await?;
         // What was set is in force from the next frame on.
         Timer::after(2 * FRAME_TIME).await;
         // All rows' exposure ends before the first one is read.
-        let row_us = u64::from(rows) * u64::from(ROW_CLOCKS) * 1_000_000 / u64::from(XCLK_HZ);
-        EXPOSURE_MIDDLE_US.store(-(row_us as i32) / 2, Ordering::Relaxed);
+        EXPOSURE_MIDDLE_US.store(-(rows_us(rows) as i32) / 2, Ordering::Relaxed);
         Ok(())
+    }
+
+    /// What it is set to, while frames are captured.
+    pub async fn setting(&mut self, _format: Format) -> Result<Setting, Error> {
+        let [(_, gain), (_, rows), _] = self.locked;
+        Ok(Setting {
+            id: identity::id(&mut self.registers.0)?,
+            comparison: self.registers.compare(&[TABLE, &self.locked]).await?,
+            exposure_us: rows_us(rows),
+            longest_exposure_us: rows_us(LONGEST_EXPOSURE),
+            gain_sixteenths: gain,
+        })
     }
 
     /// What [`FOUND`]'s registers hold.
     fn exposure(&mut self) -> Result<[u16; 2], Error> {
         let [gain, rows] = FOUND;
-        Ok([self.read(gain)?, self.read(rows)?])
+        Ok([self.registers.read(gain)?, self.registers.read(rows)?])
     }
+}
 
-    fn write(&mut self, register: u8, value: u16) -> Result<(), i2c::Error> {
-        let [high, low] = value.to_be_bytes();
-        self.bus.write(IDENTITY.address, &[register, high, low])
-    }
-
-    fn read(&mut self, register: u8) -> Result<u16, i2c::Error> {
-        self.bus.read_word(IDENTITY.address, register)
-    }
-
-    async fn write_all(&mut self, table: &[(u8, u16)]) -> Result<(), Error> {
-        for (register, value) in table {
-            self.write(*register, *value)?;
-            Timer::after(PAUSE).await;
-        }
-        Ok(())
-    }
-
-    /// Reads a table back.
-    async fn check(&mut self, table: &[(u8, u16)]) -> Result<(), Error> {
-        for (address, value) in table {
-            let (address, found) = (*address, self.read(*address)?);
-            if found != *value {
-                return Err(Error::Register { address, found });
-            }
-            Timer::after(PAUSE).await;
-        }
-        Ok(())
-    }
+/// So many rows' time, µs.
+fn rows_us(rows: u16) -> u32 {
+    (u64::from(rows) * u64::from(ROW_CLOCKS) * 1_000_000 / u64::from(XCLK_HZ)) as u32
 }

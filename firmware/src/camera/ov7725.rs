@@ -3,11 +3,11 @@
 
 use super::identity::{self, Identity};
 use super::ov7725_registers::{AUTOMATIC, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, TABLE};
-use super::{Bus, Error};
+use super::registers::Registers;
+use super::{Bus, Error, Setting};
 use crate::board::{CameraLines, XCLK_HZ};
 use crate::shared::EXPOSURE_MIDDLE_US;
 use core::sync::atomic::Ordering;
-use embassy_stm32::i2c;
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_sensing::motion::Motion;
 use hivtac_terms::geometry::Preset;
@@ -46,6 +46,9 @@ pub const FRAME_TIME: Duration = Duration::from_micros(
     FRAME_CLOCKS * (156 / FRAMES_PER_SECOND as u64) * 1_000_000 / FULL_PCLK_HZ,
 );
 
+/// [`FRAME_TIME`], µs.
+const FRAME_US: u32 = FRAME_TIME.as_micros() as u32;
+
 /// PCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
 /// Level of VSYNC while it says "no data": its pulse is high.
@@ -62,19 +65,23 @@ const STEADY_FRAMES: u32 = 3;
 /// Exposure and gain are taken as they are after this time: the data sheet's ten frames at its
 /// slowest rate.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// Between two register writes: lets tasks of lower priority run.
-const PAUSE: Duration = Duration::from_micros(100);
-
 /// The camera's control side.
 pub struct Camera {
-    bus: Bus,
+    registers: Registers,
     lines: CameraLines,
+    /// What exposure and gain are kept at.
+    locked: [(u8, u8); 4],
 }
 
 impl Camera {
     /// The bus at 100 kHz or up to 400 kHz. XCLK must already run.
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
-        Self { bus, lines }
+        let [gain, low, high] = EXPOSURE;
+        Self {
+            registers: Registers(bus),
+            lines,
+            locked: [(COM8, LOCKED), (gain, 0), (low, 0), (high, 0)],
+        }
     }
 
     /// Has the camera run, checks that it is the right one, and resets its registers: nothing else
@@ -82,8 +89,8 @@ impl Camera {
     pub async fn reset(&mut self) -> Result<(), Error> {
         self.lines.wake().await;
         Timer::after(SETTLE).await;
-        identity::check(&mut self.bus)?;
-        Ok(self.write(COM7, COM7_RESET)?)
+        identity::check(&mut self.registers.0)?;
+        self.registers.write(COM7, COM7_RESET)
     }
 
     /// Writes the register table after a reset; returns when the camera sends well exposed frames
@@ -91,8 +98,7 @@ impl Camera {
     pub async fn configure(&mut self, format: Format) -> Result<(), Error> {
         Timer::after(SETTLE).await;
         for table in [format.registers(), TABLE] {
-            self.write_all(table).await?;
-            self.check(table).await?;
+            self.registers.set(table).await?;
         }
         self.lock_exposure().await
     }
@@ -100,7 +106,7 @@ impl Camera {
     /// Changes the pixel format of a configured camera; returns when it sends frames so. Exposure
     /// and gain stay.
     pub async fn set_format(&mut self, format: Format) -> Result<(), Error> {
-        self.write_all(format.registers()).await?;
+        self.registers.set(format.registers()).await?;
         Timer::after(FRAME_TIME * FRAMES_TO_SETTLE).await;
         Ok(())
     }
@@ -108,7 +114,7 @@ impl Camera {
     /// Lets exposure and gain find what the light needs, and keeps that: markers do not change
     /// their brightness with what presses the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
-        self.write(COM8, AUTOMATIC)?;
+        self.registers.write(COM8, AUTOMATIC)?;
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
@@ -117,50 +123,50 @@ impl Camera {
             steady = if now == found { steady + 1 } else { 1 };
             found = now;
         }
-        self.write(COM8, LOCKED)?;
-        for (register, value) in EXPOSURE.into_iter().zip(found) {
-            self.write(register, value)?;
+        for ((_, value), found) in self.locked.iter_mut().skip(1).zip(found) {
+            *value = found;
         }
-        let [_, low, high] = found;
-        let lines = u32::from(u16::from_le_bytes([low, high])).min(u32::from(LINES));
-        let half_lines = 2 * LINES_TO_MIDDLE_ROW - lines;
-        let middle_us = half_lines * FRAME_TIME.as_micros() as u32 / (2 * u32::from(LINES));
+        self.registers.set(&self.locked).await?;
+        let half_lines = 2 * LINES_TO_MIDDLE_ROW - self.lines();
+        let middle_us = half_lines * FRAME_US / (2 * u32::from(LINES));
         EXPOSURE_MIDDLE_US.store(middle_us as i32, Ordering::Relaxed);
         Ok(())
+    }
+
+    /// What it is set to, while frames of `format` are captured.
+    pub async fn setting(&mut self, format: Format) -> Result<Setting, Error> {
+        let [_, (_, gain), ..] = self.locked;
+        Ok(Setting {
+            id: identity::id(&mut self.registers.0)?,
+            comparison: self
+                .registers
+                .compare(&[format.registers(), TABLE, &self.locked])
+                .await?,
+            exposure_us: self.lines() * FRAME_US / u32::from(LINES),
+            longest_exposure_us: FRAME_US,
+            gain_sixteenths: gain_sixteenths(gain),
+        })
+    }
+
+    /// Lines that a row is exposed, as it was kept.
+    fn lines(&self) -> u32 {
+        let [_, _, (_, low), (_, high)] = self.locked;
+        u32::from(u16::from_le_bytes([low, high])).min(u32::from(LINES))
     }
 
     /// What [`EXPOSURE`]'s registers hold.
     fn exposure(&mut self) -> Result<[u8; 3], Error> {
         let [gain, low, high] = EXPOSURE;
-        Ok([self.read(gain)?, self.read(low)?, self.read(high)?])
+        let registers = &mut self.registers;
+        Ok([
+            registers.read(gain)?,
+            registers.read(low)?,
+            registers.read(high)?,
+        ])
     }
+}
 
-    fn write(&mut self, register: u8, value: u8) -> Result<(), i2c::Error> {
-        self.bus.write(IDENTITY.address, &[register, value])
-    }
-
-    fn read(&mut self, register: u8) -> Result<u8, i2c::Error> {
-        self.bus.read_byte(IDENTITY.address, register)
-    }
-
-    async fn write_all(&mut self, table: &[(u8, u8)]) -> Result<(), Error> {
-        for (register, value) in table {
-            self.write(*register, *value)?;
-            Timer::after(PAUSE).await;
-        }
-        Ok(())
-    }
-
-    /// Reads a table back.
-    async fn check(&mut self, table: &[(u8, u8)]) -> Result<(), Error> {
-        for (address, value) in table {
-            let (address, found) = (*address, self.read(*address)?);
-            if found != *value {
-                let found = found.into();
-                return Err(Error::Register { address, found });
-            }
-            Timer::after(PAUSE).await;
-        }
-        Ok(())
-    }
+/// The gain register's: each of the upper four bits doubles, the lower ones are sixteenths more.
+fn gain_sixteenths(register: u8) -> u16 {
+    (16 + u16::from(register & 0x0F)) << (register >> 4).count_ones()
 }

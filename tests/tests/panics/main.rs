@@ -62,8 +62,8 @@ const REASONS: [(&str, usize, &str); 18] = [
     ),
     (
         "hivtac_firmware6camera",
-        1,
-        "set-up of the camera: what has ended is not polled again",
+        3,
+        "the camera's set-up and what it is set to: what has ended is not polled again",
     ),
     (
         "hivtac_firmware12capture_task",
@@ -88,7 +88,7 @@ const REASONS: [(&str, usize, &str); 18] = [
     ),
     (
         "embassy_executor",
-        10,
+        13,
         "the same of the capture and USB tasks, compiled into their executor; executors start \
          once",
     ),
