@@ -20,6 +20,10 @@ pub enum Kind {
     BerrOnce,
     /// The camera's clock tree stops: no VSYNC, no pixels; its registers still answer.
     CameraSilent,
+    /// The camera's clock loop multiplies half as much as it was told.
+    CameraSlow,
+    /// A register of the camera goes back to what it holds after a reset, once.
+    CameraForgets,
     /// The camera sends half of its rows in frames that begin while this lasts.
     FrameShort,
     /// The camera sends five rows more than it should in frames that begin while this lasts.
@@ -34,7 +38,7 @@ pub enum Kind {
     CablePulled,
 }
 
-const NAMES: [(&str, Kind); 13] = [
+const NAMES: [(&str, Kind); 15] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),
@@ -42,6 +46,8 @@ const NAMES: [(&str, Kind); 13] = [
     ("scl-stretch", Kind::SclStretch),
     ("berr-once", Kind::BerrOnce),
     ("camera-silent", Kind::CameraSilent),
+    ("camera-slow", Kind::CameraSlow),
+    ("camera-forgets", Kind::CameraForgets),
     ("frame-short", Kind::FrameShort),
     ("frame-long", Kind::FrameLong),
     ("dcmi-overrun", Kind::DcmiOverrun),

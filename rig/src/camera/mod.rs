@@ -71,6 +71,7 @@ pub struct Camera {
     counting: bool,
     faulty_output: Option<String>,
     sccb_writes: u64,
+    forgot: bool,
 }
 
 /// The sensor as its pins' owners share it.
@@ -118,6 +119,7 @@ impl Camera {
             counting: false,
             faulty_output: None,
             sccb_writes: 0,
+            forgot: false,
         }
     }
 
@@ -168,6 +170,9 @@ impl Camera {
             return None;
         }
         let mut output = self.part.output(self.supply.clock_hz)?;
+        if self.faults.on(Kind::CameraSlow, now_ns) {
+            output.pixel_clock_hz /= 2;
+        }
         if self.faults.on(Kind::FrameShort, now_ns) {
             output.rows /= 2;
         }
@@ -188,6 +193,10 @@ impl Camera {
 
     /// The edge of VSYNC that ends its pulse, which numbers the frame that follows.
     pub fn count_edge(&mut self, now_ns: u64) -> Exposed {
+        if self.faults.on(Kind::CameraForgets, now_ns) && !self.forgot {
+            self.forgot = true;
+            self.part.forget();
+        }
         let mut exposed = Exposed {
             at_ns: now_ns,
             middle_ns: now_ns,

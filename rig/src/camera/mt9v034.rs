@@ -248,6 +248,11 @@ impl Part for Mt9v034 {
         reset
     }
 
+    fn forget(&mut self) {
+        let after_reset = Registers::default().get(reg::ADC);
+        self.registers.write(reg::ADC, after_reset);
+    }
+
     fn reset(&mut self) {
         *self = Self::new(false);
     }

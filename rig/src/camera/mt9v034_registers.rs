@@ -19,6 +19,8 @@ pub const VERTICAL_BLANKING: u8 = 0x06;
 pub const CHIP_CONTROL: u8 = 0x07;
 /// Exposure in rows.
 pub const SHUTTER_WIDTH: u8 = 0x0B;
+/// How levels become numbers.
+pub const ADC: u8 = 0x1C;
 /// Bit 0: every register goes back to its power-up value.
 pub const RESET: u8 = 0x0C;
 /// Binning of rows (bits 1:0) and columns (3:2), flips (5:4).
@@ -67,7 +69,7 @@ const POWER_UP: [(u8, u16); 22] = [
     (SHUTTER_WIDTH, 480),
     (READ_MODE, 0x0300),
     (0x0F, 0x0100),
-    (0x1C, 0x0302),
+    (ADC, 0x0302),
     (ANALOG_GAIN, 16),
     (DESIRED_BIN, 58),
     (MAX_GAIN, 64),

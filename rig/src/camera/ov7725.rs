@@ -90,6 +90,10 @@ impl Part for Ov7725 {
         reset
     }
 
+    fn forget(&mut self) {
+        self.registers.write(registers::GREEN, 0);
+    }
+
     fn reset(&mut self) {
         *self = Self::new(self.seed, false);
     }

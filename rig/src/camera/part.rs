@@ -27,6 +27,10 @@ pub trait Part: Debug + Send {
     /// Writes a register; whether that was a reset of all of them.
     fn write(&mut self, address: u8, value: u16) -> bool;
 
+    /// One of its registers goes back to what it holds after a reset: one that colours or levels
+    /// depend on, and no timing.
+    fn forget(&mut self);
+
     /// Its reset line was low.
     fn reset(&mut self);
 }
