@@ -20,6 +20,8 @@ pub enum Kind {
     Rate,
     /// More frames lost than allowed.
     Loss,
+    /// Something about the sensor is not right.
+    NotRight,
     /// Ctrl-C or a termination signal.
     Interrupted,
 }
@@ -35,6 +37,7 @@ impl Kind {
             Kind::Refused => 6,
             Kind::Rate => 7,
             Kind::Loss => 8,
+            Kind::NotRight => 9,
             Kind::Interrupted => 130,
         }
     }

@@ -1,5 +1,6 @@
 //! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
 
+mod bring_up;
 mod check;
 mod command;
 mod decimal;
@@ -46,6 +47,7 @@ Exit codes:
   6    the device refused a command or did not answer it
   7    `check`: fewer samples a second than --min-rate
   8    `check`: more frames lost than --max-loss
+  9    `bring-up`: something is not right
   130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
 
 /// Shows the forces of a HiVTac sensor.
@@ -159,6 +161,24 @@ enum Command {
         #[command(flatten)]
         device: Device,
         /// One JSON object a picture
+        #[arg(long)]
+        json: bool,
+    },
+    /// Look at everything about a new board, in the order in which things go wrong
+    ///
+    /// USB, the camera and its registers, clocks, white, the markers as `focus` has them, tare and
+    /// noise, and a finger's press; says what is wrong and what to do, and what a person has to do
+    /// in between. Ends with the first thing on which others rest. The report is for your own
+    /// notes, and to attach to a question.
+    ///
+    /// Example: hivtac bring-up
+    BringUp {
+        #[command(flatten)]
+        device: Device,
+        /// Where the report goes
+        #[arg(value_name = "FILE.json", default_value = "bring-up.json")]
+        report: String,
+        /// The report on standard output, too, instead of a line a step
         #[arg(long)]
         json: bool,
     },
@@ -392,6 +412,16 @@ fn run(command: Command) -> Result<(), Failure> {
             json,
         } => snapshot::run(&device.address(), device.timeout, &files.files(), json),
         Command::Template { file, preset } => template::run(&file, preset),
+        Command::BringUp {
+            device,
+            report,
+            json,
+        } => bring_up::run(&bring_up::Options {
+            address: device.address(),
+            patience: device.timeout,
+            report,
+            json,
+        }),
         Command::Focus { device, json } => focus::run(&device.address(), device.timeout, json),
         Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
         Command::Tare { device, frames } => {

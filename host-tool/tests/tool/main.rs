@@ -1,6 +1,7 @@
 //! The tool against scripted devices: what it prints, and how it ends.
 #![cfg(unix)]
 
+mod bring_up;
 mod commands;
 mod endings;
 mod fake;

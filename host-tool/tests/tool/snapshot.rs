@@ -36,6 +36,20 @@ fn frame(format: Format, load: &Load, blur_px: f64) -> Vec<u8> {
     pixels.into_iter().flat_map(in_order).collect()
 }
 
+/// A whole frame at rest.
+pub fn rest_frame() -> Vec<DeviceMessage> {
+    messages(RED, &frame(Format::Rgb565, &Load::REST, 0.0))
+}
+
+/// Markers as they lie there, about.
+pub fn at_rest() -> [Marker; 4] {
+    [Marker {
+        x: Px(3 << 15),
+        y: Px(-1),
+        area: 190,
+    }; 4]
+}
+
 /// Header and parts, as a device sends them, amid other messages.
 fn messages(threshold: Threshold, bytes: &[u8]) -> Vec<DeviceMessage> {
     let header = Snapshot {
@@ -60,18 +74,13 @@ fn messages(threshold: Threshold, bytes: &[u8]) -> Vec<DeviceMessage> {
 }
 
 fn sample_with_markers(frame: u32) -> DeviceMessage {
-    let marker = Marker {
-        x: Px(3 << 15),
-        y: Px(-1),
-        area: 190,
-    };
     DeviceMessage::Sample(Sample {
         sequence: frame,
         frame,
         time_us: 332_135,
         status: Status::TARE_MISSING,
         force: None,
-        markers: Some([marker; 4]),
+        markers: Some(at_rest()),
     })
 }
 

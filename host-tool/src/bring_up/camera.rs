@@ -1,0 +1,96 @@
+//! Board and camera: which they are, and whether the camera holds what was written to it.
+
+use super::device::reason;
+use super::hear;
+use super::report::Step;
+use hivtac_host::failure::Failure;
+use hivtac_host::link::Link;
+use hivtac_wire::message::{DeviceMessage, Inspection, Request};
+use serde_json::{Value, json};
+use std::time::Duration;
+
+/// What reading all registers takes, at most; a camera that does not answer is tried again every
+/// half second.
+const INSPECTION: Duration = Duration::from_secs(3);
+/// Exposure beyond this part of the longest, with gain beyond [`HIGH_GAIN`], is all that the camera
+/// can do.
+const LONG_EXPOSURE: f64 = 0.95;
+/// Sixteenths: 3.9 of the 4 that the firmware allows.
+const HIGH_GAIN: u16 = 62;
+
+/// Has the camera's registers read back.
+///
+/// # Errors
+/// The connection breaks.
+pub fn step(link: &mut Link, patience: Duration) -> Result<(Step, Option<Inspection>), Failure> {
+    let (mut complaints, mut inspection) = (Vec::new(), None);
+    let answer = link.request(
+        Request::Inspect,
+        patience + INSPECTION,
+        |message| match message {
+            DeviceMessage::Inspection(it) => inspection = Some(it),
+            message => hear(&mut complaints, message),
+        },
+    );
+    let refused = reason(answer)?;
+    Ok(match (inspection, refused) {
+        (Some(inspection), None) => (judge(&inspection), Some(inspection)),
+        (_, refused) => (silent(refused, complaints.pop()), None),
+    })
+}
+
+fn silent(refused: Option<String>, complaint: Option<String>) -> Step {
+    let mut wrong: Vec<_> = complaint.into_iter().collect();
+    wrong.extend(refused);
+    wrong.push(
+        "push the ribbon fully home, contacts on the right side; see that it is the camera that \
+         this firmware is for"
+            .to_owned(),
+    );
+    let found = "it does not answer as it should".to_owned();
+    Step::new("camera", found, wrong, Value::Null)
+}
+
+/// What is wrong about an inspection.
+pub fn judge(it: &Inspection) -> Step {
+    let mut wrong: Vec<_> = it.different.iter().map(different).collect();
+    if !wrong.is_empty() {
+        wrong.push(
+            "the camera lost what was written: its supply dips, or another part answers at its \
+             address; reset the device, and look at the ribbon and the 3.3 V"
+                .to_owned(),
+        );
+    }
+    let part = f64::from(it.exposure_us) / f64::from(it.longest_exposure_us.max(1));
+    if part > LONG_EXPOSURE && it.gain_sixteenths > HIGH_GAIN {
+        wrong.push("longest exposure and highest gain: more light, then `hivtac expose`".into());
+    }
+    let found = format!(
+        "id {:04x}, silicon {}; {} of {} registers hold what was written; exposure {:.1} of \
+         {:.1} ms, gain {:.1}",
+        it.camera_id,
+        revision(it.silicon),
+        usize::from(it.registers).saturating_sub(it.different.len()),
+        it.registers,
+        f64::from(it.exposure_us) / 1e3,
+        f64::from(it.longest_exposure_us) / 1e3,
+        f64::from(it.gain_sixteenths) / 16.0,
+    );
+    Step::new("camera", found, wrong, json!(it))
+}
+
+fn different(register: &hivtac_wire::message::DifferentRegister) -> String {
+    format!(
+        "register {:02x} holds {:02x}, {:02x} was written",
+        register.address, register.found, register.written
+    )
+}
+
+/// The letter of a revision of the STM32H743.
+fn revision(silicon: u16) -> String {
+    match silicon {
+        0x2001 => "X".to_owned(),
+        0x2003 => "V".to_owned(),
+        other => format!("{other:04x}"),
+    }
+}

@@ -1,0 +1,62 @@
+//! Colours: what the camera makes of white.
+
+use super::report::Step;
+use crate::look;
+use hivtac_host::frame::Frame;
+use serde_json::json;
+
+/// Largest saturation of white, of 255: half of what the usual threshold asks of a marker.
+const LARGEST_SATURATION: f64 = 50.0;
+/// Brightness, of 255: below, white is too dark for markers to be seen; above, levels are no longer
+/// in proportion to light.
+const BRIGHTNESS: [f64; 2] = [60.0, 247.0];
+/// The part of the picture's sides that is looked at, about its middle: between the markers.
+const MIDDLE: f64 = 0.2;
+
+/// Judges the middle of a picture that should be white.
+pub fn step(frame: &Frame) -> Step {
+    let mean = middle(frame);
+    let [red, green, blue] = mean;
+    let high = red.max(green).max(blue);
+    let saturation = 255.0 * (high - red.min(green).min(blue)) / high.max(1.0);
+    let [least, most] = BRIGHTNESS;
+    let mut wrong = Vec::new();
+    if high < least {
+        wrong.push(format!(
+            "too dark ({high:.0}, at least {least}): cap, light; then `hivtac expose`"
+        ));
+    }
+    if high > most {
+        wrong.push(format!(
+            "too bright ({high:.0}, at most {most}): less light; then `hivtac expose`"
+        ));
+    }
+    if saturation > LARGEST_SATURATION {
+        wrong.push(format!(
+            "white is not white (saturation {saturation:.0}, at most {LARGEST_SATURATION}): use \
+             white light and a white card; if it is, the camera's gains are not what was written"
+        ));
+    }
+    let found = format!("red {red:.0}, green {green:.0}, blue {blue:.0}");
+    let figures = json!({ "red_green_blue": mean, "saturation": saturation });
+    Step::new("white", found, wrong, figures)
+}
+
+/// Mean red, green and blue about the picture's middle, of 255.
+fn middle(frame: &Frame) -> [f64; 3] {
+    let levels = look::levels(frame);
+    let (width, height) = (usize::from(frame.width), usize::from(frame.height));
+    let inside = |at: usize, side: usize| {
+        let off = (at as f64 + 0.5) / side as f64 - 0.5;
+        off.abs() <= MIDDLE / 2.0
+    };
+    let pixels = levels.chunks_exact(3).enumerate();
+    let near: Vec<_> = pixels
+        .filter(|(index, _)| inside(index % width, width) && inside(index / width, height))
+        .map(|(_, pixel)| pixel)
+        .collect();
+    [0, 1, 2].map(|channel| {
+        let sum: f64 = near.iter().map(|pixel| f64::from(pixel[channel])).sum();
+        sum / near.len().max(1) as f64
+    })
+}

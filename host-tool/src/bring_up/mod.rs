@@ -1,0 +1,166 @@
+//! `hivtac bring-up`: the first hour with a new board as one command, in the order in which things
+//! go wrong.
+
+mod camera;
+mod clocks;
+mod colours;
+mod device;
+mod noise;
+mod person;
+mod press;
+mod report;
+mod samples;
+#[cfg(test)]
+mod tests;
+
+use crate::command::tell;
+use crate::focus::Focus;
+use crate::output::{note, print};
+use crate::snapshot::snapshot;
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::link::{Link, log_text};
+use hivtac_host::port::Address;
+use hivtac_host::stop;
+use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel};
+use person::Person;
+use report::{Report, Step};
+use serde_json::json;
+use std::time::Duration;
+
+/// What to do.
+pub struct Options {
+    /// Where the device is.
+    pub address: Address,
+    /// Longest wait for the device's answers.
+    pub patience: Duration,
+    /// Where the report goes.
+    pub report: String,
+    /// The report on standard output, too, instead of a line a step.
+    pub json: bool,
+}
+
+/// Goes through all steps, and writes the report.
+///
+/// # Errors
+/// [`Kind::NotRight`] when something is not right; those of the link where that breaks, and of
+/// files.
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let mut report = Report::new();
+    let ended = BringUp::begin(options, &mut report).and_then(|mut it| it.go(&mut report));
+    report.finish();
+    report.write(&options.report)?;
+    match options.json {
+        true => print(&report.json())?,
+        false => print(&format!("report: {}", options.report))?,
+    };
+    ended?;
+    match report.wrong() {
+        names if names.is_empty() => Ok(()),
+        names => Err(Failure::new(
+            Kind::NotRight,
+            format!(
+                "not right: {}; mend the first, then run this again",
+                names.join(", ")
+            ),
+        )),
+    }
+}
+
+/// What the steps share.
+struct BringUp<'a> {
+    options: &'a Options,
+    link: Link,
+    hello: DeviceHello,
+    person: Person,
+}
+
+impl<'a> BringUp<'a> {
+    fn begin(options: &'a Options, report: &mut Report) -> Result<BringUp<'a>, Failure> {
+        let begun = Link::connect(&options.address, options.patience);
+        let (mut link, hello) = begun.inspect_err(|failure| {
+            if !stop::requested() {
+                show(options, report, device::not_there(failure));
+            }
+        })?;
+        show(options, report, device::usb(&mut link, options.patience)?);
+        report.device = device::told(&mut link, options.patience, hello.clone())?;
+        Ok(BringUp {
+            options,
+            link,
+            hello,
+            person: Person::listen(),
+        })
+    }
+
+    /// Everything from the camera on. What cannot be judged without a step is left out when that is
+    /// not right.
+    fn go(&mut self, report: &mut Report) -> Result<(), Failure> {
+        if !report.is_right() {
+            return Ok(());
+        }
+        let patience = self.options.patience;
+        let (step, inspection) = camera::step(&mut self.link, patience)?;
+        show(self.options, report, step);
+        let Some(inspection) = inspection.filter(|_| report.is_right()) else {
+            return Ok(());
+        };
+        let step = clocks::step(&mut self.link, patience, inspection.frame_time_us)?;
+        show(self.options, report, step);
+        if !report.is_right() {
+            return Ok(());
+        }
+        let step = self.white()?;
+        show(self.options, report, step);
+        let step = self.markers()?;
+        show(self.options, report, step);
+        let step = noise::step(&mut self.link, patience, self.hello.threshold.format())?;
+        let at_rest = step.is_right();
+        show(self.options, report, step);
+        if at_rest {
+            let step = press::step(&mut self.link, patience)?;
+            show(self.options, report, step);
+        }
+        Ok(())
+    }
+
+    fn white(&mut self) -> Result<Step, Failure> {
+        self.person
+            .ask("Hold a white card where the film is, or leave the film on where it is clear.")?;
+        let taken = snapshot(&mut self.link, self.options.patience)?;
+        Ok(colours::step(&taken.frame))
+    }
+
+    fn markers(&mut self) -> Result<Step, Failure> {
+        self.person
+            .ask("Take the card away and put the film on; nothing touches it.")?;
+        let taken = snapshot(&mut self.link, self.options.patience)?;
+        let focus = Focus::of(&taken.frame, &self.hello);
+        let said = match focus.right {
+            true => "sharp, bright, of the right size, in the right place (`hivtac focus`)",
+            false => "not as they should be; `hivtac focus` shows them until they are",
+        };
+        let figures = json!({ "checks": focus.checks });
+        Ok(Step::new("markers", said.to_owned(), focus.wrong, figures))
+    }
+}
+
+/// Keeps a step, and shows it.
+fn show(options: &Options, report: &mut Report, step: Step) {
+    if !options.json {
+        // A reader that has gone still wants the report's file.
+        let _ = print(&step.text());
+    }
+    report.steps.push(step);
+}
+
+/// What the device logs while it is asked: shown, and what it complains about kept.
+fn hear(complaints: &mut Vec<String>, message: DeviceMessage) {
+    match message {
+        DeviceMessage::Log(line) if line.level != LogLevel::Info => {
+            let text = log_text(&line);
+            note(&text);
+            complaints.push(text);
+        }
+        message => tell(message),
+    }
+}

@@ -1,0 +1,107 @@
+//! The tare, and how still the markers then lie.
+
+use super::device::reason;
+use super::hear;
+use super::report::Step;
+use super::samples::{Wanted, collect};
+use crate::command::TARE_PATIENCE;
+use hivtac_host::failure::Failure;
+use hivtac_host::link::Link;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::PixelFormat;
+use hivtac_wire::message::Request;
+use serde_json::json;
+use std::time::Duration;
+
+/// Frames of the tare.
+const TARE_FRAMES: u16 = 32;
+/// Fewest frames.
+const LEAST_FRAMES: usize = 16;
+/// How long frames are watched.
+const WATCH: Duration = Duration::from_secs(5);
+/// So many times that is pointed out.
+const MOST_TIMES: f64 = 3.0;
+
+/// Takes a tare, and measures how far the markers of single frames lie from their mean.
+///
+/// # Errors
+/// The connection breaks.
+pub fn step(link: &mut Link, patience: Duration, format: PixelFormat) -> Result<Step, Failure> {
+    let mut complaints = Vec::new();
+    let frames = TARE_FRAMES;
+    let answer = link.request(
+        Request::Tare { frames },
+        patience + TARE_PATIENCE,
+        |message| {
+            hear(&mut complaints, message);
+        },
+    );
+    if let Some(reason) = reason(answer)? {
+        let found = "no tare was taken".to_owned();
+        return Ok(Step::new("noise", found, vec![reason], json!(null)));
+    }
+    let wanted = Wanted {
+        enough: 200,
+        least: LEAST_FRAMES,
+        watch: WATCH,
+        patience,
+    };
+    let samples = collect(link, Request::StartWithMarkers, &wanted, &mut complaints)?;
+    let frames: Vec<_> = samples.iter().filter_map(|sample| sample.markers).collect();
+    Ok(judge(&frames, format))
+}
+
+/// Of the markers of frames at rest.
+pub fn judge(frames: &[[Marker; 4]], format: PixelFormat) -> Step {
+    let simulated_px = simulated_px(format);
+    let deviations = deviations_px(frames);
+    let square = deviations.iter().map(|px| px * px).sum::<f64>() / 8.0;
+    let (noise_px, times) = (square.sqrt(), square.sqrt() / simulated_px);
+    let mut wrong = Vec::new();
+    if frames.len() < LEAST_FRAMES {
+        wrong.push(format!(
+            "only {} frames showed the four markers; `hivtac monitor` says why",
+            frames.len()
+        ));
+    } else if times > MOST_TIMES {
+        wrong.push(format!(
+            "{times:.1} times what the simulated sensor has: light that flickers (use DC), a film \
+             that shakes, too little light (gain), or a lens out of focus"
+        ));
+    }
+    let found = format!(
+        "tare taken; markers lie still to {noise_px:.4} px, {times:.1} times what the simulated \
+         sensor has ({simulated_px} px)"
+    );
+    let figures = json!({
+        "frames": frames.len(),
+        "noise_px": noise_px,
+        "simulated_px": simulated_px,
+        "of_coordinates_px": deviations,
+    });
+    Step::new("noise", found, wrong, figures)
+}
+
+/// Standard deviation of a resting marker's coordinates on the simulated sensor, px: root mean
+/// square of the eight, measured by this command on the emulated board.
+fn simulated_px(format: PixelFormat) -> f64 {
+    match format {
+        PixelFormat::Rgb565 => 0.009,
+        PixelFormat::Yuv422 => 0.012,
+        PixelFormat::Mono => 0.007,
+    }
+}
+
+/// Standard deviations of the eight coordinates, px.
+fn deviations_px(frames: &[[Marker; 4]]) -> [f64; 8] {
+    let count = frames.len().max(1) as f64;
+    std::array::from_fn(|index| {
+        let of = |four: &[Marker; 4]| match four[index / 2] {
+            Marker { x, .. } if index % 2 == 0 => x.to_f64(),
+            Marker { y, .. } => y.to_f64(),
+        };
+        let mean = frames.iter().map(of).sum::<f64>() / count;
+        let square = frames.iter().map(|four| (of(four) - mean).powi(2));
+        (square.sum::<f64>() / count).sqrt()
+    })
+}

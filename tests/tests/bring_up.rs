@@ -1,0 +1,142 @@
+//! `hivtac bring-up` with the firmware in the rig: a good board, and one with each fault.
+
+use hivtac_tests::artifact;
+use hivtac_tests::rig::{Rig, ToolOutput, tool};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// Longest run.
+const PATIENCE: Duration = Duration::from_secs(240);
+
+/// Brings a rig with these options up; what the tool left, and its report.
+fn bring_up(options: &[&str]) -> (ToolOutput, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("report.json");
+    let rig = Rig::start(options).unwrap();
+    let output = tool(&rig, "bring-up", &[file.to_str().unwrap()]).unwrap();
+    rig.finish().unwrap();
+    let report = report(&file);
+    (output, report)
+}
+
+fn report(file: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
+}
+
+/// The names of steps, right ones and others.
+fn steps(report: &Value) -> Vec<(&str, bool)> {
+    let steps = report["steps"].as_array().unwrap();
+    let name = |step: &'_ Value| step["step"].as_str().map(str::to_owned);
+    assert!(steps.iter().all(|step| name(step).is_some()));
+    steps
+        .iter()
+        .map(|step| (step["step"].as_str().unwrap(), step["right"] == true))
+        .collect()
+}
+
+/// Ends with `step`, which says all of these; the exit code is that of something wrong.
+fn ends_wrong(options: &[&str], step: &str, words: &[&str]) {
+    let (output, report) = bring_up(options);
+    assert_eq!(output.code, Some(9), "{output:?}");
+    let (last, before) = steps(&report)
+        .split_last()
+        .map(|(l, b)| (*l, b.to_vec()))
+        .unwrap();
+    assert_eq!(last, (step, false), "{report}");
+    assert!(before.iter().all(|(_, right)| *right), "{report}");
+    let wrong = report["steps"].as_array().unwrap().last().unwrap()["wrong"].to_string();
+    for word in words {
+        assert!(wrong.contains(word), "{wrong} has no {word}");
+    }
+}
+
+/// All that needs no finger is right; interrupted while it waits for one, it leaves its report.
+#[test]
+fn a_good_board_is_right_up_to_the_press() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("report.json");
+    let rig = Rig::start(&["--scene", "rest"]).unwrap();
+    let mut child = Command::new(artifact::named_by("HIVTAC_TOOL"))
+        .args(["bring-up", "--timeout", "60", "--port", rig.port()])
+        .arg(&file)
+        .stdin(Stdio::null())
+        .stderr(std::fs::File::create(folder.path().join("asked")).unwrap())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let asked = || std::fs::read_to_string(folder.path().join("asked")).unwrap();
+    let begun = Instant::now();
+    while !asked().contains("on the right") && child.try_wait().unwrap().is_none() {
+        assert!(begun.elapsed() < PATIENCE, "{}", asked());
+        thread::sleep(Duration::from_millis(100));
+    }
+    let interrupted = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(interrupted.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{}", asked());
+    rig.finish().unwrap();
+    let report = report(&file);
+    let names = ["usb", "camera", "clocks", "white", "markers", "noise"];
+    assert_eq!(steps(&report), names.map(|name| (name, true)), "{report}");
+    assert_eq!(report["not_done"], serde_json::json!(["press"]));
+    assert_eq!(report["right"], false);
+}
+
+#[test]
+fn without_a_camera_it_says_so() {
+    let words = ["no OV7725 on I2C1", "ribbon"];
+    ends_wrong(&["--fault", "camera-absent"], "camera", &words);
+}
+
+#[test]
+fn another_camera_is_named() {
+    let words = ["ID 76 21", "ribbon"];
+    ends_wrong(&["--fault", "camera-wrong-id"], "camera", &words);
+}
+
+#[test]
+fn a_register_that_the_camera_forgot_is_named() {
+    let words = ["register 03 holds 00, 40 was written"];
+    ends_wrong(
+        &["--scene", "rest", "--fault", "camera-forgets@100"],
+        "camera",
+        &words,
+    );
+}
+
+#[test]
+fn a_camera_at_half_its_rate_is_noticed() {
+    let words = ["half the frames"];
+    ends_wrong(
+        &["--scene", "rest", "--fault", "camera-slow"],
+        "clocks",
+        &words,
+    );
+}
+
+#[test]
+fn broken_frames_are_counted() {
+    let words = ["too few or too many bytes"];
+    ends_wrong(
+        &["--scene", "rest", "--fault", "frame-short@150-100000"],
+        "clocks",
+        &words,
+    );
+}
+
+/// Something touches the film during the tare.
+#[test]
+fn a_press_during_the_tare_is_refused() {
+    let (output, report) = bring_up(&["--scene", "static"]);
+    assert_eq!(output.code, Some(9), "{output:?}");
+    assert_eq!(steps(&report).last(), Some(&("noise", false)), "{report}");
+    let wrong = report["steps"].as_array().unwrap().last().unwrap()["wrong"].to_string();
+    assert!(
+        wrong.contains("not where a film at rest has them"),
+        "{wrong}"
+    );
+}
