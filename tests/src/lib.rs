@@ -28,3 +28,5 @@ pub mod rig;
 pub mod script;
 #[cfg(feature = "host")]
 pub mod tared;
+#[cfg(feature = "host")]
+pub mod workspaces;

@@ -2,38 +2,10 @@
 //! `docs/architecture.md` allows.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
-use serde_json::Value;
-
-/// Workspaces of the project, from its root.
-const WORKSPACES: [&str; 4] = ["", "rig", "tests/qemu", "xtask/instruction-counter"];
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .unwrap()
-        .to_owned()
-}
-
-fn cargo(folder: &Path, arguments: &[&str]) -> String {
-    let program = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let output = Command::new(program)
-        .current_dir(folder)
-        .args(arguments)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(
-        output.status.success(),
-        "cargo {arguments:?} in {}: {said}",
-        folder.display()
-    );
-    String::from_utf8(output.stdout).unwrap()
-}
+use hivtac_tests::workspaces::{self, cargo, from_root, root};
 
 /// A row of the table: a folder, its package, and the folders it may use; `None` for everything.
 struct Room {
@@ -72,32 +44,17 @@ fn room(line: &str) -> Option<Room> {
 /// depends on.
 fn packages() -> BTreeMap<String, (String, BTreeSet<String>)> {
     let mut packages = BTreeMap::new();
-    for workspace in WORKSPACES {
-        let arguments = ["metadata", "--no-deps", "--format-version", "1"];
-        let text = cargo(&root().join(workspace), &arguments);
-        let metadata: Value = serde_json::from_str(&text).unwrap();
-        for package in metadata["packages"].as_array().unwrap() {
-            let manifest = Path::new(package["manifest_path"].as_str().unwrap());
-            let uses = package["dependencies"].as_array().unwrap().iter();
-            // What only a package's own tests use goes into nothing that is built from it.
-            let uses = uses.filter(|dependency| dependency["kind"] != "dev");
-            let uses = uses.filter_map(|dependency| dependency["path"].as_str());
-            let uses = uses.map(|path| from_root(Path::new(path))).collect();
-            let name = package["name"].as_str().unwrap().to_owned();
-            packages.insert(name, (from_root(manifest.parent().unwrap()), uses));
-        }
+    for package in workspaces::packages() {
+        let manifest = Path::new(package["manifest_path"].as_str().unwrap());
+        let uses = package["dependencies"].as_array().unwrap().iter();
+        // What only a package's own tests use goes into nothing that is built from it.
+        let uses = uses.filter(|dependency| dependency["kind"] != "dev");
+        let uses = uses.filter_map(|dependency| dependency["path"].as_str());
+        let uses = uses.map(|path| from_root(Path::new(path))).collect();
+        let name = package["name"].as_str().unwrap().to_owned();
+        packages.insert(name, (from_root(manifest.parent().unwrap()), uses));
     }
     packages
-}
-
-fn from_root(path: &Path) -> String {
-    let path = path.canonicalize().unwrap();
-    let root = root().canonicalize().unwrap();
-    path.strip_prefix(root)
-        .unwrap()
-        .to_str()
-        .unwrap()
-        .to_owned()
 }
 
 #[test]

@@ -1,0 +1,3 @@
+//! Documents that list what the sources hold list all of it, and nothing else.
+
+mod dependencies;
