@@ -1,3 +1,4 @@
 //! Documents that list what the sources hold list all of it, and nothing else.
 
 mod dependencies;
+mod unsafe_code;
