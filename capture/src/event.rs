@@ -3,7 +3,7 @@
 /// One VSYNC edge: the one that begins a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Edge {
-    /// 1 for the first edge that counts; 0 when there was none yet.
+    /// 1 for the first edge that counts, and so on modulo 2³²; 0 when there was none yet.
     pub number: u32,
     /// Device time, µs since boot.
     pub time_us: u64,

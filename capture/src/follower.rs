@@ -151,16 +151,16 @@ impl Follower {
     /// looked at.
     pub fn pass_over(&mut self, newest: u32) {
         self.close();
-        let passed = newest.saturating_sub(self.accounted);
+        let passed = self.newer_by(newest);
         self.tally.passed += passed;
-        self.accounted += passed;
+        self.accounted = self.accounted.wrapping_add(passed);
         self.after_loss |= passed > 0;
     }
 
     fn band(&mut self, band: Band) -> Action {
         if band.index == 0 {
             self.close();
-            if band.edge.number > self.accounted {
+            if self.newer_by(band.edge.number) > 0 {
                 self.under = Under::Scanning {
                     edge: band.edge,
                     next: 0,
@@ -195,7 +195,7 @@ impl Follower {
         }
         match how {
             Ending::Overrun => {
-                self.after_overrun |= edge.number > self.accounted;
+                self.after_overrun |= self.newer_by(edge.number) > 0;
                 self.lost(edge.number, |tally| &mut tally.overrun);
             }
             Ending::Short | Ending::Long => self.lost(edge.number, |tally| &mut tally.size),
@@ -206,8 +206,8 @@ impl Follower {
 
     fn passed(&mut self, from: u32, to: u32, restart: bool) {
         self.close();
-        self.gap_before(from.saturating_add(1));
-        self.accounted = self.accounted.max(to);
+        self.gap_before(from.wrapping_add(1));
+        self.accounted = self.accounted.wrapping_add(self.newer_by(to));
         self.after_restart |= restart;
         self.after_loss |= restart || from > 0;
     }
@@ -235,7 +235,7 @@ impl Follower {
     /// Accounts for a frame that is not good, unless that was done already.
     fn lost(&mut self, number: u32, reason: impl FnOnce(&mut Tally) -> &mut u32) {
         self.under = Under::Nothing;
-        if number > self.accounted {
+        if self.newer_by(number) > 0 {
             self.gap_before(number);
             *reason(&mut self.tally) += 1;
             self.accounted = number;
@@ -245,11 +245,19 @@ impl Follower {
 
     /// Frames between the newest one accounted for and this one were not captured.
     fn gap_before(&mut self, number: u32) {
-        let gap = number.saturating_sub(self.accounted).saturating_sub(1);
+        let gap = self.newer_by(number).saturating_sub(1);
         if gap > 0 {
             self.tally.busy += gap;
-            self.accounted += gap;
+            self.accounted = self.accounted.wrapping_add(gap);
             self.after_loss = true;
         }
+    }
+
+    /// How many frames there are after the newest one accounted for, up to this number; 0 for one
+    /// that is not newer. Numbers wrap, after most of a year at the usual rate; no two that are
+    /// compared are 2³¹ apart.
+    fn newer_by(&self, number: u32) -> u32 {
+        let further = number.wrapping_sub(self.accounted);
+        if further < 1 << 31 { further } else { 0 }
     }
 }

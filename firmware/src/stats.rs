@@ -55,7 +55,7 @@ pub fn end_passing_over(newest: u32) {
 fn passed_over(newest: u32) -> u32 {
     match PASSING_OVER.load(Ordering::Relaxed) {
         NOT_PASSING => 0,
-        last => newest.saturating_sub(last),
+        last => newest.wrapping_sub(last),
     }
 }
 

@@ -53,7 +53,7 @@ fn EXTI9_5() {
     let _ = pending.read();
     let time_us = Instant::now().as_micros();
     NEWEST_EDGE.lock(|newest| {
-        let number = newest.get().number.saturating_add(1);
+        let number = newest.get().number.wrapping_add(1);
         newest.set(Edge { number, time_us });
     });
 }

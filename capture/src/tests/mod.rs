@@ -103,6 +103,24 @@ fn a_slow_reader_loses_frames_and_never_mixes_them() {
 }
 
 #[test]
+fn frames_go_on_when_their_numbers_begin_again() {
+    let mut world = World::new(Pace::prompt());
+    world.grow_old(u32::MAX - 2);
+    for _ in 0..4 {
+        world.send(GOOD);
+    }
+    let overrun = Sent {
+        overrun_at: Some(0),
+        ..GOOD
+    };
+    world.send(overrun);
+    world.settle();
+    assert_eq!(world.numbers(), [u32::MAX - 1, u32::MAX, 0, 1, 3]);
+    assert_eq!((world.tally.processed, world.tally.overrun), (5, 1));
+    assert_eq!(world.counted(), 6);
+}
+
+#[test]
 fn a_late_interrupt_loses_its_frame_and_never_mixes_bands() {
     let mut world = World::new(Pace {
         interrupts: std::vec![0, 3 * BAND, 0, 0, 0, 2 * BAND, 0],

@@ -180,7 +180,7 @@ impl World {
 
     /// The camera sends a frame.
     pub fn send(&mut self, frame: Sent) {
-        let number = self.chip.edge.number + 1;
+        let number = self.chip.edge.number.wrapping_add(1);
         self.chip.edge = Edge {
             number,
             time_us: self.now as u64,
@@ -200,6 +200,16 @@ impl World {
             self.chip.frame_flag = true;
         }
         self.pass(PULSE);
+    }
+
+    /// Years pass in which nothing is looked at: until the newest frame is that number.
+    pub fn grow_old(&mut self, newest: u32) {
+        for quarter in [1 << 30, 2 << 30, 3 << 30, newest] {
+            self.follower.pass_over(quarter);
+        }
+        self.chip.edge.number = newest;
+        self.follower.take_tally();
+        self.tracker.start(&mut self.chip);
     }
 
     /// For the next `words` of time the follower does something else, and then passes over what
