@@ -22,9 +22,6 @@ pub use crate::record::PAYLOAD_LIMIT;
 
 /// Sectors of a log: the first two of its flash.
 const SECTORS: u32 = 2;
-/// So many blank words in a row are the end of what was written in a sector. A record without a
-/// seal leaves one.
-const BLANKS_AT_THE_END: u32 = 4;
 /// Attempts to write a record before it is given up.
 const ATTEMPTS: u32 = 8;
 
@@ -158,15 +155,14 @@ impl<F: Flash> Log<F> {
     }
 
     /// Looks for the last record of a sector, which is taken when its generation is the highest so
-    /// far.
+    /// far. Blank words do not end it: each word that could not be programmed may be one.
     fn scan(&mut self, sector: u32, payload: &mut [u8; PAYLOAD_LIMIT]) {
-        let (mut place, mut blanks) = (Place { sector, word: 0 }, 0);
-        while place.word < F::SECTOR_WORDS && blanks < BLANKS_AT_THE_END {
+        let mut place = Place { sector, word: 0 };
+        while place.word < F::SECTOR_WORDS {
             let read = self.flash.read(place);
             let header = read.ok().as_ref().and_then(Header::of);
             let record = header.filter(|header| self.take(place, header, payload));
-            blanks = if read == Ok(BLANK) { blanks + 1 } else { 0 };
-            if blanks == 0 && self.is_newest_in(sector) {
+            if read != Ok(BLANK) && self.is_newest_in(sector) {
                 // Of what does not read right, this word may be the last; then that of a seal.
                 self.end = Some(place.behind(record.map_or(2, |header| header.words() + 1)));
                 self.settled &= record.is_some();

@@ -58,6 +58,8 @@ pub struct Cells {
     pub operations: u64,
     /// Words that cannot be programmed.
     pub worn: Vec<u32>,
+    /// Words that stay as they are when they are programmed.
+    pub deaf: Vec<u32>,
     chance: u64,
 }
 
@@ -68,6 +70,7 @@ impl Cells {
             erases: [0; SECTORS as usize],
             operations: 0,
             worn: Vec::new(),
+            deaf: Vec::new(),
             chance: seed,
         }
     }
@@ -159,6 +162,9 @@ impl Flash for Mock<'_> {
         if let Some(leaves) = self.begin() {
             self.cells.words[at] = Cells::left(leaves, at, before, *word);
             return pending().await;
+        }
+        if self.cells.deaf.contains(&(at as u32)) {
+            return Err(Failed);
         }
         if self.cells.worn.contains(&(at as u32)) {
             self.cells.words[at] = State::Torn;

@@ -20,6 +20,26 @@ fn bad_words_are_passed_over_and_counted() {
 }
 
 #[test]
+fn words_that_stay_blank_hide_nothing_behind_them() {
+    for (deaf, saves) in [(2..8, 2), (2..16, 2), (2..14, 4), (0..12, 5)] {
+        let mut cells = Cells::blank(1);
+        let mut kept = Kept::default();
+        for save in 0..saves {
+            cells.deaf = if save > 0 {
+                deaf.clone().collect()
+            } else {
+                vec![]
+            };
+            let action = Action::Set(vec![save; 20]);
+            let mut device = Device::start(&mut cells, None).unwrap();
+            device.act(&action).unwrap().unwrap();
+            kept = kept.after(&action);
+            assert_eq!(Device::start(&mut cells, None).unwrap().kept(), kept);
+        }
+    }
+}
+
+#[test]
 fn flash_that_is_worn_out_says_so_and_keeps_what_it_has() {
     let mut cells = Cells::blank(1);
     let settings = Action::Set(b"last".to_vec());
