@@ -4,6 +4,7 @@ mod artifacts;
 mod bench;
 mod columns;
 mod demo;
+mod fuzz;
 mod numbers;
 mod packages;
 mod process;

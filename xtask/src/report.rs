@@ -36,6 +36,8 @@ impl Tally {
 
 struct Step {
     name: &'static str,
+    /// Why it was left out.
+    obstacle: Option<&'static str>,
     problem: Option<String>,
     duration: Duration,
     tally: Tally,
@@ -63,11 +65,24 @@ impl Report {
         }
         self.steps.push(Step {
             name,
+            obstacle: None,
             problem,
             duration: start.elapsed(),
             tally,
         });
         result.ok()
+    }
+
+    /// Notes that a step that nothing depends on cannot run here, and why.
+    pub fn leave_out(&mut self, name: &'static str, obstacle: &'static str) {
+        eprintln!("\n=== {name} is left out: {obstacle}");
+        self.steps.push(Step {
+            name,
+            obstacle: Some(obstacle),
+            problem: None,
+            duration: Duration::ZERO,
+            tally: Tally::default(),
+        });
     }
 
     /// Prints the table.
@@ -82,6 +97,9 @@ impl Report {
         self.steps.iter().for_each(Step::print);
         let total = self.total();
         let failed: Vec<_> = self.failed().map(|step| step.name).collect();
+        for (step, obstacle) in self.left_out() {
+            println!("{step} was not run: {obstacle}");
+        }
         for step in self.failed() {
             println!("{}: {}", step.name, step.problem.as_deref().unwrap_or(""));
         }
@@ -97,6 +115,11 @@ impl Report {
         self.steps.iter().filter(|step| step.problem.is_some())
     }
 
+    fn left_out(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let steps = self.steps.iter();
+        steps.filter_map(|step| Some((step.name, step.obstacle?)))
+    }
+
     fn total(&self) -> Tally {
         self.steps.iter().fold(Tally::default(), |sum, step| Tally {
             passed: sum.passed + step.tally.passed,
@@ -107,10 +130,10 @@ impl Report {
 
 impl Step {
     fn print(&self) {
-        let result = if self.problem.is_some() {
-            "FAILED"
-        } else {
-            "ok"
+        let result = match (&self.problem, self.obstacle) {
+            (Some(_), _) => "FAILED",
+            (None, Some(_)) => "not run",
+            (None, None) => "ok",
         };
         let seconds = self.duration.as_secs_f64();
         let Tally { passed, failed } = self.tally;
@@ -170,6 +193,15 @@ mod tests {
         assert_eq!(report.step("two", |_| Ok(2)), Some(2));
         let error = report.finish().unwrap_err().to_string();
         assert!(error.contains("one") && !error.contains("two"), "{error}");
+    }
+
+    #[test]
+    fn a_step_that_was_left_out_is_told_and_fails_nothing() {
+        let mut report = Report::default();
+        report.leave_out("one", "it is night");
+        let told: Vec<_> = report.left_out().collect();
+        assert_eq!(told, [("one", "it is night")]);
+        assert!(report.finish().is_ok());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use clap::Args;
 use crate::artifacts::Board;
 use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
-use crate::{artifacts, bench, columns, packages, process, workspace};
+use crate::{artifacts, bench, columns, fuzz, packages, process, workspace};
 
 /// The workspaces: folder, and whether it has more than one package.
 const WORKSPACES: [(&str, bool); 4] = [
@@ -73,6 +73,12 @@ impl Test {
                 bench::board::build(toolchain)?;
                 bench::board::lint(toolchain)
             });
+        }
+        if self.all && self.wants("attacks") {
+            match fuzz::obstacle() {
+                None => drop(report.step("attacks", |_| fuzz::run())),
+                Some(obstacle) => report.leave_out("attacks", obstacle),
+            }
         }
         report.finish()
     }
