@@ -119,8 +119,8 @@ fn disc(frame: &mut [u16], columns: usize, (x, y, radius, pixel): Disc) {
     }
 }
 
-/// Measures a frame as a whole and in another way of giving its rows, takes it as a rest position, and measures it
-/// against that. Whether there were markers.
+/// Measures a frame as a whole and in another way of giving its rows, takes it as a rest position,
+/// and measures it against that. Whether there were markers.
 fn measure(sensor: &mut Sensor<'_>, frame: &[u16], input: &mut Unstructured<'_>) -> Result<bool> {
     let mut other = Box::new(sensor.clone());
     let whole = sensor.measure_frame(frame);
