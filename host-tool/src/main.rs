@@ -23,6 +23,7 @@ mod snapshot;
 mod tally;
 mod template;
 mod truth;
+mod view;
 
 use clap::{Args, Parser, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
@@ -181,6 +182,24 @@ enum Command {
         /// The report on standard output, too, instead of a line a step
         #[arg(long)]
         json: bool,
+    },
+    /// Show a live page in a browser of this computer: forces, picture, threshold, status
+    ///
+    /// Prints `ready` and the page's address, which holds a secret: nobody else on this computer or
+    /// in another page can open it. Ends with Ctrl-C; goes on after a lost connection. `--port`
+    /// more than once shows several sensors side by side.
+    ///
+    /// Example: hivtac view
+    View {
+        /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
+        #[arg(long, value_name = "PORT")]
+        port: Vec<String>,
+        /// Longest wait for the device's hello and replies, s
+        #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+        timeout: Duration,
+        /// The page's port on 127.0.0.1; one that is free when not given
+        #[arg(long, value_name = "PORT", default_value_t = 0)]
+        listen: u16,
     },
     /// Write a template to print: where the film is punched and the dots are stuck, as SVG
     Template {
@@ -411,6 +430,18 @@ fn run(command: Command) -> Result<(), Failure> {
             files,
             json,
         } => snapshot::run(&device.address(), device.timeout, &files.files(), json),
+        Command::View {
+            port,
+            timeout,
+            listen,
+        } => view::run(&view::Options {
+            addresses: match port.as_slice() {
+                [] => vec![Address::Find],
+                ports => ports.iter().map(|port| Address::parse(port)).collect(),
+            },
+            patience: timeout,
+            port: listen,
+        }),
         Command::Template { file, preset } => template::run(&file, preset),
         Command::BringUp {
             device,

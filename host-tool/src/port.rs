@@ -14,8 +14,8 @@ const TCP_PATIENCE: Duration = Duration::from_secs(2);
 
 /// A byte stream whose reads and writes give up after [`PATIENCE`] with an error of kind `TimedOut`
 /// or `WouldBlock`.
-pub trait Port: Read + Write {}
-impl<T: Read + Write> Port for T {}
+pub trait Port: Read + Write + Send {}
+impl<T: Read + Write + Send> Port for T {}
 
 /// Which port to use.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,3 +10,4 @@ mod recordings;
 mod run;
 mod sense;
 mod snapshot;
+mod view;

@@ -1,0 +1,136 @@
+//! Server-Sent Events: samples and states as they come, for as long as the browser reads.
+
+use super::feed::{Cursor, Feed, News};
+use super::lights;
+use super::response::{EVENTS, begin};
+use crate::lines::to_json;
+use hivtac_host::stop;
+use hivtac_terms::force::Force;
+use hivtac_wire::message::Sample;
+use serde::Serialize;
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Time between two looks for news: thirty times a second, which a screen shows as motion.
+const LOOK_EVERY: Duration = Duration::from_millis(33);
+/// Time after which a silent stream says that it is there, which finds out whether its reader is.
+const SAY_SOMETHING_EVERY: Duration = Duration::from_secs(5);
+
+/// Sends events until the reader is gone or too slow, or the program is to end.
+pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>]) -> io::Result<()> {
+    begin(out, EVENTS)?;
+    let mut readers: Vec<(&Feed, Cursor)> =
+        feeds.iter().map(|feed| (&**feed, feed.begin())).collect();
+    let mut text = event(
+        "hello",
+        &Hello {
+            sensors: feeds.len(),
+            lights: lights::all(),
+        },
+    );
+    let mut said = Instant::now();
+    while !stop::requested() {
+        let mut all_read = true;
+        for (sensor, (feed, cursor)) in readers.iter_mut().enumerate() {
+            let news = feed.news(cursor);
+            all_read &= news.samples.is_empty();
+            text += &told(sensor, &news);
+        }
+        if text.is_empty() && said.elapsed() >= SAY_SOMETHING_EVERY {
+            text += ":\n\n";
+        }
+        if !text.is_empty() {
+            out.write_all(text.as_bytes())?;
+            out.flush()?;
+            said = Instant::now();
+            text.clear();
+        }
+        // With what came meanwhile, a reader of the past is soon in the present.
+        if all_read {
+            std::thread::sleep(LOOK_EVERY);
+        } else {
+            std::thread::sleep(LOOK_EVERY / 4);
+        }
+    }
+    Ok(())
+}
+
+/// An event as the stream has it. JSON has no line ends.
+fn event(name: &str, data: &impl Serialize) -> String {
+    format!("event: {name}\ndata: {}\n\n", to_json(data))
+}
+
+fn told(sensor: usize, news: &News) -> String {
+    let mut text = String::new();
+    if let Some(state) = &news.state {
+        text += &format!("event: state\ndata: {{\"sensor\":{sensor},\"state\":{state}}}\n\n");
+    }
+    if !news.samples.is_empty() {
+        let samples = news.samples.iter().map(Row::from).collect();
+        let skipped = news.skipped;
+        text += &event(
+            "samples",
+            &Samples {
+                sensor,
+                skipped,
+                samples,
+            },
+        );
+    }
+    text
+}
+
+/// The first event.
+#[derive(Serialize)]
+struct Hello {
+    sensors: usize,
+    lights: Vec<lights::Light>,
+}
+
+#[derive(Serialize)]
+struct Samples {
+    sensor: usize,
+    skipped: u64,
+    samples: Vec<Row>,
+}
+
+/// A sample: sequence number, frame, device time in µs, status; then its force or `null`.
+#[derive(Serialize)]
+struct Row(u32, u32, u64, u32, Option<ForceRow>);
+
+/// Fx, Fy, Fz, |F| and its standard uncertainty in µN; α, β and the direction's in thousandths of a
+/// degree; then the place or `null`.
+#[derive(Serialize)]
+struct ForceRow(i32, i32, i32, i32, u32, i32, i32, u32, Option<[i64; 3]>);
+
+impl From<&Sample> for Row {
+    fn from(sample: &Sample) -> Row {
+        Row(
+            sample.sequence,
+            sample.frame,
+            sample.time_us,
+            sample.status.0,
+            sample.force.as_ref().map(ForceRow::from),
+        )
+    }
+}
+
+impl From<&Force> for ForceRow {
+    fn from(force: &Force) -> ForceRow {
+        let [x, y, z] = force.cartesian.map(|component| component.0);
+        ForceRow(
+            x,
+            y,
+            z,
+            force.magnitude.0,
+            force.magnitude_sigma.0,
+            force.alpha.0,
+            force.beta.0,
+            force.direction_sigma.0,
+            force
+                .place
+                .map(|place| [place.x.0.into(), place.y.0.into(), place.sigma.0.into()]),
+        )
+    }
+}

@@ -1,0 +1,159 @@
+//! What a status bit means to a person, and what to do about it.
+
+use hivtac_terms::status::Status;
+use serde::Serialize;
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// As it should be.
+    Good,
+    /// There is a force; it is worth less than it could be.
+    Warning,
+    /// There is no force.
+    Bad,
+}
+
+/// One status bit for the page.
+#[derive(Debug, Serialize)]
+pub struct Light {
+    /// The bit's value.
+    bit: u32,
+    /// Its name, as in all output.
+    name: &'static str,
+    level: Level,
+    /// What it means.
+    meaning: &'static str,
+    /// What to do; empty when nothing has to be done.
+    advice: &'static str,
+}
+
+/// Every bit that a status can have, lowest first.
+pub fn all() -> Vec<Light> {
+    let lights = Status::NAMES.iter().map(|(bit, name)| {
+        let (meaning, advice) = words(*bit);
+        Light {
+            bit: bit.0,
+            name,
+            level: level(*bit),
+            meaning,
+            advice,
+        }
+    });
+    lights.collect()
+}
+
+fn level(bit: Status) -> Level {
+    match bit {
+        _ if Status::NO_FORCE.contains(bit) => Level::Bad,
+        Status::CONTACT => Level::Good,
+        _ => Level::Warning,
+    }
+}
+
+fn words(bit: Status) -> (&'static str, &'static str) {
+    match bit {
+        Status::MARKERS_MISSING => (
+            "fewer than four markers are seen",
+            "look at the picture: is one covered, unlit or out of view?",
+        ),
+        Status::MARKERS_AMBIGUOUS => (
+            "no four things of the markers' colour lie as markers do, or too many",
+            "look at the picture: take what else has their colour out of view",
+        ),
+        Status::BLOB_OVERFLOW => (
+            "too many spots pass the threshold",
+            "narrow the threshold, or give more light",
+        ),
+        Status::MARKERS_IMPLAUSIBLE => (
+            "the markers differ in size or shape",
+            "look at the picture: clean the film, and light all markers alike",
+        ),
+        Status::MAGNITUDE_OUT_OF_RANGE => (
+            "more force than the model knows",
+            "press less, or calibrate to a larger force",
+        ),
+        Status::DIRECTION_UNRELIABLE => ("too little force to tell its direction", ""),
+        Status::IMAGE_SATURATED => (
+            "most of the picture passes the threshold, or is white",
+            "give less light and expose anew, or narrow the threshold",
+        ),
+        Status::IMAGE_DARK => (
+            "nothing passes the threshold",
+            "switch the light on, take the cap off and expose anew, or go back to the model's \
+             threshold",
+        ),
+        Status::FRAME_INCOMPLETE => (
+            "the frame came incomplete",
+            "check the camera's cable when it repeats",
+        ),
+        Status::FRAME_DROPPED => ("a frame before this one was not processed", ""),
+        Status::CAPTURE_OVERRUN => (
+            "bytes of the camera were lost",
+            "check the camera's cable when it repeats",
+        ),
+        Status::CAMERA_RESTARTED => (
+            "the camera was silent and was started again",
+            "check the camera's cable when it repeats",
+        ),
+        Status::TARE_MISSING => (
+            "no rest position was taken on this unit",
+            "touch nothing, and press \"Tare\"",
+        ),
+        Status::NOT_CALIBRATED => (
+            "the model is of a simulated sensor, not of this unit",
+            "calibrate this unit before you rely on newtons",
+        ),
+        Status::MODEL_MISSING => ("the device has no usable model", "flash one"),
+        Status::MODEL_MISMATCH => (
+            "the model was made for another threshold or another picture",
+            "go back to the model's threshold",
+        ),
+        Status::CONTACT => ("something touches the film", ""),
+        Status::SLIP => ("the contact slips", ""),
+        Status::DIRECTION_OUT_OF_RANGE => (
+            "more force along the film than the model knows",
+            "press more steeply",
+        ),
+        Status::PLACE_OUT_OF_RANGE => (
+            "the contact is outside the part of the film that the model knows",
+            "press nearer to the middle",
+        ),
+        Status::UNEXPLAINED => (
+            "no single contact explains where the markers are",
+            "press with one tip; at rest, take a new tare",
+        ),
+        _ => (
+            "this tool does not know of it",
+            "use the hivtac of the firmware's release",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The words for what is not known are nobody's.
+    #[test]
+    fn every_bit_has_words_of_its_own() {
+        let unknown = words(Status(1 << 31)).0;
+        let lights = all();
+        assert_eq!(lights.len(), Status::NAMES.len());
+        for light in &lights {
+            assert_ne!(light.meaning, unknown, "{}", light.name);
+            let same = lights.iter().filter(|it| it.meaning == light.meaning);
+            assert_eq!(same.count(), 1, "{}", light.name);
+        }
+    }
+
+    #[test]
+    fn what_takes_the_force_away_is_bad_and_says_what_to_do() {
+        for light in all() {
+            let takes_it = Status::NO_FORCE.contains(Status(light.bit));
+            assert_eq!(light.level == Level::Bad, takes_it, "{}", light.name);
+            assert!(!takes_it || !light.advice.is_empty(), "{}", light.name);
+        }
+    }
+}

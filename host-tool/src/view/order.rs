@@ -1,0 +1,126 @@
+//! What the page asks of a device: read from JSON, carried to the device's thread, and answered.
+
+use hivtac_host::frame::Taken;
+use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_wire::message::DeviceHello;
+use serde::Deserialize;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+/// What to do with a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Take the rest position.
+    Tare,
+    /// Find exposure and gain.
+    Expose,
+    /// Set the threshold.
+    Threshold(Threshold),
+    /// Set that of the model.
+    ModelThreshold,
+    /// Take a frame.
+    Picture,
+}
+
+/// How it went.
+pub enum Answer {
+    /// Done, in words for a person.
+    Done(String),
+    /// Not done, and why.
+    Failed(String),
+    /// The frame, and the device that took it.
+    Picture(Box<(Taken, DeviceHello)>),
+}
+
+/// An order on its way to the device's thread.
+pub struct Posted {
+    /// What to do.
+    pub order: Order,
+    answer: SyncSender<Answer>,
+}
+
+impl Posted {
+    /// An order, and where its answer will be.
+    pub fn new(order: Order) -> (Posted, Receiver<Answer>) {
+        let (answer, answers) = sync_channel(1);
+        (Posted { order, answer }, answers)
+    }
+
+    /// Answers it; whoever asked may have stopped waiting.
+    pub fn answer(self, answer: Answer) {
+        let _ = self.answer.try_send(answer);
+    }
+}
+
+/// An order as the page writes it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    sensor: usize,
+    order: String,
+    format: Option<String>,
+    limits: Option<[u8; 6]>,
+}
+
+/// Which of the sensors is to do what.
+///
+/// # Errors
+/// Says what cannot be understood.
+pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
+    let written: Written = serde_json::from_slice(body).map_err(|error| error.to_string())?;
+    let order = match written.order.as_str() {
+        "tare" => Order::Tare,
+        "expose" => Order::Expose,
+        "model_threshold" => Order::ModelThreshold,
+        "threshold" => Order::Threshold(threshold(&written)?),
+        _ => return Err("there is no such order".to_owned()),
+    };
+    Ok((written.sensor, order))
+}
+
+fn threshold(written: &Written) -> Result<Threshold, String> {
+    let name = written.format.as_deref();
+    let format = PixelFormat::ALL
+        .into_iter()
+        .find(|format| Some(format.name()) == name);
+    let (format, limits) = format
+        .zip(written.limits)
+        .ok_or("a threshold has a format and six limits")?;
+    Threshold::of_limits(format, limits).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_terms::threshold::{HsvBox, Yuv422};
+
+    #[test]
+    fn orders_are_understood() {
+        let tare = parse(br#"{"sensor":1,"order":"tare"}"#);
+        assert_eq!(tare, Ok((1, Order::Tare)));
+        let red = parse(
+            br#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[170,10,100,255,45,255]}"#,
+        );
+        assert_eq!(red, Ok((0, Order::Threshold(HsvBox::RED.into()))));
+        let cr = br#"{"sensor":0,"order":"threshold","format":"yuv422","limits":[162,0,0,0,0,0]}"#;
+        let expected = Threshold::Yuv422(Yuv422 { cr_low: 162 });
+        assert_eq!(parse(cr), Ok((0, Order::Threshold(expected))));
+    }
+
+    #[test]
+    fn whatever_else_comes_is_refused() {
+        for body in [
+            "",
+            "{}",
+            r#"{"sensor":-1,"order":"tare"}"#,
+            r#"{"sensor":0,"order":"format"}"#,
+            r#"{"sensor":0,"order":"tare","more":1}"#,
+            r#"{"sensor":0,"order":"threshold"}"#,
+            r#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[180,0,0,0,0,0]}"#,
+            r#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[300,0,0,0,0,0]}"#,
+            r#"{"sensor":0,"order":"threshold","format":"mono","limits":[9,8,0,0,0,0]}"#,
+            r#"{"sensor":0,"order":"threshold","format":"ccd","limits":[9,8,0,0,0,0]}"#,
+        ] {
+            assert!(parse(body.as_bytes()).is_err(), "{body}");
+        }
+    }
+}

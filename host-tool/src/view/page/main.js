@@ -1,0 +1,56 @@
+// The page: one stream of events, one view a sensor.
+
+import { SensorView } from "./sensor.js";
+
+const link = document.getElementById("link");
+const room = document.getElementById("sensors");
+let views = [];
+
+function begin(hello) {
+  room.replaceChildren();
+  views = Array.from({ length: hello.sensors }, (_, number) => {
+    const view = new SensorView(number, hello.lights);
+    room.append(view.element);
+    return view;
+  });
+  link.textContent = "";
+}
+
+/** A connection that begins anew tells the last half minute anew. */
+function listen() {
+  const events = new EventSource("events");
+  const on = (name, act) =>
+    events.addEventListener(name, (event) => act(JSON.parse(event.data)));
+  on("hello", begin);
+  on("state", ({ sensor, state }) => views[sensor].state(state));
+  on("samples", ({ sensor, skipped, samples }) => views[sensor].samples(samples, skipped));
+  events.onerror = () => {
+    link.textContent = "hivtac view has ended or does not answer: start it again, and open the " +
+      "address that it prints";
+    views.forEach((view) => view.gone());
+  };
+}
+
+/** The view that a key is for: the one with the focus, or the first. */
+function chosen() {
+  return views.find((view) => view.element.contains(document.activeElement)) ?? views[0];
+}
+
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
+  chosen()?.key(event.key.toLowerCase());
+});
+
+/** Twenty pictures a second are motion; more would cost the processor more. */
+const DRAW_EVERY_MS = 50;
+let drawn = 0;
+function draw(now) {
+  if (now - drawn >= DRAW_EVERY_MS) {
+    drawn = now;
+    views.forEach((view) => view.draw(now));
+  }
+  requestAnimationFrame(draw);
+}
+
+listen();
+requestAnimationFrame(draw);

@@ -1,0 +1,195 @@
+// One sensor: its numbers, lights, charts, arrow, picture and threshold.
+
+import { Arrow } from "./arrow.js";
+import { Chart } from "./chart.js";
+import { Picture } from "./picture.js";
+import { Threshold } from "./threshold.js";
+
+/** How long a light stays on after its last sample, so that it can be read. */
+const LIGHT_MS = 1500;
+const CONTACT = 1 << 16;
+/** The direction's uncertainty is that of an angle in a plane: √2 that along one axis. */
+const ONE_AXIS = Math.SQRT1_2;
+
+/** A sample of the stream as names, in mN, degrees and mm. */
+function named([sequence, frame, timeUs, status, row]) {
+  const sample = { sequence, frame, seconds: timeUs / 1e6, status, force: null };
+  if (row) {
+    const [x, y, z, magnitude, magnitudeSigma, alpha, beta, directionSigma, place] = row;
+    sample.force = {
+      vector: [x / 1e3, y / 1e3, z / 1e3],
+      magnitude: magnitude / 1e3,
+      magnitudeSigma: magnitudeSigma / 1e3,
+      alpha: alpha / 1e3,
+      beta: beta / 1e3,
+      directionSigma: directionSigma / 1e3,
+      place: place && { x: place[0] / 1e3, y: place[1] / 1e3, sigma: place[2] / 1e3 },
+    };
+  }
+  return sample;
+}
+
+/** Standard uncertainties of the components: the force's along itself and across. */
+function sigmas({ vector, magnitude, magnitudeSigma, directionSigma }) {
+  const across = magnitude * Math.min(directionSigma * ONE_AXIS * Math.PI / 180, 1);
+  return vector.map((component) => {
+    const along = magnitude > 0 ? component / magnitude : 0;
+    return Math.hypot(along * magnitudeSigma, Math.sqrt(Math.max(0, 1 - along * along)) * across);
+  });
+}
+
+export class SensorView {
+  constructor(number, lights) {
+    const template = document.getElementById("sensor");
+    this.element = template.content.firstElementChild.cloneNode(true);
+    this.number = number;
+    this.lights = lights;
+    this.seen = new Map();
+    this.newest = null;
+    this.shift = 0;
+    this.end = 0;
+    this.trouble = null;
+    this.arrow = new Arrow(this.part("arrow"), this.part("scale"));
+    this.size = new Chart(this.part("size"), ["size"], true);
+    this.components = new Chart(this.part("components"), ["x", "y", "z"], false);
+    const order = (what, more) => this.order(what, more);
+    this.picture = new Picture(number, (name) => this.part(name));
+    this.threshold = new Threshold(this.part("sliders"), order);
+    for (const button of this.element.querySelectorAll("[data-do]")) {
+      button.addEventListener("click", () => this.press(button));
+    }
+  }
+
+  part(name) {
+    return this.element.querySelector(`[data-is="${name}"]`);
+  }
+
+  say(name, text) {
+    const part = this.part(name);
+    if (part.textContent !== text) part.textContent = text;
+  }
+
+  /** Has the device do something; says how it went, and whether. */
+  async order(what, more = {}) {
+    const body = JSON.stringify({ sensor: this.number, order: what, ...more });
+    try {
+      const response = await fetch("order", { method: "POST", body });
+      const answer = response.ok ? await response.json() : { text: await response.text() };
+      this.say("answer", answer.text);
+      return answer.done === true;
+    } catch {
+      this.say("answer", "hivtac view does not answer");
+      return false;
+    }
+  }
+
+  async press(button) {
+    if (button.disabled) return;
+    button.disabled = true;
+    this.say("answer", "…");
+    await this.order(button.dataset.do);
+    button.disabled = false;
+  }
+
+  key(key) {
+    if (key === "t") this.press(this.element.querySelector('[data-do="tare"]'));
+    if (key === "p") this.part("picture-on").click();
+    if (key === "m") this.part("mask-on").click();
+  }
+
+  samples(rows, skipped) {
+    const now = performance.now();
+    if (skipped > 0) this.say("answer", `this page was too slow for ${skipped} samples`);
+    for (const row of rows) {
+      const sample = named(row);
+      this.place(sample);
+      for (const light of this.lights) {
+        if (sample.status & light.bit) this.seen.set(light.bit, now);
+      }
+      const { force } = sample;
+      this.size.add(sample.shown, force && [force.magnitude], force && [force.magnitudeSigma]);
+      this.components.add(sample.shown, force && force.vector, force && sigmas(force));
+      this.newest = sample;
+    }
+  }
+
+  /** On the charts' axis of time, where a device that starts anew goes on after a gap. */
+  place(sample) {
+    let shown = sample.seconds + this.shift;
+    if (shown < this.end) {
+      this.shift = this.end + 0.5 - sample.seconds;
+      shown = sample.seconds + this.shift;
+    }
+    this.end = shown;
+    sample.shown = shown;
+  }
+
+  state(state) {
+    this.trouble = state.trouble;
+    this.element.classList.toggle("gone", state.trouble !== null);
+    this.say("title", `${state.board} · ${state.unit}`);
+    this.say("facts", `${state.port} · ${state.firmware} · ${state.model ?? "no model"}`);
+    this.say("rate", state.rate_hz === null ? "–" : state.rate_hz.toFixed(1));
+    const causes = Object.entries(state.causes).filter(([, count]) => count > 0);
+    const why = causes.map(([cause, count]) => `${cause} ${count}`).join(", ");
+    this.say("lost", why ? `${state.lost} (${why})` : `${state.lost}`);
+    this.say("latency", state.latency_us ? (state.latency_us / 1e3).toFixed(2) : "–");
+    this.say("lines", state.lines.join("\n"));
+    const model = state.model_threshold;
+    this.say("model-threshold", model ? `the model's: ${model.text}` : "");
+    this.threshold.show(state.threshold);
+  }
+
+  gone() {
+    this.trouble = "no connection to hivtac";
+  }
+
+  draw(now) {
+    this.drawLights(now);
+    const force = this.trouble === null ? this.newest?.force ?? null : null;
+    this.drawNumbers(force);
+    this.size.draw(this.end);
+    this.components.draw(this.end);
+    this.arrow.draw(force, this.size.largest(), this.newest?.frame);
+  }
+
+  drawLights(now) {
+    const on = this.lights.filter((light) => now - (this.seen.get(light.bit) ?? -1e9) < LIGHT_MS);
+    const first = this.trouble === null
+      ? { level: "good", meaning: "connected", advice: "" }
+      : { level: "bad", meaning: this.trouble, advice: "" };
+    const all = this.trouble === null ? [first, ...on] : [first];
+    const text = JSON.stringify(all);
+    if (text === this.lit) return;
+    this.lit = text;
+    this.part("lights").replaceChildren(...all.map((light) => {
+      const item = document.createElement("li");
+      item.className = light.level;
+      item.dataset.light = light.name ?? "connection";
+      item.textContent = light.meaning;
+      if (light.advice) {
+        const advice = document.createElement("span");
+        advice.className = "advice";
+        advice.textContent = `: ${light.advice}`;
+        item.append(advice);
+      }
+      return item;
+    }));
+  }
+
+  drawNumbers(force) {
+    const show = (name, value, sigma, digits) => this.say(name, force && value !== undefined
+      ? `${value.toFixed(digits)} ± ${sigma.toFixed(digits)}` : "–");
+    const parts = force ? sigmas(force) : [];
+    show("magnitude", force?.magnitude, force?.magnitudeSigma, 2);
+    ["x", "y", "z"].forEach((name, axis) => show(name, force?.vector[axis], parts[axis], 2));
+    const angle = force && force.directionSigma * ONE_AXIS;
+    show("alpha", force?.alpha, angle, 2);
+    show("beta", force?.beta, angle, 2);
+    show("place-x", force?.place?.x, force?.place?.sigma, 3);
+    show("place-y", force?.place?.y, force?.place?.sigma, 3);
+    const contact = this.newest !== null && (this.newest.status & CONTACT) !== 0;
+    this.say("contact", force ? (contact ? "yes" : "no") : "–");
+    this.part("numbers").dataset.frame = force ? this.newest.frame : "";
+  }
+}

@@ -1,0 +1,52 @@
+//! A frame for the page: a line of JSON, then its pixels, then its mask.
+
+use super::state::Limits;
+use crate::finding::MarkerJson;
+use crate::focus::Focus;
+use crate::lines::to_json;
+use crate::look::{self, PASSED};
+use hivtac_host::frame::Taken;
+use hivtac_terms::status::Status;
+use hivtac_wire::message::DeviceHello;
+use serde::Serialize;
+
+/// What the page is told of a frame.
+#[derive(Serialize)]
+struct Told {
+    frame: u32,
+    width: u16,
+    height: u16,
+    /// What it was read with.
+    threshold: Limits,
+    /// Pixels that pass, without those that dilation adds.
+    passed: usize,
+    /// As the device found them; none when it did not.
+    markers: Option<Vec<MarkerJson>>,
+    /// What is wrong with the picture, and what to do; nothing while something presses the film,
+    /// which moves and changes the markers.
+    wrong: Vec<String>,
+}
+
+/// The line with its end, three levels a pixel, and the mask, a byte a pixel.
+pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
+    let frame = &taken.frame;
+    let pixels = usize::from(frame.width) * usize::from(frame.height);
+    let mask = look::mask(frame, device.dilations).unwrap_or_else(|| vec![0; pixels]);
+    let sample = taken.sample.as_ref();
+    let is_pressed = sample.is_some_and(|sample| sample.status.contains(Status::CONTACT));
+    let markers = sample.and_then(|sample| sample.markers);
+    let told = Told {
+        frame: frame.number,
+        width: frame.width,
+        height: frame.height,
+        threshold: Limits::of(&frame.threshold),
+        passed: mask.iter().filter(|&&level| level == PASSED).count(),
+        markers: markers.map(|four| MarkerJson::all(&four)),
+        wrong: match is_pressed {
+            true => Vec::new(),
+            false => Focus::of(frame, device).wrong,
+        },
+    };
+    let line = to_json(&told) + "\n";
+    [line.as_bytes(), &look::levels(frame), &mask].concat()
+}

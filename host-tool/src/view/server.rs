@@ -1,0 +1,232 @@
+//! The page's server: on this computer's own address alone, for those who know the token.
+
+use super::events;
+use super::feed::Feed;
+use super::order::{self, Answer, Order, Posted};
+use super::picture;
+use super::request::{self, Method, Request, Timed};
+use super::response::{self, BYTES, CSS, HTML, JSON, SCRIPT, Status};
+use super::token::Token;
+use super::unstalled::Unstalled;
+use hivtac_host::failure::Failure;
+use serde_json::json;
+use std::io;
+use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{SyncSender, TrySendError};
+use std::time::{Duration, Instant};
+
+/// Most connections at once; each has a thread.
+const MOST_CONNECTIONS: usize = 32;
+/// Longest time that a request may take to come.
+const REQUEST_PATIENCE: Duration = Duration::from_secs(5);
+/// Longest wait for what a device is ordered to do, on top of its own patience: a tare.
+const ORDER_PATIENCE: Duration = Duration::from_secs(15);
+
+/// The page's files: path, kind and text.
+const FILES: [(&str, &str, &str); 8] = [
+    ("/", HTML, include_str!("page/index.html")),
+    ("/style.css", CSS, include_str!("page/style.css")),
+    ("/main.js", SCRIPT, include_str!("page/main.js")),
+    ("/sensor.js", SCRIPT, include_str!("page/sensor.js")),
+    ("/arrow.js", SCRIPT, include_str!("page/arrow.js")),
+    ("/chart.js", SCRIPT, include_str!("page/chart.js")),
+    ("/picture.js", SCRIPT, include_str!("page/picture.js")),
+    ("/threshold.js", SCRIPT, include_str!("page/threshold.js")),
+];
+
+/// A device as its visitors see it.
+pub struct Sensor {
+    /// What it tells.
+    pub feed: Arc<Feed>,
+    /// Where its orders go.
+    pub orders: SyncSender<Posted>,
+}
+
+/// A server that listens.
+pub struct Server {
+    listener: TcpListener,
+    port: u16,
+    token: Token,
+    sensors: Vec<Sensor>,
+    patience: Duration,
+    connections: AtomicUsize,
+}
+
+impl Server {
+    /// Listens at a port of 127.0.0.1, 0 for any.
+    ///
+    /// # Errors
+    /// When the port is taken, or there are no random numbers.
+    pub fn new(port: u16, sensors: Vec<Sensor>, patience: Duration) -> Result<Server, Failure> {
+        let failed = |error: io::Error| {
+            Failure::input(format!(
+                "cannot listen at port {port} of this computer: {error}; choose another with \
+                 --listen"
+            ))
+        };
+        let listener = TcpListener::bind(("127.0.0.1", port)).map_err(failed)?;
+        let port = listener.local_addr().map_err(failed)?.port();
+        Ok(Server {
+            listener,
+            port,
+            token: Token::random()?,
+            sensors,
+            patience,
+            connections: AtomicUsize::new(0),
+        })
+    }
+
+    /// What to open in a browser.
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/{}/", self.port, self.token.text())
+    }
+
+    /// Answers as long as the program runs.
+    pub fn run(self: Arc<Server>) {
+        for stream in self.listener.incoming() {
+            let Ok(stream) = stream else {
+                // Too many open files, say: later there may be fewer.
+                std::thread::sleep(Duration::from_millis(50));
+                continue;
+            };
+            let visit = Visit::new(self.clone());
+            let begun = std::thread::Builder::new().spawn(move || visit.answer(&stream));
+            // Without a thread the connection is closed, and the browser may try again.
+            drop(begun);
+        }
+    }
+
+    /// Whether a request may be answered at all.
+    fn is_own<'r>(&self, request: &'r Request) -> Option<&'r str> {
+        let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port));
+        let origin = request.origin.as_deref();
+        let is_own_origin =
+            origin.is_none_or(|origin| origin == format!("http://{}", request.host));
+        let rest = self.token.rest(&request.path)?;
+        (hosts.contains(&request.host) && is_own_origin).then_some(rest)
+    }
+}
+
+/// A connection, counted while it lasts.
+struct Visit {
+    server: Arc<Server>,
+    is_one_too_many: bool,
+}
+
+impl Drop for Visit {
+    fn drop(&mut self) {
+        self.server.connections.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+impl Visit {
+    fn new(server: Arc<Server>) -> Visit {
+        let before = server.connections.fetch_add(1, Ordering::Relaxed);
+        Visit {
+            server,
+            is_one_too_many: before >= MOST_CONNECTIONS,
+        }
+    }
+
+    /// A browser that goes away or stalls is nobody's failure.
+    fn answer(self, stream: &TcpStream) {
+        let _ = self.try_to_answer(stream);
+    }
+
+    fn try_to_answer(&self, stream: &TcpStream) -> io::Result<()> {
+        stream.set_nodelay(true)?;
+        let mut out = Unstalled::new(stream)?;
+        if self.is_one_too_many {
+            return response::refuse(&mut out, Status::Busy);
+        }
+        let end = Instant::now() + REQUEST_PATIENCE;
+        let request = match request::read(&mut Timed { stream, end }) {
+            Ok(request) => request,
+            Err(status) => return refuse_unread(stream, status),
+        };
+        match self.server.is_own(&request) {
+            Some(path) => self.route(&mut out, &request, path),
+            None => response::refuse(&mut out, Status::Forbidden),
+        }
+    }
+
+    fn route(&self, out: &mut Unstalled<'_>, request: &Request, path: &str) -> io::Result<()> {
+        let file = FILES.iter().find(|(name, ..)| *name == path);
+        let picture = path.strip_prefix("/picture/");
+        match (request.method, file, picture) {
+            (Method::Get, Some((_, kind, text)), _) => {
+                response::send(out, Status::Ok, kind, text.as_bytes())
+            }
+            (Method::Get, _, Some(sensor)) => match sensor.parse() {
+                Ok(sensor) => self.picture(out, sensor),
+                Err(_) => response::refuse(out, Status::NotFound),
+            },
+            (Method::Get, ..) if path == "/events" => {
+                let feeds = self.server.sensors.iter().map(|sensor| sensor.feed.clone());
+                events::stream(out, &feeds.collect::<Vec<_>>())
+            }
+            (Method::Post, ..) if path == "/order" => self.order(out, &request.body),
+            (Method::Post, Some(_), _) => response::refuse(out, Status::Method),
+            _ => response::refuse(out, Status::NotFound),
+        }
+    }
+
+    fn picture(&self, out: &mut Unstalled<'_>, sensor: usize) -> io::Result<()> {
+        match self.ask(sensor, Order::Picture) {
+            Ok(Answer::Picture(picture)) => {
+                let (taken, device) = *picture;
+                let bytes = picture::bytes(&taken, &device);
+                response::send(out, Status::Ok, BYTES, &bytes)
+            }
+            Ok(Answer::Failed(why)) => said(out, false, &why),
+            Ok(Answer::Done(_)) => response::refuse(out, Status::NotFound),
+            Err(status) => response::refuse(out, status),
+        }
+    }
+
+    fn order(&self, out: &mut Unstalled<'_>, body: &[u8]) -> io::Result<()> {
+        let answer = match order::parse(body) {
+            Ok((sensor, order)) => self.ask(sensor, order),
+            Err(why) => return said(out, false, &why),
+        };
+        match answer {
+            Ok(Answer::Done(text)) => said(out, true, &text),
+            Ok(Answer::Failed(why)) => said(out, false, &why),
+            Ok(Answer::Picture(_)) => response::refuse(out, Status::NotFound),
+            Err(status) => response::refuse(out, status),
+        }
+    }
+
+    /// Has a device do something, and waits for it.
+    fn ask(&self, sensor: usize, order: Order) -> Result<Answer, Status> {
+        let sensor = self.server.sensors.get(sensor).ok_or(Status::NotFound)?;
+        let (posted, answers) = Posted::new(order);
+        match sensor.orders.try_send(posted) {
+            Ok(()) => (),
+            Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => return Err(Status::Busy),
+        }
+        let late = |_| Answer::Failed("the device did not answer in time".to_owned());
+        let patience = ORDER_PATIENCE + 2 * self.server.patience;
+        Ok(answers.recv_timeout(patience).unwrap_or_else(late))
+    }
+}
+
+/// An answer in words.
+fn said(out: &mut Unstalled<'_>, done: bool, text: &str) -> io::Result<()> {
+    let body = json!({ "done": done, "text": text }).to_string();
+    response::send(out, Status::Ok, JSON, body.as_bytes())
+}
+
+/// Refuses a request of which bytes may still come: a connection that is closed on them resets, and
+/// the browser may never see the answer.
+fn refuse_unread(stream: &TcpStream, status: Status) -> io::Result<()> {
+    response::refuse(&mut Unstalled::new(stream)?, status)?;
+    stream.shutdown(std::net::Shutdown::Write)?;
+    let end = Instant::now() + Duration::from_millis(500);
+    let mut rest = Timed { stream, end };
+    let mut buffer = [0; 4096];
+    while io::Read::read(&mut rest, &mut buffer)? > 0 {}
+    Ok(())
+}

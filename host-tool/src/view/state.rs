@@ -1,0 +1,235 @@
+//! How a device stands: who it is, whether it is there, its rate, losses and latency.
+
+use crate::lines::to_json;
+use crate::tally::Tally;
+use hivtac_host::link::log_text;
+use hivtac_host::shown::{shown, unit_number};
+use hivtac_host::threshold;
+use hivtac_terms::threshold::Threshold;
+use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLine, Sample, Stats};
+use serde::Serialize;
+use std::collections::{BTreeMap, VecDeque};
+
+/// Samples that the rate is taken from.
+const RATE_OF: usize = 256;
+/// The device's lines that are shown.
+const LINES: usize = 8;
+
+/// Everything about a device but its samples.
+pub struct State {
+    port: String,
+    /// As the device said it last.
+    pub hello: DeviceHello,
+    /// Why there are no samples; nothing while they come.
+    pub trouble: Option<String>,
+    /// Losses since the page's server was started.
+    pub tally: Tally,
+    times_us: VecDeque<u64>,
+    stats: Option<Stats>,
+    lines: VecDeque<String>,
+}
+
+impl State {
+    /// Of a device that is connected.
+    pub fn new(port: String, hello: DeviceHello) -> State {
+        State {
+            port,
+            hello,
+            trouble: None,
+            tally: Tally::default(),
+            times_us: VecDeque::new(),
+            stats: None,
+            lines: VecDeque::new(),
+        }
+    }
+
+    /// Takes in what the device says.
+    pub fn take(&mut self, message: &DeviceMessage) {
+        match message {
+            DeviceMessage::Sample(sample) => self.sample(sample),
+            DeviceMessage::Stats(stats) => {
+                self.tally.stats(stats);
+                self.stats = Some(*stats);
+            }
+            DeviceMessage::Hello(hello) => self.hello = hello.clone(),
+            DeviceMessage::Log(line) => self.line(line),
+            _ => (),
+        }
+    }
+
+    fn sample(&mut self, sample: &Sample) {
+        self.tally.sample(sample);
+        self.trouble = None;
+        let newest = self.times_us.back().copied().unwrap_or(0);
+        if sample.time_us < newest {
+            // It started anew, and its clock with it.
+            self.times_us.clear();
+        }
+        if self.times_us.len() == RATE_OF {
+            self.times_us.pop_front();
+        }
+        self.times_us.push_back(sample.time_us);
+    }
+
+    fn line(&mut self, line: &LogLine) {
+        if self.lines.len() == LINES {
+            self.lines.pop_front();
+        }
+        self.lines.push_back(log_text(line));
+    }
+
+    /// The connection is lost, or the device silent.
+    pub fn trouble(&mut self, why: String) {
+        self.trouble = Some(why);
+        self.times_us.clear();
+    }
+
+    /// Samples a second, by the device's clock.
+    fn rate_hz(&self) -> Option<f64> {
+        let (first, last) = self.times_us.front().zip(self.times_us.back())?;
+        let steps = self.times_us.len().checked_sub(1)?;
+        (last > first).then(|| steps as f64 * 1e6 / (last - first) as f64)
+    }
+
+    /// One JSON object.
+    pub fn json(&self) -> String {
+        let hello = &self.hello;
+        let model = hello.model.as_ref();
+        to_json(&Told {
+            port: &self.port,
+            trouble: self.trouble.as_deref(),
+            unit: unit_number(&hello.device_id),
+            board: shown(&hello.board),
+            firmware: shown(&hello.firmware),
+            model: model.map(|model| shown(&model.name)),
+            simulated: model.is_some_and(|model| model.simulated),
+            threshold: Limits::of(&hello.threshold),
+            model_threshold: model.map(|model| Limits::of(&model.threshold)),
+            rate_hz: self.rate_hz(),
+            lost: self.tally.lost(),
+            causes: self.tally.causes(),
+            latency_us: self.stats.map(|stats| stats.latency_us),
+            processing_us: self.stats.map(|stats| stats.processing_us),
+            lines: &self.lines,
+        })
+    }
+}
+
+/// The state as the page reads it.
+#[derive(Serialize)]
+struct Told<'s> {
+    port: &'s str,
+    trouble: Option<&'s str>,
+    unit: String,
+    board: String,
+    firmware: String,
+    model: Option<String>,
+    simulated: bool,
+    threshold: Limits,
+    model_threshold: Option<Limits>,
+    rate_hz: Option<f64>,
+    lost: u64,
+    causes: BTreeMap<&'static str, u64>,
+    latency_us: Option<u32>,
+    processing_us: Option<u32>,
+    lines: &'s VecDeque<String>,
+}
+
+/// A threshold as the page reads and writes it.
+#[derive(Serialize)]
+pub struct Limits {
+    format: &'static str,
+    limits: [u8; 6],
+    text: String,
+}
+
+impl Limits {
+    /// Of a threshold.
+    pub fn of(wanted: &Threshold) -> Limits {
+        Limits {
+            format: wanted.format().name(),
+            limits: wanted.limits(),
+            text: threshold::text(wanted),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_terms::conditions::CentroidEstimator;
+    use hivtac_terms::status::Status;
+    use hivtac_terms::threshold::HsvBox;
+
+    fn state() -> State {
+        let hello = DeviceHello {
+            protocol: 2,
+            schema: 0,
+            device_id: [7; 12],
+            board: "<b>\u{1b}[2J".try_into().unwrap(),
+            firmware: "fake".try_into().unwrap(),
+            model: None,
+            width: 320,
+            height: 240,
+            threshold: HsvBox::RED.into(),
+            preset: "ov7725".try_into().unwrap(),
+            dilations: 1,
+            centroid: CentroidEstimator::BinaryMask,
+        };
+        State::new("a port".to_owned(), hello)
+    }
+
+    fn sample(number: u32, time_us: u64) -> DeviceMessage {
+        DeviceMessage::Sample(Sample {
+            sequence: number,
+            frame: number,
+            time_us,
+            status: Status::OK,
+            force: None,
+            markers: None,
+        })
+    }
+
+    fn json(state: &State) -> serde_json::Value {
+        serde_json::from_str(&state.json()).unwrap()
+    }
+
+    #[test]
+    fn the_rate_is_that_of_the_devices_clock() {
+        let mut state = state();
+        assert!(json(&state)["rate_hz"].is_null());
+        let frames = 0..600_u32;
+        frames.for_each(|n| state.take(&sample(n, 5_000 * u64::from(n))));
+        assert_eq!(json(&state)["rate_hz"], 200.0);
+        // It starts anew, at another rate.
+        (0..3).for_each(|n| state.take(&sample(n, 10_000 * u64::from(n))));
+        assert_eq!(json(&state)["rate_hz"], 100.0);
+    }
+
+    #[test]
+    fn trouble_is_over_with_the_next_sample() {
+        let mut state = state();
+        state.take(&sample(1, 1));
+        state.trouble("pulled".to_owned());
+        assert_eq!(json(&state)["trouble"], "pulled");
+        state.take(&sample(9, 2));
+        let told = json(&state);
+        assert_eq!((&told["trouble"], &told["lost"]), (&().into(), &7.into()));
+    }
+
+    #[test]
+    fn the_devices_texts_act_on_nothing_and_are_bounded() {
+        let mut state = state();
+        for _ in 0..100 {
+            state.take(&DeviceMessage::Log(LogLine {
+                level: hivtac_wire::message::LogLevel::Info,
+                time_us: 0,
+                text: "\u{202e}x".try_into().unwrap(),
+            }));
+        }
+        let told = json(&state);
+        assert_eq!(told["board"], r"<b>\u{1b}[2J");
+        assert_eq!(told["lines"].as_array().unwrap().len(), LINES);
+        assert_eq!(told["lines"][0], r"device, 0.000 s, info: \u{202e}x");
+    }
+}
