@@ -1,14 +1,15 @@
 //! The MDMA: one block of memory to another place, on software request. It alone reaches DTCM.
 //!
 //! # Note
-//! Coherence: AXI SRAM is not cached (`caches`), nor is DTCM ever. A barrier on each side keeps the
-//! core's accesses to the blocks from moving past the start and the end.
+//! Coherence: AXI SRAM and the flash's second bank are not cached (`caches`), nor is DTCM ever. A
+//! barrier on each side keeps the core's accesses to the blocks from moving past the start and the
+//! end.
 
 use embassy_stm32::pac::mdma::{Ch, regs, vals};
 use embassy_stm32::pac::{MDMA, RCC};
 
-/// Bytes that the MDMA reads and then writes at once: its whole buffer. Every block is a multiple
-/// of it, in size and place.
+/// Most bytes that the MDMA reads and then writes at once: its whole buffer. Every block is a
+/// multiple of it in size and place, or half or a quarter of it.
 pub const BUFFER_BYTES: u32 = 128;
 /// Looks at a move under way before it counts as failed: a few milliseconds.
 const PATIENCE: u32 = 100_000;
@@ -18,7 +19,7 @@ const ALL_FLAGS: u32 = 0x1F;
 /// One end of a move: the address of its first byte.
 #[derive(Clone, Copy)]
 pub enum End {
-    /// In AXI SRAM: words of 8 bytes.
+    /// On the AXI bus, as AXI SRAM and flash: words of 8 bytes.
     Axi(u32),
     /// In DTCM: words of 4 bytes, as more is not allowed there (RM0433, MDMA_CxTCR).
     Tcm(u32),
@@ -40,7 +41,10 @@ impl<const CHANNEL: usize> BlockMove<CHANNEL> {
         channel.cr().write_value(regs::Cr(0));
         while channel.cr().read().en() {}
         channel.ifcr().write_value(regs::Ifcr(ALL_FLAGS));
-        channel.tcr().write(|w| set_up(w, source, destination));
+        let at_once = BUFFER_BYTES.min(bytes as u32);
+        channel
+            .tcr()
+            .write(|w| set_up(w, source, destination, at_once));
         channel.bndtr().write(|w| w.set_bndt(bytes as u32));
         channel.sar().write_value(regs::Sar(source.address()));
         channel.dar().write_value(regs::Dar(destination.address()));
@@ -92,6 +96,13 @@ impl End {
         }
     }
 
+    fn word_bytes(self) -> u32 {
+        match self {
+            End::Axi(_) => 8,
+            End::Tcm(_) => 4,
+        }
+    }
+
     fn bus(self) -> vals::Bus {
         match self {
             End::Axi(_) => vals::Bus::SYSTEM,
@@ -100,17 +111,27 @@ impl End {
     }
 }
 
-/// One software request moves one block.
-fn set_up(w: &mut regs::Tcr, source: End, destination: End) {
+/// So many words at once: a buffer is filled or emptied by one burst or by whole ones.
+fn burst(words: u32) -> vals::Burst {
+    match words {
+        16.. => vals::Burst::INCR16,
+        8.. => vals::Burst::INCR8,
+        4.. => vals::Burst::INCR4,
+        _ => vals::Burst::SINGLE,
+    }
+}
+
+/// One software request moves one block, so many bytes at once.
+fn set_up(w: &mut regs::Tcr, source: End, destination: End, at_once: u32) {
     w.set_sinc(vals::Incmode::INCREMENT);
     w.set_ssize(source.word());
     w.set_sincos(source.word());
-    w.set_sburst(vals::Burst::INCR16);
+    w.set_sburst(burst(at_once / source.word_bytes()));
     w.set_dinc(vals::Incmode::INCREMENT);
     w.set_dsize(destination.word());
     w.set_dincos(destination.word());
-    w.set_dburst(vals::Burst::INCR16);
-    w.set_tlen((BUFFER_BYTES - 1) as u8);
+    w.set_dburst(burst(at_once / destination.word_bytes()));
+    w.set_tlen((at_once - 1) as u8);
     w.set_pke(true);
     w.set_trgm(vals::Trgm::BLOCK);
     w.set_swrm(true);

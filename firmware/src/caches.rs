@@ -5,6 +5,7 @@
 //! no cache line can ever hold a stale pixel and no code has to remember to invalidate one. DTCM is
 //! never cached.
 
+use crate::flash;
 use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 
@@ -26,6 +27,8 @@ const NO_ACCESS: u32 = 0b000 << 24;
 const FULL_ACCESS: u32 = 0b011 << 24;
 const READ_ONLY: u32 = 0b110 << 24;
 const STRONGLY_ORDERED: u32 = 0;
+/// TEX = 0, C = 0, B = 1.
+const DEVICE: u32 = 1 << 16;
 /// TEX = 1, C = 0, B = 0; shareable, as two bus masters use it.
 const NORMAL_NON_CACHEABLE: u32 = 1 << 19 | 1 << 18;
 const NEVER_EXECUTE: u32 = 1 << 28;
@@ -62,6 +65,17 @@ const NEAR_CODE: Region = Region {
     execute: true,
 };
 
+/// The flash's second bank: nothing is read ahead while it is programmed or erased, and what is
+/// stored arrives at once and in order.
+const KEPT: Region = Region {
+    base: flash::BASE,
+    size_log2: flash::SIZE_LOG2,
+    disabled_eighths: 0,
+    access: FULL_ACCESS,
+    memory_type: DEVICE,
+    execute: false,
+};
+
 /// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA
 /// buffer.
 pub fn enable(core: &mut Peripherals) {
@@ -79,7 +93,7 @@ fn set_regions(mpu: &mut MPU) {
     // default attributes.
     unsafe {
         mpu.ctrl.write(0);
-        for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS, NEAR_CODE]) {
+        for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS, NEAR_CODE, KEPT]) {
             mpu.rnr.write(number);
             mpu.rbar.write(region.base);
             mpu.rasr.write(region.attributes());

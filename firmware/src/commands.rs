@@ -3,41 +3,40 @@
 use crate::capture_task::{self, Action};
 use crate::pipeline_task::Order;
 use crate::shared::ORDERS;
-use crate::{info, outbox, session, snapshot, stats};
-use hivtac_sensing::model::Model;
+use crate::{info, memory, outbox, session, settings, snapshot, stats};
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
 use hivtac_wire::version::HelloPrefix;
 
-/// Acts on one message. `model` is for the hello.
-pub async fn handle(received: Received<HostMessage>, model: Option<&Model<'_>>) {
+/// Acts on one message.
+pub async fn handle(received: Received<HostMessage>) {
     match received {
         Received::Message(HostMessage::Hello(hello)) => {
             let prefix = HelloPrefix {
                 protocol: hello.protocol,
                 schema: hello.schema,
             };
-            greet(prefix, model).await;
+            greet(prefix).await;
         }
-        Received::ForeignHello(prefix) => greet(prefix, model).await,
+        Received::ForeignHello(prefix) => greet(prefix).await,
         // Before a hello, and after one of another version, commands are ignored.
         Received::Message(HostMessage::Command(command)) if session::is_open() => {
-            obey(command, model).await;
+            obey(command).await;
         }
         Received::Message(HostMessage::Command(_)) => {}
     }
 }
 
-async fn greet(prefix: HelloPrefix, model: Option<&Model<'_>>) {
+async fn greet(prefix: HelloPrefix) {
     session::begin(prefix.is_ours());
     outbox::clear();
-    outbox::answer(DeviceMessage::Hello(info::hello(model))).await;
+    outbox::answer(DeviceMessage::Hello(info::hello())).await;
 }
 
-async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
+async fn obey(Command { id, request }: Command) {
     let outcome = match request {
         Request::GetInfo => {
-            outbox::answer(DeviceMessage::Hello(info::hello(model))).await;
+            outbox::answer(DeviceMessage::Hello(info::hello())).await;
             outbox::answer(DeviceMessage::Stats(stats::snapshot())).await;
             Outcome::Done
         }
@@ -70,6 +69,23 @@ async fn obey(Command { id, request }: Command, model: Option<&Model<'_>>) {
             None => return,
         },
         Request::Tare { frames } => match order(Order::Tare { id, frames }) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::SetTare(position) => match order(Order::SetTare { id, position }) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::SetName(name) => {
+            settings::set_name(name);
+            Outcome::Done
+        }
+        // The memory task replies itself, when it has done so.
+        Request::GetSettings => match memory::order(memory::Action::Report, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::Keep(selection) => match memory::order(memory::Action::Keep(selection), id) {
             Some(outcome) => outcome,
             None => return,
         },

@@ -5,6 +5,7 @@
 //! camera ┴→ capture → bands → pipeline → outbox → usb → host
 //!                                ↑                 │
 //!                             orders ← commands ←──┘
+//!                                         └→ memory → flash
 //! ```
 //!
 //! Who interrupts whom: [`priorities`]. What they share: [`shared`]. What lies where: `memory.x`,
@@ -23,9 +24,11 @@ mod capture;
 mod capture_task;
 mod commands;
 mod faults;
+mod flash;
 mod health;
 mod info;
 mod log;
+mod memory;
 mod model;
 mod near_table;
 mod next_threshold;
@@ -34,6 +37,7 @@ mod pipeline_task;
 mod priorities;
 mod seeded_bugs;
 mod session;
+mod settings;
 mod shared;
 mod snapshot;
 mod snapshot_copy;
@@ -51,6 +55,8 @@ use embassy_stm32::interrupt;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::threshold::{ByteOrder, Threshold};
+use hivtac_wire::kept::Record;
+use memory::Memory;
 use pipeline_task::Sensor;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -75,10 +81,13 @@ fn main() -> ! {
     vsync::start();
     let model = model::embedded();
     let sensor = SENSOR.take();
-    let format = configure(sensor, model);
+    let memory = Memory::open(board.flash);
+    settings::set_name(memory.record().name.clone());
+    let format = configure(sensor, model, memory.record());
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
-    usb.spawn(token(usb::run(board.usb, model)));
+    usb.spawn(token(usb::run(board.usb)));
+    usb.spawn(token(memory::run(memory)));
     usb.spawn(token(health::run(board.led)));
     let capture = CAPTURE_EXECUTOR.start(priorities::CAPTURE_EXECUTOR);
     capture.spawn(token(capture_task::run(
@@ -98,14 +107,36 @@ fn main() -> ! {
         })
 }
 
-/// Sets the pipeline to the camera's frames and to the threshold that the model was made for, or to
-/// the usual one of its pixels, and says what pixels it asks for. A model for pixels that the
-/// camera does not send gives no force then, and every sample says so.
-fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
+/// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
+fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) -> Format {
+    let mut settings = usual(&model);
+    let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
+    if let Some(threshold) = kept.threshold.filter(is_sent) {
+        settings.threshold = threshold;
+    }
+    if sensor.configure(settings, model).is_err() {
+        defmt::panic!("the built-in settings are out of range");
+    }
+    sensor.set_motion(camera::MOTION);
+    let tare = kept.tare.as_ref();
+    match tare.map(|tare| settings::rest(tare, sensor.settings())) {
+        Some(Ok(rest)) => sensor.set_tare(Some(rest)),
+        Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
+        None => {}
+    }
+    settings::follow(sensor);
+    // Always one that the camera sends.
+    Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
+}
+
+/// The camera's frames and the threshold that the model was made for, or the usual one of its
+/// pixels. A model for pixels that the camera does not send gives no force then, and every sample
+/// says so.
+fn usual(model: &Option<Model<'static>>) -> Settings {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;
     let sent = |model: &Model| Format::of(model.conditions.threshold.format());
-    let settings = match &model {
+    match model {
         Some(model) if sent(model).is_some() => Settings {
             geometry,
             ..model.conditions.settings(order)
@@ -114,14 +145,7 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>) -> Format {
             threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
             ..Settings::usual(geometry, order)
         },
-    };
-    if sensor.configure(settings, model).is_err() {
-        defmt::panic!("the built-in settings are out of range");
     }
-    sensor.set_motion(camera::MOTION);
-    info::set_settings(sensor.settings());
-    // Always one that the camera sends.
-    Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

@@ -11,7 +11,7 @@ use crate::session::Asked;
 use crate::shared::{CAPTURE_EVENTS, ORDERS};
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
-use crate::{info, outbox, session, stats, vsync};
+use crate::{outbox, session, settings, stats, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
@@ -19,6 +19,7 @@ use hivtac_sensing::pipeline::{self, Measurement};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{Outcome, Sample};
+use hivtac_wire::settings::RestPosition;
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
 pub enum Order {
@@ -35,6 +36,13 @@ pub enum Order {
         id: u16,
         /// How many; unchecked.
         frames: u16,
+    },
+    /// Take this as the rest position, or none.
+    SetTare {
+        /// Of the command.
+        id: u16,
+        /// As it came, unchecked.
+        position: Option<RestPosition>,
     },
     /// Keep the next whole frame and send it.
     Snapshot(Asked),
@@ -198,7 +206,23 @@ impl PipelineTask {
                 Some(taring) => self.taring = Some(taring),
                 None => outbox::reply(id, Outcome::InvalidArgument),
             },
+            Order::SetTare { id, position } => {
+                outbox::reply(id, self.set_tare(position));
+            }
             Order::Snapshot(asked) => self.snapshots.begin(asked),
+        }
+    }
+
+    fn set_tare(&mut self, position: Option<RestPosition>) -> Outcome {
+        let rest = position.map(|position| settings::rest(&position, self.sensor.settings()));
+        match rest.transpose() {
+            Ok(rest) => {
+                self.give_up_tare();
+                self.sensor.set_tare(rest);
+                settings::follow(self.sensor);
+                Outcome::Done
+            }
+            Err(outcome) => outcome,
         }
     }
 
@@ -217,7 +241,7 @@ impl PipelineTask {
     /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
     /// which frames pass.
     fn threshold_changed(&mut self) {
-        info::set_settings(self.sensor.settings());
+        settings::follow(self.sensor);
         self.sensor.forget_motion();
         let mut missed = false;
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
@@ -288,6 +312,7 @@ impl PipelineTask {
         if let Some(outcome) = taring.add(self.sensor, measurement) {
             if let Ok(rest) = outcome {
                 self.sensor.set_tare(Some(rest));
+                settings::follow(self.sensor);
             }
             outbox::reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
             self.taring = None;

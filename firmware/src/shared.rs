@@ -2,9 +2,9 @@
 //!
 //! Contexts are those of [`priorities`](crate::priorities): the *VSYNC handler*, the *capture
 //! handlers* (DCMI and its DMA, of one priority), the *capture task*, the *USB tasks* (receiver,
-//! sender, watch on DTR, statistics; of one executor, as is the *LED task*), and in thread mode the
-//! *pipeline*. Each item is a lock, a queue or an atomic; the functions around it stand in the
-//! module of its subject, and nothing else touches it.
+//! sender, watch on DTR, statistics; of one executor, as are the *LED task* and the *memory task*),
+//! and in thread mode the *pipeline*. Each item is a lock, a queue or an atomic; the functions
+//! around it stand in the module of its subject, and nothing else touches it.
 //!
 //! Elsewhere, with the type or the list that belongs to them:
 //!
@@ -23,7 +23,9 @@ use crate::camera::{Format, USUAL_FORMAT};
 use crate::capture::{CaptureEvent, Running};
 use crate::capture_task::CameraOrder;
 use crate::health::Condition;
+use crate::memory::MemoryOrder;
 use crate::pipeline_task::Order;
+use crate::settings::OfPipeline;
 use crate::snapshot::Taken;
 use crate::stats;
 use core::cell::{Cell, RefCell};
@@ -33,8 +35,8 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use hivtac_capture::Edge;
-use hivtac_sensing::settings::Settings;
 use hivtac_wire::message::{DeviceMessage, Sample};
+use hivtac_wire::settings::Name;
 
 /// What waits for one receiver; whoever sends never waits longer than for room.
 type Queue<T, const N: usize> = Channel<CriticalSectionRawMutex, T, N>;
@@ -99,9 +101,9 @@ pub static PASSING_OVER: AtomicU32 = AtomicU32::new(stats::NOT_PASSING);
 /// Orders of the host that wait. From the USB tasks to the pipeline.
 pub static ORDERS: Queue<Order, 4> = Queue::new();
 
-/// The pipeline's settings; nothing before it is configured. Written at boot and by the pipeline;
-/// read by the USB tasks (`info`).
-pub static SETTINGS: CriticalSectionMutex<Cell<Option<Settings>>> =
+/// What the pipeline measures with; nothing before it is configured. Written at boot and by the
+/// pipeline; read by the USB tasks and the memory task (`settings`).
+pub static PIPELINE: CriticalSectionMutex<Cell<Option<OfPipeline>>> =
     CriticalSectionMutex::new(Cell::new(None));
 
 /// How the sensor is doing, a [`Condition`]. Written by the pipeline and the capture task; read by
@@ -114,6 +116,19 @@ pub static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
 
 /// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
 pub static SNAPSHOT_TAKEN: Request<Taken> = Request::new();
+
+// What is kept.
+
+/// The device's name. Written at boot and by the USB tasks; read by them and the memory task
+/// (`settings`).
+pub static NAME: CriticalSectionMutex<Cell<Name>> =
+    CriticalSectionMutex::new(Cell::new(Name::new()));
+
+/// What a host asks of the flash. From the USB tasks to the memory task.
+pub static MEMORY_ORDER: Request<MemoryOrder> = Request::new();
+
+/// Such an order is under way. Set by the USB tasks, cleared by the memory task (`memory`).
+pub static MEMORY_ORDERED: AtomicBool = AtomicBool::new(false);
 
 // The conversation with the host.
 

@@ -24,7 +24,6 @@ use embassy_stm32::{bind_interrupts, peripherals};
 use embassy_time::{Duration, Ticker, with_timeout};
 use embassy_usb::class::cdc_acm::{CdcAcmClass, ControlChanged, Receiver, Sender, State};
 use embassy_usb::{Builder, Config};
-use hivtac_sensing::model::Model;
 use hivtac_wire::decoder::Decoder;
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::DeviceMessage;
@@ -45,9 +44,9 @@ bind_interrupts!(struct Irqs {
 
 type Port<'d> = Guarded<Driver<'d, peripherals::USB_OTG_FS>>;
 
-/// Runs for ever at the USB executor's priority. `model` is for the device's hello.
+/// Runs for ever at the USB executor's priority.
 #[embassy_executor::task]
-pub async fn run(port: UsbPort, model: Option<Model<'static>>) {
+pub async fn run(port: UsbPort) {
     let mut out_packets = [0; 4 * PACKET];
     let mut config_descriptor = [0; 128];
     let mut bos_descriptor = [0; 16];
@@ -76,7 +75,7 @@ pub async fn run(port: UsbPort, model: Option<Model<'static>>) {
     let mut device = builder.build();
     join5(
         device.run(),
-        receive(receiver, model.as_ref()),
+        receive(receiver),
         send(sender),
         watch_dtr(control),
         send_stats(),
@@ -93,7 +92,7 @@ fn identity() -> Config<'static> {
     config
 }
 
-async fn receive<'d>(mut receiver: Receiver<'d, Port<'d>>, model: Option<&Model<'_>>) {
+async fn receive<'d>(mut receiver: Receiver<'d, Port<'d>>) {
     let mut decoder = Decoder::<HOST_FRAME_LIMIT>::new();
     let mut packet = [0; PACKET];
     loop {
@@ -101,7 +100,7 @@ async fn receive<'d>(mut receiver: Receiver<'d, Port<'d>>, model: Option<&Model<
         while let Ok(length) = receiver.read_packet(&mut packet).await {
             let mut bytes = packet.get(..length).unwrap_or(&packet);
             while let Some(message) = decoder.feed(&mut bytes) {
-                commands::handle(message, model).await;
+                commands::handle(message).await;
             }
             stats::HOST_FRAMES_REJECTED.set(decoder.rejected().frames());
         }

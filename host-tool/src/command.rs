@@ -1,12 +1,14 @@
 //! `hivtac tare`, `hivtac threshold` and `hivtac expose`: one command each.
 
 use crate::output::{note, print};
+use crate::settings;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
 use hivtac_host::threshold::text;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
+use hivtac_wire::settings::Selection;
 use std::time::Duration;
 
 /// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
@@ -14,12 +16,21 @@ const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 /// Time a tare may need besides.
 pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
 
-/// Takes the mean of the next `frames` good frames (1–256) as the rest position.
-pub fn tare(address: &Address, patience: Duration, frames: u16) -> Result<(), Failure> {
+/// Takes the mean of the next `frames` good frames (1–256) as the rest position, until the device
+/// restarts or for good.
+pub fn tare(address: &Address, patience: Duration, frames: u16, keep: bool) -> Result<(), Failure> {
     let wait = TARE_PATIENCE + SLOWEST_FRAME * frames.into();
     let (mut link, _) = Link::connect(address, patience)?;
     send(&mut link, Request::Tare { frames }, wait)?;
-    print(&format!("tare taken over {frames} frames")).map(|_| ())
+    if keep {
+        let selection = Selection {
+            tare: true,
+            ..Selection::NONE
+        };
+        settings::keep(&mut link, selection)?;
+    }
+    let kept = if keep { " and kept" } else { "" };
+    print(&format!("tare taken over {frames} frames{kept}")).map(|_| ())
 }
 
 /// Has exposure and gain found anew for the light that there is.
@@ -29,16 +40,26 @@ pub fn expose(address: &Address, patience: Duration) -> Result<(), Failure> {
     print("exposure and gain found; take a new tare").map(|_| ())
 }
 
-/// Sets the threshold until the device restarts: this one, or when none is given that of its model.
+/// Sets the threshold, until the device restarts or for good: this one, or when none is given that
+/// of its model.
 pub fn threshold(
     address: &Address,
     patience: Duration,
     wanted: Option<Threshold>,
+    keep: bool,
 ) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let wanted = wanted.map_or_else(|| of_model(&hello), Ok)?;
     send(&mut link, Request::SetThreshold(wanted), patience)?;
-    print(&format!("threshold set: {}", text(&wanted)))?;
+    if keep {
+        let selection = Selection {
+            threshold: true,
+            ..Selection::NONE
+        };
+        settings::keep(&mut link, selection)?;
+    }
+    let kept = if keep { " and kept" } else { "" };
+    print(&format!("threshold set{kept}: {}", text(&wanted)))?;
     let made_for = hello.model.map(|model| model.threshold);
     if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
         note(&format!(
@@ -59,7 +80,8 @@ fn of_model(hello: &DeviceHello) -> Result<Threshold, Failure> {
     Ok(model.threshold)
 }
 
-fn send(link: &mut Link, request: Request, wait: Duration) -> Result<(), Failure> {
+/// Sends a command and waits for its reply.
+pub fn send(link: &mut Link, request: Request, wait: Duration) -> Result<(), Failure> {
     link.request(request, wait, tell)
 }
 

@@ -49,6 +49,7 @@ pub struct Info<'a> {
     protocol: u16,
     schema: String,
     device_id: String,
+    name: &'a str,
     board: &'a str,
     firmware: &'a str,
     model: Option<Model<'a>>,
@@ -83,6 +84,7 @@ impl<'a> Info<'a> {
             protocol: hello.protocol,
             schema: format!("{:#018x}", hello.schema),
             device_id: unit_number(&hello.device_id),
+            name: &hello.name,
             board: &hello.board,
             firmware: &hello.firmware,
             model: hello.model.as_ref().map(|model| Model {
@@ -107,7 +109,7 @@ impl<'a> Info<'a> {
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![
             format!("port       {}", self.port),
-            format!("device     {}", self.device_id),
+            format!("device     {}{}", self.device_id, self.called()),
             format!("board      {}", shown(self.board)),
             format!("firmware   {}", shown(self.firmware)),
             format!("protocol   {}, schema {}", self.protocol, self.schema),
@@ -130,6 +132,13 @@ impl<'a> Info<'a> {
         }
         lines.extend(self.stats.iter().flat_map(stats_lines));
         lines
+    }
+
+    fn called(&self) -> String {
+        match self.name {
+            "" => String::new(),
+            name => format!(", called {}", shown(name)),
+        }
     }
 
     fn model_text(&self) -> String {

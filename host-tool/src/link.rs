@@ -236,6 +236,10 @@ fn name_of(request: &Request) -> &'static str {
         Request::Expose => "expose",
         Request::Snapshot => "snapshot",
         Request::Inspect => "inspect",
+        Request::GetSettings => "get settings",
+        Request::SetName(_) => "set name",
+        Request::SetTare(_) => "set tare",
+        Request::Keep(_) => "keep settings",
     }
 }
 
@@ -256,6 +260,10 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::NotRead => "this computer took no bytes for 0.1 s; is it busy? try again",
         Outcome::NoCamera => {
             "its camera does not answer, or is another one; `hivtac bring-up` says what to do"
+        }
+        Outcome::Worn => {
+            "its flash is worn and keeps nothing new; it works on, with what it kept before at \
+             each start"
         }
         Outcome::NotAtRest => {
             "the markers are not where a film at rest has them; take away what touches it, and \

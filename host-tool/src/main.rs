@@ -19,6 +19,7 @@ mod raw;
 mod record;
 mod replay;
 mod sense;
+mod settings;
 mod snapshot;
 mod tally;
 mod template;
@@ -32,6 +33,7 @@ use hivtac_host::stop;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
+use hivtac_wire::settings::Name;
 use lines::Format;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -108,7 +110,9 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Take the present position of the film as its rest position
+    /// Take the present position of the film as its rest position, until the device restarts
+    ///
+    /// Example: hivtac tare --keep
     Tare {
         #[command(flatten)]
         device: Device,
@@ -120,6 +124,9 @@ enum Command {
             value_parser = clap::value_parser!(u16).range(1..=256)
         )]
         frames: u16,
+        /// Keep it through restarts
+        #[arg(long)]
+        keep: bool,
     },
     /// Set which pixels a marker may have, and with that the camera's pixel format, until the
     /// device restarts
@@ -127,12 +134,20 @@ enum Command {
     /// There are forces only with the threshold that the device's model was made for; markers there
     /// are all the same, as `hivtac-calibrate collect` needs them. Another pixel format forgets the
     /// tare.
+    ///
+    /// Example: hivtac threshold --hsv 170,10,100,255,45,255
     Threshold {
         #[command(flatten)]
         device: Device,
         #[command(flatten)]
         wanted: WantedThreshold,
+        /// Keep it through restarts
+        #[arg(long)]
+        keep: bool,
     },
+    /// Show, save, give back or forget what the device keeps through restarts
+    #[command(subcommand)]
+    Settings(SettingsCommand),
     /// Let the camera find exposure and gain for the light that there is, and keep them
     ///
     /// It does so by itself when it starts.
@@ -217,6 +232,86 @@ enum Command {
     /// only when size, preset and threshold are those of the model; the status says so otherwise,
     /// and blobs, markers and features are there all the same.
     Sense(SenseArguments),
+}
+
+#[derive(Subcommand)]
+enum SettingsCommand {
+    /// Show name, threshold and tare in use, and which of them are kept
+    ///
+    /// Example: hivtac settings get
+    Get {
+        #[command(flatten)]
+        device: Device,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
+    /// Give the device something of yours to keep
+    #[command(subcommand)]
+    Set(SetCommand),
+    /// Save the settings in use in a file
+    ///
+    /// Example: hivtac settings export thumb.json
+    Export {
+        #[command(flatten)]
+        device: Device,
+        /// The file to make, JSON
+        #[arg(value_name = "FILE.json")]
+        file: String,
+    },
+    /// Set and keep the settings of a file
+    ///
+    /// The rest position only when the file is of the same device.
+    ///
+    /// Example: hivtac settings import thumb.json
+    Import {
+        #[command(flatten)]
+        device: Device,
+        /// What `export` made
+        #[arg(value_name = "FILE.json")]
+        file: String,
+    },
+    /// Forget everything that was kept: no name, the model's threshold, no tare
+    ///
+    /// Example: hivtac settings reset
+    Reset {
+        #[command(flatten)]
+        device: Device,
+    },
+}
+
+#[derive(Subcommand)]
+enum SetCommand {
+    /// A name to tell it from others, by which `info` shows it
+    ///
+    /// Example: hivtac settings set name thumb
+    Name {
+        #[command(flatten)]
+        device: Device,
+        /// At most 24 bytes of UTF-8
+        #[arg(value_name = "NAME", value_parser = settings::name)]
+        name: Name,
+    },
+}
+
+impl SettingsCommand {
+    fn run(self) -> Result<(), Failure> {
+        use settings::Action;
+        let (device, action) = match self {
+            SettingsCommand::Get { device, json } => (device, Action::Get { json }),
+            SettingsCommand::Set(SetCommand::Name { device, name }) => {
+                (device, Action::SetName(name))
+            }
+            SettingsCommand::Export { device, file } => (device, Action::Export(file)),
+            SettingsCommand::Import { device, file } => (device, Action::Import(file)),
+            SettingsCommand::Reset { device } => (device, Action::Reset),
+        };
+        let options = settings::Options {
+            address: device.address(),
+            patience: device.timeout,
+        };
+        settings::run(&options, &action)
+    }
 }
 
 #[derive(Args)]
@@ -455,13 +550,18 @@ fn run(command: Command) -> Result<(), Failure> {
         }),
         Command::Focus { device, json } => focus::run(&device.address(), device.timeout, json),
         Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
-        Command::Tare { device, frames } => {
-            command::tare(&device.address(), device.timeout, frames)
-        }
+        Command::Tare {
+            device,
+            frames,
+            keep,
+        } => command::tare(&device.address(), device.timeout, frames, keep),
         Command::Expose { device } => command::expose(&device.address(), device.timeout),
-        Command::Threshold { device, wanted } => {
-            command::threshold(&device.address(), device.timeout, wanted.threshold())
-        }
+        Command::Threshold {
+            device,
+            wanted,
+            keep,
+        } => command::threshold(&device.address(), device.timeout, wanted.threshold(), keep),
+        Command::Settings(command) => command.run(),
     }
 }
 

@@ -259,7 +259,11 @@ impl Player {
             | Request::Tare { .. }
             | Request::Expose
             | Request::Snapshot
-            | Request::Inspect => Outcome::Unsupported,
+            | Request::Inspect
+            | Request::GetSettings
+            | Request::SetName(_)
+            | Request::SetTare(_)
+            | Request::Keep(_) => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

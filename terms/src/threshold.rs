@@ -6,6 +6,10 @@ use core::fmt;
 
 /// What a pixel is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
 pub enum PixelFormat {
     /// 16 bits: red in bits 15–11, green in 10–5, blue in 4–0.
     Rgb565,

@@ -6,8 +6,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::Mono;
-use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
+use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
     UnsignedMilliDegrees,
@@ -15,6 +14,7 @@ use hivtac_terms::units::{
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
 use hivtac_wire::message::*;
+use hivtac_wire::settings::*;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -53,7 +53,7 @@ fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
 const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });
 
-fn hello(model: Option<ModelIdentity>, threshold: Threshold) -> DeviceMessage {
+fn hello(model: Option<ModelIdentity>, threshold: Threshold, name: &str) -> DeviceMessage {
     DeviceMessage::Hello(DeviceHello {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
@@ -67,6 +67,7 @@ fn hello(model: Option<ModelIdentity>, threshold: Threshold) -> DeviceMessage {
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
+        name: name.try_into().unwrap(),
     })
 }
 
@@ -204,12 +205,54 @@ fn inspection() -> DeviceMessage {
     })
 }
 
+fn rest() -> RestPosition {
+    let marker = |x, y| Marker {
+        x: Px(x),
+        y: Px(y),
+        area: 190,
+    };
+    RestPosition {
+        format: PixelFormat::Rgb565,
+        dilations: 1,
+        centroid: CentroidEstimator::RednessWeighted,
+        markers: [
+            marker(6_553_600, 3_932_160),
+            marker(14_417_920, 3_932_160),
+            marker(14_417_920, 11_796_480),
+            marker(6_553_600, 11_796_480),
+        ],
+        rect_center: (Px(10_485_760), Px(7_864_320)),
+        rect_area: 943_718_400,
+    }
+}
+
+const NAME_AND_TARE: Selection = Selection {
+    name: true,
+    threshold: false,
+    tare: true,
+};
+
+fn settings() -> DeviceMessage {
+    DeviceMessage::Settings(SettingsReport {
+        name: "thumb".try_into().unwrap(),
+        threshold: RED,
+        tare: Some(rest()),
+        kept: NAME_AND_TARE,
+        found: Found::Settings,
+        erases: 3,
+        failures: 0,
+    })
+}
+
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
-        ("device-hello", hello(Some(model(RED)), RED)),
-        ("device-hello-yuv422", hello(Some(model(RED_CR)), RED_CR)),
-        ("device-hello-without-model", hello(None, RED)),
+        ("device-hello", hello(Some(model(RED)), RED, "thumb")),
+        (
+            "device-hello-yuv422",
+            hello(Some(model(RED_CR)), RED_CR, "thumb"),
+        ),
+        ("device-hello-without-model", hello(None, RED, "")),
         (
             "sample-force",
             sample(Status::NOT_CALIBRATED | Status::CONTACT, Some(PLACE)),
@@ -245,6 +288,8 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("snapshot-part", snapshot_part()),
         ("reply-no-camera", reply(10, Outcome::NoCamera)),
         ("inspection", inspection()),
+        ("settings", settings()),
+        ("reply-worn", reply(14, Outcome::Worn)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -274,6 +319,14 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("expose", command(9, Request::Expose)),
         ("take-snapshot", command(300, Request::Snapshot)),
         ("inspect", command(10, Request::Inspect)),
+        ("get-settings", command(11, Request::GetSettings)),
+        (
+            "set-name",
+            command(12, Request::SetName("thumb".try_into().unwrap())),
+        ),
+        ("set-tare", command(13, Request::SetTare(Some(rest())))),
+        ("forget-tare", command(13, Request::SetTare(None))),
+        ("keep", command(14, Request::Keep(NAME_AND_TARE))),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -325,7 +378,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 8);
+    assert_eq!(distinct.len(), 9);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -334,7 +387,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 9);
+    assert_eq!(requests.len(), 13);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

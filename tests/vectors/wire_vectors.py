@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x6E77BE40EB041591
+SCHEMA = 0x1CF97246EA8E3AD1
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -101,6 +101,20 @@ def hello_end(threshold):
     ]
 
 
+REST = [
+    raw("tare: Some", [1]),
+    raw("format: Rgb565", [0]),
+    raw("dilations 1", [1]),
+    raw("centroid: RednessWeighted", [1]),
+    *(field for x, y in [(6_553_600, 3_932_160), (14_417_920, 3_932_160), (14_417_920, 11_796_480),
+                         (6_553_600, 11_796_480)]
+      for field in (signed("x_q16", x), signed("y_q16", y), unsigned("area_px", 190))),
+    signed("rect_center: x_q16", 10_485_760),
+    signed("y_q16", 7_864_320),
+    signed("rect_area_q16", 943_718_400),
+]
+
+
 MODEL = [
     raw("model: Some", [1]),
     (varint(0xCAFEF00D), "model.crc 0xcafef00d"),
@@ -170,9 +184,10 @@ STATS = [
 ]
 
 DEVICE = {
-    "device-hello": HELLO + MODEL + RED + hello_end(RED),
-    "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR),
-    "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED),
+    "device-hello": HELLO + MODEL + RED + hello_end(RED) + [string("name", "thumb")],
+    "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR) + [string("name", "thumb")],
+    "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED)
+    + [string("name", "")],
     "sample-force": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact") + ANGLES
     + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
     "sample-without-place": sample(41, 42, 1_400_000, 0x50010,
@@ -234,6 +249,17 @@ DEVICE = {
         unsigned("longest_exposure_us", 6_405),
         unsigned("gain_sixteenths", 24),
     ],
+    "settings": [
+        raw("Settings", [8]),
+        string("name", "thumb"),
+        *RED,
+        *REST,
+        raw("kept: name, not threshold, tare", [1, 0, 1]),
+        raw("found: Settings", [1]),
+        unsigned("erases", 3),
+        unsigned("failures", 0),
+    ],
+    "reply-worn": [raw("Reply", [4]), unsigned("id", 14), raw("outcome: Worn", [10])],
 }
 
 HOST = {
@@ -249,6 +275,12 @@ HOST = {
     "expose": COMMAND + [unsigned("id", 9), raw("Expose", [6])],
     "take-snapshot": COMMAND + [unsigned("id", 300), raw("Snapshot", [7])],
     "inspect": COMMAND + [unsigned("id", 10), raw("Inspect", [8])],
+    "get-settings": COMMAND + [unsigned("id", 11), raw("GetSettings", [9])],
+    "set-name": COMMAND + [unsigned("id", 12), raw("SetName", [10]), string("name", "thumb")],
+    "set-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), *REST],
+    "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
+    "keep": COMMAND
+    + [unsigned("id", 14), raw("Keep", [12]), raw("name, not threshold, tare", [1, 0, 1])],
 }
 
 FOREIGN = {

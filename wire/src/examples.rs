@@ -1,13 +1,14 @@
 //! Messages for tests: the longest of each kind, and arbitrary ones.
 
 use crate::message::*;
+use crate::settings::*;
 use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
+use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
     UnsignedMilliDegrees,
@@ -38,6 +39,7 @@ pub fn device_hello() -> DeviceHello {
         preset: String::try_from("ov7725").unwrap(),
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
+        name: String::new(),
     }
 }
 
@@ -58,6 +60,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             width: u16::MAX,
             height: u16::MAX,
             preset: full(),
+            name: full(),
             ..device_hello()
         }),
         DeviceMessage::Sample(longest_sample()),
@@ -84,6 +87,15 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             bytes: Bytes::from_array([u8::MAX; SNAPSHOT_PART_BYTES]),
         }),
         DeviceMessage::Inspection(longest_inspection()),
+        DeviceMessage::Settings(SettingsReport {
+            name: full(),
+            threshold: RED,
+            tare: Some(longest_rest()),
+            kept: Selection::ALL,
+            found: Found::AnotherVersion,
+            erases: u32::MAX,
+            failures: u32::MAX,
+        }),
     ]
 }
 
@@ -114,6 +126,18 @@ pub fn longest_sample() -> Sample {
                 area: u32::MAX,
             }; 4],
         ),
+    }
+}
+
+/// A rest position, each number as long as it can be.
+pub fn longest_rest() -> RestPosition {
+    RestPosition {
+        format: PixelFormat::Mono,
+        dilations: u8::MAX,
+        centroid: CentroidEstimator::RednessWeighted,
+        markers: longest_sample().markers.unwrap(),
+        rect_center: (Px(i32::MIN), Px(i32::MIN)),
+        rect_area: i64::MIN,
     }
 }
 
@@ -166,6 +190,10 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::Expose,
         Request::Snapshot,
         Request::Inspect,
+        Request::GetSettings,
+        Request::SetName(full()),
+        Request::SetTare(Some(longest_rest())),
+        Request::Keep(Selection::ALL),
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -191,6 +219,7 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_snapshot().prop_map(DeviceMessage::Snapshot),
         any_part().prop_map(DeviceMessage::SnapshotPart),
         any_inspection().prop_map(DeviceMessage::Inspection),
+        any_report().prop_map(DeviceMessage::Settings),
     ]
 }
 
@@ -206,6 +235,10 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         Just(Request::Expose),
         Just(Request::Snapshot),
         Just(Request::Inspect),
+        Just(Request::GetSettings),
+        any_string().prop_map(Request::SetName),
+        proptest::option::of(any_rest()).prop_map(Request::SetTare),
+        any_selection().prop_map(Request::Keep),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -225,24 +258,28 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
     let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
-    (any::<[u8; 12]>(), names, size, model, seen).prop_map(
-        |(device_id, (board, firmware, preset), (width, height), model, seen)| DeviceHello {
-            device_id,
-            board,
-            firmware,
-            width,
-            height,
-            model: model.map(|(crc, name, simulated, threshold)| ModelIdentity {
-                crc,
+    let identity = (any::<[u8; 12]>(), any_string());
+    (identity, names, size, model, seen).prop_map(
+        |((device_id, name), (board, firmware, preset), (width, height), model, seen)| {
+            DeviceHello {
+                device_id,
                 name,
-                simulated,
-                threshold,
-            }),
-            threshold: seen.0,
-            preset,
-            dilations: seen.1,
-            centroid: seen.2,
-            ..device_hello()
+                board,
+                firmware,
+                width,
+                height,
+                model: model.map(|(crc, name, simulated, threshold)| ModelIdentity {
+                    crc,
+                    name,
+                    simulated,
+                    threshold,
+                }),
+                threshold: seen.0,
+                preset,
+                dilations: seen.1,
+                centroid: seen.2,
+                ..device_hello()
+            }
         },
     )
 }
@@ -337,6 +374,7 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::Unsupported),
         Just(Outcome::NotRead),
         Just(Outcome::NoCamera),
+        Just(Outcome::Worn),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -385,7 +423,60 @@ fn any_inspection() -> impl Strategy<Value = Inspection> {
     )
 }
 
-fn any_threshold() -> impl Strategy<Value = Threshold> {
+fn any_report() -> impl Strategy<Value = SettingsReport> {
+    let found = prop_oneof![
+        Just(Found::Nothing),
+        Just(Found::Settings),
+        Just(Found::AnotherVersion)
+    ];
+    let used = (
+        any_string(),
+        any_threshold(),
+        proptest::option::of(any_rest()),
+    );
+    (used, any_selection(), found, any::<[u32; 2]>()).prop_map(
+        |((name, threshold, tare), kept, found, [erases, failures])| SettingsReport {
+            name,
+            threshold,
+            tare,
+            kept,
+            found,
+            erases,
+            failures,
+        },
+    )
+}
+
+fn any_selection() -> impl Strategy<Value = Selection> {
+    any::<[bool; 3]>().prop_map(|[name, threshold, tare]| Selection {
+        name,
+        threshold,
+        tare,
+    })
+}
+
+/// Any rest position.
+pub fn any_rest() -> impl Strategy<Value = RestPosition> {
+    let formats = [PixelFormat::Rgb565, PixelFormat::Yuv422, PixelFormat::Mono];
+    let format = any::<prop::sample::Index>().prop_map(move |nth| *nth.get(&formats));
+    let markers = [any_marker(), any_marker(), any_marker(), any_marker()];
+    (format, any::<(u8, bool, i32, i32, i64)>(), markers).prop_map(
+        |(format, (dilations, weighted, x, y, rect_area), markers)| RestPosition {
+            format,
+            dilations,
+            centroid: match weighted {
+                true => CentroidEstimator::RednessWeighted,
+                false => CentroidEstimator::BinaryMask,
+            },
+            markers,
+            rect_center: (Px(x), Px(y)),
+            rect_area,
+        },
+    )
+}
+
+/// Any threshold, also one that means nothing.
+pub fn any_threshold() -> impl Strategy<Value = Threshold> {
     prop_oneof![
         any_box().prop_map(Threshold::Rgb565),
         any::<u8>().prop_map(|cr_low| Threshold::Yuv422(Yuv422 { cr_low })),

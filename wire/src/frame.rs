@@ -18,8 +18,8 @@ pub const MAX_DEVICE_BODY: usize = 248;
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 144;
 
-/// Longest body a host sends in this protocol version: its hello.
-pub const MAX_HOST_BODY: usize = 14;
+/// Longest body a host sends in this protocol version: a rest position.
+pub const MAX_HOST_BODY: usize = 89;
 
 /// Longest frame from the device in this protocol version, closing zero included.
 pub const MAX_DEVICE_FRAME: usize = frame_length(MAX_DEVICE_BODY);
@@ -35,7 +35,7 @@ pub const MAX_HOST_FRAME: usize = frame_length(MAX_HOST_BODY);
 pub const DEVICE_FRAME_LIMIT: usize = 256;
 
 /// No protocol version has longer frames from the host. A device's decoder holds this much.
-pub const HOST_FRAME_LIMIT: usize = 64;
+pub const HOST_FRAME_LIMIT: usize = 256;
 
 /// Bytes of the frame around a body: checksum, one COBS byte for each 254 bytes begun, closing
 /// zero.

@@ -10,7 +10,9 @@ extern crate std;
 
 pub mod decoder;
 pub mod frame;
+pub mod kept;
 pub mod message;
+pub mod settings;
 pub mod usb;
 pub mod version;
 

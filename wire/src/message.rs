@@ -1,5 +1,6 @@
 //! Every message, both ways.
 
+use crate::settings::{Name, RestPosition, Selection, SettingsReport};
 use heapless::{String, Vec};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::Force;
@@ -32,6 +33,8 @@ pub enum DeviceMessage {
     SnapshotPart(SnapshotPart),
     /// What the board and its camera are set to.
     Inspection(Inspection),
+    /// Answer to [`Request::GetSettings`].
+    Settings(SettingsReport),
 }
 
 /// What the host sends.
@@ -79,6 +82,8 @@ pub struct DeviceHello {
     pub dilations: u8,
     /// How a marker's position is taken from its pixels.
     pub centroid: CentroidEstimator,
+    /// What its user calls it.
+    pub name: Name,
 }
 
 /// Which model makes the forces.
@@ -266,6 +271,14 @@ pub enum Request {
     Snapshot,
     /// Read the camera's registers back and send an [`Inspection`]. Answered behind it.
     Inspect,
+    /// Send a [`SettingsReport`]. Answered behind it.
+    GetSettings,
+    /// Set the device's name, until it restarts.
+    SetName(Name),
+    /// Set the rest position, or forget it. Answered when it holds.
+    SetTare(Option<RestPosition>),
+    /// Keep these settings as they are in use, through restarts. Answered when they are kept.
+    Keep(Selection),
 }
 
 /// The answer to a command.
@@ -302,4 +315,6 @@ pub enum Outcome {
     NotRead,
     /// The camera does not answer, or not as the one that this firmware is for.
     NoCamera,
+    /// The flash is worn: nothing can be kept any more. What was kept before still is.
+    Worn,
 }

@@ -475,6 +475,7 @@ mod tests {
             preset: "ov7725".try_into().unwrap(),
             dilations: 1,
             centroid: CentroidEstimator::RednessWeighted,
+            name: Default::default(),
         };
         let yuv422 = conditions_of(&hello).unwrap();
         assert_eq!(yuv422.pixel_format, PixelFormat::Yuv422);

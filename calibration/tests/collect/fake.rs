@@ -66,6 +66,7 @@ pub fn hello() -> DeviceHello {
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
+        name: Default::default(),
     }
 }
 

@@ -5,6 +5,7 @@ use super::free_bus::{self, Lines};
 use crate::band_copy::BandCopy;
 use crate::camera::Camera;
 use crate::capture::Capture;
+use crate::flash::SecondBank;
 use crate::seeded_bugs;
 use crate::snapshot_copy::SnapshotCopy;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull};
@@ -33,6 +34,8 @@ pub struct Board {
     pub capture: Capture,
     /// Where the pipeline gets its rows from.
     pub bands: BandCopy,
+    /// Where settings are kept.
+    pub flash: SecondBank,
     /// What keeps a frame for the host.
     pub snapshots: SnapshotCopy,
     /// What the USB task needs to make its driver.

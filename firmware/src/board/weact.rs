@@ -17,6 +17,7 @@ use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
 use crate::camera::{Bus, Camera};
 use crate::capture::Capture;
+use crate::flash::SecondBank;
 use crate::priorities;
 use crate::snapshot_copy::SnapshotCopy;
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -64,6 +65,7 @@ pub fn start() -> Board {
         camera: Camera::new(Bus::new(bus), lines),
         capture: Capture::new(p.DCMI, BandDma::new(p.DMA1_CH0), priorities::CAPTURE),
         bands: BandCopy::new(p.MDMA_CH0),
+        flash: SecondBank::new(p.FLASH, p.MDMA_CH2),
         snapshots: SnapshotCopy::new(p.MDMA_CH1),
         usb: UsbPort {
             core: p.USB_OTG_FS,

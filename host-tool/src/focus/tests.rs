@@ -21,6 +21,7 @@ fn device() -> DeviceHello {
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
+        name: Default::default(),
     }
 }
 

@@ -175,6 +175,7 @@ mod tests {
             preset: "ov7725".try_into().unwrap(),
             dilations: 1,
             centroid: CentroidEstimator::BinaryMask,
+            name: Default::default(),
         };
         State::new("a port".to_owned(), hello)
     }

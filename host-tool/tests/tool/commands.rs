@@ -28,7 +28,7 @@ fn info_for_a_person() {
         run.stdout,
         format!(
             "port       {}\n\
-             device     000102030405060708090aff\n\
+             device     000102030405060708090aff, called thumb\n\
              board      fake board\n\
              firmware   fake 1.0\n\
              protocol   2, schema {SCHEMA_HASH:#018x}\n\

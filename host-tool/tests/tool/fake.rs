@@ -2,15 +2,17 @@
 
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
+use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::{HsvBox, Threshold};
+use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
     UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::*;
+use hivtac_wire::settings::*;
 use hivtac_wire::version::SCHEMA_HASH;
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::OpenptFlags;
@@ -32,6 +34,10 @@ pub struct Conversation {
     pub commands: mpsc::Sender<Request>,
     /// What a tare is answered with; `None`: nothing.
     pub tare: Option<Outcome>,
+    /// Its settings.
+    pub settings: SettingsReport,
+    /// How keeping ends.
+    pub flash: Outcome,
     /// What is sent for each snapshot in turn before it is said to be done.
     pub snapshots: VecDeque<Vec<DeviceMessage>>,
     /// True when the host takes nothing any more.
@@ -122,6 +128,15 @@ impl Conversation {
                 }
                 return false;
             }
+            Request::GetSettings => {
+                let settings = self.settings.clone();
+                self.send(DeviceMessage::Settings(settings));
+            }
+            Request::SetName(name) => self.settings.name = name.clone(),
+            Request::Keep(_) => {
+                self.reply(id, self.flash);
+                return false;
+            }
             Request::Snapshot => {
                 let messages = self.snapshots.pop_front().unwrap_or_default();
                 messages.into_iter().for_each(|message| self.send(message));
@@ -134,7 +149,7 @@ impl Conversation {
 }
 
 /// What its model was made for.
-const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+pub const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
 
 pub fn hello() -> DeviceHello {
     DeviceHello {
@@ -155,6 +170,41 @@ pub fn hello() -> DeviceHello {
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
+        name: "thumb".try_into().unwrap(),
+    }
+}
+
+/// Of a device with a name that is kept, a tare that is not, and the model's threshold.
+pub fn settings() -> SettingsReport {
+    let marker = |x: i32, y: i32| Marker {
+        x: Px(x << 16),
+        y: Px(y << 16),
+        area: 190,
+    };
+    SettingsReport {
+        name: "thumb".try_into().unwrap(),
+        threshold: RED,
+        tare: Some(RestPosition {
+            format: PixelFormat::Rgb565,
+            dilations: 1,
+            centroid: CentroidEstimator::RednessWeighted,
+            markers: [
+                marker(100, 60),
+                marker(220, 60),
+                marker(220, 180),
+                marker(100, 180),
+            ],
+            rect_center: (Px(160 << 16), Px(120 << 16)),
+            rect_area: 14_400 << 16,
+        }),
+        kept: Selection {
+            name: true,
+            threshold: true,
+            tare: false,
+        },
+        found: Found::Settings,
+        erases: 3,
+        failures: 0,
     }
 }
 
@@ -195,6 +245,8 @@ fn conversation(stream: Box<dyn Stream>, commands: &mpsc::Sender<Request>) -> Co
         stats: Stats::default(),
         commands: commands.clone(),
         tare: Some(Outcome::Done),
+        settings: settings(),
+        flash: Outcome::Done,
         snapshots: VecDeque::new(),
         host_is_gone: false,
     }

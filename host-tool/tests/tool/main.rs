@@ -9,5 +9,6 @@ mod monitor;
 mod recordings;
 mod run;
 mod sense;
+mod settings;
 mod snapshot;
 mod view;

@@ -35,7 +35,7 @@ const NEVER: [&str; 8] = [
 
 /// Functions that may panic: a part of their mangled names, the most sites, and why none is
 /// reached. The first that fits counts.
-const REASONS: [(&str, usize, &str); 18] = [
+const REASONS: [(&str, usize, &str); 20] = [
     (
         "embassy_usb_synopsys_otg",
         37,
@@ -81,6 +81,16 @@ const REASONS: [(&str, usize, &str); 18] = [
         "the USB tasks wait for each answer once: what has ended is not polled again",
     ),
     (
+        "hivtac_firmware..flash",
+        3,
+        "an operation of the flash is waited for once: what has ended is not polled again",
+    ),
+    (
+        "hivtac_firmware6memory",
+        8,
+        "the same of what is saved: writing and reading back, one after the other",
+    ),
+    (
         "hivtac_firmware",
         3,
         "at the start only: tasks are spawned once, and the settings are constants that the \
@@ -88,9 +98,9 @@ const REASONS: [(&str, usize, &str); 18] = [
     ),
     (
         "embassy_executor",
-        13,
-        "the same of the capture and USB tasks, compiled into their executor; executors start \
-         once",
+        16,
+        "the same of the capture, USB and memory tasks, compiled into their executor; executors \
+         start once",
     ),
     (
         "embassy_sync",

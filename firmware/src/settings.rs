@@ -1,0 +1,131 @@
+//! The settings in use, as the host sees them and as they are kept: told by the pipeline, read by
+//! the USB tasks.
+
+use crate::pipeline_task::Sensor;
+use crate::shared::{NAME, PIPELINE};
+use core::cell::Cell;
+use hivtac_sensing::features::Features;
+use hivtac_sensing::rest::Rest;
+use hivtac_sensing::settings::Settings;
+use hivtac_terms::threshold::Threshold;
+use hivtac_wire::message::{ModelIdentity, Outcome};
+use hivtac_wire::settings::{Name, RestPosition};
+
+/// What the pipeline measures with.
+#[derive(Clone)]
+pub struct OfPipeline {
+    /// Its settings.
+    pub settings: Settings,
+    /// Its rest position, when one was taken.
+    pub tare: Option<Rest>,
+    /// Its model, when it has one.
+    pub model: Option<ModelIdentity>,
+}
+
+/// Tells what the pipeline measures with from now on.
+pub fn follow(sensor: &Sensor) {
+    let model = sensor.model().map(|model| ModelIdentity {
+        crc: model.crc(),
+        name: model.name(),
+        simulated: model.is_simulated(),
+        threshold: model.conditions.threshold,
+    });
+    let told = OfPipeline {
+        settings: *sensor.settings(),
+        tare: sensor.tare().copied(),
+        model,
+    };
+    PIPELINE.lock(|cell| cell.set(Some(told)));
+}
+
+/// What the pipeline measures with; nothing before it is configured.
+pub fn of_pipeline() -> Option<OfPipeline> {
+    PIPELINE.lock(copy)
+}
+
+/// Sets the device's name.
+pub fn set_name(name: Name) {
+    NAME.lock(|cell| cell.set(name));
+}
+
+/// The device's name.
+pub fn name() -> Name {
+    NAME.lock(copy)
+}
+
+fn copy<T: Clone + Default>(cell: &Cell<T>) -> T {
+    let value = cell.take();
+    cell.set(value.clone());
+    value
+}
+
+/// What can be kept.
+pub struct InUse {
+    /// The device's name.
+    pub name: Name,
+    /// The threshold.
+    pub threshold: Threshold,
+    /// The rest position, when one was taken.
+    pub tare: Option<RestPosition>,
+    /// The threshold of the model.
+    of_model: Option<Threshold>,
+}
+
+impl InUse {
+    /// The threshold, unless it is that of the model.
+    pub fn own_threshold(&self) -> Option<Threshold> {
+        Some(self.threshold).filter(|_| Some(self.threshold) != self.of_model)
+    }
+}
+
+/// What is in use; nothing before the pipeline is configured.
+pub fn in_use() -> Option<InUse> {
+    let OfPipeline {
+        settings,
+        tare,
+        model,
+    } = of_pipeline()?;
+    Some(InUse {
+        name: name(),
+        threshold: settings.threshold,
+        tare: tare.map(|rest| position(&rest, &settings)),
+        of_model: model.map(|model| model.threshold),
+    })
+}
+
+/// A rest position and by which settings its markers were seen.
+fn position(rest: &Rest, settings: &Settings) -> RestPosition {
+    RestPosition {
+        format: settings.threshold.format(),
+        dilations: settings.dilations,
+        centroid: settings.centroid,
+        markers: rest.markers(),
+        rect_center: rest.features.rect_center,
+        rect_area: rest.features.rect_area,
+    }
+}
+
+/// The rest position for frames that are seen by these settings.
+///
+/// # Errors
+/// Why it is none.
+pub fn rest(position: &RestPosition, settings: &Settings) -> Result<Rest, Outcome> {
+    let seen_so = position.format == settings.threshold.format()
+        && position.dilations == settings.dilations
+        && position.centroid == settings.centroid;
+    let rest = Rest {
+        features: Features {
+            centroids: position.markers.map(|marker| (marker.x, marker.y)),
+            rect_center: position.rect_center,
+            rect_area: position.rect_area,
+        },
+        areas: position.markers.map(|marker| marker.area),
+    };
+    if !seen_so || !rest.is_sound() {
+        Err(Outcome::InvalidArgument)
+    } else if !rest.fits(&settings.geometry) {
+        Err(Outcome::NotAtRest)
+    } else {
+        Ok(rest)
+    }
+}

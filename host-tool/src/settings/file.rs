@@ -1,0 +1,366 @@
+//! Settings as JSON: what `export` writes and `import` reads.
+
+use super::{name, unusable};
+use crate::files::read_at_most;
+use crate::lines::to_json;
+use hivtac_host::failure::Failure;
+use hivtac_host::shown::unit_number;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
+use hivtac_terms::units::Px;
+use hivtac_wire::settings::{Found, RestPosition, Selection, SettingsReport};
+use serde::{Deserialize, Serialize};
+
+/// What these files are; another layout has another number.
+const VERSION: u32 = 1;
+/// Most bytes of such a file.
+const LONGEST_FILE: u64 = 64 << 10;
+
+/// The settings of a device.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct File {
+    hivtac_settings: u32,
+    /// The unit's number, for its rest position is that of no other.
+    pub device_id: String,
+    /// Empty when it has none.
+    pub name: String,
+    threshold: Limits,
+    /// The rest position, when one was taken.
+    pub tare: Option<Rest>,
+}
+
+/// A threshold as everywhere in the tool's JSON.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "format", rename_all = "lowercase", deny_unknown_fields)]
+enum Limits {
+    Rgb565 {
+        hue_low: u8,
+        hue_high: u8,
+        saturation_low: u8,
+        saturation_high: u8,
+        value_low: u8,
+        value_high: u8,
+    },
+    Yuv422 {
+        cr_low: u8,
+    },
+    Mono {
+        luma_low: u8,
+        luma_high: u8,
+    },
+}
+
+/// A rest position: coordinates in 1/65,536 px, areas in px.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rest {
+    format: Format,
+    dilations: u8,
+    centroid: Centroid,
+    markers: [Seen; 4],
+    rect_center_q16: [i32; 2],
+    rect_area_q16: i64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Seen {
+    x_q16: i32,
+    y_q16: i32,
+    area_px: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Format {
+    Rgb565,
+    Yuv422,
+    Mono,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Centroid {
+    BinaryMask,
+    RednessWeighted,
+}
+
+/// The settings in use, and which of them are kept: `settings get --json`.
+#[derive(Serialize)]
+pub struct Kept {
+    #[serde(flatten)]
+    file: File,
+    kept: KeptParts,
+    found: &'static str,
+    erases: u32,
+    failures: u32,
+}
+
+#[derive(Serialize)]
+struct KeptParts {
+    name: bool,
+    threshold: bool,
+    tare: bool,
+}
+
+impl Kept {
+    /// Of what a device reports.
+    pub fn new(device_id: &[u8; 12], report: &SettingsReport) -> Kept {
+        let Selection {
+            name,
+            threshold,
+            tare,
+        } = report.kept;
+        Kept {
+            file: File::new(device_id, report),
+            kept: KeptParts {
+                name,
+                threshold,
+                tare,
+            },
+            found: match report.found {
+                Found::Nothing => "nothing",
+                Found::Settings => "settings",
+                Found::AnotherVersion => "another-version",
+            },
+            erases: report.erases,
+            failures: report.failures,
+        }
+    }
+}
+
+impl File {
+    /// Of what a device reports.
+    pub fn new(device_id: &[u8; 12], report: &SettingsReport) -> File {
+        File {
+            hivtac_settings: VERSION,
+            device_id: unit_number(device_id),
+            name: report.name.as_str().to_owned(),
+            threshold: limits(&report.threshold),
+            tare: report.tare.as_ref().map(Rest::of),
+        }
+    }
+
+    /// Whether it was made of this device.
+    pub fn is_of(&self, device_id: &[u8; 12]) -> bool {
+        self.device_id == unit_number(device_id)
+    }
+
+    /// The threshold.
+    pub fn threshold(&self) -> Threshold {
+        match self.threshold {
+            Limits::Rgb565 {
+                hue_low,
+                hue_high,
+                saturation_low,
+                saturation_high,
+                value_low,
+                value_high,
+            } => Threshold::Rgb565(HsvBox {
+                hue_low,
+                hue_high,
+                saturation_low,
+                saturation_high,
+                value_low,
+                value_high,
+            }),
+            Limits::Yuv422 { cr_low } => Threshold::Yuv422(Yuv422 { cr_low }),
+            Limits::Mono {
+                luma_low,
+                luma_high,
+            } => Threshold::Mono(Mono {
+                low: luma_low,
+                high: luma_high,
+            }),
+        }
+    }
+
+    /// The rest position.
+    pub fn rest(&self) -> Option<RestPosition> {
+        self.tare.as_ref().map(Rest::position)
+    }
+}
+
+fn limits(threshold: &Threshold) -> Limits {
+    match *threshold {
+        Threshold::Rgb565(HsvBox {
+            hue_low,
+            hue_high,
+            saturation_low,
+            saturation_high,
+            value_low,
+            value_high,
+        }) => Limits::Rgb565 {
+            hue_low,
+            hue_high,
+            saturation_low,
+            saturation_high,
+            value_low,
+            value_high,
+        },
+        Threshold::Yuv422(Yuv422 { cr_low }) => Limits::Yuv422 { cr_low },
+        Threshold::Mono(Mono { low, high }) => Limits::Mono {
+            luma_low: low,
+            luma_high: high,
+        },
+    }
+}
+
+impl Rest {
+    fn of(position: &RestPosition) -> Rest {
+        Rest {
+            format: match position.format {
+                PixelFormat::Rgb565 => Format::Rgb565,
+                PixelFormat::Yuv422 => Format::Yuv422,
+                PixelFormat::Mono => Format::Mono,
+            },
+            dilations: position.dilations,
+            centroid: match position.centroid {
+                CentroidEstimator::BinaryMask => Centroid::BinaryMask,
+                CentroidEstimator::RednessWeighted => Centroid::RednessWeighted,
+            },
+            markers: position.markers.map(|marker| Seen {
+                x_q16: marker.x.0,
+                y_q16: marker.y.0,
+                area_px: marker.area,
+            }),
+            rect_center_q16: [position.rect_center.0.0, position.rect_center.1.0],
+            rect_area_q16: position.rect_area,
+        }
+    }
+
+    fn position(&self) -> RestPosition {
+        let [x, y] = self.rect_center_q16;
+        RestPosition {
+            format: match self.format {
+                Format::Rgb565 => PixelFormat::Rgb565,
+                Format::Yuv422 => PixelFormat::Yuv422,
+                Format::Mono => PixelFormat::Mono,
+            },
+            dilations: self.dilations,
+            centroid: match self.centroid {
+                Centroid::BinaryMask => CentroidEstimator::BinaryMask,
+                Centroid::RednessWeighted => CentroidEstimator::RednessWeighted,
+            },
+            markers: self.markers.map(|marker| Marker {
+                x: Px(marker.x_q16),
+                y: Px(marker.y_q16),
+                area: marker.area_px,
+            }),
+            rect_center: (Px(x), Px(y)),
+            rect_area: self.rect_area_q16,
+        }
+    }
+}
+
+/// Reads such a file.
+///
+/// # Errors
+/// What is wrong with it, and where.
+pub fn read(path: &str) -> Result<File, Failure> {
+    let bytes = read_at_most(path, LONGEST_FILE).map_err(|error| unusable(path, error))?;
+    let bytes = bytes.ok_or_else(|| unusable(path, "too long for a file of settings"))?;
+    parse(&bytes).map_err(|why| unusable(path, why))
+}
+
+fn parse(bytes: &[u8]) -> Result<File, String> {
+    let file: File = serde_json::from_slice(bytes)
+        .map_err(|error| format!("no settings of `hivtac settings export`: {error}"))?;
+    if file.hivtac_settings != VERSION {
+        return Err(format!(
+            "settings of version {}; this hivtac reads version {VERSION}",
+            file.hivtac_settings
+        ));
+    }
+    if !file.name.is_empty() {
+        name(&file.name).map_err(|why| format!("the name is none: {why}"))?;
+    }
+    let threshold = file.threshold();
+    threshold
+        .check()
+        .map_err(|error| format!("the threshold means nothing: {error}"))?;
+    Ok(file)
+}
+
+/// Writes such a file.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(path: &str, file: &File) -> Result<(), Failure> {
+    let text = to_json(file) + "\n";
+    std::fs::write(path, text).map_err(|error| unusable(path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(threshold: Threshold) -> SettingsReport {
+        let marker = |nth: i32| Marker {
+            x: Px(nth * 70_001),
+            y: Px(-nth),
+            area: 190,
+        };
+        SettingsReport {
+            name: "thumb".try_into().unwrap(),
+            threshold,
+            tare: Some(RestPosition {
+                format: threshold.format(),
+                dilations: 1,
+                centroid: CentroidEstimator::RednessWeighted,
+                markers: [0, 1, 2, 3].map(marker),
+                rect_center: (Px(7), Px(8)),
+                rect_area: 1 << 40,
+            }),
+            kept: Selection::ALL,
+            found: Found::Settings,
+            erases: 1,
+            failures: 0,
+        }
+    }
+
+    #[test]
+    fn settings_come_back_from_their_file() {
+        for threshold in [
+            Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255])),
+            Threshold::Yuv422(Yuv422 { cr_low: 162 }),
+            Threshold::Mono(Mono { low: 0, high: 88 }),
+        ] {
+            let report = report(threshold);
+            let file = File::new(&[7; 12], &report);
+            let read = parse(to_json(&file).as_bytes()).unwrap();
+            assert_eq!(read, file);
+            assert_eq!((read.threshold(), read.rest()), (threshold, report.tare));
+            assert!(read.is_of(&[7; 12]) && !read.is_of(&[8; 12]));
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_none_says_why() {
+        let good = to_json(&File::new(
+            &[7; 12],
+            &report(Threshold::Rgb565(HsvBox::of_limits([
+                170, 10, 100, 255, 45, 255,
+            ]))),
+        ));
+        for (from, to, word) in [
+            (
+                "\"hivtac_settings\":1",
+                "\"hivtac_settings\":2",
+                "version 2",
+            ),
+            ("\"thumb\"", "\"th\\u001bumb\"", "cannot be seen"),
+            ("\"hue_low\":170", "\"hue_low\":200", "means nothing"),
+            ("\"hue_low\"", "\"huelow\"", "huelow"),
+            ("rgb565", "rgb888", "rgb888"),
+            ("{", "[", "no settings"),
+        ] {
+            let bad = good.replace(from, to);
+            assert_ne!(bad, good);
+            let error = parse(bad.as_bytes()).unwrap_err();
+            assert!(error.contains(word), "{word}: {error}");
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! `hivtac settings`: what a device keeps through restarts, shown, named, saved, given back and
+//! forgotten.
+
+mod file;
+
+use crate::command::{send, tell};
+use crate::lines::to_json;
+use crate::output::{note, print};
+use file::{File, Kept};
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::link::Link;
+use hivtac_host::port::Address;
+use hivtac_host::shown::shown;
+use hivtac_host::threshold::text;
+use hivtac_terms::threshold::Threshold;
+use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
+use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
+use std::time::Duration;
+
+/// Longest time that keeping may take: an erased sector takes 1 to 2 s, and a worn one is tried
+/// again.
+pub const KEEP_PATIENCE: Duration = Duration::from_secs(20);
+
+/// A device and how long to wait for it.
+pub struct Options {
+    /// Where it is.
+    pub address: Address,
+    /// Longest wait for its hello and replies.
+    pub patience: Duration,
+}
+
+/// What to do with its settings.
+pub enum Action {
+    /// Show them.
+    Get {
+        /// As one JSON object.
+        json: bool,
+    },
+    /// Give it a name and keep that.
+    SetName(Name),
+    /// Save them in a file.
+    Export(String),
+    /// Set and keep those of a file.
+    Import(String),
+    /// Forget all that was kept.
+    Reset,
+}
+
+/// Does it.
+///
+/// # Errors
+/// A file that is none of settings, before anything is asked of the device; what the device
+/// refuses; those of [`Link::connect`].
+pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
+    let imported = match action {
+        Action::Import(path) => Some(file::read(path)?),
+        _ => None,
+    };
+    let (link, hello) = Link::connect(&options.address, options.patience)?;
+    let mut device = Device {
+        link,
+        hello,
+        patience: options.patience,
+    };
+    match action {
+        Action::Get { json } => device.show(*json),
+        Action::SetName(name) => device.set_name(name),
+        Action::Export(path) => device.export(path),
+        Action::Import(path) => imported.map_or(Ok(()), |file| device.import(path, &file)),
+        Action::Reset => device.reset(),
+    }
+}
+
+/// Keeps these of the settings in use.
+///
+/// # Errors
+/// What the device refuses.
+pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
+    send(link, Request::Keep(selection), KEEP_PATIENCE)
+}
+
+/// A name for a device: 1 to 24 bytes that can be read.
+///
+/// # Errors
+/// Why it is none.
+pub fn name(text: &str) -> Result<Name, String> {
+    if text.is_empty() {
+        return Err("it is empty; `hivtac settings reset` takes a name away".to_owned());
+    }
+    if shown(text) != text {
+        return Err("it has characters that cannot be seen".to_owned());
+    }
+    Name::try_from(text).map_err(|_| {
+        format!(
+            "it has {} bytes of UTF-8, of which {NAME_BYTES} can be kept",
+            text.len()
+        )
+    })
+}
+
+struct Device {
+    link: Link,
+    hello: DeviceHello,
+    patience: Duration,
+}
+
+impl Device {
+    fn settings(&mut self) -> Result<SettingsReport, Failure> {
+        let mut report = None;
+        let patience = self.patience;
+        self.link
+            .request(Request::GetSettings, patience, |message| match message {
+                DeviceMessage::Settings(newest) => report = Some(newest),
+                other => tell(other),
+            })?;
+        report.ok_or_else(|| self.link.lost("its settings did not come"))
+    }
+
+    fn send(&mut self, request: Request) -> Result<(), Failure> {
+        send(&mut self.link, request, self.patience)
+    }
+
+    fn show(&mut self, json: bool) -> Result<(), Failure> {
+        let report = self.settings()?;
+        let lines = match json {
+            true => to_json(&Kept::new(&self.hello.device_id, &report)),
+            false => lines(&report).join("\n"),
+        };
+        print(&lines).map(|_| ())
+    }
+
+    fn set_name(&mut self, name: &Name) -> Result<(), Failure> {
+        self.send(Request::SetName(name.clone()))?;
+        let selection = Selection {
+            name: true,
+            ..Selection::NONE
+        };
+        keep(&mut self.link, selection)?;
+        print(&format!("this device is now called {}", shown(name))).map(|_| ())
+    }
+
+    fn export(&mut self, path: &str) -> Result<(), Failure> {
+        let report = self.settings()?;
+        file::write(path, &File::new(&self.hello.device_id, &report))?;
+        print(&format!("settings in use written to {path}")).map(|_| ())
+    }
+
+    fn import(&mut self, path: &str, file: &File) -> Result<(), Failure> {
+        let is_own = file.is_of(&self.hello.device_id);
+        if !is_own && file.tare.is_some() {
+            note(&format!(
+                "hivtac: {path} is of another device ({}): its rest position is left out; take a \
+                 tare",
+                shown(&file.device_id)
+            ));
+        }
+        let tare = file.rest().filter(|_| is_own);
+        let name = name(&file.name).unwrap_or_default();
+        self.set(name, Some(file.threshold()), tare)?;
+        print(&format!("settings of {path} are in use and kept")).map(|_| ())
+    }
+
+    fn reset(&mut self) -> Result<(), Failure> {
+        let threshold = self.hello.model.as_ref().map(|model| model.threshold);
+        self.set(Name::new(), threshold, None)?;
+        print("everything that was kept is forgotten; take a tare").map(|_| ())
+    }
+
+    /// Sets and keeps all.
+    fn set(
+        &mut self,
+        name: Name,
+        threshold: Option<Threshold>,
+        tare: Option<RestPosition>,
+    ) -> Result<(), Failure> {
+        let unkept = |failure: Failure| {
+            let what = "nothing was kept: a restart brings back the settings from before";
+            Failure::new(failure.kind, format!("{failure}; {what}"))
+        };
+        // Another pixel format forgets the rest position.
+        if let Some(threshold) = threshold.filter(|threshold| *threshold != self.hello.threshold) {
+            self.send(Request::SetThreshold(threshold))
+                .map_err(unkept)?;
+        }
+        self.send(Request::SetTare(tare)).map_err(unkept)?;
+        self.send(Request::SetName(name)).map_err(unkept)?;
+        keep(&mut self.link, Selection::ALL)
+    }
+}
+
+fn lines(report: &SettingsReport) -> Vec<String> {
+    let until = |kept: bool| match kept {
+        true => "kept",
+        false => "until restart",
+    };
+    let name = match report.name.as_str() {
+        "" => "none".to_owned(),
+        name => shown(name),
+    };
+    let tare = match report.tare {
+        Some(_) => "taken",
+        None => "none",
+    };
+    let found = match report.found {
+        Found::Nothing => "nothing was ever kept",
+        Found::Settings => "settings found at the start",
+        Found::AnotherVersion => {
+            "settings of another version of the firmware, which this one does not read; they stay \
+             until something is kept"
+        }
+    };
+    vec![
+        format!("name       {name} ({})", until(report.kept.name)),
+        format!(
+            "threshold  {} ({})",
+            text(&report.threshold),
+            until(report.kept.threshold)
+        ),
+        format!("tare       {tare} ({})", until(report.kept.tare)),
+        format!("flash      {found}"),
+        format!(
+            "           {} sectors erased in its life, {} failed attempts to write since the start",
+            report.erases, report.failures
+        ),
+    ]
+}
+
+/// A file that cannot be used.
+fn unusable(path: &str, why: impl std::fmt::Display) -> Failure {
+    Failure::new(Kind::Input, format!("{path}: {why}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_short_and_can_be_read() {
+        assert_eq!(name("thumb").unwrap(), "thumb");
+        assert_eq!(name("Däumling 2").unwrap(), "Däumling 2");
+        for (text, word) in [
+            ("", "empty"),
+            ("a\u{1b}[2J", "cannot be seen"),
+            ("a\nb", "cannot be seen"),
+            ("thirteen-ä-characters-ä-ä", "28 bytes"),
+        ] {
+            let error = name(text).unwrap_err();
+            assert!(error.contains(word), "{text:?}: {error}");
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Settings that are kept: shown, named, saved, given back and forgotten.
+
+use crate::fake::*;
+use crate::run::*;
+use hivtac_terms::threshold::{Threshold, Yuv422};
+use hivtac_wire::message::*;
+use hivtac_wire::settings::*;
+use serde_json::Value;
+
+const ALL: Selection = Selection::ALL;
+
+fn only(name: bool, threshold: bool, tare: bool) -> Request {
+    Request::Keep(Selection {
+        name,
+        threshold,
+        tare,
+    })
+}
+
+fn device() -> FakeDevice {
+    FakeDevice::on_tcp([Box::new(|device| device.serve())])
+}
+
+fn commands(device: &FakeDevice) -> Vec<Request> {
+    device.commands.try_iter().collect()
+}
+
+#[test]
+fn settings_for_a_person() {
+    let device = device();
+    let run = run(&["settings", "get", "--port", &device.port]);
+    assert_eq!(
+        run.stdout,
+        "name       thumb (kept)\n\
+         threshold  rgb565, H 170–10, S 100–255, V 45–255 (kept)\n\
+         tare       taken (until restart)\n\
+         flash      settings found at the start\n\
+         \x20          3 sectors erased in its life, 0 failed attempts to write since the start\n"
+    );
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+}
+
+#[test]
+fn settings_as_json() {
+    let device = device();
+    let run = run(&["settings", "get", "--json", "--port", &device.port]);
+    let settings: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(settings["name"], "thumb");
+    assert_eq!(settings["kept"]["name"], true);
+    assert_eq!(settings["kept"]["tare"], false);
+    assert_eq!(settings["threshold"]["hue_low"], 170);
+    assert_eq!(settings["tare"]["markers"][2]["x_q16"], 220 << 16);
+    assert_eq!(settings["found"], "settings");
+    assert_eq!(settings["erases"], 3);
+}
+
+#[test]
+fn settings_of_another_version_are_told() {
+    let script: Script = Box::new(|device| {
+        device.settings.found = Found::AnotherVersion;
+        device.serve();
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["settings", "get", "--port", &device.port]);
+    assert!(run.stdout.contains("does not read"), "{}", run.stdout);
+}
+
+#[test]
+fn a_name_is_set_and_kept() {
+    let device = device();
+    let run = run(&["settings", "set", "name", "index", "--port", &device.port]);
+    assert_eq!(run.stdout, "this device is now called index\n");
+    let name = Request::SetName("index".try_into().unwrap());
+    assert_eq!(commands(&device), [name, only(true, false, false)]);
+}
+
+#[test]
+fn a_name_that_is_none_is_wrong_usage() {
+    for bad in ["", "twenty-five-letters-aaaaaa", "a\u{7}b"] {
+        let run = run(&["settings", "set", "name", bad]);
+        assert_eq!(run.code, Some(2), "{bad:?}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn a_tare_and_a_threshold_are_kept_when_asked_for() {
+    let one = device();
+    let taken = run(&["tare", "--keep", "--port", &one.port]);
+    assert_eq!(taken.stdout, "tare taken over 32 frames and kept\n");
+    let tare = Request::Tare { frames: 32 };
+    assert_eq!(commands(&one), [tare, only(false, false, true)]);
+    let other = device();
+    let set = run(&["threshold", "--model", "--keep", "--port", &other.port]);
+    let text = "threshold set and kept: rgb565, H 170–10, S 100–255, V 45–255\n";
+    assert_eq!(set.stdout, text);
+    let threshold = Request::SetThreshold(RED);
+    assert_eq!(commands(&other), [threshold, only(false, true, false)]);
+}
+
+#[test]
+fn worn_flash_is_a_refusal() {
+    let script: Script = Box::new(|device| {
+        device.flash = Outcome::Worn;
+        device.serve();
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["tare", "--keep", "--port", &device.port]);
+    assert_eq!(run.code, Some(6));
+    assert!(run.stderr.contains("its flash is worn"), "{}", run.stderr);
+}
+
+/// A file of the settings of a fake device, some of its text replaced.
+fn exported(directory: &tempfile::TempDir, from: &str, to: &str) -> String {
+    let path = directory.path().join("thumb.json");
+    let path = path.to_str().unwrap().to_owned();
+    let device = device();
+    let run = run(&["settings", "export", &path, "--port", &device.port]);
+    assert_eq!(run.stdout, format!("settings in use written to {path}\n"));
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{text}");
+    std::fs::write(&path, text.replace(from, to)).unwrap();
+    path
+}
+
+#[test]
+fn what_was_exported_is_set_and_kept_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = exported(&directory, "", "");
+    let device = device();
+    let run = run(&["settings", "import", &file, "--port", &device.port]);
+    let text = format!("settings of {file} are in use and kept\n");
+    assert_eq!((run.stdout, run.stderr), (text, String::new()));
+    let settings = settings();
+    let expected = [
+        Request::SetTare(settings.tare),
+        Request::SetName(settings.name),
+        Request::Keep(ALL),
+    ];
+    assert_eq!(commands(&device), expected);
+}
+
+#[test]
+fn another_devices_rest_position_is_left_out() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = exported(&directory, "0405060708090aff", "0405060708090afe");
+    let device = device();
+    let run = run(&["settings", "import", &file, "--port", &device.port]);
+    assert_eq!(run.code, Some(0));
+    assert!(run.stderr.contains("of another device"), "{}", run.stderr);
+    assert_eq!(commands(&device)[0], Request::SetTare(None));
+}
+
+#[test]
+fn a_file_that_is_no_settings_changes_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = exported(&directory, "\"hue_low\"", "\"hue\"");
+    let device = device();
+    let refused = run(&["settings", "import", &file, "--port", &device.port]);
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("`hue`"), "{}", refused.stderr);
+    assert!(commands(&device).is_empty());
+    let missing = run(&["settings", "import", "/no/such/file.json"]);
+    assert_eq!(missing.code, Some(1));
+    assert!(missing.stderr.contains("/no/such/file.json"));
+}
+
+/// The device refuses the rest position: nothing has been kept by then.
+#[test]
+fn an_import_that_is_refused_keeps_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = exported(&directory, "", "");
+    let script: Script = Box::new(|device| {
+        while let Some(message) = device.next() {
+            match message {
+                HostMessage::Command(Command {
+                    id,
+                    request: Request::SetTare(_),
+                }) => device.reply(id, Outcome::NotAtRest),
+                message => device.answer_to(message),
+            }
+        }
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["settings", "import", &file, "--port", &device.port]);
+    assert_eq!(run.code, Some(6));
+    assert!(run.stderr.contains("nothing was kept"), "{}", run.stderr);
+    assert!(commands(&device).is_empty(), "no Keep");
+}
+
+#[test]
+fn a_reset_forgets_everything_and_keeps_that() {
+    let script: Script = Box::new(|device| {
+        let cr = Threshold::Yuv422(Yuv422 { cr_low: 162 });
+        let hello = DeviceHello {
+            threshold: cr,
+            ..hello()
+        };
+        device.next();
+        device.send(DeviceMessage::Hello(hello));
+        device.serve();
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["settings", "reset", "--port", &device.port]);
+    assert_eq!(
+        run.stdout,
+        "everything that was kept is forgotten; take a tare\n"
+    );
+    let expected = [
+        Request::SetThreshold(RED),
+        Request::SetTare(None),
+        Request::SetName(Name::new()),
+        Request::Keep(ALL),
+    ];
+    assert_eq!(commands(&device), expected);
+}

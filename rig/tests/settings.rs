@@ -1,0 +1,311 @@
+//! What the flashed firmware keeps in its flash, through restarts and power cuts.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use common::{Run, Setup, command, firmware};
+use hivtac_rig::flash::{Contents, Cut, Leaves};
+use hivtac_rig::script::Action;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
+use hivtac_wire::message::{DeviceMessage, Outcome, Request};
+use hivtac_wire::settings::{Found, Name, RestPosition, Selection, SettingsReport};
+
+/// Numbers of commands.
+const SET: u16 = 30;
+const KEEP: u16 = 40;
+const REPORT: u16 = 50;
+/// When they are sent, ms.
+const SET_MS: u64 = 170;
+const KEEP_MS: u64 = 190;
+/// Some frames behind a restart, and the report.
+const RESTART_MS: u64 = 225;
+/// An erase takes 1 s.
+const ERASED_MS: u64 = 1_350;
+/// Where the firmware writes: of the second bank's sectors the first two.
+const SECTOR_BYTES: usize = 128 << 10;
+
+fn name(text: &str) -> Name {
+    text.try_into().unwrap()
+}
+
+fn send(id: u16, request: Request) -> Action {
+    Action::Send(command(id, request))
+}
+
+/// A run at rest with this flash that asks for the settings at its end.
+fn setup(flash: &Path, virtual_ms: u64) -> Setup {
+    let setup = Setup::new(firmware(), virtual_ms);
+    let setup = setup.at(virtual_ms - 20, send(REPORT, Request::GetSettings));
+    Setup {
+        scene: "rest",
+        flash: Some(flash.to_owned()),
+        ..setup
+    }
+}
+
+/// Gives a name and keeps that alone; without a camera, which is not needed for it.
+fn naming(flash: &Path, text: &str, virtual_ms: u64) -> Setup {
+    let only_name = Selection {
+        name: true,
+        ..Selection::NONE
+    };
+    setup(flash, virtual_ms)
+        .fault("camera-absent")
+        .at(SET_MS, send(SET, Request::SetName(name(text))))
+        .at(KEEP_MS, send(KEEP, Request::Keep(only_name)))
+}
+
+fn report(run: &Run) -> &SettingsReport {
+    let reports = run.messages.iter().filter_map(|message| match message {
+        DeviceMessage::Settings(report) => Some(report),
+        _ => None,
+    });
+    reports.last().expect("a report")
+}
+
+fn outcome(run: &Run, id: u16) -> Outcome {
+    let answers = run.answers(id);
+    assert_eq!(answers.len(), 1, "one reply to {id}");
+    answers[0].0
+}
+
+/// What a device says after a restart.
+fn restarted(flash: &Path) -> SettingsReport {
+    let run = setup(flash, RESTART_MS).run();
+    assert!(!run.samples().is_empty(), "it measures");
+    let sample = run.samples()[0];
+    assert!(sample.force.is_some(), "{sample:?}");
+    let report = report(&run);
+    let untared = sample.status.contains(Status::TARE_MISSING);
+    assert_eq!(untared, report.tare.is_none(), "{sample:?}");
+    assert_eq!(run.hellos()[0].name, report.name);
+    report.clone()
+}
+
+/// The flash of a device that keeps the name "old" and a tare, and what it says of them.
+static OLD: LazyLock<(Vec<u8>, SettingsReport)> = LazyLock::new(old);
+
+fn old() -> (Vec<u8>, SettingsReport) {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("flash");
+    let run = setup(&flash, ERASED_MS)
+        .at(SET_MS, send(SET, Request::Tare { frames: 2 }))
+        .at(SET_MS, send(SET + 1, Request::SetName(name("old"))))
+        .at(KEEP_MS + 20, send(KEEP, Request::Keep(Selection::ALL)))
+        .run();
+    assert_eq!(outcome(&run, SET), Outcome::Done);
+    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    run.assert_only_setup_drops();
+    assert_eq!(run.missing_frames(), [0; 0], "forces go on");
+    let kept = report(&run).clone();
+    assert_eq!(kept.kept, Selection::ALL);
+    assert_eq!((kept.found, kept.erases), (Found::Nothing, 1));
+    (std::fs::read(&flash).unwrap(), kept)
+}
+
+/// A folder, and in it that flash.
+struct Device {
+    directory: tempfile::TempDir,
+    flash: PathBuf,
+    kept: SettingsReport,
+}
+
+impl Device {
+    fn new() -> Device {
+        let (contents, kept) = &*OLD;
+        let directory = tempfile::tempdir().unwrap();
+        let flash = directory.path().join("flash");
+        std::fs::write(&flash, contents).unwrap();
+        Device {
+            directory,
+            flash,
+            kept: kept.clone(),
+        }
+    }
+
+    /// A copy of its flash.
+    fn copy(&self, name: &str) -> PathBuf {
+        let copy = self.directory.path().join(name);
+        std::fs::copy(&self.flash, &copy).unwrap();
+        copy
+    }
+}
+
+#[test]
+fn name_tare_and_threshold_are_kept_while_forces_go_on() {
+    let device = Device::new();
+    let first = restarted(&device.flash);
+    let expected = SettingsReport {
+        found: Found::Settings,
+        ..device.kept.clone()
+    };
+    assert_eq!(first, expected);
+    assert!(first.tare.is_some());
+    // Another threshold, kept alone: the device begins with it, and keeps the rest.
+    let green = Threshold::Rgb565(HsvBox::of_limits([40, 80, 100, 255, 45, 255]));
+    let only_threshold = Selection {
+        threshold: true,
+        ..Selection::NONE
+    };
+    let run = setup(&device.flash, 300)
+        .at(SET_MS, send(SET, Request::SetThreshold(green)))
+        .at(SET_MS + 40, send(KEEP, Request::Keep(only_threshold)))
+        .run();
+    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    let run = setup(&device.flash, RESTART_MS).run();
+    assert_eq!(run.hellos()[0].threshold, green);
+    assert_eq!(report(&run).name, "old");
+    assert_eq!(report(&run).tare, device.kept.tare);
+    assert_eq!(report(&run).erases, 1, "there is room for hundreds");
+}
+
+/// Power is cut at each operation of a change of the name: the device has the old one or the new
+/// one, its tare, and says the same at the next start.
+#[test]
+fn after_a_power_cut_the_old_or_the_new_is_there() {
+    let device = Device::new();
+    let whole = device.copy("whole");
+    let run = naming(&whole, "new", RESTART_MS).run();
+    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    let operations = run.report.flash_operations;
+    assert!((3..10).contains(&operations), "{operations}");
+    let mut names = Vec::new();
+    // A cut after one operation is a cut before the next.
+    let each = [Leaves::Before, Leaves::Torn];
+    let cuts = (0..operations).flat_map(|operation| each.map(|leaves| Cut { operation, leaves }));
+    let last = Cut {
+        operation: operations - 1,
+        leaves: Leaves::After,
+    };
+    for cut in cuts.chain([last]) {
+        let flash = device.copy("cut");
+        let setup = naming(&flash, "new", RESTART_MS);
+        let run = Setup {
+            cut: Some(cut),
+            ..setup
+        }
+        .run();
+        assert!(run.report.power_was_cut, "{cut:?}");
+        let found = restarted(&flash);
+        assert!(["old", "new"].contains(&found.name.as_str()), "{found:?}");
+        assert_eq!(found.tare, device.kept.tare, "{cut:?}");
+        assert_eq!(found.kept, Selection::ALL);
+        if cut.leaves == Leaves::Torn {
+            let again = restarted(&flash);
+            assert_eq!(again.name, found.name, "{cut:?}");
+        }
+        names.push(found.name);
+    }
+    assert_eq!(names.first().unwrap(), "old");
+    assert_eq!(names.last().unwrap(), "new");
+}
+
+/// A device that never kept anything begins with an erase. One that was cut leaves some of its words
+/// blank, some torn, and some as they were.
+#[test]
+fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("flash");
+    let cut = Some(Cut {
+        operation: 0,
+        leaves: Leaves::Torn,
+    });
+    let run = Setup {
+        cut,
+        ..naming(&flash, "new", ERASED_MS)
+    }
+    .run();
+    assert!(run.report.power_was_cut);
+    let found = restarted(&flash);
+    assert_eq!((found.name.as_str(), found.found), ("", Found::Nothing));
+    let run = naming(&flash, "new", ERASED_MS).run();
+    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    assert_eq!(restarted(&flash).name, "new");
+}
+
+/// The flash of a device whose record has another first byte, and the checksum for it.
+fn of_another_version(flash: &Path) {
+    let mut contents = Contents::load(flash).unwrap();
+    let sector = &mut contents.array[..SECTOR_BYTES];
+    // Of the storage's layout: 10 bytes before the record, of which the last four are a checksum
+    // over generation and record.
+    let length = usize::from(sector[1]);
+    let words = sector.chunks(32);
+    let mut record: Vec<u8> = words.clone().next().unwrap()[10..].to_vec();
+    for word in words.skip(1) {
+        record.extend(&word[1..]);
+    }
+    record.truncate(length);
+    assert_eq!(record[0], 1, "the version");
+    sector[10] = 200;
+    record[0] = 200;
+    let mut checked = sector[2..6].to_vec();
+    checked.extend(&record);
+    let checksum = hivtac_wire::frame::CRC32.checksum(&checked);
+    sector[6..10].copy_from_slice(&checksum.to_le_bytes());
+    contents.save(flash).unwrap();
+}
+
+#[test]
+fn settings_of_another_version_are_told_and_stay_until_something_is_kept() {
+    let device = Device::new();
+    of_another_version(&device.flash);
+    let before = Contents::load(&device.flash).unwrap();
+    let found = restarted(&device.flash);
+    assert_eq!(found.found, Found::AnotherVersion);
+    assert_eq!((found.name.as_str(), found.tare), ("", None));
+    assert_eq!(Contents::load(&device.flash).unwrap(), before, "untouched");
+    let run = naming(&device.flash, "new", RESTART_MS).run();
+    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    let found = restarted(&device.flash);
+    assert_eq!((found.name.as_str(), found.found), ("new", Found::Settings));
+}
+
+/// Of another format; with a marker outside every picture; of a film that is pressed.
+#[test]
+fn a_rest_position_that_is_none_is_refused_and_nothing_changes() {
+    let device = Device::new();
+    let good = device.kept.tare.unwrap();
+    let other = RestPosition {
+        format: PixelFormat::Yuv422,
+        ..good
+    };
+    let mut outside = good;
+    outside.markers[2].x.0 = i32::MAX;
+    let mut pressed = good;
+    let (x, y) = good.rect_center;
+    for marker in &mut pressed.markers {
+        marker.x.0 += (marker.x.0 - x.0) / 4;
+        marker.y.0 += (marker.y.0 - y.0) / 4;
+    }
+    let wanted = [
+        (Some(other), Outcome::InvalidArgument),
+        (Some(outside), Outcome::InvalidArgument),
+        (Some(pressed), Outcome::NotAtRest),
+        (Some(good), Outcome::Done),
+        (None, Outcome::Done),
+    ];
+    let mut setup = setup(&device.flash, 280).at(210, send(REPORT + 1, Request::GetSettings));
+    for (nth, (position, _)) in (0..).zip(wanted) {
+        let at = if nth < 4 { SET_MS } else { 230 };
+        setup = setup.at(at + nth, send(SET + nth as u16, Request::SetTare(position)));
+    }
+    let run = setup.run();
+    for (nth, (_, expected)) in (0..).zip(wanted) {
+        assert_eq!(outcome(&run, SET + nth), expected, "{nth}");
+    }
+    let reports: Vec<_> = run
+        .messages
+        .iter()
+        .filter_map(|message| match message {
+            DeviceMessage::Settings(report) => Some((report.tare, report.kept.tare)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(reports, [(Some(good), true), (None, false)]);
+    let last = run.samples().last().unwrap().status;
+    assert!(last.contains(Status::TARE_MISSING), "{last:?}");
+}

@@ -1,0 +1,150 @@
+//! What a device keeps in its flash, as bytes: one record with all of it, so that it is changed as
+//! a whole or not at all.
+
+use crate::settings::{Name, RestPosition};
+use hivtac_terms::threshold::Threshold;
+use serde::{Deserialize, Serialize};
+
+/// First byte of a record. Raised on every change of what follows.
+const VERSION: u8 = 1;
+
+/// Longest record.
+pub const MAX_BYTES: usize = 130;
+
+/// All that a device keeps.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Record {
+    /// What its user calls it.
+    pub name: Name,
+    /// `None` for that of the model.
+    pub threshold: Option<Threshold>,
+    /// The rest position.
+    pub tare: Option<RestPosition>,
+    /// The model that was sent to it; `None` for the built-in one.
+    pub model: Option<KeptModel>,
+}
+
+/// A model file that lies in flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeptModel {
+    /// Which of the places for models, 0 or 1.
+    pub slot: u8,
+    /// Its length.
+    pub bytes: u32,
+    /// CRC-32 of the file without its own.
+    pub crc: u32,
+}
+
+/// The record is of another version, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AnotherVersion;
+
+impl Record {
+    /// Its bytes, at the front of `buffer`.
+    pub fn to_bytes<'b>(&self, buffer: &'b mut [u8; MAX_BYTES]) -> &'b [u8] {
+        // The longest record fits: tested below.
+        postcard::to_slice(&(VERSION, self), buffer).map_or(&[], |bytes| bytes)
+    }
+
+    /// The other way round.
+    ///
+    /// # Errors
+    /// [`AnotherVersion`].
+    pub fn of_bytes(bytes: &[u8]) -> Result<Record, AnotherVersion> {
+        match postcard::take_from_bytes::<(u8, Record)>(bytes) {
+            Ok(((VERSION, record), [])) => Ok(record),
+            _ => Err(AnotherVersion),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::examples::{any_rest, any_threshold, longest_rest};
+    use hivtac_terms::threshold::HsvBox;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn longest() -> Record {
+        Record {
+            name: Name::try_from("x".repeat(24).as_str()).unwrap(),
+            threshold: Some(Threshold::Rgb565(HsvBox::of_limits([255; 6]))),
+            tare: Some(longest_rest()),
+            model: Some(KeptModel {
+                slot: 1,
+                bytes: u32::MAX,
+                crc: u32::MAX,
+            }),
+        }
+    }
+
+    #[test]
+    fn the_longest_record_fits_exactly() {
+        let mut buffer = [0; MAX_BYTES];
+        let bytes = longest().to_bytes(&mut buffer);
+        assert_eq!(bytes.len(), MAX_BYTES);
+        assert_eq!(Record::of_bytes(bytes), Ok(longest()));
+    }
+
+    /// The record of a device in use must be read by every firmware with this version's number.
+    #[test]
+    fn the_bytes_of_version_1() {
+        let record = Record {
+            name: Name::try_from("thumb").unwrap(),
+            threshold: Some(Threshold::Rgb565(HsvBox::of_limits([
+                170, 10, 100, 255, 45, 255,
+            ]))),
+            tare: None,
+            model: Some(KeptModel {
+                slot: 1,
+                bytes: 9_216,
+                crc: 0xcafe_f00d,
+            }),
+        };
+        let bytes = [
+            1, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
+            0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c,
+        ];
+        let mut buffer = [0; MAX_BYTES];
+        assert_eq!(record.to_bytes(&mut buffer), bytes);
+        assert_eq!(Record::of_bytes(&bytes), Ok(record));
+    }
+
+    #[test]
+    fn records_of_another_version_are_not_read() {
+        let mut buffer = [0; MAX_BYTES];
+        let length = Record::default().to_bytes(&mut buffer).len();
+        let bytes = &mut buffer[..length + 1];
+        assert!(Record::of_bytes(&bytes[..length]).is_ok());
+        assert_eq!(Record::of_bytes(bytes), Err(AnotherVersion), "a byte more");
+        assert_eq!(Record::of_bytes(&bytes[..length - 1]), Err(AnotherVersion));
+        bytes[0] = VERSION + 1;
+        assert_eq!(Record::of_bytes(&bytes[..length]), Err(AnotherVersion));
+        assert_eq!(Record::of_bytes(&[]), Err(AnotherVersion));
+    }
+
+    proptest! {
+        #[test]
+        fn a_record_comes_back(
+            name in "[a-zé ]{0,12}",
+            threshold in proptest::option::of(any_threshold()),
+            tare in proptest::option::of(any_rest()),
+            model in proptest::option::of(any::<(u8, u32, u32)>()),
+        ) {
+            let record = Record {
+                name: Name::try_from(name.as_str()).unwrap(),
+                threshold,
+                tare,
+                model: model.map(|(slot, bytes, crc)| KeptModel { slot, bytes, crc }),
+            };
+            let mut buffer = [0; MAX_BYTES];
+            prop_assert_eq!(Record::of_bytes(record.to_bytes(&mut buffer)), Ok(record));
+        }
+
+        #[test]
+        fn any_bytes_are_a_record_or_another_version(bytes: Vec<u8>) {
+            let _ = Record::of_bytes(&bytes);
+        }
+    }
+}

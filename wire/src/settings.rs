@@ -1,0 +1,90 @@
+//! A device's settings: what its user gave it, in use and kept.
+
+use heapless::String;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_terms::units::Px;
+use postcard_schema::Schema;
+use serde::{Deserialize, Serialize};
+
+/// Longest name, bytes of UTF-8.
+pub const NAME_BYTES: usize = 24;
+
+/// A name that a user gave a device, empty when there is none.
+pub type Name = String<NAME_BYTES>;
+
+/// A rest position that was taken on a device, and by which settings its markers were seen: it
+/// means nothing under others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct RestPosition {
+    /// Of the frames.
+    pub format: PixelFormat,
+    /// 3×3 dilations of the mask, 0–3.
+    pub dilations: u8,
+    /// How a marker's position is taken from its pixels.
+    pub centroid: CentroidEstimator,
+    /// The four markers at rest.
+    pub markers: [Marker; 4],
+    /// The mean centre of their bounding rectangle, (x, y).
+    pub rect_center: (Px, Px),
+    /// Its mean area, 1/65,536 px².
+    pub rect_area: i64,
+}
+
+/// Answer to [`GetSettings`](crate::message::Request::GetSettings).
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct SettingsReport {
+    /// The name in use.
+    pub name: Name,
+    /// The threshold in use.
+    pub threshold: Threshold,
+    /// The rest position in use, when one was taken.
+    pub tare: Option<RestPosition>,
+    /// Which of them will be the same after a restart.
+    pub kept: Selection,
+    /// What the device found in its flash at the start.
+    pub found: Found,
+    /// Sectors of the flash that were erased so far to keep settings.
+    pub erases: u32,
+    /// Attempts to write that failed since the start.
+    pub failures: u32,
+}
+
+/// Some of the settings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Selection {
+    /// The name.
+    pub name: bool,
+    /// The threshold.
+    pub threshold: bool,
+    /// The rest position.
+    pub tare: bool,
+}
+
+impl Selection {
+    /// None of them.
+    pub const NONE: Selection = Selection {
+        name: false,
+        threshold: false,
+        tare: false,
+    };
+    /// All of them.
+    pub const ALL: Selection = Selection {
+        name: true,
+        threshold: true,
+        tare: true,
+    };
+}
+
+/// What a device found in its flash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum Found {
+    /// Nothing: no settings were ever kept.
+    Nothing,
+    /// What it kept.
+    Settings,
+    /// What firmware of another version kept, and this one does not read. It stays until settings
+    /// are kept anew.
+    AnotherVersion,
+}
