@@ -49,6 +49,8 @@ pub struct Alignment {
 
 /// Distance of lags on the grid, s.
 const STEP_S: f64 = 0.02;
+/// No recording and its gauge are longer together, s: two days.
+const LONGEST_S: f64 = 172_800.0;
 /// The most frames that are used on the grid; the refinement uses all.
 const GRID_FRAMES: usize = 1000;
 /// This part of the frames must have a reading.
@@ -89,6 +91,11 @@ pub fn align(frames: &[RadiusSample], gauge: Joined<'_>, search: Search) -> Resu
         .copied()
         .collect();
     let [low, high] = search.lags_s;
+    ensure!(
+        high - low <= LONGEST_S,
+        "the gauge's times differ from the sensor's by {low:.1} to {high:.1} s: are they of the \
+         same recording?"
+    );
     let steps = ((high - low) / STEP_S).ceil().max(0.0) as usize;
     let grid: Vec<Option<Fit>> = (0..=steps)
         .into_par_iter()

@@ -21,7 +21,7 @@ use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceHello, Sample};
 use serde::{Deserialize, Serialize};
 
-use super::poses::Pose;
+use super::poses::{self, Pose};
 use crate::conditions::{CentroidName, Conditions, OriginName};
 
 const SAMPLES: &str = "samples.csv";
@@ -34,6 +34,11 @@ x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,\
 x3_q16,y3_q16,area3_px,x_mm,y_mm";
 const GAUGE_COLUMNS: &str = "run,host_s,line";
 const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
+
+/// No marker has a larger number: 2¹⁰ px in 1/65,536 px, and more than a frame's area.
+const LARGEST_MARKER: i64 = 1 << 26;
+/// The longest that a sensor runs, µs: most of a century, exact in seconds as `f64`.
+const LARGEST_US: u64 = 1 << 51;
 
 /// A recording's folder, open for writing.
 #[derive(Debug)]
@@ -276,43 +281,60 @@ impl Recording {
                 unit.display()
             )
         })?;
-        let conditions = serde_json::from_str(&text)
-            .with_context(|| format!("{} is damaged", unit.display()))?;
-        let samples = rows(&path.join(SAMPLES), sample, SAMPLE_COLUMNS)?;
+        let table = |name: &str| {
+            let path = path.join(name);
+            fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
+        };
+        Self::parse(&text, &table(SAMPLES)?, &table(GAUGE)?)
+            .with_context(|| path.display().to_string())
+    }
+
+    /// The recording in the texts of its files: `unit.json`, `samples.csv` and `gauge.csv`.
+    ///
+    /// # Errors
+    /// When one is damaged; names the file and the line.
+    pub fn parse(unit: &str, samples: &str, gauge: &str) -> Result<Self> {
+        let conditions =
+            serde_json::from_str(unit).with_context(|| format!("{UNIT} is damaged"))?;
+        let samples = rows([SAMPLES, samples], sample, SAMPLE_COLUMNS)?;
         let gauge_line = |record: &csv::StringRecord| {
             let line: GaugeLine = record.deserialize(Some(&GAUGE_COLUMNS.split(',').collect()))?;
+            ensure!(line.host_s.is_finite(), "host_s is {}", line.host_s);
             Ok((line.run, line.host_s, line.line))
         };
-        let gauge_lines = rows(&path.join(GAUGE), gauge_line, GAUGE_COLUMNS)?;
-        Ok(Self {
+        let gauge_lines = rows([GAUGE, gauge], gauge_line, GAUGE_COLUMNS)?;
+        let recording = Self {
             conditions,
             samples,
             gauge_lines,
-        })
+        };
+        let lines = recording.samples.len() + recording.gauge_lines.len();
+        let runs = recording.runs();
+        // Each run that left a line follows another one that did.
+        ensure!(runs <= lines, "{lines} lines cannot be of {runs} runs");
+        Ok(recording)
     }
 
     /// How many runs there are.
     pub fn runs(&self) -> usize {
-        let last = self.samples.iter().map(|kept| kept.run + 1).max();
-        let heard = self.gauge_lines.iter().map(|(run, ..)| run + 1).max();
+        let after = |run: usize| run.saturating_add(1);
+        let last = self.samples.iter().map(|kept| after(kept.run)).max();
+        let heard = self.gauge_lines.iter().map(|(run, ..)| after(*run)).max();
         last.max(heard).unwrap_or(0)
     }
 }
 
 /// The whole lines of one of the folder's tables.
 fn rows<T>(
-    path: &Path,
+    [name, text]: [&str; 2],
     parse: impl Fn(&csv::StringRecord) -> Result<T>,
     columns: &str,
 ) -> Result<Vec<T>> {
-    let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let mut table = csv::Reader::from_reader(whole.as_bytes());
     ensure!(
         whole.is_empty() || table.headers()?.iter().eq(columns.split(',')),
-        "{} has other columns than this release writes ({columns}): record into another folder",
-        path.display()
+        "{name} has other columns than this release writes ({columns}): record into another folder"
     );
     let rows = table.records().map(|record| {
         let record = record?;
@@ -320,7 +342,7 @@ fn rows<T>(
         parse(&record).with_context(|| format!("line {line}"))
     });
     rows.collect::<Result<_>>()
-        .with_context(|| format!("{} is damaged", path.display()))
+        .with_context(|| format!("{name} is damaged"))
 }
 
 fn sample(record: &csv::StringRecord) -> Result<Kept> {
@@ -332,15 +354,22 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
                 for (part, value) in marker.iter_mut().enumerate() {
                     *value = number(8 + 3 * m + part)?;
                 }
+                ensure!(
+                    marker.iter().all(|value| value.abs() <= LARGEST_MARKER),
+                    "marker {m} is beyond every frame: {marker:?}"
+                );
             }
             Ok(markers)
         }
         why => Err(why.to_owned()),
     };
+    let (host_s, device_us): (f64, u64) = (record[1].parse()?, record[2].parse()?);
+    ensure!(host_s.is_finite(), "host_s is {host_s}");
+    ensure!(device_us <= LARGEST_US, "device_us is {device_us}");
     Ok(Kept {
         run: record[0].parse()?,
-        host_s: record[1].parse()?,
-        device_us: record[2].parse()?,
+        host_s,
+        device_us,
         pose: pose(record, [5, 20])?,
         seen,
     })
@@ -351,15 +380,18 @@ fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Optio
     if record[angles].is_empty() && record[angles + 1].is_empty() {
         return Ok(None);
     }
-    let pair = |at: usize| Ok::<_, anyhow::Error>([record[at].parse()?, record[at + 1].parse()?]);
-    Ok(Some(Pose {
-        angles_deg: pair(angles)?,
-        place_mm: pair(place)?,
-    }))
+    let texts = [angles, angles + 1, place, place + 1].map(|column| &record[column]);
+    ensure!(
+        texts.iter().all(|text| !text.is_empty()),
+        "half a pose: {texts:?}"
+    );
+    poses::parse(&texts.join(",")).map(Some)
 }
 
 fn takes_done(path: &Path) -> Result<Vec<Pose>> {
-    let poses = rows(path, |record| pose(record, [1, 5]), TAKE_COLUMNS)?;
+    let text =
+        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let poses = rows([TAKES, &text], |record| pose(record, [1, 5]), TAKE_COLUMNS)?;
     Ok(poses.into_iter().flatten().collect())
 }
 
@@ -519,5 +551,35 @@ mod tests {
         fs::write(&file, text.replace("131072", "131o72")).unwrap();
         let error = format!("{:#}", Recording::read(path).unwrap_err());
         assert!(error.contains("samples.csv is damaged: line 2"), "{error}");
+    }
+
+    #[test]
+    fn numbers_that_no_sensor_sends_are_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path();
+        let mut folder = Folder::open(path, &conditions()).unwrap();
+        folder
+            .sample(0.5, Some(tilted()), &sample(1, true))
+            .unwrap();
+        let read = |name: &str| fs::read_to_string(path.join(name)).unwrap();
+        let [unit, samples, gauge] = [UNIT, SAMPLES, GAUGE].map(read);
+        assert!(Recording::parse(&unit, &samples, &gauge).is_ok());
+        let refused = |before: &str, after: &str, words: &str| {
+            assert!(samples.contains(before), "{before} in {samples}");
+            let samples = samples.replacen(before, after, 1);
+            let error = Recording::parse(&unit, &samples, &gauge).unwrap_err();
+            assert!(format!("{error:#}").contains(words), "{after}: {error:#}");
+        };
+        refused("\n0,0.500000,", "\n18446744073709551615,0.5,", "runs");
+        refused("\n0,0.500000,", "\n7,0.5,", "runs");
+        refused("\n0,0.500000,", "\n0,NaN,", "line 2: host_s is NaN");
+        refused(",25600,", ",18446744073709551615,", "line 2: device_us");
+        refused(",131072,", ",9131072000,", "line 2: marker 1");
+        refused(",4,-3.5,", ",NaN,-3.5,", "line 2: `NaN");
+        refused(",4,-3.5,", ",4,-93.5,", "angles are within");
+        refused(",0.5,-2\n", ",1e9,-2\n", "places within");
+        let gauge = format!("{gauge}0,inf,0.1N\n");
+        let error = Recording::parse(&unit, &samples, &gauge).unwrap_err();
+        assert!(format!("{error:#}").contains("gauge.csv is damaged: line 2"));
     }
 }

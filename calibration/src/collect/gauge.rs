@@ -76,7 +76,7 @@ pub fn reading(line: &str, usual: Unit) -> Result<f64, Bad> {
     let value: f64 = number
         .parse()
         .ok()
-        .filter(|_| whole)
+        .filter(|value: &f64| whole && value.is_finite())
         .ok_or(Bad::NoReading)?;
     let (scale, letters) = UNITS
         .iter()
@@ -177,6 +177,7 @@ mod tests {
             ("0.12N0.13N", Bad::NoReading),
             ("inf", Bad::NoReading),
             ("NaN", Bad::NoReading),
+            (&"9".repeat(400), Bad::NoReading),
             ("0.1psi", Bad::Unit),
             ("OL", Bad::Overload),
             ("+OVER", Bad::Overload),

@@ -61,7 +61,8 @@ impl Series {
         Ok(series)
     }
 
-    fn parse(text: &str, unit: Unit) -> Self {
+    /// Reads the text of such a file; one without readings is as good as any.
+    pub fn parse(text: &str, unit: Unit) -> Self {
         let mut series = Self::default();
         let mut first = true;
         for (index, line) in text.lines().enumerate() {

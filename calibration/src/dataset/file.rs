@@ -39,6 +39,13 @@ const LAST_COLUMNS: [&str; 16] = [
     "area3_px",
     "status",
 ];
+/// Beyond these there are no numbers, ±: a force's component, N; a tip's coordinate, mm; a feature,
+/// px or px²; an area, px. Sums and differences of such stay far inside their types.
+const LARGEST_N: f64 = 1e3;
+const LARGEST_MM: f64 = 1e3;
+const LARGEST_FEATURE: f64 = 1048576.0;
+const LARGEST_AREA: u32 = 1 << 20;
+
 const FORCE_AT: usize = 2;
 const PLACE_AT: usize = FORCE_AT + 3;
 
@@ -81,9 +88,17 @@ impl Dataset {
     /// # Errors
     /// When the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
+        fs::write(path, self.to_text()?).with_context(|| format!("cannot write {}", path.display()))
+    }
+
+    /// The text of its file.
+    ///
+    /// # Errors
+    /// When something in it cannot be written as text.
+    pub fn to_text(&self) -> Result<Vec<u8>> {
         let mut text = opening(&self.about)?.into_bytes();
         text.extend(lines(&self.about, &self.rows)?);
-        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+        Ok(text)
     }
 
     /// Reads a data set.
@@ -96,7 +111,11 @@ impl Dataset {
         Self::parse(&text).with_context(|| format!("{} is not a usable data set", path.display()))
     }
 
-    fn parse(text: &str) -> Result<Self> {
+    /// Reads the text of a data set.
+    ///
+    /// # Errors
+    /// When it is no data set; names the line.
+    pub fn parse(text: &str) -> Result<Self> {
         let mut lines = text.lines();
         let first = lines.next().unwrap_or_default();
         ensure!(first == FORMAT, "line 1 is not `{FORMAT}`");
@@ -192,7 +211,7 @@ impl Record<'_> {
         };
         let mut force_n = [0.0; 3];
         for (i, component) in force_n.iter_mut().enumerate() {
-            *component = self.number(FORCE_AT + i)?;
+            *component = self.number(FORCE_AT + i, LARGEST_N)?;
         }
         let seen = match &self.record[self.columns.status_at()] {
             "" => Ok(self.observation()?),
@@ -212,8 +231,8 @@ impl Record<'_> {
             return Ok(None);
         }
         Ok(Some([
-            self.number(places.start)?,
-            self.number(places.start + 1)?,
+            self.number(places.start, LARGEST_MM)?,
+            self.number(places.start + 1, LARGEST_MM)?,
         ]))
     }
 
@@ -223,10 +242,17 @@ impl Record<'_> {
             areas_px: [0; 4],
         };
         for (i, feature) in seen.features_q16.iter_mut().enumerate() {
-            *feature = (self.number(self.columns.features_at() + i)? * PX).round() as i64;
+            let number = self.number(self.columns.features_at() + i, LARGEST_FEATURE)?;
+            *feature = (number * PX).round() as i64;
         }
         for (i, area) in seen.areas_px.iter_mut().enumerate() {
-            *area = self.whole(self.columns.areas_at() + i)?;
+            let column = self.columns.areas_at() + i;
+            *area = self.whole(column)?;
+            ensure!(
+                *area <= LARGEST_AREA,
+                "column {}: {area} is more than {LARGEST_AREA}",
+                self.columns.names[column]
+            );
         }
         Ok(seen)
     }
@@ -241,14 +267,15 @@ impl Record<'_> {
             .with_context(|| format!("column {}: `{text}`", self.columns.names[column]))
     }
 
-    fn number(&self, column: usize) -> Result<f64> {
-        let text = &self.record[column];
+    /// A number within ± `most`.
+    fn number(&self, column: usize, most: f64) -> Result<f64> {
+        let (text, name) = (&self.record[column], self.columns.names[column]);
         match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => bail!(
-                "column {}: `{text}` is not a finite number",
-                self.columns.names[column]
-            ),
+            Ok(value) if value.abs() <= most => Ok(value),
+            Ok(value) if value.is_finite() => {
+                bail!("column {name}: `{text}` is beyond ±{most}")
+            }
+            _ => bail!("column {name}: `{text}` is not a finite number"),
         }
     }
 }
@@ -322,5 +349,24 @@ mod tests {
         );
         refused(text.replace(",200,200,", ",200,2.5,"), "column area");
         refused(text.replace("markers_missing", "a,b"), "line: 7");
+    }
+
+    #[test]
+    fn numbers_that_no_frame_has_are_refused() {
+        let refused = |change: &dyn Fn(&mut Row), words: &str| {
+            let mut dataset = example();
+            change(&mut dataset.rows[0]);
+            let text = String::from_utf8(dataset.to_text().unwrap()).unwrap();
+            let error = format!("{:#}", Dataset::parse(&text).unwrap_err());
+            assert!(error.contains(words), "{error}");
+        };
+        let feature = |row: &mut Row, i: usize| {
+            row.seen.as_mut().unwrap().features_q16[i] = i64::MAX / 2;
+        };
+        refused(&|row| feature(row, 0), "column x0_px");
+        refused(&|row| feature(row, 10), "column rect_area_px2");
+        refused(&|row| row.force_n[1] = 1e200, "column fy_n");
+        let area = |row: &mut Row| row.seen.as_mut().unwrap().areas_px[3] = u32::MAX;
+        refused(&area, "column area3_px");
     }
 }

@@ -121,6 +121,19 @@ fn what_does_not_convince_is_refused() {
 }
 
 #[test]
+fn clocks_that_cannot_be_of_one_recording_are_refused() {
+    let series = gauge(hand, 70.0, 0.0, 0.0, 0.000_5);
+    for far in [1e7, 1e300, f64::INFINITY, f64::NAN] {
+        let search = Search {
+            lags_s: [-far, far],
+            drift: true,
+        };
+        let error = refused(&frames(hand, 60.0), &series, search);
+        assert!(error.contains("of the same recording?"), "{error}");
+    }
+}
+
+#[test]
 fn a_pull_is_no_press() {
     let pulled = gauge(|t| -hand(t), 70.0, 0.0, 0.0, 0.000_5);
     let error = refused(&frames(hand, 60.0), &pulled, WIDE);
