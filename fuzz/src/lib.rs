@@ -14,6 +14,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod calibration;
 mod capture;
 #[cfg(test)]
 mod corpus;
@@ -28,7 +29,7 @@ mod wire;
 pub type Attack = fn(&[u8]) -> bool;
 
 /// Every attack by the name of its target, which is that of its folder in `fuzz/corpus`, too.
-pub const ATTACKS: [(&str, Attack); 7] = [
+pub const ATTACKS: [(&str, Attack); 10] = [
     ("from_device", wire::from_device),
     ("from_host", wire::from_host),
     ("model", model::attack),
@@ -36,6 +37,9 @@ pub const ATTACKS: [(&str, Attack); 7] = [
     ("capture", capture::attack),
     ("storage", storage::attack),
     ("scene_file", scene_file::attack),
+    ("dataset", calibration::dataset),
+    ("recording", calibration::recording),
+    ("network", calibration::network),
 ];
 
 /// The attack of that name.
