@@ -5,6 +5,7 @@ mod bench;
 mod columns;
 mod demo;
 mod fuzz;
+mod licences;
 mod numbers;
 mod packages;
 mod process;

@@ -9,7 +9,7 @@ use clap::Args;
 use crate::artifacts::Board;
 use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
-use crate::{artifacts, bench, columns, fuzz, packages, process, workspace};
+use crate::{artifacts, bench, columns, fuzz, licences, packages, process, workspace};
 
 /// The workspaces: folder, and whether it has more than one package.
 const WORKSPACES: [(&str, bool); 4] = [
@@ -74,13 +74,27 @@ impl Test {
                 bench::board::lint(toolchain)
             });
         }
-        if self.all && self.wants("attacks") {
+        if self.all {
+            self.optional(&mut report);
+        }
+        report.finish()
+    }
+
+    /// What needs programs that nothing else here does.
+    fn optional(&self, report: &mut Report) {
+        if self.wants("licences") {
+            let folders = WORKSPACES.iter().map(|(folder, _)| *folder);
+            match licences::obstacle() {
+                None => drop(report.step("licences", |_| licences::check(folders))),
+                Some(obstacle) => report.leave_out("licences", obstacle),
+            }
+        }
+        if self.wants("attacks") {
             match fuzz::obstacle() {
                 None => drop(report.step("attacks", |_| fuzz::run())),
                 Some(obstacle) => report.leave_out("attacks", obstacle),
             }
         }
-        report.finish()
     }
 
     fn wants(&self, step: &str) -> bool {
