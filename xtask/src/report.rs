@@ -73,8 +73,21 @@ impl Report {
         result.ok()
     }
 
-    /// Notes that a step that nothing depends on cannot run here, and why.
-    pub fn leave_out(&mut self, name: &'static str, obstacle: &'static str) {
+    /// Runs a step that nothing depends on, unless something keeps it from running here.
+    pub fn optional(
+        &mut self,
+        name: &'static str,
+        obstacle: Option<&'static str>,
+        work: impl FnOnce() -> Result<()>,
+    ) {
+        match obstacle {
+            None => drop(self.step(name, |_| work())),
+            Some(obstacle) => self.leave_out(name, obstacle),
+        }
+    }
+
+    /// Notes that a step is left out, and why.
+    fn leave_out(&mut self, name: &'static str, obstacle: &'static str) {
         eprintln!("\n=== {name} is left out: {obstacle}");
         self.steps.push(Step {
             name,
@@ -198,7 +211,7 @@ mod tests {
     #[test]
     fn a_step_that_was_left_out_is_told_and_fails_nothing() {
         let mut report = Report::default();
-        report.leave_out("one", "it is night");
+        report.optional("one", Some("it is night"), || bail!("it ran"));
         let told: Vec<_> = report.left_out().collect();
         assert_eq!(told, [("one", "it is night")]);
         assert!(report.finish().is_ok());

@@ -84,16 +84,12 @@ impl Test {
     fn optional(&self, report: &mut Report) {
         if self.wants("licences") {
             let folders = WORKSPACES.iter().map(|(folder, _)| *folder);
-            match licences::obstacle() {
-                None => drop(report.step("licences", |_| licences::check(folders))),
-                Some(obstacle) => report.leave_out("licences", obstacle),
-            }
+            report.optional("licences", licences::obstacle(), || {
+                licences::check(folders)
+            });
         }
         if self.wants("attacks") {
-            match fuzz::obstacle() {
-                None => drop(report.step("attacks", |_| fuzz::run())),
-                Some(obstacle) => report.leave_out("attacks", obstacle),
-            }
+            report.optional("attacks", fuzz::obstacle(), fuzz::run);
         }
     }
 
