@@ -203,8 +203,8 @@ fn after_a_power_cut_the_old_or_the_new_is_there() {
     assert_eq!(names.last().unwrap(), "new");
 }
 
-/// A device that never kept anything begins with an erase. One that was cut leaves some of its words
-/// blank, some torn, and some as they were.
+/// A device that never kept anything begins with an erase. One that was cut leaves some of its
+/// words blank, some torn, and some as they were.
 #[test]
 fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
     let directory = tempfile::tempdir().unwrap();

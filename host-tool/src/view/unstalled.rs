@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 /// Longest time that a browser may take for one write.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Writes to a browser that reads: one that lets a single write last as long as it may, even if some
-/// of it went through, is cut off.
+/// Writes to a browser that reads: one that lets a single write last as long as it may, even if
+/// some of it went through, is cut off.
 pub struct Unstalled<'s>(&'s TcpStream);
 
 impl Unstalled<'_> {
