@@ -215,6 +215,9 @@ enum Command {
         /// The page's port on 127.0.0.1; one that is free when not given
         #[arg(long, value_name = "PORT", default_value_t = 0)]
         listen: u16,
+        /// Where the page's recordings go, as hivtac-UNIT-NUMBER.mcap
+        #[arg(long, value_name = "FOLDER", default_value = ".")]
+        recordings: PathBuf,
     },
     /// Write a template to print: where the film is punched and the dots are stuck, as SVG
     Template {
@@ -529,6 +532,7 @@ fn run(command: Command) -> Result<(), Failure> {
             port,
             timeout,
             listen,
+            recordings,
         } => view::run(&view::Options {
             addresses: match port.as_slice() {
                 [] => vec![Address::Find],
@@ -536,6 +540,7 @@ fn run(command: Command) -> Result<(), Failure> {
             },
             patience: timeout,
             port: listen,
+            folder: recordings,
         }),
         Command::Template { file, preset } => template::run(&file, preset),
         Command::BringUp {

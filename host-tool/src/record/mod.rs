@@ -42,16 +42,24 @@ pub struct Options {
 
 /// Records until the time is over, Ctrl-C, or the device is gone.
 pub fn run(options: &Options) -> Result<(), Failure> {
-    let kind = Format::of(&options.file)?;
-    if options.file.exists() {
-        let what = "there is such a file already; choose another name";
-        return Err(input(&options.file, what));
-    }
+    check(&options.file)?;
     let (mut link, hello) = Link::connect(&options.address, options.patience)?;
-    let mut recording = Recording::create(options, kind, &hello)?;
+    let mut recording = Recording::create(&options.file, &hello)?;
     let result = recording.follow(&mut link, options);
     recording.tally.rejected(link.rejected());
     recording.end(&hello, result)
+}
+
+/// Says whether a file can be made.
+fn check(file: &Path) -> Result<Format, Failure> {
+    let format = Format::of(file)?;
+    match file.exists() {
+        true => {
+            let what = "there is such a file already; choose another name";
+            Err(input(file, what))
+        }
+        false => Ok(format),
+    }
 }
 
 /// The kind of a file, by the end of its name.
@@ -80,7 +88,7 @@ enum Sink {
 }
 
 /// A file under way.
-struct Recording {
+pub struct Recording {
     file: PathBuf,
     partial: PathBuf,
     sink: Sink,
@@ -91,8 +99,13 @@ struct Recording {
 }
 
 impl Recording {
-    fn create(options: &Options, kind: Format, hello: &DeviceHello) -> Result<Recording, Failure> {
-        let file = options.file.clone();
+    /// Begins `….mcap` or `….csv` with a device's hello, as `….partial`.
+    ///
+    /// # Errors
+    /// When there is such a file already, or it cannot be made.
+    pub fn create(file: &Path, hello: &DeviceHello) -> Result<Recording, Failure> {
+        let kind = check(file)?;
+        let file = file.to_owned();
         let mut partial = file.clone().into_os_string();
         partial.push(".partial");
         let partial = PathBuf::from(partial);
@@ -138,6 +151,7 @@ impl Recording {
             if flushed.elapsed() >= FLUSH_EVERY {
                 flushed = Instant::now();
                 self.flush()?;
+                self.show_progress();
             }
             if heard.elapsed() >= SILENCE {
                 return Err(link.lost("the device sends nothing"));
@@ -150,7 +164,11 @@ impl Recording {
         late.iter().try_for_each(|message| self.keep(message))
     }
 
-    fn keep(&mut self, message: &DeviceMessage) -> Result<(), Failure> {
+    /// Keeps a message that has just come.
+    ///
+    /// # Errors
+    /// When the disk is full, or gone.
+    pub fn keep(&mut self, message: &DeviceMessage) -> Result<(), Failure> {
         match message {
             DeviceMessage::Sample(sample) => drop(self.tally.sample(sample)),
             DeviceMessage::Stats(stats) => self.tally.stats(stats),
@@ -166,22 +184,36 @@ impl Recording {
         kept.map_err(|error| input(&self.partial, error))
     }
 
-    fn flush(&mut self) -> Result<(), Failure> {
+    /// Brings to the disk what came so far.
+    ///
+    /// # Errors
+    /// When it is full, or gone.
+    pub fn flush(&mut self) -> Result<(), Failure> {
         let flushed = match &mut self.sink {
             Sink::Bag(bag) => bag.flush(),
             Sink::Table(table) => table.flush().map_err(Into::into),
         };
-        flushed.map_err(|error| input(&self.partial, error))?;
+        flushed.map_err(|error| input(&self.partial, error))
+    }
+
+    /// For a person, how long it lasts and what came.
+    pub fn progress(&self) -> String {
+        let seconds = self.begun.elapsed().as_secs();
+        format!("{seconds} s, {}", self.tally.received_line())
+    }
+
+    fn show_progress(&self) {
         let mut terminal = std::io::stderr();
         if terminal.is_terminal() {
-            let seconds = self.begun.elapsed().as_secs();
-            let _ = write!(terminal, "\r{seconds} s, {} ", self.tally.received_line());
+            let _ = write!(terminal, "\r{} ", self.progress());
         }
-        Ok(())
     }
 
     /// Ends the file, whatever ended the recording, and names it when nothing is missing.
-    fn end(self, hello: &DeviceHello, result: Result<(), Failure>) -> Result<(), Failure> {
+    ///
+    /// # Errors
+    /// What ended it, or that it could not be ended.
+    pub fn end(self, hello: &DeviceHello, result: Result<(), Failure>) -> Result<(), Failure> {
         let Recording {
             file,
             partial,

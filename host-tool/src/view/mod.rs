@@ -6,6 +6,7 @@ mod lights;
 mod order;
 mod owner;
 mod picture;
+mod recorder;
 mod request;
 mod response;
 mod server;
@@ -20,7 +21,9 @@ use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use owner::Owner;
+use recorder::Recorder;
 use server::{Sensor, Server};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
@@ -39,6 +42,8 @@ pub struct Options {
     pub patience: Duration,
     /// The page's port on 127.0.0.1, 0 for any.
     pub port: u16,
+    /// Where recordings go.
+    pub folder: PathBuf,
 }
 
 /// Serves the page until it is interrupted. Prints `ready` and its address.
@@ -49,7 +54,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let opened = options
         .addresses
         .iter()
-        .map(|address| open(address, options.patience));
+        .map(|address| open(address, options));
     let opened: Vec<(Sensor, Opened)> = opened.collect::<Result<_, _>>()?;
     let (sensors, opened): (Vec<_>, Vec<_>) = opened.into_iter().unzip();
     let server = Arc::new(Server::new(options.port, sensors, options.patience)?);
@@ -74,16 +79,17 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 /// A device that is connected, for its thread.
 type Opened = (Owner, Link);
 
-fn open(address: &Address, patience: Duration) -> Result<(Sensor, Opened), Failure> {
-    let (link, hello) = Link::connect(address, patience)?;
+fn open(address: &Address, options: &Options) -> Result<(Sensor, Opened), Failure> {
+    let (link, hello) = Link::connect(address, options.patience)?;
     let feed = Arc::new(Feed::default());
     let (orders, posted) = sync_channel(ORDERS);
     let owner = Owner::new(
         address.clone(),
-        patience,
+        options.patience,
         (&link, hello),
         feed.clone(),
         posted,
+        Recorder::new(&options.folder),
     );
     Ok((Sensor { feed, orders }, (owner, link)))
 }

@@ -17,6 +17,10 @@ pub enum Order {
     Threshold(Threshold),
     /// Set that of the model.
     ModelThreshold,
+    /// Begin a recording.
+    Record,
+    /// End it.
+    StopRecording,
     /// Take a frame.
     Picture,
 }
@@ -71,6 +75,8 @@ pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
         "tare" => Order::Tare,
         "expose" => Order::Expose,
         "model_threshold" => Order::ModelThreshold,
+        "record" => Order::Record,
+        "stop_recording" => Order::StopRecording,
         "threshold" => Order::Threshold(threshold(&written)?),
         _ => return Err("there is no such order".to_owned()),
     };

@@ -3,6 +3,7 @@
 
 use super::feed::Feed;
 use super::order::{Answer, Order, Posted};
+use super::recorder::Recorder;
 use super::state::State;
 use crate::command::TARE_PATIENCE;
 use hivtac_host::failure::{Failure, Kind};
@@ -38,6 +39,7 @@ pub struct Owner {
 struct Watched {
     feed: Arc<Feed>,
     state: State,
+    recorder: Recorder,
     told: Instant,
     /// Something came since.
     is_new: bool,
@@ -48,6 +50,7 @@ struct Watched {
 impl Watched {
     fn message(&mut self, message: DeviceMessage) {
         self.state.take(&message);
+        self.recorder.message(&message);
         if let DeviceMessage::Sample(sample) = message {
             self.heard = Instant::now();
             self.feed.sample(sample);
@@ -65,7 +68,7 @@ impl Watched {
     fn tell(&mut self) {
         self.told = Instant::now();
         self.is_new = false;
-        self.feed.state(self.state.json());
+        self.feed.state(self.state.json(self.recorder.told()));
     }
 
     fn trouble(&mut self, why: String) {
@@ -82,10 +85,12 @@ impl Owner {
         (link, hello): (&Link, DeviceHello),
         feed: Arc<Feed>,
         orders: Receiver<Posted>,
+        recorder: Recorder,
     ) -> Owner {
         let mut watched = Watched {
             feed,
             state: State::new(link.name.clone(), hello),
+            recorder,
             told: Instant::now(),
             is_new: false,
             heard: Instant::now(),
@@ -114,6 +119,8 @@ impl Owner {
             self.watched.state.tally.rejected(link.rejected());
             if let Err(failure) = result {
                 self.watched.trouble(failure.to_string());
+                self.watched.recorder.end(Err(failure));
+                self.watched.tell();
             }
         }
     }
@@ -211,6 +218,11 @@ impl Owner {
     fn try_to(&mut self, link: &mut Link, order: Order) -> Result<Answer, Failure> {
         let (request, patience, done) = match order {
             Order::Picture => return self.picture(link),
+            Order::Record => return self.record(link),
+            Order::StopRecording => {
+                self.request(link, Request::GetInfo, self.patience)?;
+                return Ok(Answer::Done(self.watched.recorder.end(Ok(()))));
+            }
             Order::Tare => {
                 let frames = TARE_FRAMES;
                 let done = format!("tare taken over {frames} frames");
@@ -240,6 +252,20 @@ impl Owner {
         // What holds now, as the device has it.
         self.request(link, Request::GetInfo, self.patience)?;
         Ok(Answer::Done(done))
+    }
+
+    /// Begins a file, with the device's counters in front.
+    fn record(&mut self, link: &mut Link) -> Result<Answer, Failure> {
+        let Watched {
+            recorder, state, ..
+        } = &mut self.watched;
+        match recorder.begin(&state.hello) {
+            Ok(text) => {
+                self.request(link, Request::GetInfo, self.patience)?;
+                Ok(Answer::Done(text))
+            }
+            Err(failure) => Ok(Answer::Failed(failure.to_string())),
+        }
     }
 
     fn picture(&mut self, link: &mut Link) -> Result<Answer, Failure> {

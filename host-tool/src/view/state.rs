@@ -1,5 +1,6 @@
 //! How a device stands: who it is, whether it is there, its rate, losses and latency.
 
+use super::recorder;
 use crate::lines::to_json;
 use crate::tally::Tally;
 use hivtac_host::link::log_text;
@@ -91,8 +92,8 @@ impl State {
         (last > first).then(|| steps as f64 * 1e6 / (last - first) as f64)
     }
 
-    /// One JSON object.
-    pub fn json(&self) -> String {
+    /// One JSON object; `recording` is how that stands.
+    pub fn json(&self, recording: recorder::Told) -> String {
         let hello = &self.hello;
         let model = hello.model.as_ref();
         to_json(&Told {
@@ -110,6 +111,7 @@ impl State {
             causes: self.tally.causes(),
             latency_us: self.stats.map(|stats| stats.latency_us),
             processing_us: self.stats.map(|stats| stats.processing_us),
+            recording,
             lines: &self.lines,
         })
     }
@@ -132,6 +134,7 @@ struct Told<'s> {
     causes: BTreeMap<&'static str, u64>,
     latency_us: Option<u32>,
     processing_us: Option<u32>,
+    recording: recorder::Told,
     lines: &'s VecDeque<String>,
 }
 
@@ -192,7 +195,8 @@ mod tests {
     }
 
     fn json(state: &State) -> serde_json::Value {
-        serde_json::from_str(&state.json()).unwrap()
+        let nothing = recorder::Recorder::new(std::path::Path::new(".")).told();
+        serde_json::from_str(&state.json(nothing)).unwrap()
     }
 
     #[test]

@@ -83,7 +83,7 @@ impl Folder {
 }
 
 /// What `monitor` shows of a recording, as fast as it reads.
-fn replayed(file: &str, frames: &str) -> Vec<u64> {
+pub fn replayed(file: &str, frames: &str) -> Vec<u64> {
     let mut replay = start(&["replay", "--fast", file]);
     let mut said = String::new();
     let stdout = replay.child().stdout.take().unwrap();

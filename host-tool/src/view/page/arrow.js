@@ -58,7 +58,7 @@ export class Arrow {
     this.pen = canvas.getContext("2d");
     this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     this.pen.clearRect(0, 0, width, height);
-    this.perMm = Math.min(width / 16, height / 14);
+    this.perMm = Math.min(width / 15.5, height / 11.5);
     this.middle = [width / 2, height * 0.64];
     const style = getComputedStyle(canvas);
     this.colour = (name) => style.getPropertyValue(`--${name}`);

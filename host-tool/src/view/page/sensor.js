@@ -93,6 +93,7 @@ export class SensorView {
 
   key(key) {
     if (key === "t") this.press(this.element.querySelector('[data-do="tare"]'));
+    if (key === "r") this.press(this.part("record"));
     if (key === "p") this.part("picture-on").click();
     if (key === "m") this.part("mask-on").click();
   }
@@ -134,6 +135,9 @@ export class SensorView {
     const why = causes.map(([cause, count]) => `${cause} ${count}`).join(", ");
     this.say("lost", why ? `${state.lost} (${why})` : `${state.lost}`);
     this.say("latency", state.latency_us ? (state.latency_us / 1e3).toFixed(2) : "–");
+    this.say("recording", state.recording.text);
+    this.say("record", state.recording.on ? "Stop recording" : "Record");
+    this.part("record").dataset.do = state.recording.on ? "stop_recording" : "record";
     this.say("lines", state.lines.join("\n"));
     const model = state.model_threshold;
     this.say("model-threshold", model ? `the model's: ${model.text}` : "");

@@ -1,161 +1,17 @@
 //! `hivtac view` as a browser sees it, and as others see it who should not.
 
+mod client;
+mod orders;
+
 use crate::fake::*;
 use crate::run::*;
-use crate::snapshot::{at_rest, rest_frame};
-use hivtac_terms::threshold::{HsvBox, Threshold};
+use crate::snapshot::rest_frame;
+use client::View;
 use hivtac_wire::message::*;
-use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
+use serde_json::json;
+use std::io::{Read, Write};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
-
-/// Longest wait for an answer or an event.
-const PATIENCE: Duration = Duration::from_secs(20);
-
-/// A tool that serves its page.
-struct View {
-    run: Run,
-    /// `127.0.0.1:PORT`.
-    host: String,
-    /// `/TOKEN`.
-    token: String,
-}
-
-impl View {
-    fn of(ports: &[&str]) -> View {
-        let mut arguments = vec!["view"];
-        ports
-            .iter()
-            .for_each(|port| arguments.extend(["--port", port]));
-        let mut run = start(&arguments);
-        let mut said = String::new();
-        let stdout = run.child().stdout.take().unwrap();
-        BufReader::new(stdout).read_line(&mut said).unwrap();
-        let address = said
-            .trim()
-            .strip_prefix("ready http://")
-            .unwrap_or_else(|| {
-                panic!("{said:?}: {:?}", run.child().wait());
-            });
-        let (host, token) = address.split_once('/').unwrap();
-        View {
-            host: host.to_owned(),
-            token: format!("/{}", token.trim_end_matches('/')),
-            run,
-        }
-    }
-
-    fn connect(&self) -> TcpStream {
-        let stream = TcpStream::connect(&self.host).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        stream
-    }
-
-    /// The answer to these bytes, head and body.
-    fn ask(&self, request: &[u8]) -> (String, Vec<u8>) {
-        let mut stream = self.connect();
-        stream.write_all(request).unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).unwrap();
-        let end = answer
-            .windows(4)
-            .position(|four| four == b"\r\n\r\n")
-            .unwrap();
-        let body = answer.split_off(end + 4);
-        (String::from_utf8(answer).unwrap(), body)
-    }
-
-    /// The number in the first line of the answer.
-    fn status(&self, request: &str) -> u16 {
-        let (head, _) = self.ask(request.as_bytes());
-        head.split(' ').nth(1).unwrap().parse().unwrap()
-    }
-
-    fn get(&self, path: &str) -> (String, Vec<u8>) {
-        let (host, token) = (&self.host, &self.token);
-        self.ask(format!("GET {token}{path} HTTP/1.1\r\nHost: {host}\r\n\r\n").as_bytes())
-    }
-
-    fn order(&self, order: &Value) -> Value {
-        let (host, token, body) = (&self.host, &self.token, order.to_string());
-        let length = body.len();
-        let request = format!(
-            "POST {token}/order HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{host}\r\n\
-             Content-Length: {length}\r\n\r\n{body}"
-        );
-        let (head, body) = self.ask(request.as_bytes());
-        assert!(head.starts_with("HTTP/1.1 200 "), "{head}");
-        serde_json::from_slice(&body).unwrap()
-    }
-
-    fn events(&self) -> Events {
-        let (host, token) = (&self.host, &self.token);
-        let mut stream = self.connect();
-        let request = format!("GET {token}/events HTTP/1.1\r\nHost: {host}\r\n\r\n");
-        stream.write_all(request.as_bytes()).unwrap();
-        Events(BufReader::new(stream))
-    }
-
-    /// Ends it as Ctrl-C does.
-    fn interrupt(mut self) -> Option<i32> {
-        signal(self.run.child().id(), "INT");
-        self.run.child().wait().unwrap().code()
-    }
-}
-
-impl Drop for View {
-    fn drop(&mut self) {
-        // Fails only when it has ended already.
-        let _ = self.run.child().kill();
-        let _ = self.run.child().wait();
-    }
-}
-
-/// A stream of events that is read.
-struct Events(BufReader<TcpStream>);
-
-impl Events {
-    /// Reads until there is something in an event of this name.
-    fn until<T>(&mut self, name: &str, mut find: impl FnMut(&Value) -> Option<T>) -> T {
-        let end = Instant::now() + PATIENCE;
-        let mut own = false;
-        while Instant::now() < end {
-            let mut line = String::new();
-            assert!(
-                self.0.read_line(&mut line).unwrap() > 0,
-                "the stream has ended"
-            );
-            if let Some(event) = line.strip_prefix("event: ") {
-                own = event.trim() == name;
-            } else if let (true, Some(data)) = (own, line.strip_prefix("data: "))
-                && let Some(found) = find(&serde_json::from_str(data).unwrap())
-            {
-                return found;
-            }
-        }
-        panic!("no such {name} within {PATIENCE:?}");
-    }
-
-    /// The state of a sensor, once it is so.
-    fn state(&mut self, sensor: u32, is_so: impl Fn(&Value) -> bool) -> Value {
-        self.until("state", |event| {
-            let is_own = event["sensor"] == sensor;
-            (is_own && is_so(&event["state"])).then(|| event["state"].clone())
-        })
-    }
-
-    /// The first sample with this sequence number or a later one.
-    fn sample(&mut self, sensor: u32, sequence: u64) -> Value {
-        self.until("samples", |event| {
-            let samples = event["samples"].as_array().unwrap().iter();
-            let mut late = samples.filter(|row| row[0].as_u64().unwrap() >= sequence);
-            let is_own = event["sensor"] == sensor;
-            late.next().filter(|_| is_own).cloned()
-        })
-    }
-}
 
 /// A device that sends samples 0 to `count` when it is to start, and then answers.
 fn device(count: u32) -> Script {
@@ -373,88 +229,6 @@ fn readers_that_stall_stop_nobody() {
 }
 
 #[test]
-fn a_picture_has_its_pixels_mask_and_markers() {
-    let device = FakeDevice::on_tcp([device(3)]);
-    let view = View::of(&[&device.port]);
-    let (head, body) = view.get("/picture/0");
-    assert!(head.starts_with("HTTP/1.1 200"), "{head}");
-    let end = body.iter().position(|&byte| byte == b'\n').unwrap();
-    let told: Value = serde_json::from_slice(&body[..end]).unwrap();
-    let pixels = &body[end + 1..];
-    assert_eq!(
-        (&told["width"], &told["height"]),
-        (&json!(320), &json!(240))
-    );
-    assert_eq!(pixels.len(), 4 * 320 * 240);
-    let passed = pixels[3 * 320 * 240..]
-        .iter()
-        .filter(|&&level| level == 255);
-    assert_eq!(told["passed"], passed.count());
-    // Four dots of 18 px.
-    assert!(
-        (600..1400).contains(&told["passed"].as_u64().unwrap()),
-        "{told}"
-    );
-    assert_eq!(told["markers"][3]["area"], at_rest()[3].area);
-    assert_eq!(told["wrong"], json!([]));
-    assert_eq!(
-        told["threshold"]["limits"],
-        json!([170, 10, 100, 255, 45, 255])
-    );
-    // The next one comes with nothing in it, and the page is told why there is none.
-    let (_, body) = view.get("/picture/0");
-    let told: Value = serde_json::from_slice(&body).unwrap();
-    assert!(
-        told["text"]
-            .as_str()
-            .unwrap()
-            .contains("nothing of it came"),
-        "{told}"
-    );
-}
-
-#[test]
-fn orders_reach_the_device_and_refusals_the_page() {
-    let script: Script = Box::new(|device| {
-        device.tare = Some(Outcome::NotAtRest);
-        serve(device, 3);
-    });
-    let device = FakeDevice::on_tcp([script]);
-    let view = View::of(&[&device.port]);
-    let refused = view.order(&json!({"sensor": 0, "order": "tare"}));
-    assert_eq!(refused["done"], false);
-    assert!(
-        refused["text"].as_str().unwrap().contains("at rest"),
-        "{refused}"
-    );
-    let limits = json!([1, 2, 3, 4, 5, 6]);
-    let done = view
-        .order(&json!({"sensor": 0, "order": "threshold", "format": "rgb565", "limits": limits}));
-    assert_eq!(done, json!({"done": true, "text": "threshold set"}));
-    assert_eq!(
-        view.order(&json!({"sensor": 0, "order": "model_threshold"}))["done"],
-        true
-    );
-    let wrong = view.order(&json!({"sensor": 0, "order": "reboot"}));
-    assert_eq!(
-        wrong,
-        json!({"done": false, "text": "there is no such order"})
-    );
-    let orders: Vec<_> = device
-        .commands
-        .try_iter()
-        .filter(|request| !matches!(request, Request::GetInfo | Request::StartWithMarkers))
-        .collect();
-    let set = |limits| Request::SetThreshold(Threshold::Rgb565(HsvBox::of_limits(limits)));
-    let expected = [
-        Request::Tare { frames: 32 },
-        set([1, 2, 3, 4, 5, 6]),
-        set([170, 10, 100, 255, 45, 255]),
-    ];
-    assert_eq!(orders, expected);
-}
-
-#[test]
 fn a_lost_connection_is_shown_and_comes_back() {
     let vanish: Script = Box::new(|device| {
         while !device.next().is_some_and(|message| {
@@ -473,24 +247,6 @@ fn a_lost_connection_is_shown_and_comes_back() {
     );
     assert_eq!(events.sample(0, 8)[0], 8);
     events.state(0, |state| state["trouble"].is_null());
-}
-
-#[test]
-fn several_sensors_are_told_apart() {
-    let devices = [4, 8].map(|count| FakeDevice::on_tcp([device(count)]));
-    let view = View::of(&[&devices[0].port, &devices[1].port]);
-    let mut events = view.events();
-    assert_eq!(events.until("hello", |hello| hello["sensors"].as_u64()), 2);
-    assert_eq!(events.sample(1, 7)[0], 7);
-    let done = view.order(&json!({"sensor": 1, "order": "tare"}));
-    assert_eq!(done["done"], true);
-    let tares = devices.map(|device| {
-        let asked: Vec<_> = device.commands.try_iter().collect();
-        asked.contains(&Request::Tare { frames: 32 })
-    });
-    assert_eq!(tares, [false, true]);
-    let (head, _) = view.get("/picture/2");
-    assert!(head.starts_with("HTTP/1.1 404"), "{head}");
 }
 
 #[test]

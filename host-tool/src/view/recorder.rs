@@ -1,0 +1,136 @@
+//! The page's record button: a file at a time, beside what the page shows.
+
+use crate::record::Recording;
+use hivtac_host::failure::Failure;
+use hivtac_host::shown::{shown, unit_number};
+use hivtac_wire::message::{DeviceHello, DeviceMessage};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Time between two flushes: what a power cut costs.
+const FLUSH_EVERY: Duration = Duration::from_secs(1);
+
+/// What is recorded of a device, if anything.
+pub struct Recorder {
+    folder: PathBuf,
+    under_way: Option<UnderWay>,
+    /// What became of the last file.
+    last: String,
+}
+
+struct UnderWay {
+    recording: Recording,
+    hello: DeviceHello,
+    name: String,
+    flushed: Instant,
+}
+
+/// How it stands, for the page.
+#[derive(Debug, PartialEq, Eq, Serialize)]
+pub struct Told {
+    /// Whether a file is under way.
+    on: bool,
+    /// Which, and what came; or what became of the last one.
+    text: String,
+}
+
+impl Recorder {
+    /// Into files of this folder.
+    pub fn new(folder: &Path) -> Recorder {
+        Recorder {
+            folder: folder.to_owned(),
+            under_way: None,
+            last: String::new(),
+        }
+    }
+
+    /// Begins a file; says which. While one is under way, that goes on.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn begin(&mut self, hello: &DeviceHello) -> Result<String, Failure> {
+        if self.under_way.is_none() {
+            let file = free_name(&self.folder, &unit_number(&hello.device_id));
+            self.under_way = Some(UnderWay {
+                recording: Recording::create(&file, hello)?,
+                hello: hello.clone(),
+                name: shown(&file.display().to_string()),
+                flushed: Instant::now(),
+            });
+        }
+        Ok(self.told().text)
+    }
+
+    /// Keeps what the device says. A disk that is full ends the file, and nothing else.
+    pub fn message(&mut self, message: &DeviceMessage) {
+        let Some(under_way) = &mut self.under_way else {
+            return;
+        };
+        let mut result = under_way.recording.keep(message);
+        if result.is_ok() && under_way.flushed.elapsed() >= FLUSH_EVERY {
+            under_way.flushed = Instant::now();
+            result = under_way.recording.flush();
+        }
+        if let Err(failure) = result {
+            self.end(Err(failure));
+        }
+    }
+
+    /// Ends the file that is under way, if any, whatever the reason; says what became of it.
+    pub fn end(&mut self, why: Result<(), Failure>) -> String {
+        if let Some(under_way) = self.under_way.take() {
+            let UnderWay {
+                recording,
+                hello,
+                name,
+                ..
+            } = under_way;
+            let progress = recording.progress();
+            self.last = match recording.end(&hello, why) {
+                Ok(()) => format!("recorded {name}: {progress}"),
+                Err(failure) => format!("{name}.partial: {progress}; it ended: {failure}"),
+            };
+        }
+        self.last.clone()
+    }
+
+    /// How it stands.
+    pub fn told(&self) -> Told {
+        match &self.under_way {
+            Some(UnderWay {
+                name, recording, ..
+            }) => Told {
+                on: true,
+                text: format!("recording {name}: {}", recording.progress()),
+            },
+            None => Told {
+                on: false,
+                text: self.last.clone(),
+            },
+        }
+    }
+}
+
+/// `hivtac-UNIT-N.mcap` with the first number that is not taken.
+fn free_name(folder: &Path, unit: &str) -> PathBuf {
+    let name = |number: u32| folder.join(format!("hivtac-{unit}-{number}.mcap"));
+    let is_free = |file: &PathBuf| !file.exists() && !file.with_extension("mcap.partial").exists();
+    let mut names = (1..=u32::MAX).map(name);
+    names.find(is_free).unwrap_or_else(|| name(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_are_taken_are_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = || free_name(folder.path(), "07");
+        assert_eq!(name(), folder.path().join("hivtac-07-1.mcap"));
+        std::fs::write(name(), "").unwrap();
+        std::fs::write(folder.path().join("hivtac-07-2.mcap.partial"), "").unwrap();
+        assert_eq!(name(), folder.path().join("hivtac-07-3.mcap"));
+    }
+}
