@@ -13,6 +13,8 @@ pub mod golden;
 #[cfg(feature = "host")]
 pub mod artifact;
 #[cfg(feature = "host")]
+pub mod browser;
+#[cfg(feature = "host")]
 pub mod hard;
 #[cfg(feature = "host")]
 pub mod judged;

@@ -1,8 +1,9 @@
 //! Debian packages: installed when missing and allowed, named plainly when not.
 
+use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 
 use crate::process;
 
@@ -59,4 +60,24 @@ pub fn ensure_qemu() -> Result<()> {
         install(&["qemu-system-arm"], "the Cortex-M7 emulator is missing")?;
     }
     Ok(())
+}
+
+/// Names by which systems have a Chromium.
+const CHROMIUM: [&str; 4] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+];
+
+/// A browser for the test of the page of `hivtac view`.
+///
+/// # Errors
+/// When there is none and none can be installed.
+pub fn chromium() -> Result<PathBuf> {
+    let find = || CHROMIUM.iter().find_map(|name| process::find_program(name));
+    if find().is_none() {
+        install(&["chromium", "fonts-dejavu-core"], "a browser is missing")?;
+    }
+    find().context("Chromium was installed and is not found")
 }

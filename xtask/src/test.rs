@@ -168,8 +168,10 @@ impl Test {
                 let programs = programs.context("not run: the firmware could not be built")?;
                 let mut command = cross_room_tests(toolchain, programs)?;
                 if self.all {
-                    // Only a slow test runs it.
-                    command.env("HIVTAC_CALIBRATE", artifacts::calibrate()?);
+                    // Only slow tests run these.
+                    command
+                        .env("HIVTAC_CALIBRATE", artifacts::calibrate()?)
+                        .env("HIVTAC_CHROMIUM", packages::chromium()?);
                 }
                 run_tests(self.slow_ones(&mut command), tally)
             });
