@@ -99,6 +99,7 @@ impl State {
         to_json(&Told {
             port: &self.port,
             trouble: self.trouble.as_deref(),
+            name: shown(&hello.name),
             unit: unit_number(&hello.device_id),
             board: shown(&hello.board),
             firmware: shown(&hello.firmware),
@@ -122,6 +123,8 @@ impl State {
 struct Told<'s> {
     port: &'s str,
     trouble: Option<&'s str>,
+    /// What its user calls it; empty when nothing.
+    name: String,
     unit: String,
     board: String,
     firmware: String,
@@ -178,7 +181,7 @@ mod tests {
             preset: "ov7725".try_into().unwrap(),
             dilations: 1,
             centroid: CentroidEstimator::BinaryMask,
-            name: Default::default(),
+            name: "\u{9b}thumb".try_into().unwrap(),
         };
         State::new("a port".to_owned(), hello)
     }
@@ -234,6 +237,7 @@ mod tests {
         }
         let told = json(&state);
         assert_eq!(told["board"], r"<b>\u{1b}[2J");
+        assert_eq!(told["name"], r"\u{9b}thumb");
         assert_eq!(told["lines"].as_array().unwrap().len(), LINES);
         assert_eq!(told["lines"][0], r"device, 0.000 s, info: \u{202e}x");
     }

@@ -128,7 +128,8 @@ export class SensorView {
   state(state) {
     this.trouble = state.trouble;
     this.element.classList.toggle("gone", state.trouble !== null);
-    this.say("title", `${state.board} · ${state.unit}`);
+    const called = state.name ? `${state.name} · ` : "";
+    this.say("title", `${called}${state.board} · ${state.unit}`);
     this.say("facts", `${state.port} · ${state.firmware} · ${state.model ?? "no model"}`);
     this.say("rate", state.rate_hz === null ? "–" : state.rate_hz.toFixed(1));
     const causes = Object.entries(state.causes).filter(([, count]) => count > 0);
