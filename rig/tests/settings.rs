@@ -58,27 +58,13 @@ fn naming(flash: &Path, text: &str, virtual_ms: u64) -> Setup {
         .at(KEEP_MS, send(KEEP, Request::Keep(only_name)))
 }
 
-fn report(run: &Run) -> &SettingsReport {
-    let reports = run.messages.iter().filter_map(|message| match message {
-        DeviceMessage::Settings(report) => Some(report),
-        _ => None,
-    });
-    reports.last().expect("a report")
-}
-
-fn outcome(run: &Run, id: u16) -> Outcome {
-    let answers = run.answers(id);
-    assert_eq!(answers.len(), 1, "one reply to {id}");
-    answers[0].0
-}
-
 /// What a device says after a restart.
 fn restarted(flash: &Path) -> SettingsReport {
     let run = setup(flash, RESTART_MS).run();
     assert!(!run.samples().is_empty(), "it measures");
     let sample = run.samples()[0];
     assert!(sample.force.is_some(), "{sample:?}");
-    let report = report(&run);
+    let report = run.settings();
     let untared = sample.status.contains(Status::TARE_MISSING);
     assert_eq!(untared, report.tare.is_none(), "{sample:?}");
     assert_eq!(run.hellos()[0].name, report.name);
@@ -96,11 +82,11 @@ fn old() -> (Vec<u8>, SettingsReport) {
         .at(SET_MS, send(SET + 1, Request::SetName(name("old"))))
         .at(KEEP_MS + 20, send(KEEP, Request::Keep(Selection::ALL)))
         .run();
-    assert_eq!(outcome(&run, SET), Outcome::Done);
-    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    assert_eq!(run.outcome(SET), Outcome::Done);
+    assert_eq!(run.outcome(KEEP), Outcome::Done);
     run.assert_only_setup_drops();
     assert_eq!(run.missing_frames(), [0; 0], "forces go on");
-    let kept = report(&run).clone();
+    let kept = run.settings().clone();
     assert_eq!(kept.kept, Selection::ALL);
     assert_eq!((kept.found, kept.erases), (Found::Nothing, 1));
     (std::fs::read(&flash).unwrap(), kept)
@@ -154,12 +140,12 @@ fn name_tare_and_threshold_are_kept_while_forces_go_on() {
         .at(SET_MS, send(SET, Request::SetThreshold(green)))
         .at(SET_MS + 40, send(KEEP, Request::Keep(only_threshold)))
         .run();
-    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    assert_eq!(run.outcome(KEEP), Outcome::Done);
     let run = setup(&device.flash, RESTART_MS).run();
     assert_eq!(run.hellos()[0].threshold, green);
-    assert_eq!(report(&run).name, "old");
-    assert_eq!(report(&run).tare, device.kept.tare);
-    assert_eq!(report(&run).erases, 1, "there is room for hundreds");
+    assert_eq!(run.settings().name, "old");
+    assert_eq!(run.settings().tare, device.kept.tare);
+    assert_eq!(run.settings().erases, 1, "there is room for hundreds");
 }
 
 /// Power is cut at each operation of a change of the name: the device has the old one or the new
@@ -169,7 +155,7 @@ fn after_a_power_cut_the_old_or_the_new_is_there() {
     let device = Device::new();
     let whole = device.copy("whole");
     let run = naming(&whole, "new", RESTART_MS).run();
-    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    assert_eq!(run.outcome(KEEP), Outcome::Done);
     let operations = run.report.flash_operations;
     assert!((3..10).contains(&operations), "{operations}");
     let mut names = Vec::new();
@@ -222,7 +208,7 @@ fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
     let found = restarted(&flash);
     assert_eq!((found.name.as_str(), found.found), ("", Found::Nothing));
     let run = naming(&flash, "new", ERASED_MS).run();
-    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    assert_eq!(run.outcome(KEEP), Outcome::Done);
     assert_eq!(restarted(&flash).name, "new");
 }
 
@@ -259,7 +245,7 @@ fn settings_of_another_version_are_told_and_stay_until_something_is_kept() {
     assert_eq!((found.name.as_str(), found.tare), ("", None));
     assert_eq!(Contents::load(&device.flash).unwrap(), before, "untouched");
     let run = naming(&device.flash, "new", RESTART_MS).run();
-    assert_eq!(outcome(&run, KEEP), Outcome::Done);
+    assert_eq!(run.outcome(KEEP), Outcome::Done);
     let found = restarted(&device.flash);
     assert_eq!((found.name.as_str(), found.found), ("new", Found::Settings));
 }
@@ -295,7 +281,7 @@ fn a_rest_position_that_is_none_is_refused_and_nothing_changes() {
     }
     let run = setup.run();
     for (nth, (_, expected)) in (0..).zip(wanted) {
-        assert_eq!(outcome(&run, SET + nth), expected, "{nth}");
+        assert_eq!(run.outcome(SET + nth), expected, "{nth}");
     }
     let reports: Vec<_> = run
         .messages

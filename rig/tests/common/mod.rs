@@ -31,6 +31,7 @@ use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     self, Command, DeviceHello, DeviceMessage, HostMessage, Reply, Request, Sample, Stats,
 };
+use hivtac_wire::settings::SettingsReport;
 use hivtac_wire::version::HelloPrefix;
 use serde_json::Value;
 
@@ -331,6 +332,25 @@ impl Run {
             }
         }
         answers
+    }
+
+    /// What the device answered to a command, once.
+    pub fn outcome(&self, asked: u16) -> message::Outcome {
+        let answers = self.answers(asked);
+        assert_eq!(answers.len(), 1, "one reply to {asked}");
+        answers[0].0
+    }
+
+    /// The last settings.
+    pub fn settings(&self) -> &SettingsReport {
+        let settings = self.messages.iter().rev().find_map(|m| {
+            if let DeviceMessage::Settings(s) = m {
+                Some(s)
+            } else {
+                None
+            }
+        });
+        settings.expect("settings came")
     }
 
     /// The last counters.
