@@ -15,7 +15,7 @@ use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 
 use crate::faults::{Faults, Kind};
-use crate::flash::Bank;
+use crate::flash::{BANK, Bank};
 use crate::rules::Rules;
 use block::{Block, asked_for};
 
@@ -78,7 +78,7 @@ pub struct Mdma {
     chance: u64,
     channels: [Channel; CHANNELS],
     interrupt: Level,
-    bytes: u64,
+    memory_bytes: u64,
 }
 
 impl Mdma {
@@ -92,13 +92,14 @@ impl Mdma {
             chance: seed,
             channels: Default::default(),
             interrupt: Level::Low,
-            bytes: 0,
+            memory_bytes: 0,
         }
     }
 
-    /// Bytes moved so far.
-    pub fn bytes(&self) -> u64 {
-        self.bytes
+    /// Bytes moved so far out of memories, which is what bands and snapshots are; not those of the
+    /// flash.
+    pub fn memory_bytes(&self) -> u64 {
+        self.memory_bytes
     }
 
     /// How often a block takes the time that it takes alone.
@@ -174,8 +175,9 @@ impl Mdma {
 
     fn end(&mut self, nth: usize, flags: u32, registers: &mut RegisterFile) {
         let channel = &mut self.channels[nth];
-        if let Some((block, _)) = channel.under_way.take() {
-            self.bytes += block.bytes;
+        let block = channel.under_way.take().map(|(block, _)| block);
+        if let Some(block) = block.filter(|block| !is_flash(block.source)) {
+            self.memory_bytes += block.bytes;
         }
         channel.flags |= flags;
         let control = register(nth, row::CR);
@@ -193,6 +195,10 @@ impl Mdma {
             context.interrupt(0, level);
         }
     }
+}
+
+fn is_flash(address: u64) -> bool {
+    u32::try_from(address).is_ok_and(|address| BANK.contains(&address))
 }
 
 fn register(nth: usize, row: usize) -> Register {
