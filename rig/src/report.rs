@@ -123,6 +123,7 @@ impl Report {
                 "empty_frames": self.dcmi.empty_frames,
                 "words": self.dcmi.words,
                 "overruns": self.dcmi.overruns,
+                "waits": self.dcmi.waits,
             },
             "flash": {
                 "operations": self.flash_operations,

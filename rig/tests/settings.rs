@@ -5,7 +5,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{Run, Setup, command, firmware};
+use common::{Setup, command, firmware};
 use hivtac_rig::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;

@@ -14,6 +14,7 @@ use rigless::soc::stm32h743::generated::mdma::Register;
 use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 
+use crate::busy_bus::{Chance, InterruptLine};
 use crate::faults::{Faults, Kind};
 use crate::flash::{BANK, Bank};
 use crate::rules::Rules;
@@ -75,9 +76,9 @@ pub struct Mdma {
     faults: Faults,
     bank: Bank,
     /// Decides the next block's wait.
-    chance: u64,
+    chance: Chance,
     channels: [Channel; CHANNELS],
-    interrupt: Level,
+    interrupt: InterruptLine,
     memory_bytes: u64,
 }
 
@@ -87,11 +88,11 @@ impl Mdma {
     pub fn new(rules: Rules, faults: Faults, bank: Bank, seed: u64) -> Self {
         Self {
             rules,
+            interrupt: InterruptLine::new(faults.clone(), seed),
             faults,
             bank,
-            chance: seed,
+            chance: Chance::new(seed),
             channels: Default::default(),
-            interrupt: Level::Low,
             memory_bytes: 0,
         }
     }
@@ -107,11 +108,7 @@ impl Mdma {
         if !self.faults.on(Kind::BusBusy, now_ns) {
             return 1;
         }
-        self.chance = self
-            .chance
-            .wrapping_mul(0x5851_F42D_4C95_7F2D)
-            .wrapping_add(1);
-        1 + (self.chance >> 33) % LONGEST_WAIT
+        1 + self.chance.below(LONGEST_WAIT)
     }
 
     fn control_written(
@@ -190,10 +187,7 @@ impl Mdma {
             channel.flags & enables != 0
         };
         let level = Level::from(self.channels.iter().enumerate().any(wants));
-        if level != self.interrupt {
-            self.interrupt = level;
-            context.interrupt(0, level);
-        }
+        self.interrupt.drive(level, context);
     }
 }
 
@@ -236,8 +230,9 @@ impl Device for Mdma {
         &mut self,
         register: Register,
         _registers: &mut RegisterFile,
-        _context: &mut DeviceContext<'_>,
+        context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
+        self.interrupt.read_back(context);
         let index = register.index().checked_sub(1)?;
         let channel = &self.channels[index / ROWS];
         let active = if channel.under_way.is_some() {
@@ -273,6 +268,9 @@ impl Device for Mdma {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        if self.interrupt.falls_at(event, context) {
+            return;
+        }
         for nth in 0..CHANNELS {
             if self.channels[nth]
                 .under_way
@@ -336,7 +334,7 @@ impl Device for Mdma {
 
     fn reset(&mut self) {
         self.channels = Default::default();
-        self.interrupt = Level::Low;
+        self.interrupt.reset();
     }
 }
 
