@@ -5,7 +5,7 @@ use crate::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNe
 use core::fmt;
 
 /// How forces are followed from frame to frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
@@ -84,24 +84,42 @@ pub struct Rezero {
     pub total: MilliPx,
 }
 
-impl Default for ContactLimits {
-    /// From 2 mN on, until 1 mN.
-    fn default() -> Self {
-        ContactLimits {
+impl TemporalSettings {
+    /// A contact from 2 mN on until 1 mN; a slip of 60 µm within 50 ms, from a tenth of the normal
+    /// force on; no filter, no re-zeroing.
+    pub const USUAL: TemporalSettings = TemporalSettings {
+        contact: ContactLimits {
             begins: UnsignedMicroNewtons(2_000),
             ends: UnsignedMicroNewtons(1_000),
-        }
+        },
+        slip: SlipLimits {
+            distance: Micrometres(60),
+            within: Milliseconds(50),
+            ratio: Permille(100),
+        },
+        filter: Filter::None,
+        rezero: None,
+    };
+}
+
+impl Default for TemporalSettings {
+    /// [`TemporalSettings::USUAL`].
+    fn default() -> Self {
+        TemporalSettings::USUAL
+    }
+}
+
+impl Default for ContactLimits {
+    /// Those of [`TemporalSettings::USUAL`].
+    fn default() -> Self {
+        TemporalSettings::USUAL.contact
     }
 }
 
 impl Default for SlipLimits {
-    /// 60 µm within 50 ms, from a tenth of the normal force on.
+    /// Those of [`TemporalSettings::USUAL`].
     fn default() -> Self {
-        SlipLimits {
-            distance: Micrometres(60),
-            within: Milliseconds(50),
-            ratio: Permille(100),
-        }
+        TemporalSettings::USUAL.slip
     }
 }
 

@@ -18,6 +18,7 @@ use hivtac_force::force::Force;
 use hivtac_force::rest::Rest;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, SlipLimits, TemporalError, TemporalSettings};
+use hivtac_terms::units::Px;
 use rezero::Rezeroing;
 use slip::Slip;
 
@@ -53,10 +54,10 @@ pub struct Temporal {
 }
 
 impl Temporal {
-    /// With the default settings, before the first frame.
-    pub fn new() -> Temporal {
+    /// With the usual settings, before the first frame.
+    pub const fn new() -> Temporal {
         Temporal {
-            settings: TemporalSettings::default(),
+            settings: TemporalSettings::USUAL,
             contact: Contact::NONE,
             slip: Slip::NONE,
             filter: ForceFilter::EMPTY,
@@ -77,23 +78,32 @@ impl Temporal {
     pub fn set(&mut self, settings: TemporalSettings) -> Result<(), TemporalError> {
         settings.check()?;
         self.settings = settings;
+        self.begin_anew();
+        Ok(())
+    }
+
+    /// Forgets what was before: the next frames are seen in another way. The rest position stays.
+    pub fn begin_anew(&mut self) {
         self.contact = Contact::NONE;
         self.slip = Slip::NONE;
         self.filter = ForceFilter::EMPTY;
         self.rezeroing.begin_anew();
-        Ok(())
     }
 
     /// A rest position was taken, or forgotten: forces are others from the next frame on.
     pub fn set_tare(&mut self, taken: Option<Rest>) {
+        self.begin_anew();
         self.rezeroing.set(taken);
-        self.slip = Slip::NONE;
-        self.filter = ForceFilter::EMPTY;
     }
 
     /// The rest position that was taken, without what re-zeroing made of it.
     pub fn tare(&self) -> Option<&Rest> {
         self.rezeroing.taken()
+    }
+
+    /// How far re-zeroing moved the coordinate of the rest position that it moved farthest.
+    pub fn rezeroed(&self) -> Px {
+        self.rezeroing.farthest()
     }
 
     /// Takes the next frame.
@@ -111,7 +121,7 @@ impl Temporal {
         for (set, bit) in [
             (touched == Some(true), Status::CONTACT),
             (slipping, Status::SLIP),
-            (self.rezeroing.has_moved(), Status::REZEROED),
+            (self.rezeroed() != Px(0), Status::REZEROED),
         ] {
             if set {
                 status |= bit;

@@ -82,9 +82,12 @@ impl Rezeroing {
         self.taken.as_ref()
     }
 
-    /// Whether the rest position is not where it was taken.
-    pub fn has_moved(&self) -> bool {
-        self.moved != [0; 8]
+    /// How far the coordinate moved that moved farthest.
+    pub fn farthest(&self) -> Px {
+        Px(self
+            .moved
+            .iter()
+            .fold(0, |most, moved| most.max(moved.abs())))
     }
 
     /// Takes the features of a frame that nothing touched, or none of any other frame. Gives the
@@ -255,17 +258,20 @@ mod tests {
         let drifted = features(1 << 16);
         let mut film = Followed::new();
         film.for_ms(2_900, Some(&drifted));
-        assert!(film.right() == 0.0 && !film.state.has_moved(), "it waits");
+        assert!(
+            film.right() == 0.0 && film.state.farthest() == Px(0),
+            "it waits"
+        );
         film.for_ms(5_000, Some(&drifted));
         assert!((0.039..0.061).contains(&film.right()), "{}", film.right());
-        assert!(film.state.has_moved());
+        assert!((film.state.farthest().to_f64() - film.right()).abs() < 1e-9);
         film.for_ms(20_000, Some(&drifted));
         assert!((film.right() - 0.1).abs() < 1e-4, "{}", film.right());
         assert_eq!(film.rest.areas, [130; 4]);
         let moved = film.rest.features;
         assert_eq!(moved, Features::of_markers(&film.rest.markers()));
         film.state.set(Some(film.rest));
-        assert!(!film.state.has_moved(), "taken anew");
+        assert_eq!(film.state.farthest(), Px(0), "taken anew");
     }
 
     #[test]
