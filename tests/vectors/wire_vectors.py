@@ -307,8 +307,8 @@ HOST = {
     "set-name": COMMAND + [unsigned("id", 12), raw("SetName", [10]), string("name", "thumb")],
     "set-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), *REST],
     "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
-    "keep": COMMAND
-    + [unsigned("id", 14), raw("Keep", [12]), raw("name, not threshold, tare, temporal", [1, 0, 1, 1])],
+    "keep": COMMAND + [unsigned("id", 14), raw("Keep", [12])]
+    + [raw("name, not threshold, tare, temporal", [1, 0, 1, 1])],
     "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS

@@ -8,9 +8,10 @@
 //! frame without a force: that frame's own force is sent. So is the place that a contact begins
 //! with, for places before it mean nothing.
 //!
-//! The uncertainty that is stated is that of the frame's own force, and never less: it holds what is
-//! wrong in all frames alike, of which a filter takes nothing away. While a force changes, what is
-//! sent is late; how far it is from the frame's own force is added, by root of the sum of squares.
+//! The uncertainty that is stated is that of the frame's own force, and never less: it holds what
+//! is wrong in all frames alike, of which a filter takes nothing away. While a force changes, what
+//! is sent is late; how far it is from the frame's own force is added, by root of the sum of
+//! squares.
 
 use super::{Filter, Moment};
 use hivtac_force::force::{Force, Place, Polar};

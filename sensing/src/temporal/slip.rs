@@ -2,7 +2,8 @@
 //!
 //! The place is a point of the film itself: it stays while the contact sticks, however far that
 //! takes the film along, and moves when the contact slips. Friction then pulls the film with a
-//! force along it, which is a part of the one into it: a place that moves without is none of a slip.
+//! force along it, which is a part of the one into it: a place that moves without is none of a
+//! slip.
 //!
 //! A place is not exact. Its noise grows as the force falls, and what the model does not know of a
 //! unit shifts it with every change of the force; the stated uncertainty holds that. So a place has
@@ -14,8 +15,8 @@
 //! stated uncertainty; and by three times the noise of the frames between, the mean length of the
 //! place's second differences, which a steady motion does not have. A slip begins with the second
 //! frame in a row that says so: when a force begins to change, a rolling shutter has one frame in
-//! which markers do not move as between the two before. While it slips, three fifths of the distance
-//! are enough.
+//! which markers do not move as between the two before. While it slips, three fifths of the
+//! distance are enough.
 
 use super::SlipLimits;
 use hivtac_force::force::{Force, Place};
