@@ -22,6 +22,7 @@ fn device() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: Default::default(),
+        filter: Default::default(),
     }
 }
 
