@@ -182,8 +182,9 @@ fn both(a: u32, b: u32) -> u32 {
 /// The angle between two vectors, m°, to 4 m°; 0 where one of them is none.
 fn angle_mdeg(a: &[MicroNewtons; 3], b: &[MicroNewtons; 3]) -> u32 {
     let (a, b) = (shortened(a), shortened(b));
-    let dot: i64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
-    let cross = [(1, 2), (2, 0), (0, 1)].map(|(i, j): (usize, usize)| a[i] * b[j] - a[j] * b[i]);
+    let ([ax, ay, az], [bx, by, bz]) = (a, b);
+    let dot = ax * bx + ay * by + az * bz;
+    let cross = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
     // |a × b|² ≤ |a|²·|b|² < 2⁶⁴.
     let square: u64 = cross.iter().map(|part| part.unsigned_abs().pow(2)).sum();
     atan2(i64::from(root(square)), dot).0.unsigned_abs()

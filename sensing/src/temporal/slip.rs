@@ -144,12 +144,8 @@ impl Slip {
         let triples = places().zip(places().skip(1)).zip(places().skip(2));
         let (mut sum, mut count) = (0_u64, 0_u32);
         for ((a, b), c) in triples {
-            let second = |k: usize| {
-                let [a, b, c] = [a, b, c].map(|seen| i64::from(seen.place[k]));
-                (a - 2 * b + c).clamp(-FAR, FAR)
-            };
-            let [x, y] = [second(0), second(1)];
-            sum += u64::from(root((x * x + y * y) as u64));
+            let ([ax, ay], [bx, by], [cx, cy]) = (a.place, b.place, c.place);
+            sum += u64::from(length(second(ax, bx, cx), second(ay, by, cy)));
             count += 1;
         }
         match count {
@@ -163,15 +159,24 @@ impl Slip {
 const FAR: i64 = 1 << 30;
 
 /// Distance of two places, µm.
-fn far(a: [i32; 2], b: [i32; 2]) -> u64 {
-    let [x, y] = [0, 1].map(|k: usize| (i64::from(a[k]) - i64::from(b[k])).clamp(-FAR, FAR));
-    root((x * x + y * y) as u64).into()
+fn far([ax, ay]: [i32; 2], [bx, by]: [i32; 2]) -> u64 {
+    length(i64::from(ax) - i64::from(bx), i64::from(ay) - i64::from(by)).into()
+}
+
+fn second(a: i32, b: i32, c: i32) -> i64 {
+    i64::from(a) - 2 * i64::from(b) + i64::from(c)
+}
+
+fn length(x: i64, y: i64) -> u32 {
+    let [x, y] = [x, y].map(|part| part.clamp(-FAR, FAR));
+    root((x * x + y * y) as u64)
 }
 
 /// By how much a place must have moved from one frame to another, µm.
 fn least_moved(distance: u64, now: &Seen, before: &Seen, place: &Place) -> u64 {
-    let changed = |k: usize| u64::from(now.force[k].abs_diff(before.force[k]).min(1 << 30)).pow(2);
-    let change = u64::from(root(changed(0) + changed(1) + changed(2)));
+    let pairs = now.force.iter().zip(&before.force);
+    let squares = pairs.map(|(now, before)| u64::from(now.abs_diff(*before).min(1 << 30)).pow(2));
+    let change = u64::from(root(squares.sum()));
     let smaller = Divisor::new(now.magnitude.min(before.magnitude));
     let sigma = u64::from(place.sigma.0.min(1 << 30));
     distance
