@@ -6,7 +6,7 @@ use crate::blob::Blob;
 use crate::dilate::{Dilation, MAX_ROWS};
 use crate::history::{Band, History};
 use crate::label::Labeller;
-use crate::mask::{last_word_bits, words_of};
+use crate::mask::{any_set, last_word_bits, words_of};
 use crate::tables::Pixels;
 use hivtac_terms::status::Status;
 
@@ -227,11 +227,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         let mut left = count.min(room);
         while left > 0 {
             let rows = left.min(MAX_ROWS);
+            let mut any = false;
             if !self.labels.is_exhausted() {
                 let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
-                pixels.mask_rows(part, width, self.dilation.incoming(rows));
+                any = pixels.mask_rows(part, width, self.dilation.incoming(rows));
             }
-            self.take(pixels, band, rows);
+            self.take(pixels, band, rows, any);
             left -= rows;
         }
         // What ends a frame is weighed when it is finished.
@@ -255,7 +256,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
         }
-        self.take(&(), &Band::WITHOUT_PIXELS, 1);
+        let any = any_set(incoming);
+        self.take(&(), &Band::WITHOUT_PIXELS, 1, any);
     }
 
     /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no
@@ -290,10 +292,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if self.active { usize::from(missing) } else { 0 }
     }
 
-    /// Takes the rows that were written to the dilation.
-    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
+    /// Takes the rows that were written to the dilation; `any` says whether a bit of them is set.
+    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize, any: bool) {
         if !self.labels.is_exhausted() {
-            self.dilation.look(rows);
+            if any {
+                self.dilation.look(rows);
+            }
             if !self.is_quiet() {
                 self.label(pixels, band, rows);
             }

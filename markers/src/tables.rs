@@ -15,20 +15,22 @@ pub trait Pixels {
     fn row_length(&self, width: u16) -> usize;
 
     /// Thresholds a row: bit i of word w is pixel 32·w + i. `mask` has ⌈pixels / 32⌉ words; bits
-    /// beyond the row become unset.
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]);
+    /// beyond the row become unset. Says whether any is set.
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool;
 
     /// Thresholds several rows of `width` pixels, which lie one after the other. `mask` has
-    /// ⌈width / 32⌉ words for each.
-    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+    /// ⌈width / 32⌉ words for each. Says whether any bit is set.
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         if width.is_multiple_of(32) {
             // One long row.
             return self.mask_row(rows, mask);
         }
         let rows = rows.chunks(self.row_length(width).max(1));
+        let mut any = false;
         for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
-            self.mask_row(row, mask);
+            any |= self.mask_row(row, mask);
         }
+        any
     }
 
     /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the
@@ -49,8 +51,9 @@ impl Pixels for () {
         0
     }
 
-    fn mask_row(&self, _: &[u16], mask: &mut [u32]) {
+    fn mask_row(&self, _: &[u16], mask: &mut [u32]) -> bool {
         mask.fill(0);
+        false
     }
 
     fn weight(&self, _: &[u16], _: u16) -> u8 {
@@ -177,8 +180,8 @@ impl Pixels for ByteTable {
         usize::from(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        threshold_bytes(&self.bytes, row, mask);
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
+        threshold_bytes(&self.bytes, row, mask)
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {

@@ -37,8 +37,8 @@ pub use mounting::{Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
 pub use predict::{Markers, Prediction, Tables};
 pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
-pub use table::{Answer, Place, Table};
-pub use terms::{Limits, MOST_TILTS, Sizes, Terms, Tilts};
+pub use table::{Answer, Place, Steps, Table};
+pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
 
 /// Most steps that a model may ask for.
 pub const MOST_STEPS: u8 = 3;
