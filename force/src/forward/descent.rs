@@ -89,8 +89,7 @@ impl<'a> Descent<'a> {
     pub fn estimate(self) -> Estimate {
         Estimate {
             pose: self.here.pose,
-            unexplained: self.here.unexplained / self.observed.wider,
-            wider: self.observed.wider,
+            unexplained: self.here.unexplained,
             solved: self.here.solved,
             looks: self.looks,
         }
