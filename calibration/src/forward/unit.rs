@@ -73,8 +73,8 @@ impl Weights {
         self.film = Some(FilmModel {
             tip_radius_mm: found.tip_radius_mm,
             rest_px: found.rest_px,
-            own: found.tolerance,
             unit: Some(found.unit.clone()),
+            open: found.open.clone(),
             ..film
         });
         self.rest = rest;

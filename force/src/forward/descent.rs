@@ -100,11 +100,9 @@ impl<'a> Descent<'a> {
 
     /// What it has come to.
     pub fn estimate(self) -> Estimate {
-        let wider = self.markers.observed.wider;
         Estimate {
             pose: self.here.pose,
-            unexplained: self.here.unexplained / wider,
-            wider,
+            unexplained: self.here.unexplained,
             solved: self.here.solved,
             looks: self.looks,
         }
