@@ -50,17 +50,29 @@ pub fn threshold(
 ) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let wanted = wanted.map_or_else(|| of_model(&hello), Ok)?;
-    send(&mut link, Request::SetThreshold(wanted), patience)?;
+    set_threshold(&mut link, &hello, wanted, patience, keep)?;
+    let kept = if keep { " and kept" } else { "" };
+    print(&format!("threshold set{kept}: {}", text(&wanted))).map(|_| ())
+}
+
+/// Sets a threshold, until the device restarts or for good, and says when there will be no forces
+/// with it.
+pub fn set_threshold(
+    link: &mut Link,
+    device: &DeviceHello,
+    wanted: Threshold,
+    patience: Duration,
+    keep: bool,
+) -> Result<(), Failure> {
+    send(link, Request::SetThreshold(wanted), patience)?;
     if keep {
         let selection = Selection {
             threshold: true,
             ..Selection::NONE
         };
-        settings::keep(&mut link, selection)?;
+        settings::keep(link, selection)?;
     }
-    let kept = if keep { " and kept" } else { "" };
-    print(&format!("threshold set{kept}: {}", text(&wanted)))?;
-    let made_for = hello.model.map(|model| model.threshold);
+    let made_for = device.model.as_ref().map(|model| model.threshold);
     if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
         note(&format!(
             "hivtac: samples have markers but no force (model_mismatch): the device's model was \

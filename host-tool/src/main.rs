@@ -1,5 +1,6 @@
 //! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
 
+mod auto_threshold;
 mod bring_up;
 mod check;
 mod command;
@@ -50,7 +51,7 @@ Exit codes:
   6    the device refused a command or did not answer it
   7    `check`: fewer samples a second than --min-rate
   8    `check`: more frames lost than --max-loss
-  9    `bring-up`: something is not right
+  9    `bring-up`, `threshold auto`: something is not right
   130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
 
 /// Shows the forces of a HiVTac sensor.
@@ -136,15 +137,8 @@ enum Command {
     /// tare.
     ///
     /// Example: hivtac threshold --hsv 170,10,100,255,45,255
-    Threshold {
-        #[command(flatten)]
-        device: Device,
-        #[command(flatten)]
-        wanted: WantedThreshold,
-        /// Keep it through restarts
-        #[arg(long)]
-        keep: bool,
-    },
+    #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+    Threshold(ThresholdArguments),
     /// Show, save, give back or forget what the device keeps through restarts
     #[command(subcommand)]
     Settings(SettingsCommand),
@@ -349,6 +343,68 @@ struct CheckArguments {
     /// One JSON object instead of lines
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Args)]
+struct ThresholdArguments {
+    #[command(subcommand)]
+    auto: Option<ThresholdCommand>,
+    #[command(flatten)]
+    device: Device,
+    #[command(flatten)]
+    wanted: Option<WantedThreshold>,
+    /// Keep it through restarts
+    #[arg(long)]
+    keep: bool,
+}
+
+#[derive(Subcommand)]
+enum ThresholdCommand {
+    /// Find the threshold that separates the dots from the film in the device's own pictures, show
+    /// why, and set it
+    ///
+    /// It is half way between film and dots; or the model's, when that separates them, too, since
+    /// there are forces only with that. The pixel format stays. Nothing should touch the film.
+    ///
+    /// Example: hivtac threshold auto --dry-run
+    Auto {
+        #[command(flatten)]
+        device: Device,
+        /// Keep it through restarts
+        #[arg(long)]
+        keep: bool,
+        /// Set nothing
+        #[arg(long, conflicts_with = "keep")]
+        dry_run: bool,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl ThresholdArguments {
+    fn run(self) -> Result<(), Failure> {
+        match self.auto {
+            Some(ThresholdCommand::Auto {
+                device,
+                keep,
+                dry_run,
+                json,
+            }) => auto_threshold::run(&auto_threshold::Options {
+                address: device.address(),
+                patience: device.timeout,
+                keep,
+                dry_run,
+                json,
+            }),
+            None => command::threshold(
+                &self.device.address(),
+                self.device.timeout,
+                self.wanted.and_then(|wanted| wanted.threshold()),
+                self.keep,
+            ),
+        }
+    }
 }
 
 #[derive(Args)]
@@ -561,11 +617,7 @@ fn run(command: Command) -> Result<(), Failure> {
             keep,
         } => command::tare(&device.address(), device.timeout, frames, keep),
         Command::Expose { device } => command::expose(&device.address(), device.timeout),
-        Command::Threshold {
-            device,
-            wanted,
-            keep,
-        } => command::threshold(&device.address(), device.timeout, wanted.threshold(), keep),
+        Command::Threshold(arguments) => arguments.run(),
         Command::Settings(command) => command.run(),
     }
 }

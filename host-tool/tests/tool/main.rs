@@ -11,4 +11,5 @@ mod run;
 mod sense;
 mod settings;
 mod snapshot;
+mod threshold_auto;
 mod view;
