@@ -9,6 +9,7 @@ mod files;
 mod finding;
 mod focus;
 mod force_json;
+mod help;
 mod hsv;
 mod info;
 mod lines;
@@ -27,7 +28,8 @@ mod template;
 mod truth;
 mod view;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, FromArgMatches, Parser, Subcommand};
+use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
@@ -40,23 +42,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-const EXIT_CODES: &str = "\
-Exit codes:
-  0    done; also when the reader of the output went away (broken pipe)
-  1    a file, a picture or the output cannot be used
-  2    wrong usage
-  3    no device: none found, the port cannot be opened, or nobody answers
-  4    the device speaks another version of the protocol
-  5    the connection was lost
-  6    the device refused a command or did not answer it
-  7    `check`: fewer samples a second than --min-rate
-  8    `check`: more frames lost than --max-loss
-  9    `bring-up`, `threshold auto`: something is not right
-  130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
-
 /// Shows the forces of a HiVTac sensor.
 #[derive(Parser)]
-#[command(version, after_help = EXIT_CODES)]
+#[command(version)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -65,6 +53,8 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Show forces as they come, and a summary at the end
+    ///
+    /// Example: hivtac monitor --seconds 10
     Monitor(MonitorArguments),
     /// Measure rate, jitter, losses and latency for a while, and hold them against limits
     ///
@@ -85,14 +75,17 @@ enum Command {
         /// End after so many seconds
         #[arg(long, value_name = "S", value_parser = seconds)]
         seconds: Option<Duration>,
+        /// At the end, what became of it as one JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Play a recording as if it were a device, for any other command, on a TCP port of this
     /// computer
     ///
-    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording.
+    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording:
+    /// `hivtac monitor --port tcp:127.0.0.1:7000` shows the forces of the example.
     ///
-    /// Example: hivtac replay press.mcap --tcp 7000, and elsewhere hivtac monitor --port
-    /// tcp:127.0.0.1:7000
+    /// Example: hivtac replay press.mcap --tcp 7000
     Replay {
         /// What `record` made; also one that was cut
         file: PathBuf,
@@ -102,8 +95,13 @@ enum Command {
         /// As fast as the other program reads, not as it was recorded
         #[arg(long)]
         fast: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Show what the device is and how it fares
+    ///
+    /// Example: hivtac info
     Info {
         #[command(flatten)]
         device: Device,
@@ -128,6 +126,9 @@ enum Command {
         /// Keep it through restarts
         #[arg(long)]
         keep: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set which pixels a marker may have, and with that the camera's pixel format, until the
     /// device restarts
@@ -145,14 +146,21 @@ enum Command {
     /// Let the camera find exposure and gain for the light that there is, and keep them
     ///
     /// It does so by itself when it starts.
+    ///
+    /// Example: hivtac expose
     Expose {
         #[command(flatten)]
         device: Device,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Save a frame as the sensing saw it, while forces go on
     ///
     /// It says what the device itself found in it, too. `hivtac sense` on the picture or the raw
     /// frame finds the same; on that of YUV422 only on the raw frame, with the device's model.
+    ///
+    /// Example: hivtac snapshot frame.png --mask mask.png
     Snapshot {
         #[command(flatten)]
         device: Device,
@@ -167,6 +175,8 @@ enum Command {
     /// Picture after picture: the width of each marker's rim and of the marker, its colour and
     /// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
     /// everything is right.
+    ///
+    /// Example: hivtac focus
     Focus {
         #[command(flatten)]
         device: Device,
@@ -212,8 +222,13 @@ enum Command {
         /// Where the page's recordings go, as hivtac-UNIT-NUMBER.mcap
         #[arg(long, value_name = "FOLDER", default_value = ".")]
         recordings: PathBuf,
+        /// The page's address in a JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Write a template to print: where the film is punched and the dots are stuck, as SVG
+    ///
+    /// Example: hivtac template film.svg
     Template {
         /// File to write
         #[arg(value_name = "FILE.svg")]
@@ -221,6 +236,9 @@ enum Command {
         /// Whose markers
         #[arg(long, value_name = "paper|ov7725", default_value = "ov7725", value_parser = preset)]
         preset: Preset,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
@@ -228,7 +246,23 @@ enum Command {
     /// channel are rounded to RGB565, which is what the sensor's camera delivers. There is a force
     /// only when size, preset and threshold are those of the model; the status says so otherwise,
     /// and blobs, markers and features are there all the same.
+    ///
+    /// Example: hivtac sense photo.jpg
     Sense(SenseArguments),
+    /// Print what a shell completes this tool's commands by
+    ///
+    /// Example: hivtac completion bash
+    Completion {
+        /// Which shell's
+        shell: Shell,
+    },
+    /// Write a man page of each command into a folder
+    ///
+    /// Example: hivtac man ~/.local/share/man/man1
+    Man {
+        /// The folder, made when it is missing
+        folder: PathBuf,
+    },
 }
 
 #[derive(Subcommand)]
@@ -255,6 +289,9 @@ enum SettingsCommand {
         /// The file to make, JSON
         #[arg(value_name = "FILE.json")]
         file: String,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set and keep the settings of a file
     ///
@@ -267,6 +304,9 @@ enum SettingsCommand {
         /// What `export` made
         #[arg(value_name = "FILE.json")]
         file: String,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Forget everything that was kept: no name, the model's threshold, no tare
     ///
@@ -274,6 +314,9 @@ enum SettingsCommand {
     Reset {
         #[command(flatten)]
         device: Device,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -288,24 +331,28 @@ enum SetCommand {
         /// At most 24 bytes of UTF-8
         #[arg(value_name = "NAME", value_parser = settings::name)]
         name: Name,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
 }
 
 impl SettingsCommand {
     fn run(self) -> Result<(), Failure> {
         use settings::Action;
-        let (device, action) = match self {
-            SettingsCommand::Get { device, json } => (device, Action::Get { json }),
-            SettingsCommand::Set(SetCommand::Name { device, name }) => {
-                (device, Action::SetName(name))
+        let (device, json, action) = match self {
+            SettingsCommand::Get { device, json } => (device, json, Action::Get),
+            SettingsCommand::Set(SetCommand::Name { device, name, json }) => {
+                (device, json, Action::SetName(name))
             }
-            SettingsCommand::Export { device, file } => (device, Action::Export(file)),
-            SettingsCommand::Import { device, file } => (device, Action::Import(file)),
-            SettingsCommand::Reset { device } => (device, Action::Reset),
+            SettingsCommand::Export { device, file, json } => (device, json, Action::Export(file)),
+            SettingsCommand::Import { device, file, json } => (device, json, Action::Import(file)),
+            SettingsCommand::Reset { device, json } => (device, json, Action::Reset),
         };
         let options = settings::Options {
             address: device.address(),
             patience: device.timeout,
+            json,
         };
         settings::run(&options, &action)
     }
@@ -356,6 +403,9 @@ struct ThresholdArguments {
     /// Keep it through restarts
     #[arg(long)]
     keep: bool,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Subcommand)]
@@ -402,6 +452,7 @@ impl ThresholdArguments {
                 self.device.timeout,
                 self.wanted.and_then(|wanted| wanted.threshold()),
                 self.keep,
+                self.json,
             ),
         }
     }
@@ -572,13 +623,20 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             file,
             seconds,
+            json,
         } => record::run(&record::Options {
             address: device.address(),
             patience: device.timeout,
             duration: seconds,
             file,
+            json,
         }),
-        Command::Replay { file, tcp, fast } => replay::run(&file, tcp, fast),
+        Command::Replay {
+            file,
+            tcp,
+            fast,
+            json,
+        } => replay::run(&file, tcp, fast, json),
         Command::Snapshot {
             device,
             files,
@@ -589,6 +647,7 @@ fn run(command: Command) -> Result<(), Failure> {
             timeout,
             listen,
             recordings,
+            json,
         } => view::run(&view::Options {
             addresses: match port.as_slice() {
                 [] => vec![Address::Find],
@@ -597,8 +656,9 @@ fn run(command: Command) -> Result<(), Failure> {
             patience: timeout,
             port: listen,
             folder: recordings,
+            json,
         }),
-        Command::Template { file, preset } => template::run(&file, preset),
+        Command::Template { file, preset, json } => template::run(&file, preset, json),
         Command::BringUp {
             device,
             report,
@@ -615,15 +675,22 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             frames,
             keep,
-        } => command::tare(&device.address(), device.timeout, frames, keep),
-        Command::Expose { device } => command::expose(&device.address(), device.timeout),
+            json,
+        } => command::tare(&device.address(), device.timeout, frames, keep, json),
+        Command::Expose { device, json } => {
+            command::expose(&device.address(), device.timeout, json)
+        }
         Command::Threshold(arguments) => arguments.run(),
         Command::Settings(command) => command.run(),
+        Command::Completion { shell } => help::completion(shell),
+        Command::Man { folder } => help::man(&folder),
     }
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse().command) {
+    let matches = help::command().get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    match run(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure.kind != Kind::Interrupted {
