@@ -116,6 +116,23 @@ mod tests {
         }
     }
 
+    /// With what it printed, in a block of its own or after another command.
+    #[test]
+    fn every_command_is_shown_in_the_guide() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let guide = std::fs::read_to_string(root.join("docs/using.md")).unwrap();
+        for (name, _) in doing() {
+            let begin = format!("$ {name}");
+            let is_it = |line: &&str| {
+                let rest = line.strip_prefix(begin.as_str());
+                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+            };
+            let mut after = guide.lines().skip_while(|line| !is_it(line)).skip(1);
+            let output = after.next().unwrap_or_default();
+            assert!(!output.is_empty(), "docs/using.md does not show {begin}");
+        }
+    }
+
     #[test]
     fn every_help_has_all_exit_codes() {
         for (name, mut command) in doing() {

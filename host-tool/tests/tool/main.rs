@@ -3,6 +3,7 @@
 
 mod bring_up;
 mod commands;
+mod documents;
 mod endings;
 mod fake;
 mod monitor;
