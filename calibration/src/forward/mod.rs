@@ -3,6 +3,7 @@
 
 pub mod building;
 mod honest;
+mod left_out;
 mod nearest;
 mod noise;
 mod tables;
