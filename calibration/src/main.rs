@@ -25,8 +25,8 @@ enum Command {
     Collect(CollectCommand),
     /// A unit's own model from ten known loads, step by step (`--into FOLDER`): what to do next,
     /// live numbers, and at the end the model and how good it is on loads left out. Or from a data
-    /// set (`--data`): 4 loads and more, some tilted, four of them 2 to 3 mm off the middle, several
-    /// frames each; prints what was found of the unit and writes its weights file.
+    /// set (`--data`): 4 loads and more, some tilted, four of them 2 to 3 mm off the middle,
+    /// several frames each; prints what was found of the unit and writes its weights file.
     Unit(UnitArgs),
     /// Quantize a weights file; writes a model file. The same weights give the same bytes on every
     /// machine.

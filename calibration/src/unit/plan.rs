@@ -5,8 +5,8 @@ use crate::collect::poses::{self, Pose, Task};
 /// More loads tell hardly more of a unit (`docs/results/units.md`).
 pub const MOST_LOADS: usize = 10;
 
-/// The usual loads: α and β in degrees, x and y in mm, and |F| in mN. One weak and one strong in the
-/// middle, then tilted to each side, then off the middle to each side.
+/// The usual loads: α and β in degrees, x and y in mm, and |F| in mN. One weak and one strong in
+/// the middle, then tilted to each side, then off the middle to each side.
 const USUAL: [([f64; 2], [f64; 2], u32); MOST_LOADS] = [
     ([0.0, 0.0], [0.0, 0.0], 100),
     ([0.0, 0.0], [0.0, 0.0], 200),
