@@ -80,6 +80,10 @@ async fn obey(Command { id, request }: Command) {
             settings::set_name(name);
             Outcome::Done
         }
+        Request::SetTemporal(settings) => match order(Order::SetTemporal { id, settings }) {
+            Some(outcome) => outcome,
+            None => return,
+        },
         // The memory task replies itself, when it has done so.
         Request::GetSettings => match memory::order(memory::Action::Report, id) {
             Some(outcome) => outcome,

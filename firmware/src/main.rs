@@ -54,6 +54,7 @@ use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::settings::Settings;
+use hivtac_sensing::temporal::Temporal;
 use hivtac_terms::threshold::{ByteOrder, Threshold};
 use hivtac_wire::kept::Record;
 use memory::Memory;
@@ -83,7 +84,8 @@ fn main() -> ! {
     let sensor = SENSOR.take();
     let memory = Memory::open(board.flash);
     settings::set_name(memory.record().name.clone());
-    let format = configure(sensor, model, memory.record());
+    let mut temporal = Temporal::new();
+    let format = configure(sensor, &mut temporal, model, memory.record());
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
@@ -100,6 +102,7 @@ fn main() -> ! {
         .run(|spawner: Spawner| {
             spawner.spawn(token(pipeline_task::run(
                 sensor,
+                temporal,
                 board.bands,
                 board.snapshots,
             )));
@@ -108,7 +111,12 @@ fn main() -> ! {
 }
 
 /// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
-fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) -> Format {
+fn configure(
+    sensor: &mut Sensor,
+    temporal: &mut Temporal,
+    model: Option<Model<'static>>,
+    kept: &Record,
+) -> Format {
     let mut settings = usual(&model);
     let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
     if let Some(threshold) = kept.threshold.filter(is_sent) {
@@ -120,11 +128,17 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) 
     sensor.set_motion(camera::MOTION);
     let tare = kept.tare.as_ref();
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
-        Some(Ok(rest)) => sensor.set_tare(Some(rest)),
+        Some(Ok(rest)) => {
+            sensor.set_tare(Some(rest));
+            temporal.set_tare(Some(rest));
+        }
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
         None => {}
     }
-    settings::follow(sensor);
+    if temporal.set(kept.temporal).is_err() {
+        defmt::warn!("the kept limits of contact, slip or filter are out of range");
+    }
+    settings::follow(sensor, temporal);
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }

@@ -109,6 +109,8 @@ impl Memory {
             name,
             threshold,
             tare,
+            temporal,
+            rezeroed,
             ..
         } = used;
         if asked.id().is_some() {
@@ -120,6 +122,8 @@ impl Memory {
                 found: self.found,
                 erases: self.log.erases(),
                 failures: self.log.failures(),
+                temporal,
+                rezeroed,
             }));
         }
         Outcome::Done
@@ -131,6 +135,7 @@ impl Memory {
             name: used.name == self.record.name,
             threshold: used.own_threshold() == self.record.threshold,
             tare: used.tare == self.record.tare,
+            temporal: used.temporal == self.record.temporal,
         }
     }
 
@@ -147,6 +152,9 @@ impl Memory {
         }
         if selection.name {
             record.name = used.name;
+        }
+        if selection.temporal {
+            record.temporal = used.temporal;
         }
         if record == self.record && self.is_kept {
             return Outcome::Done;

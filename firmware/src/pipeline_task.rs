@@ -16,7 +16,10 @@ use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
+use hivtac_sensing::rest::Rest;
+use hivtac_sensing::temporal::{Followed, Moment, Temporal};
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{Outcome, Sample};
 use hivtac_wire::settings::RestPosition;
@@ -44,6 +47,13 @@ pub enum Order {
         /// As it came, unchecked.
         position: Option<RestPosition>,
     },
+    /// Follow forces so from the next frame on.
+    SetTemporal {
+        /// Of the command.
+        id: u16,
+        /// As they came, unchecked.
+        settings: TemporalSettings,
+    },
     /// Keep the next whole frame and send it.
     Snapshot(Asked),
 }
@@ -51,11 +61,17 @@ pub enum Order {
 /// The pipeline, its table in DTCM.
 pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
-/// Runs for ever in thread mode. `sensor` is configured.
+/// Runs for ever in thread mode. `sensor` and `temporal` are configured.
 #[embassy_executor::task]
-pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: SnapshotCopy) {
+pub async fn run(
+    sensor: &'static mut Sensor,
+    temporal: Temporal,
+    bands: BandCopy,
+    snapshots: SnapshotCopy,
+) {
     let mut task = PipelineTask {
         sensor,
+        temporal,
         next_threshold: NextThreshold::NONE,
         bands,
         follower: Follower::new(SHAPE),
@@ -87,6 +103,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: Snapsh
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
+    temporal: Temporal,
     next_threshold: NextThreshold,
     bands: BandCopy,
     follower: Follower,
@@ -209,6 +226,14 @@ impl PipelineTask {
             Order::SetTare { id, position } => {
                 outbox::reply(id, self.set_tare(position));
             }
+            Order::SetTemporal { id, settings } => {
+                let outcome = match self.temporal.set(settings) {
+                    Ok(()) => Outcome::Done,
+                    Err(_) => Outcome::InvalidArgument,
+                };
+                settings::follow(self.sensor, &self.temporal);
+                outbox::reply(id, outcome);
+            }
             Order::Snapshot(asked) => self.snapshots.begin(asked),
         }
     }
@@ -218,19 +243,25 @@ impl PipelineTask {
         match rest.transpose() {
             Ok(rest) => {
                 self.give_up_tare();
-                self.sensor.set_tare(rest);
-                settings::follow(self.sensor);
+                self.use_tare(rest);
                 Outcome::Done
             }
             Err(outcome) => outcome,
         }
     }
 
+    /// Measures against this rest position from the next frame on, or against the model's own.
+    fn use_tare(&mut self, rest: Option<Rest>) {
+        self.sensor.set_tare(rest);
+        self.temporal.set_tare(self.sensor.tare().copied());
+        settings::follow(self.sensor, &self.temporal);
+    }
+
     /// Frames of other pixels come from now on: those of the threshold that waits. Markers have
     /// other areas in them, so that no rest position holds.
     fn change_format(&mut self) {
         let asked = self.next_threshold.come_into_use(self.sensor);
-        self.sensor.set_tare(None);
+        self.use_tare(None);
         self.give_up_tare();
         self.threshold_changed();
         if let Some(id) = asked.and_then(Asked::id) {
@@ -241,8 +272,9 @@ impl PipelineTask {
     /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
     /// which frames pass.
     fn threshold_changed(&mut self) {
-        settings::follow(self.sensor);
+        settings::follow(self.sensor, &self.temporal);
         self.sensor.forget_motion();
+        self.temporal.begin_anew();
         let mut missed = false;
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
             missed = true;
@@ -262,12 +294,17 @@ impl PipelineTask {
         let begun = Instant::now();
         let measurement = self.sensor.finish_frame();
         self.newest = delivery.edge.number;
-        let sample = self.sample(delivery, &measurement);
+        let followed = self.temporal.follow(moment(delivery), &measurement);
+        let sample = self.sample(delivery, &measurement, &followed);
         let (frame, time_us) = (sample.frame, sample.time_us);
         self.busy_us += begun.elapsed().as_micros() as u32;
         stats::PROCESSING_US.set(self.busy_us);
         let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
         stats::LATENCY_US.set(latency_us as u32);
+        if let Some(rest) = followed.rest {
+            self.sensor.set_tare(Some(rest));
+            settings::follow(self.sensor, &self.temporal);
+        }
         self.tare_with(&measurement);
         health::set(match measurement.force {
             Some(_) => Condition::Good,
@@ -282,8 +319,13 @@ impl PipelineTask {
         self.snapshots.frame(frame, time_us, threshold);
     }
 
-    fn sample(&mut self, delivery: &Delivery, measurement: &Measurement) -> Sample {
-        let mut status = measurement.status;
+    fn sample(
+        &mut self,
+        delivery: &Delivery,
+        measurement: &Measurement,
+        followed: &Followed,
+    ) -> Sample {
+        let mut status = followed.status;
         let first = core::mem::replace(&mut self.first, false);
         for (set, bit) in [
             (delivery.after_loss && !first, Status::FRAME_DROPPED),
@@ -294,13 +336,13 @@ impl PipelineTask {
                 status |= bit;
             }
         }
+        let Moment { frame, time_us } = moment(delivery);
         Sample {
             sequence: self.sequence,
-            frame: delivery.edge.number,
-            time_us: (delivery.edge.time_us)
-                .saturating_add_signed(camera::exposure_middle_us().into()),
+            frame,
+            time_us,
             status,
-            force: measurement.force,
+            force: followed.force,
             markers: measurement.markers.filter(|_| session::wants_markers()),
         }
     }
@@ -310,12 +352,12 @@ impl PipelineTask {
             return;
         };
         if let Some(outcome) = taring.add(self.sensor, measurement) {
-            if let Ok(rest) = outcome {
-                self.sensor.set_tare(Some(rest));
-                settings::follow(self.sensor);
-            }
-            outbox::reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
+            let id = taring.id();
             self.taring = None;
+            if let Ok(rest) = outcome {
+                self.use_tare(Some(rest));
+            }
+            outbox::reply(id, outcome.err().unwrap_or(Outcome::Done));
         }
     }
 
@@ -323,5 +365,14 @@ impl PipelineTask {
         if let Some(taring) = self.taring.take() {
             outbox::reply(taring.id(), taring.given_up());
         }
+    }
+}
+
+/// When the frame was exposed that was delivered.
+fn moment(delivery: &Delivery) -> Moment {
+    let edge = delivery.edge;
+    Moment {
+        frame: edge.number,
+        time_us: (edge.time_us).saturating_add_signed(camera::exposure_middle_us().into()),
     }
 }

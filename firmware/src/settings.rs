@@ -7,7 +7,10 @@ use core::cell::Cell;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
+use hivtac_sensing::temporal::Temporal;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::{ModelIdentity, Outcome};
 use hivtac_wire::settings::{Name, RestPosition};
 
@@ -16,14 +19,18 @@ use hivtac_wire::settings::{Name, RestPosition};
 pub struct OfPipeline {
     /// Its settings.
     pub settings: Settings,
-    /// Its rest position, when one was taken.
+    /// Its rest position as it was taken, when one was.
     pub tare: Option<Rest>,
+    /// How far re-zeroing moved it.
+    pub rezeroed: Px,
+    /// How it follows forces from frame to frame.
+    pub temporal: TemporalSettings,
     /// Its model, when it has one.
     pub model: Option<ModelIdentity>,
 }
 
 /// Tells what the pipeline measures with from now on.
-pub fn follow(sensor: &Sensor) {
+pub fn follow(sensor: &Sensor, temporal: &Temporal) {
     let model = sensor.model().map(|model| ModelIdentity {
         crc: model.crc(),
         name: model.name(),
@@ -32,7 +39,9 @@ pub fn follow(sensor: &Sensor) {
     });
     let told = OfPipeline {
         settings: *sensor.settings(),
-        tare: sensor.tare().copied(),
+        tare: temporal.tare().copied(),
+        rezeroed: temporal.rezeroed(),
+        temporal: *temporal.settings(),
         model,
     };
     PIPELINE.lock(|cell| cell.set(Some(told)));
@@ -65,8 +74,12 @@ pub struct InUse {
     pub name: Name,
     /// The threshold.
     pub threshold: Threshold,
-    /// The rest position, when one was taken.
+    /// The rest position as it was taken, when one was.
     pub tare: Option<RestPosition>,
+    /// How far re-zeroing moved it.
+    pub rezeroed: Px,
+    /// How forces are followed from frame to frame.
+    pub temporal: TemporalSettings,
     /// The threshold of the model.
     of_model: Option<Threshold>,
 }
@@ -83,12 +96,16 @@ pub fn in_use() -> Option<InUse> {
     let OfPipeline {
         settings,
         tare,
+        rezeroed,
+        temporal,
         model,
     } = of_pipeline()?;
     Some(InUse {
         name: name(),
         threshold: settings.threshold,
         tare: tare.map(|rest| position(&rest, &settings)),
+        rezeroed,
+        temporal,
         of_model: model.map(|model| model.threshold),
     })
 }

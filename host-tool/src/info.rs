@@ -2,6 +2,7 @@
 
 use crate::lines::to_json;
 use crate::output::{note, print};
+use crate::settings::temporal::FilterJson;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
@@ -60,6 +61,7 @@ pub struct Info<'a> {
     preset: &'a str,
     dilations: u8,
     centroid: &'static str,
+    filter: FilterJson,
     stats: Option<Stats>,
 }
 
@@ -102,6 +104,7 @@ impl<'a> Info<'a> {
                 CentroidEstimator::BinaryMask => "binary-mask",
                 CentroidEstimator::RednessWeighted => "redness-weighted",
             },
+            filter: FilterJson::new(hello.filter),
             stats,
         }
     }
@@ -130,6 +133,7 @@ impl<'a> Info<'a> {
                 text(made_for)
             ));
         }
+        lines.push(format!("filter     {}", self.filter.text()));
         lines.extend(self.stats.iter().flat_map(stats_lines));
         lines
     }

@@ -238,6 +238,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::Inspect => "inspect",
         Request::GetSettings => "get settings",
         Request::SetName(_) => "set name",
+        Request::SetTemporal(_) => "set limits of contact, slip, filter and re-zeroing",
         Request::SetTare(_) => "set tare",
         Request::Keep(_) => "keep settings",
     }

@@ -34,10 +34,13 @@ use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use hivtac_terms::geometry::Preset;
+use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
+use hivtac_terms::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
 use hivtac_wire::settings::Name;
 use lines::Format;
+use settings::temporal::{Change, RezeroChange, small_thousandths, thousandths};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -267,7 +270,7 @@ enum Command {
 
 #[derive(Subcommand)]
 enum SettingsCommand {
-    /// Show name, threshold and tare in use, and which of them are kept
+    /// Show name, threshold, tare and limits in use, and which of them are kept
     ///
     /// Example: hivtac settings get
     Get {
@@ -308,7 +311,7 @@ enum SettingsCommand {
         #[arg(long)]
         json: bool,
     },
-    /// Forget everything that was kept: no name, the model's threshold, no tare
+    /// Forget everything that was kept: no name, the model's threshold, no tare, the usual limits
     ///
     /// Example: hivtac settings reset
     Reset {
@@ -320,6 +323,16 @@ enum SettingsCommand {
     },
 }
 
+/// A device, and how is told what was done with it.
+#[derive(Args)]
+struct Told {
+    #[command(flatten)]
+    device: Device,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
+}
+
 #[derive(Subcommand)]
 enum SetCommand {
     /// A name to tell it from others, by which `info` shows it
@@ -327,14 +340,181 @@ enum SetCommand {
     /// Example: hivtac settings set name thumb
     Name {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// At most 24 bytes of UTF-8
         #[arg(value_name = "NAME", value_parser = settings::name)]
         name: Name,
-        /// One JSON object instead of a line
-        #[arg(long)]
-        json: bool,
     },
+    /// From what force on something touches the film, and until what
+    ///
+    /// A contact also begins only with three times the force's standard uncertainty, and ends below
+    /// half of that.
+    ///
+    /// Example: hivtac settings set contact --begins 5 --ends 3
+    #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
+    Contact {
+        #[command(flatten)]
+        device: Told,
+        /// |F| with which it begins, mN; 2 by default
+        #[arg(long, value_name = "MN", value_parser = thousandths, group = "limit")]
+        begins: Option<u32>,
+        /// |F| below which it ends, mN; 1 by default
+        #[arg(long, value_name = "MN", value_parser = thousandths, group = "limit")]
+        ends: Option<u32>,
+    },
+    /// How far a contact moves over the film when it slips
+    ///
+    /// Example: hivtac settings set slip --distance 100
+    #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
+    Slip {
+        #[command(flatten)]
+        device: Told,
+        /// Distance, µm, 1 to 5000; 60 by default
+        #[arg(long, value_name = "UM", group = "limit")]
+        distance: Option<u32>,
+        /// In what time at most, ms, 10 to 100; 50 by default
+        #[arg(long, value_name = "MS", group = "limit")]
+        within: Option<u32>,
+        /// Least force along the film over that into it, 0 to 2; 0.1 by default
+        #[arg(long, value_name = "RATIO", value_parser = small_thousandths, group = "limit")]
+        ratio: Option<u16>,
+    },
+    /// What is sent in place of each frame's own force
+    ///
+    /// Contact and slip are told of each frame's own force all the same.
+    #[command(subcommand)]
+    Filter(FilterCommand),
+    /// Whether the rest position follows what drifts while nothing touches the film
+    ///
+    /// A force below the contact's that grows no faster than the rate is taken for drift, and
+    /// missing in every force from then on: by the total at most. With the usual limits it grows by
+    /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
+    #[command(subcommand)]
+    Rezero(RezeroCommand),
+}
+
+#[derive(Subcommand)]
+enum FilterCommand {
+    /// Each frame's own force
+    ///
+    /// Example: hivtac settings set filter none
+    None {
+        #[command(flatten)]
+        device: Told,
+    },
+    /// A first-order low-pass; a steady change comes its time constant later
+    ///
+    /// Example: hivtac settings set filter low-pass --ms 20
+    LowPass {
+        #[command(flatten)]
+        device: Told,
+        /// Its time constant, ms, 1 to 10000
+        #[arg(long, value_name = "MS")]
+        ms: u32,
+    },
+    /// The median of each component in three frames; a steady change comes a frame later
+    ///
+    /// Example: hivtac settings set filter median-of-three
+    MedianOfThree {
+        #[command(flatten)]
+        device: Told,
+    },
+}
+
+impl FilterCommand {
+    fn change(self) -> (Told, Change) {
+        let (device, filter) = match self {
+            FilterCommand::None { device } => (device, Filter::None),
+            FilterCommand::LowPass { device, ms } => {
+                let time_constant = Milliseconds(ms);
+                (device, Filter::LowPass { time_constant })
+            }
+            FilterCommand::MedianOfThree { device } => (device, Filter::MedianOfThree),
+        };
+        (device, Change::Filter(filter))
+    }
+}
+
+#[derive(Subcommand)]
+enum RezeroCommand {
+    /// It stays where it was taken
+    ///
+    /// Example: hivtac settings set rezero off
+    Off {
+        #[command(flatten)]
+        device: Told,
+    },
+    /// It follows, within limits
+    ///
+    /// Example: hivtac settings set rezero on
+    On {
+        #[command(flatten)]
+        device: Told,
+        /// How long nothing touches before, s, 1 to 3600; 10 by default
+        #[arg(long, value_name = "S", value_parser = thousandths)]
+        after: Option<u32>,
+        /// How far in a second, px, 0.001 to 0.1; 0.005 by default
+        #[arg(long, value_name = "PX", value_parser = small_thousandths)]
+        rate: Option<u16>,
+        /// How far in all, px, 0.001 to 0.25; 0.1 by default
+        #[arg(long, value_name = "PX", value_parser = small_thousandths)]
+        total: Option<u16>,
+    },
+}
+
+impl RezeroCommand {
+    fn change(self) -> (Told, Change) {
+        match self {
+            RezeroCommand::Off { device } => (device, Change::Rezero(None)),
+            RezeroCommand::On {
+                device,
+                after,
+                rate,
+                total,
+            } => {
+                let change = RezeroChange {
+                    after: after.map(Milliseconds),
+                    rate: rate.map(MilliPx),
+                    total: total.map(MilliPx),
+                };
+                (device, Change::Rezero(Some(change)))
+            }
+        }
+    }
+}
+
+impl SetCommand {
+    fn action(self) -> (Told, settings::Action) {
+        let (device, change) = match self {
+            SetCommand::Name { device, name } => {
+                return (device, settings::Action::SetName(name));
+            }
+            SetCommand::Contact {
+                device,
+                begins,
+                ends,
+            } => {
+                let [begins, ends] = [begins, ends].map(|limit| limit.map(UnsignedMicroNewtons));
+                (device, Change::Contact { begins, ends })
+            }
+            SetCommand::Slip {
+                device,
+                distance,
+                within,
+                ratio,
+            } => {
+                let change = Change::Slip {
+                    distance: distance.map(Micrometres),
+                    within: within.map(Milliseconds),
+                    ratio: ratio.map(Permille),
+                };
+                (device, change)
+            }
+            SetCommand::Filter(filter) => filter.change(),
+            SetCommand::Rezero(rezero) => rezero.change(),
+        };
+        (device, settings::Action::SetTemporal(change))
+    }
 }
 
 impl SettingsCommand {
@@ -342,8 +522,9 @@ impl SettingsCommand {
         use settings::Action;
         let (device, json, action) = match self {
             SettingsCommand::Get { device, json } => (device, json, Action::Get),
-            SettingsCommand::Set(SetCommand::Name { device, name, json }) => {
-                (device, json, Action::SetName(name))
+            SettingsCommand::Set(command) => {
+                let (Told { device, json }, action) = command.action();
+                (device, json, action)
             }
             SettingsCommand::Export { device, file, json } => (device, json, Action::Export(file)),
             SettingsCommand::Import { device, file, json } => (device, json, Action::Import(file)),

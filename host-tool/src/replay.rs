@@ -267,6 +267,7 @@ impl Player {
             | Request::Inspect
             | Request::GetSettings
             | Request::SetName(_)
+            | Request::SetTemporal(_)
             | Request::SetTare(_)
             | Request::Keep(_) => Outcome::Unsupported,
         };

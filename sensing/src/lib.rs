@@ -19,6 +19,7 @@ pub use hivtac_markers::{blob, formats, rules, scanner, screen, settings, tables
 pub mod motion;
 pub mod pipeline;
 pub mod tare;
+pub mod temporal;
 
 #[cfg(test)]
 mod picture;

@@ -6,10 +6,11 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, MilliDegrees, MilliPx, Milliseconds, Px, SignedMicrometres,
+    UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
@@ -51,9 +52,26 @@ fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
 }
 
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+/// Usual limits with a low-pass and re-zeroing.
+const OWN: TemporalSettings = TemporalSettings {
+    filter: Filter::LowPass {
+        time_constant: Milliseconds(20),
+    },
+    rezero: Some(Rezero {
+        after: Milliseconds(10_000),
+        rate: MilliPx(5),
+        total: MilliPx(100),
+    }),
+    ..TemporalSettings::USUAL
+};
 const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });
 
-fn hello(model: Option<ModelIdentity>, threshold: Threshold, name: &str) -> DeviceMessage {
+fn hello(
+    model: Option<ModelIdentity>,
+    threshold: Threshold,
+    name: &str,
+    filter: Filter,
+) -> DeviceMessage {
     DeviceMessage::Hello(DeviceHello {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
@@ -68,6 +86,7 @@ fn hello(model: Option<ModelIdentity>, threshold: Threshold, name: &str) -> Devi
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: name.try_into().unwrap(),
+        filter,
     })
 }
 
@@ -230,6 +249,7 @@ const NAME_AND_TARE: Selection = Selection {
     name: true,
     threshold: false,
     tare: true,
+    temporal: true,
 };
 
 fn settings() -> DeviceMessage {
@@ -241,21 +261,40 @@ fn settings() -> DeviceMessage {
         found: Found::Settings,
         erases: 3,
         failures: 0,
+        temporal: OWN,
+        rezeroed: Px(1_311),
     })
 }
 
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
-        ("device-hello", hello(Some(model(RED)), RED, "thumb")),
+        (
+            "device-hello",
+            hello(Some(model(RED)), RED, "thumb", OWN.filter),
+        ),
         (
             "device-hello-yuv422",
-            hello(Some(model(RED_CR)), RED_CR, "thumb"),
+            hello(Some(model(RED_CR)), RED_CR, "thumb", Filter::None),
         ),
-        ("device-hello-without-model", hello(None, RED, "")),
+        (
+            "device-hello-without-model",
+            hello(None, RED, "", Filter::None),
+        ),
         (
             "sample-force",
             sample(Status::NOT_CALIBRATED | Status::CONTACT, Some(PLACE)),
+        ),
+        (
+            "sample-slip",
+            sample(
+                Status::NOT_CALIBRATED | Status::CONTACT | Status::SLIP,
+                Some(PLACE),
+            ),
+        ),
+        (
+            "sample-rezeroed",
+            sample(Status::CONTACT | Status::REZEROED, Some(PLACE)),
         ),
         (
             "sample-without-place",
@@ -296,6 +335,10 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
 }
 
 fn host_messages() -> BTreeMap<String, HostMessage> {
+    let median = TemporalSettings {
+        filter: Filter::MedianOfThree,
+        ..TemporalSettings::USUAL
+    };
     let command = |id, request| HostMessage::Command(Command { id, request });
     [
         ("host-hello", HostMessage::Hello(HelloPrefix::OURS.into())),
@@ -326,6 +369,15 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ),
         ("set-tare", command(13, Request::SetTare(Some(rest())))),
         ("forget-tare", command(13, Request::SetTare(None))),
+        ("set-temporal", command(15, Request::SetTemporal(OWN))),
+        (
+            "set-temporal-usual",
+            command(15, Request::SetTemporal(TemporalSettings::USUAL)),
+        ),
+        (
+            "set-temporal-median",
+            command(15, Request::SetTemporal(median)),
+        ),
         ("keep", command(14, Request::Keep(NAME_AND_TARE))),
     ]
     .map(|(name, message)| (name.to_owned(), message))
@@ -387,7 +439,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 13);
+    assert_eq!(requests.len(), 14);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

@@ -8,10 +8,11 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{ContactLimits, Filter, Rezero, SlipLimits, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
+    SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
@@ -40,6 +41,7 @@ pub fn device_hello() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: String::new(),
+        filter: Filter::None,
     }
 }
 
@@ -61,6 +63,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             height: u16::MAX,
             preset: full(),
             name: full(),
+            filter: longest_temporal().filter,
             ..device_hello()
         }),
         DeviceMessage::Sample(longest_sample()),
@@ -95,6 +98,8 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             found: Found::AnotherVersion,
             erases: u32::MAX,
             failures: u32::MAX,
+            temporal: longest_temporal(),
+            rezeroed: Px(i32::MIN),
         }),
     ]
 }
@@ -138,6 +143,29 @@ pub fn longest_rest() -> RestPosition {
         markers: longest_sample().markers.unwrap(),
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
         rect_area: i64::MIN,
+    }
+}
+
+/// Temporal settings, each number as long as it can be.
+pub fn longest_temporal() -> TemporalSettings {
+    TemporalSettings {
+        contact: ContactLimits {
+            begins: UnsignedMicroNewtons(u32::MAX),
+            ends: UnsignedMicroNewtons(u32::MAX),
+        },
+        slip: SlipLimits {
+            distance: Micrometres(u32::MAX),
+            within: Milliseconds(u32::MAX),
+            ratio: Permille(u16::MAX),
+        },
+        filter: Filter::LowPass {
+            time_constant: Milliseconds(u32::MAX),
+        },
+        rezero: Some(Rezero {
+            after: Milliseconds(u32::MAX),
+            rate: MilliPx(u16::MAX),
+            total: MilliPx(u16::MAX),
+        }),
     }
 }
 
@@ -194,6 +222,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::SetName(full()),
         Request::SetTare(Some(longest_rest())),
         Request::Keep(Selection::ALL),
+        Request::SetTemporal(longest_temporal()),
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -239,6 +268,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         any_string().prop_map(Request::SetName),
         proptest::option::of(any_rest()).prop_map(Request::SetTare),
         any_selection().prop_map(Request::Keep),
+        any_temporal().prop_map(Request::SetTemporal),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -258,9 +288,9 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
     let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
-    let identity = (any::<[u8; 12]>(), any_string());
+    let identity = (any::<[u8; 12]>(), any_string(), any_temporal());
     (identity, names, size, model, seen).prop_map(
-        |((device_id, name), (board, firmware, preset), (width, height), model, seen)| {
+        |((device_id, name, temporal), (board, firmware, preset), (width, height), model, seen)| {
             DeviceHello {
                 device_id,
                 name,
@@ -278,6 +308,7 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
                 preset,
                 dilations: seen.1,
                 centroid: seen.2,
+                filter: temporal.filter,
                 ..device_hello()
             }
         },
@@ -433,26 +464,64 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         any_string(),
         any_threshold(),
         proptest::option::of(any_rest()),
+        any_temporal(),
     );
-    (used, any_selection(), found, any::<[u32; 2]>()).prop_map(
-        |((name, threshold, tare), kept, found, [erases, failures])| SettingsReport {
-            name,
-            threshold,
-            tare,
-            kept,
-            found,
-            erases,
-            failures,
+    let numbers = any::<([u32; 2], i32)>();
+    (used, any_selection(), found, numbers).prop_map(
+        |((name, threshold, tare, temporal), kept, found, ([erases, failures], rezeroed))| {
+            SettingsReport {
+                name,
+                threshold,
+                tare,
+                kept,
+                found,
+                erases,
+                failures,
+                temporal,
+                rezeroed: Px(rezeroed),
+            }
         },
     )
 }
 
 fn any_selection() -> impl Strategy<Value = Selection> {
-    any::<[bool; 3]>().prop_map(|[name, threshold, tare]| Selection {
+    any::<[bool; 4]>().prop_map(|[name, threshold, tare, temporal]| Selection {
         name,
         threshold,
         tare,
+        temporal,
     })
+}
+
+/// Any temporal settings.
+pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
+    let filter = prop_oneof![
+        Just(Filter::None),
+        Just(Filter::MedianOfThree),
+        any::<u32>().prop_map(|ms| Filter::LowPass {
+            time_constant: Milliseconds(ms)
+        }),
+    ];
+    let rezero = proptest::option::of(any::<(u32, u16, u16)>());
+    (any::<[u32; 4]>(), any::<u16>(), filter, rezero).prop_map(
+        |([begins, ends, distance, within], ratio, filter, rezero)| TemporalSettings {
+            contact: ContactLimits {
+                begins: UnsignedMicroNewtons(begins),
+                ends: UnsignedMicroNewtons(ends),
+            },
+            slip: SlipLimits {
+                distance: Micrometres(distance),
+                within: Milliseconds(within),
+                ratio: Permille(ratio),
+            },
+            filter,
+            rezero: rezero.map(|(after, rate, total)| Rezero {
+                after: Milliseconds(after),
+                rate: MilliPx(rate),
+                total: MilliPx(total),
+            }),
+        },
+    )
 }
 
 /// Any rest position.

@@ -6,6 +6,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::Threshold;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -84,6 +85,8 @@ pub struct DeviceHello {
     pub centroid: CentroidEstimator,
     /// What its user calls it.
     pub name: Name,
+    /// What is sent in place of each frame's own force.
+    pub filter: Filter,
 }
 
 /// Which model makes the forces.
@@ -279,6 +282,8 @@ pub enum Request {
     SetTare(Option<RestPosition>),
     /// Keep these settings as they are in use, through restarts. Answered when they are kept.
     Keep(Selection),
+    /// Set how forces are followed from frame to frame. Answered when it holds.
+    SetTemporal(TemporalSettings),
 }
 
 /// The answer to a command.

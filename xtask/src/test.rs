@@ -135,7 +135,7 @@ impl Test {
     }
 
     /// The rig's tests at the speed that it assumes of the core, and those in which time matters
-    /// at half of it.
+    /// at half of it and on a busy bus.
     fn rig_tests(&self, report: &mut Report, programs: Option<&Programs>) {
         let mut test = |step, prepare: &dyn Fn(&mut Command)| {
             if self.wants(step) {
@@ -151,6 +151,7 @@ impl Test {
         test("tests: rig", &|_| {});
         test("tests: rig at half speed", &|command| {
             command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");
+            command.env("HIVTAC_BUSY_BUS", "1");
             for name in TIMED {
                 command.args(["--test", name]);
             }

@@ -518,6 +518,7 @@ mod tests {
             dilations: 1,
             centroid: CentroidEstimator::RednessWeighted,
             name: Default::default(),
+            filter: Default::default(),
         };
         let yuv422 = conditions_of(&hello).unwrap();
         assert_eq!(yuv422.pixel_format, PixelFormat::Yuv422);

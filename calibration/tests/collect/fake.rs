@@ -67,6 +67,7 @@ pub fn hello() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: Default::default(),
+        filter: Default::default(),
     }
 }
 

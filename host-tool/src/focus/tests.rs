@@ -23,6 +23,7 @@ pub fn device() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: Default::default(),
+        filter: Default::default(),
     }
 }
 

@@ -2,6 +2,7 @@
 //! forgotten.
 
 mod file;
+pub mod temporal;
 
 use crate::command::{send, tell};
 use crate::lines::to_json;
@@ -13,11 +14,14 @@ use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
 use serde_json::{Value, json};
 use std::time::Duration;
+use temporal::Change;
 
 /// Longest time that keeping may take: an erased sector takes 1 to 2 s, and a worn one is tried
 /// again.
@@ -39,6 +43,8 @@ pub enum Action {
     Get,
     /// Give it a name and keep that.
     SetName(Name),
+    /// Change how forces are followed, and keep that.
+    SetTemporal(Change),
     /// Save them in a file.
     Export(String),
     /// Set and keep those of a file.
@@ -67,6 +73,7 @@ pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
     match action {
         Action::Get => device.show(),
         Action::SetName(name) => device.set_name(name),
+        Action::SetTemporal(change) => device.set_temporal(*change),
         Action::Export(path) => device.export(path),
         Action::Import(path) => imported.map_or(Ok(()), |file| device.import(path, &file)),
         Action::Reset => device.reset(),
@@ -147,6 +154,27 @@ impl Device {
         self.tell(&line, json!({ "name": name.as_str(), "kept": true }))
     }
 
+    fn set_temporal(&mut self, change: Change) -> Result<(), Failure> {
+        let settings = change.of(self.settings()?.temporal);
+        settings
+            .check()
+            .map_err(|error| Failure::new(Kind::Input, format!("{error}; nothing was changed")))?;
+        self.send(Request::SetTemporal(settings))?;
+        let selection = Selection {
+            temporal: true,
+            ..Selection::NONE
+        };
+        keep(&mut self.link, selection)?;
+        let named = |(name, _): &(&str, String)| *name == change.name();
+        let texts = temporal::texts(&settings).into_iter().find(named);
+        let (name, text) = texts.unwrap_or_default();
+        let line = format!("{name} set and kept: {text}");
+        self.tell(
+            &line,
+            json!({ "setting": name, "text": text, "kept": true }),
+        )
+    }
+
     fn export(&mut self, path: &str) -> Result<(), Failure> {
         let report = self.settings()?;
         file::write(path, &File::new(&self.hello.device_id, &report))?;
@@ -165,7 +193,7 @@ impl Device {
         }
         let tare = file.rest().filter(|_| is_own);
         let name = name(&file.name).unwrap_or_default();
-        self.set(name, Some(file.threshold()), tare)?;
+        self.set(name, Some(file.threshold()), tare, file.temporal())?;
         let line = format!("settings of {path} are in use and kept");
         let parts = json!({ "file": path, "kept": true, "tare": tare.is_some() });
         self.tell(&line, parts)
@@ -173,7 +201,7 @@ impl Device {
 
     fn reset(&mut self) -> Result<(), Failure> {
         let threshold = self.hello.model.as_ref().map(|model| model.threshold);
-        self.set(Name::new(), threshold, None)?;
+        self.set(Name::new(), threshold, None, TemporalSettings::default())?;
         let line = "everything that was kept is forgotten; take a tare";
         self.tell(line, json!({ "kept": false }))
     }
@@ -184,6 +212,7 @@ impl Device {
         name: Name,
         threshold: Option<Threshold>,
         tare: Option<RestPosition>,
+        temporal: TemporalSettings,
     ) -> Result<(), Failure> {
         let unkept = |failure: Failure| {
             let what = "nothing was kept: a restart brings back the settings from before";
@@ -195,6 +224,7 @@ impl Device {
                 .map_err(unkept)?;
         }
         self.send(Request::SetTare(tare)).map_err(unkept)?;
+        self.send(Request::SetTemporal(temporal)).map_err(unkept)?;
         self.send(Request::SetName(name)).map_err(unkept)?;
         keep(&mut self.link, Selection::ALL)
     }
@@ -209,9 +239,10 @@ fn lines(report: &SettingsReport) -> Vec<String> {
         "" => "none".to_owned(),
         name => shown(name),
     };
-    let tare = match report.tare {
-        Some(_) => "taken",
-        None => "none",
+    let tare = match (report.tare, report.rezeroed) {
+        (None, _) => "none".to_owned(),
+        (Some(_), Px(0)) => "taken".to_owned(),
+        (Some(_), moved) => format!("taken; re-zeroed by {:.3} px", moved.to_f64()),
     };
     let found = match report.found {
         Found::Nothing => "nothing was ever kept",
@@ -221,7 +252,7 @@ fn lines(report: &SettingsReport) -> Vec<String> {
              until something is kept"
         }
     };
-    vec![
+    let mut lines = vec![
         format!("name       {name} ({})", until(report.kept.name)),
         format!(
             "threshold  {} ({})",
@@ -229,12 +260,18 @@ fn lines(report: &SettingsReport) -> Vec<String> {
             until(report.kept.threshold)
         ),
         format!("tare       {tare} ({})", until(report.kept.tare)),
+    ];
+    let temporal = until(report.kept.temporal);
+    let texts = temporal::texts(&report.temporal).into_iter();
+    lines.extend(texts.map(|(name, text)| format!("{name:<11}{text} ({temporal})")));
+    lines.extend([
         format!("flash      {found}"),
         format!(
             "           {} sectors erased in its life, {} failed attempts to write since the start",
             report.erases, report.failures
         ),
-    ]
+    ]);
+    lines
 }
 
 /// A file that cannot be used.

@@ -111,7 +111,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "go back to the model's threshold",
         ),
         Status::CONTACT => ("something touches the film", ""),
-        Status::SLIP => ("the contact slips", ""),
+        Status::SLIP => ("what touches the film slips", ""),
         Status::DIRECTION_OUT_OF_RANGE => (
             "more force along the film than the model knows",
             "press more steeply",
@@ -119,6 +119,10 @@ fn words(bit: Status) -> (&'static str, &'static str) {
         Status::PLACE_OUT_OF_RANGE => (
             "the contact is outside the part of the film that the model knows",
             "press nearer to the middle",
+        ),
+        Status::REZEROED => (
+            "the rest position followed what drifted since the tare",
+            "take a new tare when forces matter",
         ),
         Status::UNEXPLAINED => (
             "no single contact explains where the markers are",

@@ -36,6 +36,7 @@ fn info_for_a_person() {
              frame      320 × 240 px\n\
              threshold  rgb565, H 170–10, S 100–255, V 45–255\n\
              markers    preset ov7725, dilations 1, centroids redness-weighted\n\
+             filter     none: each frame's own force\n\
              frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0, set-up 0\n\
              camera     0 timeouts, 0 restarts, 0 overruns\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\
@@ -58,6 +59,7 @@ fn info_as_json() {
     assert_eq!(info["model"]["simulated"], true);
     assert_eq!(info["threshold"]["hue_low"], 170);
     assert_eq!(info["threshold"]["format"], "rgb565");
+    assert_eq!(info["filter"]["kind"], "none");
     assert_eq!(info["model"]["threshold"], info["threshold"]);
     assert_eq!(info["stats"]["frames_exposed"], 0);
     assert_eq!(run.stdout.lines().count(), 1);

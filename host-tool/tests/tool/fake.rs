@@ -4,6 +4,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
@@ -171,6 +172,7 @@ pub fn hello() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: "thumb".try_into().unwrap(),
+        filter: Filter::None,
     }
 }
 
@@ -201,10 +203,13 @@ pub fn settings() -> SettingsReport {
             name: true,
             threshold: true,
             tare: false,
+            temporal: true,
         },
         found: Found::Settings,
         erases: 3,
         failures: 0,
+        temporal: TemporalSettings::default(),
+        rezeroed: Px(0),
     }
 }
 
