@@ -1,14 +1,16 @@
 //! `hivtac tare`, `hivtac threshold` and `hivtac expose`: one command each.
 
-use crate::output::{note, print};
+use crate::output;
+use crate::output::note;
 use crate::settings;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_host::threshold::text;
+use hivtac_host::threshold::{text, to_json};
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::Selection;
+use serde_json::json;
 use std::time::Duration;
 
 /// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
@@ -18,7 +20,13 @@ pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
 
 /// Takes the mean of the next `frames` good frames (1–256) as the rest position, until the device
 /// restarts or for good.
-pub fn tare(address: &Address, patience: Duration, frames: u16, keep: bool) -> Result<(), Failure> {
+pub fn tare(
+    address: &Address,
+    patience: Duration,
+    frames: u16,
+    keep: bool,
+    json: bool,
+) -> Result<(), Failure> {
     let wait = TARE_PATIENCE + SLOWEST_FRAME * frames.into();
     let (mut link, _) = Link::connect(address, patience)?;
     send(&mut link, Request::Tare { frames }, wait)?;
@@ -30,14 +38,22 @@ pub fn tare(address: &Address, patience: Duration, frames: u16, keep: bool) -> R
         settings::keep(&mut link, selection)?;
     }
     let kept = if keep { " and kept" } else { "" };
-    print(&format!("tare taken over {frames} frames{kept}")).map(|_| ())
+    output::tell(
+        json,
+        &format!("tare taken over {frames} frames{kept}"),
+        &json!({ "tare_frames": frames, "kept": keep }),
+    )
 }
 
 /// Has exposure and gain found anew for the light that there is.
-pub fn expose(address: &Address, patience: Duration) -> Result<(), Failure> {
+pub fn expose(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
     let (mut link, _) = Link::connect(address, patience)?;
     send(&mut link, Request::Expose, patience)?;
-    print("exposure and gain found; take a new tare").map(|_| ())
+    output::tell(
+        json,
+        "exposure and gain found; take a new tare",
+        &json!({ "exposed": true }),
+    )
 }
 
 /// Sets the threshold, until the device restarts or for good: this one, or when none is given that
@@ -47,20 +63,37 @@ pub fn threshold(
     patience: Duration,
     wanted: Option<Threshold>,
     keep: bool,
+    json: bool,
 ) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let wanted = wanted.map_or_else(|| of_model(&hello), Ok)?;
-    send(&mut link, Request::SetThreshold(wanted), patience)?;
+    set_threshold(&mut link, &hello, wanted, patience, keep)?;
+    let kept = if keep { " and kept" } else { "" };
+    output::tell(
+        json,
+        &format!("threshold set{kept}: {}", text(&wanted)),
+        &json!({ "threshold": to_json(&wanted), "kept": keep }),
+    )
+}
+
+/// Sets a threshold, until the device restarts or for good, and says when there will be no forces
+/// with it.
+pub fn set_threshold(
+    link: &mut Link,
+    device: &DeviceHello,
+    wanted: Threshold,
+    patience: Duration,
+    keep: bool,
+) -> Result<(), Failure> {
+    send(link, Request::SetThreshold(wanted), patience)?;
     if keep {
         let selection = Selection {
             threshold: true,
             ..Selection::NONE
         };
-        settings::keep(&mut link, selection)?;
+        settings::keep(link, selection)?;
     }
-    let kept = if keep { " and kept" } else { "" };
-    print(&format!("threshold set{kept}: {}", text(&wanted)))?;
-    let made_for = hello.model.map(|model| model.threshold);
+    let made_for = device.model.as_ref().map(|model| model.threshold);
     if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
         note(&format!(
             "hivtac: samples have markers but no force (model_mismatch): the device's model was \

@@ -1,5 +1,6 @@
 //! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
 
+mod auto_threshold;
 mod bring_up;
 mod check;
 mod command;
@@ -8,6 +9,7 @@ mod files;
 mod finding;
 mod focus;
 mod force_json;
+mod help;
 mod hsv;
 mod info;
 mod lines;
@@ -26,7 +28,8 @@ mod template;
 mod truth;
 mod view;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, FromArgMatches, Parser, Subcommand};
+use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
@@ -42,23 +45,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-const EXIT_CODES: &str = "\
-Exit codes:
-  0    done; also when the reader of the output went away (broken pipe)
-  1    a file, a picture or the output cannot be used
-  2    wrong usage
-  3    no device: none found, the port cannot be opened, or nobody answers
-  4    the device speaks another version of the protocol
-  5    the connection was lost
-  6    the device refused a command or did not answer it
-  7    `check`: fewer samples a second than --min-rate
-  8    `check`: more frames lost than --max-loss
-  9    `bring-up`: something is not right
-  130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
-
 /// Shows the forces of a HiVTac sensor.
 #[derive(Parser)]
-#[command(version, after_help = EXIT_CODES)]
+#[command(version)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -67,6 +56,8 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Show forces as they come, and a summary at the end
+    ///
+    /// Example: hivtac monitor --seconds 10
     Monitor(MonitorArguments),
     /// Measure rate, jitter, losses and latency for a while, and hold them against limits
     ///
@@ -87,14 +78,17 @@ enum Command {
         /// End after so many seconds
         #[arg(long, value_name = "S", value_parser = seconds)]
         seconds: Option<Duration>,
+        /// At the end, what became of it as one JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Play a recording as if it were a device, for any other command, on a TCP port of this
     /// computer
     ///
-    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording.
+    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording:
+    /// `hivtac monitor --port tcp:127.0.0.1:7000` shows the forces of the example.
     ///
-    /// Example: hivtac replay press.mcap --tcp 7000, and elsewhere hivtac monitor --port
-    /// tcp:127.0.0.1:7000
+    /// Example: hivtac replay press.mcap --tcp 7000
     Replay {
         /// What `record` made; also one that was cut
         file: PathBuf,
@@ -104,8 +98,13 @@ enum Command {
         /// As fast as the other program reads, not as it was recorded
         #[arg(long)]
         fast: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Show what the device is and how it fares
+    ///
+    /// Example: hivtac info
     Info {
         #[command(flatten)]
         device: Device,
@@ -130,6 +129,9 @@ enum Command {
         /// Keep it through restarts
         #[arg(long)]
         keep: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set which pixels a marker may have, and with that the camera's pixel format, until the
     /// device restarts
@@ -139,29 +141,29 @@ enum Command {
     /// tare.
     ///
     /// Example: hivtac threshold --hsv 170,10,100,255,45,255
-    Threshold {
-        #[command(flatten)]
-        device: Device,
-        #[command(flatten)]
-        wanted: WantedThreshold,
-        /// Keep it through restarts
-        #[arg(long)]
-        keep: bool,
-    },
+    #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+    Threshold(ThresholdArguments),
     /// Show, save, give back or forget what the device keeps through restarts
     #[command(subcommand)]
     Settings(SettingsCommand),
     /// Let the camera find exposure and gain for the light that there is, and keep them
     ///
     /// It does so by itself when it starts.
+    ///
+    /// Example: hivtac expose
     Expose {
         #[command(flatten)]
         device: Device,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Save a frame as the sensing saw it, while forces go on
     ///
     /// It says what the device itself found in it, too. `hivtac sense` on the picture or the raw
     /// frame finds the same; on that of YUV422 only on the raw frame, with the device's model.
+    ///
+    /// Example: hivtac snapshot frame.png --mask mask.png
     Snapshot {
         #[command(flatten)]
         device: Device,
@@ -176,6 +178,8 @@ enum Command {
     /// Picture after picture: the width of each marker's rim and of the marker, its colour and
     /// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
     /// everything is right.
+    ///
+    /// Example: hivtac focus
     Focus {
         #[command(flatten)]
         device: Device,
@@ -221,8 +225,13 @@ enum Command {
         /// Where the page's recordings go, as hivtac-UNIT-NUMBER.mcap
         #[arg(long, value_name = "FOLDER", default_value = ".")]
         recordings: PathBuf,
+        /// The page's address in a JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Write a template to print: where the film is punched and the dots are stuck, as SVG
+    ///
+    /// Example: hivtac template film.svg
     Template {
         /// File to write
         #[arg(value_name = "FILE.svg")]
@@ -230,6 +239,9 @@ enum Command {
         /// Whose markers
         #[arg(long, value_name = "paper|ov7725", default_value = "ov7725", value_parser = preset)]
         preset: Preset,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
@@ -237,7 +249,23 @@ enum Command {
     /// channel are rounded to RGB565, which is what the sensor's camera delivers. There is a force
     /// only when size, preset and threshold are those of the model; the status says so otherwise,
     /// and blobs, markers and features are there all the same.
+    ///
+    /// Example: hivtac sense photo.jpg
     Sense(SenseArguments),
+    /// Print what a shell completes this tool's commands by
+    ///
+    /// Example: hivtac completion bash
+    Completion {
+        /// Which shell's
+        shell: Shell,
+    },
+    /// Write a man page of each command into a folder
+    ///
+    /// Example: hivtac man ~/.local/share/man/man1
+    Man {
+        /// The folder, made when it is missing
+        folder: PathBuf,
+    },
 }
 
 #[derive(Subcommand)]
@@ -264,6 +292,9 @@ enum SettingsCommand {
         /// The file to make, JSON
         #[arg(value_name = "FILE.json")]
         file: String,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set and keep the settings of a file
     ///
@@ -276,6 +307,9 @@ enum SettingsCommand {
         /// What `export` made
         #[arg(value_name = "FILE.json")]
         file: String,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Forget everything that was kept: no name, the model's threshold, no tare, the usual limits
     ///
@@ -283,7 +317,20 @@ enum SettingsCommand {
     Reset {
         #[command(flatten)]
         device: Device,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
+}
+
+/// A device, and how is told what was done with it.
+#[derive(Args)]
+struct Told {
+    #[command(flatten)]
+    device: Device,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Subcommand)]
@@ -293,7 +340,7 @@ enum SetCommand {
     /// Example: hivtac settings set name thumb
     Name {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// At most 24 bytes of UTF-8
         #[arg(value_name = "NAME", value_parser = settings::name)]
         name: Name,
@@ -307,7 +354,7 @@ enum SetCommand {
     #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
     Contact {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// |F| with which it begins, mN; 2 by default
         #[arg(long, value_name = "MN", value_parser = thousandths, group = "limit")]
         begins: Option<u32>,
@@ -321,7 +368,7 @@ enum SetCommand {
     #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
     Slip {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// Distance, µm, 1 to 5000; 60 by default
         #[arg(long, value_name = "UM", group = "limit")]
         distance: Option<u32>,
@@ -335,8 +382,6 @@ enum SetCommand {
     /// What is sent in place of each frame's own force
     ///
     /// Contact and slip are told of each frame's own force all the same.
-    ///
-    /// Example: hivtac settings set filter low-pass --ms 20
     #[command(subcommand)]
     Filter(FilterCommand),
     /// Whether the rest position follows what drifts while nothing touches the film
@@ -344,8 +389,6 @@ enum SetCommand {
     /// A force below the contact's that grows no faster than the rate is taken for drift, and
     /// missing in every force from then on: by the total at most. With the usual limits it grows by
     /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
-    ///
-    /// Example: hivtac settings set rezero on
     #[command(subcommand)]
     Rezero(RezeroCommand),
 }
@@ -353,27 +396,33 @@ enum SetCommand {
 #[derive(Subcommand)]
 enum FilterCommand {
     /// Each frame's own force
+    ///
+    /// Example: hivtac settings set filter none
     None {
         #[command(flatten)]
-        device: Device,
+        device: Told,
     },
     /// A first-order low-pass; a steady change comes its time constant later
+    ///
+    /// Example: hivtac settings set filter low-pass --ms 20
     LowPass {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// Its time constant, ms, 1 to 10000
         #[arg(long, value_name = "MS")]
         ms: u32,
     },
     /// The median of each component in three frames; a steady change comes a frame later
+    ///
+    /// Example: hivtac settings set filter median-of-three
     MedianOfThree {
         #[command(flatten)]
-        device: Device,
+        device: Told,
     },
 }
 
 impl FilterCommand {
-    fn change(self) -> (Device, Change) {
+    fn change(self) -> (Told, Change) {
         let (device, filter) = match self {
             FilterCommand::None { device } => (device, Filter::None),
             FilterCommand::LowPass { device, ms } => {
@@ -389,14 +438,18 @@ impl FilterCommand {
 #[derive(Subcommand)]
 enum RezeroCommand {
     /// It stays where it was taken
+    ///
+    /// Example: hivtac settings set rezero off
     Off {
         #[command(flatten)]
-        device: Device,
+        device: Told,
     },
     /// It follows, within limits
+    ///
+    /// Example: hivtac settings set rezero on
     On {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// How long nothing touches before, s, 1 to 3600; 10 by default
         #[arg(long, value_name = "S", value_parser = thousandths)]
         after: Option<u32>,
@@ -410,7 +463,7 @@ enum RezeroCommand {
 }
 
 impl RezeroCommand {
-    fn change(self) -> (Device, Change) {
+    fn change(self) -> (Told, Change) {
         match self {
             RezeroCommand::Off { device } => (device, Change::Rezero(None)),
             RezeroCommand::On {
@@ -431,7 +484,7 @@ impl RezeroCommand {
 }
 
 impl SetCommand {
-    fn action(self) -> (Device, settings::Action) {
+    fn action(self) -> (Told, settings::Action) {
         let (device, change) = match self {
             SetCommand::Name { device, name } => {
                 return (device, settings::Action::SetName(name));
@@ -467,16 +520,20 @@ impl SetCommand {
 impl SettingsCommand {
     fn run(self) -> Result<(), Failure> {
         use settings::Action;
-        let (device, action) = match self {
-            SettingsCommand::Get { device, json } => (device, Action::Get { json }),
-            SettingsCommand::Set(command) => command.action(),
-            SettingsCommand::Export { device, file } => (device, Action::Export(file)),
-            SettingsCommand::Import { device, file } => (device, Action::Import(file)),
-            SettingsCommand::Reset { device } => (device, Action::Reset),
+        let (device, json, action) = match self {
+            SettingsCommand::Get { device, json } => (device, json, Action::Get),
+            SettingsCommand::Set(command) => {
+                let (Told { device, json }, action) = command.action();
+                (device, json, action)
+            }
+            SettingsCommand::Export { device, file, json } => (device, json, Action::Export(file)),
+            SettingsCommand::Import { device, file, json } => (device, json, Action::Import(file)),
+            SettingsCommand::Reset { device, json } => (device, json, Action::Reset),
         };
         let options = settings::Options {
             address: device.address(),
             patience: device.timeout,
+            json,
         };
         settings::run(&options, &action)
     }
@@ -514,6 +571,72 @@ struct CheckArguments {
     /// One JSON object instead of lines
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Args)]
+struct ThresholdArguments {
+    #[command(subcommand)]
+    auto: Option<ThresholdCommand>,
+    #[command(flatten)]
+    device: Device,
+    #[command(flatten)]
+    wanted: Option<WantedThreshold>,
+    /// Keep it through restarts
+    #[arg(long)]
+    keep: bool,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum ThresholdCommand {
+    /// Find the threshold that separates the dots from the film in the device's own pictures, show
+    /// why, and set it
+    ///
+    /// It is half way between film and dots; or the model's, when that separates them, too, since
+    /// there are forces only with that. The pixel format stays. Nothing should touch the film.
+    ///
+    /// Example: hivtac threshold auto --dry-run
+    Auto {
+        #[command(flatten)]
+        device: Device,
+        /// Keep it through restarts
+        #[arg(long)]
+        keep: bool,
+        /// Set nothing
+        #[arg(long, conflicts_with = "keep")]
+        dry_run: bool,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl ThresholdArguments {
+    fn run(self) -> Result<(), Failure> {
+        match self.auto {
+            Some(ThresholdCommand::Auto {
+                device,
+                keep,
+                dry_run,
+                json,
+            }) => auto_threshold::run(&auto_threshold::Options {
+                address: device.address(),
+                patience: device.timeout,
+                keep,
+                dry_run,
+                json,
+            }),
+            None => command::threshold(
+                &self.device.address(),
+                self.device.timeout,
+                self.wanted.and_then(|wanted| wanted.threshold()),
+                self.keep,
+                self.json,
+            ),
+        }
+    }
 }
 
 #[derive(Args)]
@@ -681,13 +804,20 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             file,
             seconds,
+            json,
         } => record::run(&record::Options {
             address: device.address(),
             patience: device.timeout,
             duration: seconds,
             file,
+            json,
         }),
-        Command::Replay { file, tcp, fast } => replay::run(&file, tcp, fast),
+        Command::Replay {
+            file,
+            tcp,
+            fast,
+            json,
+        } => replay::run(&file, tcp, fast, json),
         Command::Snapshot {
             device,
             files,
@@ -698,6 +828,7 @@ fn run(command: Command) -> Result<(), Failure> {
             timeout,
             listen,
             recordings,
+            json,
         } => view::run(&view::Options {
             addresses: match port.as_slice() {
                 [] => vec![Address::Find],
@@ -706,8 +837,9 @@ fn run(command: Command) -> Result<(), Failure> {
             patience: timeout,
             port: listen,
             folder: recordings,
+            json,
         }),
-        Command::Template { file, preset } => template::run(&file, preset),
+        Command::Template { file, preset, json } => template::run(&file, preset, json),
         Command::BringUp {
             device,
             report,
@@ -724,19 +856,22 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             frames,
             keep,
-        } => command::tare(&device.address(), device.timeout, frames, keep),
-        Command::Expose { device } => command::expose(&device.address(), device.timeout),
-        Command::Threshold {
-            device,
-            wanted,
-            keep,
-        } => command::threshold(&device.address(), device.timeout, wanted.threshold(), keep),
+            json,
+        } => command::tare(&device.address(), device.timeout, frames, keep, json),
+        Command::Expose { device, json } => {
+            command::expose(&device.address(), device.timeout, json)
+        }
+        Command::Threshold(arguments) => arguments.run(),
         Command::Settings(command) => command.run(),
+        Command::Completion { shell } => help::completion(shell),
+        Command::Man { folder } => help::man(&folder),
     }
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse().command) {
+    let matches = help::command().get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    match run(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure.kind != Kind::Interrupted {

@@ -122,7 +122,10 @@ fn check_truth(run: &Run) {
     };
     let presses = first(&|sample| truth[&sample.frame].0);
     let touched = first(&|sample| sample.status.contains(Status::CONTACT));
-    assert!((presses..presses + 3).contains(&touched), "{presses} {touched}");
+    assert!(
+        (presses..presses + 3).contains(&touched),
+        "{presses} {touched}"
+    );
     let moves = first(&|sample| truth[&sample.frame].1 > 1e-6);
     let slips = first(&|sample| sample.status.contains(Status::SLIP));
     assert!((moves..moves + 4).contains(&slips), "{moves} {slips}");

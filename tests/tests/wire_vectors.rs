@@ -269,12 +269,18 @@ fn settings() -> DeviceMessage {
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
-        ("device-hello", hello(Some(model(RED)), RED, "thumb", OWN.filter)),
+        (
+            "device-hello",
+            hello(Some(model(RED)), RED, "thumb", OWN.filter),
+        ),
         (
             "device-hello-yuv422",
             hello(Some(model(RED_CR)), RED_CR, "thumb", Filter::None),
         ),
-        ("device-hello-without-model", hello(None, RED, "", Filter::None)),
+        (
+            "device-hello-without-model",
+            hello(None, RED, "", Filter::None),
+        ),
         (
             "sample-force",
             sample(Status::NOT_CALIBRATED | Status::CONTACT, Some(PLACE)),
@@ -368,7 +374,10 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
             "set-temporal-usual",
             command(15, Request::SetTemporal(TemporalSettings::USUAL)),
         ),
-        ("set-temporal-median", command(15, Request::SetTemporal(median))),
+        (
+            "set-temporal-median",
+            command(15, Request::SetTemporal(median)),
+        ),
         ("keep", command(14, Request::Keep(NAME_AND_TARE))),
     ]
     .map(|(name, message)| (name.to_owned(), message))

@@ -65,7 +65,7 @@ impl Folder {
         let gauge = append(&path.join(GAUGE), GAUGE_COLUMNS)?;
         let takes = append(&path.join(TAKES), TAKE_COLUMNS)?;
         let before = Recording::read(path)?;
-        let done = takes_done(&path.join(TAKES))?;
+        let done = done(path)?;
         Ok(Self {
             samples,
             takes,
@@ -388,9 +388,19 @@ fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Optio
     poses::parse(&texts.join(",")).map(Some)
 }
 
-fn takes_done(path: &Path) -> Result<Vec<Pose>> {
-    let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+/// The poses whose takes were finished in a folder; none where nothing was recorded yet.
+///
+/// # Errors
+/// When their list cannot be read, or is damaged.
+pub fn done(folder: &Path) -> Result<Vec<Pose>> {
+    let path = folder.join(TAKES);
+    let text = match fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => {
+            return Err(error).with_context(|| format!("cannot read {}", path.display()));
+        }
+    };
     let poses = rows([TAKES, &text], |record| pose(record, [1, 5]), TAKE_COLUMNS)?;
     Ok(poses.into_iter().flatten().collect())
 }

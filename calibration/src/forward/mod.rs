@@ -4,6 +4,7 @@
 pub mod building;
 mod honest;
 mod left_open;
+mod left_out;
 mod nearest;
 mod noise;
 mod tables;

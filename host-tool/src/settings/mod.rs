@@ -6,6 +6,7 @@ pub mod temporal;
 
 use crate::command::{send, tell};
 use crate::lines::to_json;
+use crate::output;
 use crate::output::{note, print};
 use file::{File, Kept};
 use hivtac_host::failure::{Failure, Kind};
@@ -18,6 +19,7 @@ use hivtac_terms::threshold::Threshold;
 use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
+use serde_json::{Value, json};
 use std::time::Duration;
 use temporal::Change;
 
@@ -31,15 +33,14 @@ pub struct Options {
     pub address: Address,
     /// Longest wait for its hello and replies.
     pub patience: Duration,
+    /// One JSON object instead of lines.
+    pub json: bool,
 }
 
 /// What to do with its settings.
 pub enum Action {
     /// Show them.
-    Get {
-        /// As one JSON object.
-        json: bool,
-    },
+    Get,
     /// Give it a name and keep that.
     SetName(Name),
     /// Change how forces are followed, and keep that.
@@ -67,9 +68,10 @@ pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
         link,
         hello,
         patience: options.patience,
+        json: options.json,
     };
     match action {
-        Action::Get { json } => device.show(*json),
+        Action::Get => device.show(),
         Action::SetName(name) => device.set_name(name),
         Action::SetTemporal(change) => device.set_temporal(*change),
         Action::Export(path) => device.export(path),
@@ -109,6 +111,7 @@ struct Device {
     link: Link,
     hello: DeviceHello,
     patience: Duration,
+    json: bool,
 }
 
 impl Device {
@@ -127,9 +130,13 @@ impl Device {
         send(&mut self.link, request, self.patience)
     }
 
-    fn show(&mut self, json: bool) -> Result<(), Failure> {
+    fn tell(&self, line: &str, object: Value) -> Result<(), Failure> {
+        output::tell(self.json, line, &object)
+    }
+
+    fn show(&mut self) -> Result<(), Failure> {
         let report = self.settings()?;
-        let lines = match json {
+        let lines = match self.json {
             true => to_json(&Kept::new(&self.hello.device_id, &report)),
             false => lines(&report).join("\n"),
         };
@@ -143,7 +150,8 @@ impl Device {
             ..Selection::NONE
         };
         keep(&mut self.link, selection)?;
-        print(&format!("this device is now called {}", shown(name))).map(|_| ())
+        let line = format!("this device is now called {}", shown(name));
+        self.tell(&line, json!({ "name": name.as_str(), "kept": true }))
     }
 
     fn set_temporal(&mut self, change: Change) -> Result<(), Failure> {
@@ -160,13 +168,18 @@ impl Device {
         let named = |(name, _): &(&str, String)| *name == change.name();
         let texts = temporal::texts(&settings).into_iter().find(named);
         let (name, text) = texts.unwrap_or_default();
-        print(&format!("{name} set and kept: {text}")).map(|_| ())
+        let line = format!("{name} set and kept: {text}");
+        self.tell(
+            &line,
+            json!({ "setting": name, "text": text, "kept": true }),
+        )
     }
 
     fn export(&mut self, path: &str) -> Result<(), Failure> {
         let report = self.settings()?;
         file::write(path, &File::new(&self.hello.device_id, &report))?;
-        print(&format!("settings in use written to {path}")).map(|_| ())
+        let line = format!("settings in use written to {path}");
+        self.tell(&line, json!({ "file": path }))
     }
 
     fn import(&mut self, path: &str, file: &File) -> Result<(), Failure> {
@@ -181,13 +194,16 @@ impl Device {
         let tare = file.rest().filter(|_| is_own);
         let name = name(&file.name).unwrap_or_default();
         self.set(name, Some(file.threshold()), tare, file.temporal())?;
-        print(&format!("settings of {path} are in use and kept")).map(|_| ())
+        let line = format!("settings of {path} are in use and kept");
+        let parts = json!({ "file": path, "kept": true, "tare": tare.is_some() });
+        self.tell(&line, parts)
     }
 
     fn reset(&mut self) -> Result<(), Failure> {
         let threshold = self.hello.model.as_ref().map(|model| model.threshold);
         self.set(Name::new(), threshold, None, TemporalSettings::default())?;
-        print("everything that was kept is forgotten; take a tare").map(|_| ())
+        let line = "everything that was kept is forgotten; take a tare";
+        self.tell(line, json!({ "kept": false }))
     }
 
     /// Sets and keeps all.

@@ -341,3 +341,50 @@ fn the_help_lists_the_exit_codes() {
         );
     }
 }
+
+#[test]
+fn shells_are_told_what_completes_a_command() {
+    for (shell, words) in [
+        ("bash", "complete -F _hivtac"),
+        ("zsh", "#compdef hivtac"),
+        ("fish", "complete -c hivtac"),
+        ("powershell", "Register-ArgumentCompleter"),
+        ("elvish", "edit:completion"),
+    ] {
+        let done = run(&["completion", shell]);
+        assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""), "{shell}");
+        assert!(done.stdout.contains(words), "{shell}: {}", done.stdout);
+        assert!(done.stdout.contains("threshold"), "{shell}");
+    }
+    assert_eq!(run(&["completion", "nonsense"]).code, Some(2));
+}
+
+/// What was done, for a program: one object, and its parts.
+#[test]
+fn commands_tell_programs_what_they_did() {
+    let told = |arguments: &[&str]| {
+        let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| device.serve())]);
+        let done = run(&[arguments, &["--json", "--port", &device.port]].concat());
+        assert_eq!(
+            (done.code, done.stderr.as_str()),
+            (Some(0), ""),
+            "{arguments:?}"
+        );
+        assert_eq!(done.stdout.lines().count(), 1, "{}", done.stdout);
+        serde_json::from_str::<serde_json::Value>(&done.stdout).unwrap()
+    };
+    let tare = told(&["tare", "--frames", "8", "--keep"]);
+    assert_eq!(tare, serde_json::json!({ "tare_frames": 8, "kept": true }));
+    assert_eq!(told(&["expose"]), serde_json::json!({ "exposed": true }));
+    let threshold = told(&["threshold", "--model"]);
+    assert_eq!(threshold["threshold"]["saturation_low"], 100);
+    assert_eq!(threshold["kept"], false);
+    let name = told(&["settings", "set", "name", "index"]);
+    assert_eq!(name, serde_json::json!({ "name": "index", "kept": true }));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("thumb.json");
+    let file = file.to_str().unwrap();
+    assert_eq!(told(&["settings", "export", file])["file"], file);
+    assert_eq!(told(&["settings", "import", file])["tare"], true);
+    assert_eq!(told(&["settings", "reset"])["kept"], false);
+}

@@ -3,6 +3,7 @@
 
 mod bring_up;
 mod commands;
+mod documents;
 mod endings;
 mod fake;
 mod monitor;
@@ -11,4 +12,5 @@ mod run;
 mod sense;
 mod settings;
 mod snapshot;
+mod threshold_auto;
 mod view;

@@ -316,3 +316,30 @@ fn a_re_zeroed_rest_position_is_told() {
     let line = "tare       taken; re-zeroed by 0.188 px (until restart)\n";
     assert!(run.stdout.contains(line), "{}", run.stdout);
 }
+
+/// What `docs/using.md` says that these print.
+#[test]
+fn the_guide_shows_what_setting_prints() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap();
+    let guide = std::fs::read_to_string(root.join("docs/using.md")).unwrap();
+    let mut shown = 0;
+    let lines: Vec<&str> = guide.lines().collect();
+    for pair in lines.windows(2) {
+        let Some(rest) = pair[0].strip_prefix("$ hivtac settings set ") else {
+            continue;
+        };
+        if rest.starts_with("name ") {
+            continue;
+        }
+        let arguments: Vec<&str> = ["settings", "set"]
+            .into_iter()
+            .chain(rest.split(' '))
+            .collect();
+        let (_, printed) = changed(&arguments);
+        assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
+        shown += 1;
+    }
+    assert_eq!(shown, 7);
+}
