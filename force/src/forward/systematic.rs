@@ -72,7 +72,10 @@ impl<'a> SystematicGrid<'a> {
                 }
             }
         }
-        let [across_n, size, place_mm, residual] = [0, 1, 2, 3].map(|k| self.steps[k] * sums[k]);
+        for (sum, step) in sums.iter_mut().zip(self.steps) {
+            *sum *= step;
+        }
+        let [across_n, size, place_mm, residual] = sums;
         Systematic {
             across_n,
             size,
