@@ -3,7 +3,7 @@
 use crate::capture_task::{self, Action};
 use crate::pipeline_task::Order;
 use crate::shared::ORDERS;
-use crate::{info, memory, outbox, session, settings, snapshot, stats};
+use crate::{info, memory, model_upload, outbox, session, settings, snapshot, stats};
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -80,12 +80,26 @@ async fn obey(Command { id, request }: Command) {
             settings::set_name(name);
             Outcome::Done
         }
-        // The memory task replies itself, when it has done so.
+        Request::BeginModel { bytes } => model_upload::begin(bytes),
+        Request::ModelPart(part) => model_upload::part(&part),
+        // The memory task replies itself, when it has done so, or the pipeline then.
         Request::GetSettings => match memory::order(memory::Action::Report, id) {
             Some(outcome) => outcome,
             None => return,
         },
         Request::Keep(selection) => match memory::order(memory::Action::Keep(selection), id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::UseModel => match memory::order(memory::Action::UseModel, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::UseBuiltInModel => match memory::order(memory::Action::UseBuiltInModel, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::Reset => match memory::order(memory::Action::Reset, id) {
             Some(outcome) => outcome,
             None => return,
         },

@@ -30,7 +30,10 @@ mod info;
 mod log;
 mod memory;
 mod model;
+mod model_slots;
+mod model_upload;
 mod near_table;
+mod next_model;
 mod next_threshold;
 mod outbox;
 mod pipeline_task;
@@ -52,11 +55,11 @@ use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::settings::Settings;
-use hivtac_terms::threshold::{ByteOrder, Threshold};
+use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
 use memory::Memory;
+use model::Chosen;
+use next_model::InUse;
 use pipeline_task::Sensor;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -79,11 +82,12 @@ fn main() -> ! {
     let board = board::start();
     faults::report_reset();
     vsync::start();
-    let model = model::embedded();
     let sensor = SENSOR.take();
-    let memory = Memory::open(board.flash);
+    let mut memory = Memory::open(board.flash);
     settings::set_name(memory.record().name.clone());
-    let format = configure(sensor, model, memory.record());
+    let chosen = memory.model();
+    let model_in_use = InUse::of(&chosen);
+    let format = configure(sensor, chosen, memory.record());
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
@@ -100,6 +104,7 @@ fn main() -> ! {
         .run(|spawner: Spawner| {
             spawner.spawn(token(pipeline_task::run(
                 sensor,
+                model_in_use,
                 board.bands,
                 board.snapshots,
             )));
@@ -108,8 +113,9 @@ fn main() -> ! {
 }
 
 /// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
-fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) -> Format {
-    let mut settings = usual(&model);
+fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
+    let Chosen { model, source, .. } = chosen;
+    let mut settings = model::settings(model.as_ref());
     let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
     if let Some(threshold) = kept.threshold.filter(is_sent) {
         settings.threshold = threshold;
@@ -124,28 +130,9 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) 
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
         None => {}
     }
-    settings::follow(sensor);
+    settings::follow(sensor, source);
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
-}
-
-/// The camera's frames and the threshold that the model was made for, or the usual one of its
-/// pixels. A model for pixels that the camera does not send gives no force then, and every sample
-/// says so.
-fn usual(model: &Option<Model<'static>>) -> Settings {
-    let order = ByteOrder::Swapped;
-    let geometry = camera::GEOMETRY;
-    let sent = |model: &Model| Format::of(model.conditions.threshold.format());
-    match model {
-        Some(model) if sent(model).is_some() => Settings {
-            geometry,
-            ..model.conditions.settings(order)
-        },
-        _ => Settings {
-            threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
-            ..Settings::usual(geometry, order)
-        },
-    }
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

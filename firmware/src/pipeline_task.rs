@@ -6,9 +6,10 @@ use crate::camera;
 use crate::capture::{self, CaptureEvent};
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
+use crate::next_model::{self, InUse};
 use crate::next_threshold::NextThreshold;
 use crate::session::Asked;
-use crate::shared::{CAPTURE_EVENTS, ORDERS};
+use crate::shared::{CAPTURE_EVENTS, NEXT_MODEL, ORDERS};
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
 use crate::{outbox, session, settings, stats, vsync};
@@ -46,16 +47,29 @@ pub enum Order {
     },
     /// Keep the next whole frame and send it.
     Snapshot(Asked),
+    /// Use the model of [`NEXT_MODEL`].
+    UseModel {
+        /// Of the command.
+        asked: Asked,
+        /// With its threshold and no tare, whatever is in use.
+        afresh: bool,
+    },
 }
 
 /// The pipeline, its table in DTCM.
 pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
-/// Runs for ever in thread mode. `sensor` is configured.
+/// Runs for ever in thread mode. `sensor` is configured, with `model`.
 #[embassy_executor::task]
-pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: SnapshotCopy) {
+pub async fn run(
+    sensor: &'static mut Sensor,
+    model: InUse,
+    bands: BandCopy,
+    snapshots: SnapshotCopy,
+) {
     let mut task = PipelineTask {
         sensor,
+        model,
         next_threshold: NextThreshold::NONE,
         bands,
         follower: Follower::new(SHAPE),
@@ -87,6 +101,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: Snapsh
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
+    model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
     follower: Follower,
@@ -210,6 +225,26 @@ impl PipelineTask {
                 outbox::reply(id, self.set_tare(position));
             }
             Order::Snapshot(asked) => self.snapshots.begin(asked),
+            Order::UseModel { asked, afresh } => self.use_model(asked, afresh),
+        }
+    }
+
+    /// Between two frames, so that none is of two models.
+    fn use_model(&mut self, asked: Asked, afresh: bool) {
+        let Some(next) = NEXT_MODEL.try_take() else {
+            return;
+        };
+        self.give_up_tare();
+        let before = self.sensor.threshold();
+        let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
+        if self.sensor.threshold() == before {
+            settings::follow(self.sensor, self.model.source);
+        } else {
+            self.threshold_changed();
+        }
+        let waits = wanted.is_some_and(|threshold| self.next_threshold.wait_for(asked, threshold));
+        if let Some(id) = asked.id().filter(|_| !waits) {
+            outbox::reply(id, Outcome::Done);
         }
     }
 
@@ -219,7 +254,7 @@ impl PipelineTask {
             Ok(rest) => {
                 self.give_up_tare();
                 self.sensor.set_tare(rest);
-                settings::follow(self.sensor);
+                settings::follow(self.sensor, self.model.source);
                 Outcome::Done
             }
             Err(outcome) => outcome,
@@ -241,7 +276,7 @@ impl PipelineTask {
     /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
     /// which frames pass.
     fn threshold_changed(&mut self) {
-        settings::follow(self.sensor);
+        settings::follow(self.sensor, self.model.source);
         self.sensor.forget_motion();
         let mut missed = false;
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
@@ -312,7 +347,7 @@ impl PipelineTask {
         if let Some(outcome) = taring.add(self.sensor, measurement) {
             if let Ok(rest) = outcome {
                 self.sensor.set_tare(Some(rest));
-                settings::follow(self.sensor);
+                settings::follow(self.sensor, self.model.source);
             }
             outbox::reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
             self.taring = None;

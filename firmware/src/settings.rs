@@ -8,7 +8,7 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{ModelIdentity, Outcome};
+use hivtac_wire::message::{ModelIdentity, ModelSource, Outcome};
 use hivtac_wire::settings::{Name, RestPosition};
 
 /// What the pipeline measures with.
@@ -22,13 +22,14 @@ pub struct OfPipeline {
     pub model: Option<ModelIdentity>,
 }
 
-/// Tells what the pipeline measures with from now on.
-pub fn follow(sensor: &Sensor) {
+/// Tells what the pipeline measures with from now on, its model from this source.
+pub fn follow(sensor: &Sensor, source: ModelSource) {
     let model = sensor.model().map(|model| ModelIdentity {
         crc: model.crc(),
         name: model.name(),
         simulated: model.is_simulated(),
         threshold: model.conditions.threshold,
+        source,
     });
     let told = OfPipeline {
         settings: *sensor.settings(),
@@ -94,7 +95,7 @@ pub fn in_use() -> Option<InUse> {
 }
 
 /// A rest position and by which settings its markers were seen.
-fn position(rest: &Rest, settings: &Settings) -> RestPosition {
+pub fn position(rest: &Rest, settings: &Settings) -> RestPosition {
     RestPosition {
         format: settings.threshold.format(),
         dilations: settings.dilations,

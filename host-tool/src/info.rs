@@ -9,7 +9,9 @@ use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, Request, Stats};
+use hivtac_wire::message::{
+    DeviceHello, DeviceMessage, ModelIdentity, ModelSource, Request, Stats,
+};
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
@@ -63,13 +65,44 @@ pub struct Info<'a> {
     stats: Option<Stats>,
 }
 
+/// The model in use.
 #[derive(Serialize)]
-struct Model<'a> {
+pub struct Model<'a> {
     crc: String,
     name: &'a str,
     simulated: bool,
+    source: &'static str,
     #[serde(serialize_with = "as_json")]
     threshold: Threshold,
+}
+
+impl<'a> Model<'a> {
+    /// As a device names it.
+    pub fn of(model: &'a ModelIdentity) -> Model<'a> {
+        Model {
+            crc: format!("{:08x}", model.crc),
+            name: &model.name,
+            simulated: model.simulated,
+            source: match model.source {
+                ModelSource::BuiltIn => "built-in",
+                ModelSource::Kept => "kept",
+                ModelSource::Fallback => "fallback",
+            },
+            threshold: model.threshold,
+        }
+    }
+
+    fn text(&self) -> String {
+        let origin = match self.simulated {
+            true => "simulated sensor",
+            false => "this unit",
+        };
+        let name = shown(self.name);
+        format!(
+            "{name}, CRC {}, trained on: {origin}; {}",
+            self.crc, self.source
+        )
+    }
 }
 
 fn as_json<S: Serializer>(threshold: &Threshold, serializer: S) -> Result<S::Ok, S::Error> {
@@ -87,12 +120,7 @@ impl<'a> Info<'a> {
             name: &hello.name,
             board: &hello.board,
             firmware: &hello.firmware,
-            model: hello.model.as_ref().map(|model| Model {
-                crc: format!("{:08x}", model.crc),
-                name: &model.name,
-                simulated: model.simulated,
-                threshold: model.threshold,
-            }),
+            model: hello.model.as_ref().map(Model::of),
             width: hello.width,
             height: hello.height,
             threshold: hello.threshold,
@@ -130,32 +158,29 @@ impl<'a> Info<'a> {
                 text(made_for)
             ));
         }
+        if self
+            .model
+            .as_ref()
+            .is_some_and(|model| model.source == "fallback")
+        {
+            lines.push(
+                "           the kept model cannot be used; send it again with `hivtac update model`"
+                    .to_owned(),
+            );
+        }
         lines.extend(self.stats.iter().flat_map(stats_lines));
         lines
+    }
+
+    fn model_text(&self) -> String {
+        let text = self.model.as_ref().map(Model::text);
+        text.unwrap_or_else(|| "none".to_owned())
     }
 
     fn called(&self) -> String {
         match self.name {
             "" => String::new(),
             name => format!(", called {}", shown(name)),
-        }
-    }
-
-    fn model_text(&self) -> String {
-        match &self.model {
-            Some(model) => {
-                let origin = if model.simulated {
-                    "simulated sensor"
-                } else {
-                    "this unit"
-                };
-                format!(
-                    "{}, CRC {}, trained on: {origin}",
-                    shown(model.name),
-                    model.crc
-                )
-            }
-            None => "none".to_owned(),
         }
     }
 }

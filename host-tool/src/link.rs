@@ -240,6 +240,11 @@ fn name_of(request: &Request) -> &'static str {
         Request::SetName(_) => "set name",
         Request::SetTare(_) => "set tare",
         Request::Keep(_) => "keep settings",
+        Request::BeginModel { .. } => "begin model",
+        Request::ModelPart(_) => "model part",
+        Request::UseModel => "use model",
+        Request::UseBuiltInModel => "use built-in model",
+        Request::Reset => "reset",
     }
 }
 
@@ -264,6 +269,14 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::Worn => {
             "its flash is worn and keeps nothing new; it works on, with what it kept before at \
              each start"
+        }
+        Outcome::ModelUnusable => {
+            "it cannot use this model file; the one in use goes on, and the device's line above \
+             says why"
+        }
+        Outcome::AnotherSensor => {
+            "the model was made for another sensor, camera or frame; the one in use goes on, and \
+             the device's line above says which"
         }
         Outcome::NotAtRest => {
             "the markers are not where a film at rest has them; take away what touches it, and \

@@ -24,6 +24,7 @@ mod snapshot;
 mod tally;
 mod template;
 mod truth;
+mod update;
 mod view;
 
 use clap::{Args, Parser, Subcommand};
@@ -148,6 +149,9 @@ enum Command {
     /// Show, save, give back or forget what the device keeps through restarts
     #[command(subcommand)]
     Settings(SettingsCommand),
+    /// Give the device a model of its own
+    #[command(subcommand)]
+    Update(UpdateCommand),
     /// Let the camera find exposure and gain for the light that there is, and keep them
     ///
     /// It does so by itself when it starts.
@@ -274,13 +278,53 @@ enum SettingsCommand {
         #[arg(value_name = "FILE.json")]
         file: String,
     },
-    /// Forget everything that was kept: no name, the model's threshold, no tare
+    /// Forget everything that was kept: no name, the built-in model and its threshold, no tare
     ///
     /// Example: hivtac settings reset
     Reset {
         #[command(flatten)]
         device: Device,
     },
+}
+
+#[derive(Subcommand)]
+enum UpdateCommand {
+    /// Send a model file, which the device checks, keeps through restarts and uses from then on
+    ///
+    /// Forces go on with the model before until then. What is damaged, not sound, or made for
+    /// another camera or unit is refused, and nothing changes.
+    ///
+    /// Example: hivtac update model thumb.hvtm
+    Model {
+        #[command(flatten)]
+        device: Device,
+        /// What `hivtac-calibrate` made
+        #[arg(value_name = "FILE.hvtm", required_unless_present = "built_in")]
+        file: Option<String>,
+        /// The model that is built into the firmware instead of a file; the kept one is forgotten
+        #[arg(long, conflicts_with = "file")]
+        built_in: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl UpdateCommand {
+    fn run(self) -> Result<(), Failure> {
+        let UpdateCommand::Model {
+            device, file, json, ..
+        } = self;
+        let options = update::Options {
+            address: device.address(),
+            patience: device.timeout,
+            json,
+        };
+        match file {
+            Some(path) => update::model(&options, &path),
+            None => update::built_in_model(&options),
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -567,6 +611,7 @@ fn run(command: Command) -> Result<(), Failure> {
             keep,
         } => command::threshold(&device.address(), device.timeout, wanted.threshold(), keep),
         Command::Settings(command) => command.run(),
+        Command::Update(command) => command.run(),
     }
 }
 

@@ -263,7 +263,12 @@ impl Player {
             | Request::GetSettings
             | Request::SetName(_)
             | Request::SetTare(_)
-            | Request::Keep(_) => Outcome::Unsupported,
+            | Request::Keep(_)
+            | Request::BeginModel { .. }
+            | Request::ModelPart(_)
+            | Request::UseModel
+            | Request::UseBuiltInModel
+            | Request::Reset => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

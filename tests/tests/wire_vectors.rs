@@ -290,9 +290,18 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("inspection", inspection()),
         ("settings", settings()),
         ("reply-worn", reply(14, Outcome::Worn)),
+        ("reply-model-unusable", reply(18, Outcome::ModelUnusable)),
+        ("reply-another-sensor", reply(18, Outcome::AnotherSensor)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
+}
+
+fn model_part() -> ModelPart {
+    ModelPart {
+        offset: 57_972,
+        bytes: [0x0D, 0xF0, 0xFE, 0xCA].as_slice().try_into().unwrap(),
+    }
 }
 
 fn host_messages() -> BTreeMap<String, HostMessage> {
@@ -327,6 +336,14 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("set-tare", command(13, Request::SetTare(Some(rest())))),
         ("forget-tare", command(13, Request::SetTare(None))),
         ("keep", command(14, Request::Keep(NAME_AND_TARE))),
+        (
+            "begin-model",
+            command(16, Request::BeginModel { bytes: 57_976 }),
+        ),
+        ("model-part", command(17, Request::ModelPart(model_part()))),
+        ("use-model", command(18, Request::UseModel)),
+        ("use-built-in-model", command(19, Request::UseBuiltInModel)),
+        ("reset", command(20, Request::Reset)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -387,7 +404,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 13);
+    assert_eq!(requests.len(), 18);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x1CF97246EA8E3AD1
+SCHEMA = 0xCA0394843191A69B
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -121,6 +121,7 @@ MODEL = [
     string("model.name", "11-64-64-3 ov7725"),
     raw("model.simulated: true", [1]),
 ]
+KEPT_MODEL = [raw("model.source: Kept", [1])]
 
 
 def sample(sequence, frame_number, time_us, status, names):
@@ -184,8 +185,10 @@ STATS = [
 ]
 
 DEVICE = {
-    "device-hello": HELLO + MODEL + RED + hello_end(RED) + [string("name", "thumb")],
-    "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR) + [string("name", "thumb")],
+    "device-hello": HELLO + MODEL + RED + KEPT_MODEL + hello_end(RED)
+    + [string("name", "thumb")],
+    "device-hello-yuv422": HELLO + MODEL + RED_CR + KEPT_MODEL + hello_end(RED_CR)
+    + [string("name", "thumb")],
     "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED)
     + [string("name", "")],
     "sample-force": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact") + ANGLES
@@ -260,6 +263,12 @@ DEVICE = {
         unsigned("failures", 0),
     ],
     "reply-worn": [raw("Reply", [4]), unsigned("id", 14), raw("outcome: Worn", [10])],
+    "reply-model-unusable": [
+        raw("Reply", [4]), unsigned("id", 18), raw("outcome: ModelUnusable", [11]),
+    ],
+    "reply-another-sensor": [
+        raw("Reply", [4]), unsigned("id", 18), raw("outcome: AnotherSensor", [12]),
+    ],
 }
 
 HOST = {
@@ -281,6 +290,14 @@ HOST = {
     "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
     "keep": COMMAND
     + [unsigned("id", 14), raw("Keep", [12]), raw("name, not threshold, tare", [1, 0, 1])],
+    "begin-model": COMMAND
+    + [unsigned("id", 16), raw("BeginModel", [13]), unsigned("bytes", 57_976)],
+    "model-part": COMMAND
+    + [unsigned("id", 17), raw("ModelPart", [14]), unsigned("offset", 57_972),
+       raw("bytes: 4", [4]), raw("the file's CRC-32 0xcafef00d", [0x0D, 0xF0, 0xFE, 0xCA])],
+    "use-model": COMMAND + [unsigned("id", 18), raw("UseModel", [15])],
+    "use-built-in-model": COMMAND + [unsigned("id", 19), raw("UseBuiltInModel", [16])],
+    "reset": COMMAND + [unsigned("id", 20), raw("Reset", [17])],
 }
 
 FOREIGN = {

@@ -56,6 +56,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
                 name: full(),
                 simulated: true,
                 threshold: RED,
+                source: ModelSource::Fallback,
             }),
             width: u16::MAX,
             height: u16::MAX,
@@ -194,6 +195,14 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::SetName(full()),
         Request::SetTare(Some(longest_rest())),
         Request::Keep(Selection::ALL),
+        Request::BeginModel { bytes: u32::MAX },
+        Request::ModelPart(ModelPart {
+            offset: u32::MAX,
+            bytes: Bytes::from_array([u8::MAX; MODEL_PART_BYTES]),
+        }),
+        Request::UseModel,
+        Request::UseBuiltInModel,
+        Request::Reset,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -239,6 +248,11 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         any_string().prop_map(Request::SetName),
         proptest::option::of(any_rest()).prop_map(Request::SetTare),
         any_selection().prop_map(Request::Keep),
+        any::<u32>().prop_map(|bytes| Request::BeginModel { bytes }),
+        any_model_part().prop_map(Request::ModelPart),
+        Just(Request::UseModel),
+        Just(Request::UseBuiltInModel),
+        Just(Request::Reset),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -257,7 +271,19 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     ];
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
-    let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
+    let source = prop_oneof![
+        Just(ModelSource::BuiltIn),
+        Just(ModelSource::Kept),
+        Just(ModelSource::Fallback)
+    ];
+    let model = (
+        any::<u32>(),
+        any_string(),
+        any::<bool>(),
+        any_threshold(),
+        source,
+    );
+    let model = proptest::option::of(model);
     let identity = (any::<[u8; 12]>(), any_string());
     (identity, names, size, model, seen).prop_map(
         |((device_id, name), (board, firmware, preset), (width, height), model, seen)| {
@@ -268,11 +294,12 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
                 firmware,
                 width,
                 height,
-                model: model.map(|(crc, name, simulated, threshold)| ModelIdentity {
+                model: model.map(|(crc, name, simulated, threshold, source)| ModelIdentity {
                     crc,
                     name,
                     simulated,
                     threshold,
+                    source,
                 }),
                 threshold: seen.0,
                 preset,
@@ -375,6 +402,8 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::NotRead),
         Just(Outcome::NoCamera),
         Just(Outcome::Worn),
+        Just(Outcome::ModelUnusable),
+        Just(Outcome::AnotherSensor),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -395,6 +424,14 @@ fn any_snapshot() -> impl Strategy<Value = Snapshot> {
 fn any_part() -> impl Strategy<Value = SnapshotPart> {
     let bytes = proptest::collection::vec(any::<u8>(), 0..=SNAPSHOT_PART_BYTES);
     (any::<u32>(), bytes).prop_map(|(offset, bytes)| SnapshotPart {
+        offset,
+        bytes: Bytes::from_slice(&bytes).unwrap(),
+    })
+}
+
+fn any_model_part() -> impl Strategy<Value = ModelPart> {
+    let bytes = proptest::collection::vec(any::<u8>(), 0..=MODEL_PART_BYTES);
+    (any::<u32>(), bytes).prop_map(|(offset, bytes)| ModelPart {
         offset,
         bytes: Bytes::from_slice(&bytes).unwrap(),
     })

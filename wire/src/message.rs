@@ -97,6 +97,20 @@ pub struct ModelIdentity {
     pub simulated: bool,
     /// The threshold that it was made for: with another one there is no force.
     pub threshold: Threshold,
+    /// Where it came from.
+    pub source: ModelSource,
+}
+
+/// Where a model in use came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ModelSource {
+    /// It is built into the firmware.
+    BuiltIn,
+    /// A host sent it, and the device keeps it.
+    Kept,
+    /// It is built into the firmware, which uses it instead of the kept one: that one does not
+    /// read, or is none for this sensor.
+    Fallback,
 }
 
 /// One frame's result.
@@ -279,6 +293,36 @@ pub enum Request {
     SetTare(Option<RestPosition>),
     /// Keep these settings as they are in use, through restarts. Answered when they are kept.
     Keep(Selection),
+    /// A model file of so many bytes follows, 1 to [`MODEL_BYTES`], in [`ModelPart`]s. What was sent
+    /// of another one is forgotten.
+    BeginModel {
+        /// Bytes of the file.
+        bytes: u32,
+    },
+    /// The next bytes of the model file.
+    ModelPart(ModelPart),
+    /// Check the model that was sent, keep it, and use it from a frame on. Answered when it is in
+    /// use.
+    UseModel,
+    /// Use the built-in model from a frame on, and forget the kept one. Answered when it is in use.
+    UseBuiltInModel,
+    /// Forget all that is kept, and go on as a new device does. Answered when it is in use.
+    Reset,
+}
+
+/// Most bytes of a model file that is sent.
+pub const MODEL_BYTES: usize = 96 << 10;
+
+/// Most bytes of a model file in one [`ModelPart`].
+pub const MODEL_PART_BYTES: usize = 224;
+
+/// The next bytes of a model file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ModelPart {
+    /// Bytes of the file before these.
+    pub offset: u32,
+    /// The bytes.
+    pub bytes: Vec<u8, MODEL_PART_BYTES>,
 }
 
 /// The answer to a command.
@@ -317,4 +361,10 @@ pub enum Outcome {
     NoCamera,
     /// The flash is worn: nothing can be kept any more. What was kept before still is.
     Worn,
+    /// Refused: what was sent is no model file that this firmware can use. A [`LogLine`] before
+    /// this says what is wrong.
+    ModelUnusable,
+    /// Refused: the model was made for another sensor, camera or frame. A [`LogLine`] before this
+    /// says which.
+    AnotherSensor,
 }

@@ -156,13 +156,12 @@ impl Device {
         }
         let tare = file.rest().filter(|_| is_own);
         let name = name(&file.name).unwrap_or_default();
-        self.set(name, Some(file.threshold()), tare)?;
+        self.set(name, file.threshold(), tare)?;
         print(&format!("settings of {path} are in use and kept")).map(|_| ())
     }
 
     fn reset(&mut self) -> Result<(), Failure> {
-        let threshold = self.hello.model.as_ref().map(|model| model.threshold);
-        self.set(Name::new(), threshold, None)?;
+        send(&mut self.link, Request::Reset, KEEP_PATIENCE)?;
         print("everything that was kept is forgotten; take a tare").map(|_| ())
     }
 
@@ -170,7 +169,7 @@ impl Device {
     fn set(
         &mut self,
         name: Name,
-        threshold: Option<Threshold>,
+        threshold: Threshold,
         tare: Option<RestPosition>,
     ) -> Result<(), Failure> {
         let unkept = |failure: Failure| {
@@ -178,7 +177,7 @@ impl Device {
             Failure::new(failure.kind, format!("{failure}; {what}"))
         };
         // Another pixel format forgets the rest position.
-        if let Some(threshold) = threshold.filter(|threshold| *threshold != self.hello.threshold) {
+        if threshold != self.hello.threshold {
             self.send(Request::SetThreshold(threshold))
                 .map_err(unkept)?;
         }

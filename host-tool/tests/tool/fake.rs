@@ -163,6 +163,7 @@ pub fn hello() -> DeviceHello {
             name: "11-64-64-3 ov7725".try_into().unwrap(),
             simulated: true,
             threshold: RED,
+            source: ModelSource::BuiltIn,
         }),
         width: 320,
         height: 240,

@@ -11,4 +11,5 @@ mod run;
 mod sense;
 mod settings;
 mod snapshot;
+mod update;
 mod view;

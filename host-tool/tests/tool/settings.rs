@@ -2,7 +2,6 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_terms::threshold::{Threshold, Yuv422};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use serde_json::Value;
@@ -188,28 +187,12 @@ fn an_import_that_is_refused_keeps_nothing() {
 }
 
 #[test]
-fn a_reset_forgets_everything_and_keeps_that() {
-    let script: Script = Box::new(|device| {
-        let cr = Threshold::Yuv422(Yuv422 { cr_low: 162 });
-        let hello = DeviceHello {
-            threshold: cr,
-            ..hello()
-        };
-        device.next();
-        device.send(DeviceMessage::Hello(hello));
-        device.serve();
-    });
-    let device = FakeDevice::on_tcp([script]);
+fn a_reset_is_the_devices_own() {
+    let device = device();
     let run = run(&["settings", "reset", "--port", &device.port]);
     assert_eq!(
         run.stdout,
         "everything that was kept is forgotten; take a tare\n"
     );
-    let expected = [
-        Request::SetThreshold(RED),
-        Request::SetTare(None),
-        Request::SetName(Name::new()),
-        Request::Keep(ALL),
-    ];
-    assert_eq!(commands(&device), expected);
+    assert_eq!(commands(&device), [Request::Reset]);
 }
