@@ -68,7 +68,11 @@ async fn obey(Command { id, request }: Command) {
             Some(outcome) => outcome,
             None => return,
         },
-        Request::Tare { frames } => match order(Order::Tare { id, frames }) {
+        Request::Tare { frames } => match tare(id, frames, false) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::TareAnyway { frames } => match tare(id, frames, true) {
             Some(outcome) => outcome,
             None => return,
         },
@@ -105,6 +109,14 @@ async fn obey(Command { id, request }: Command) {
         },
     };
     outbox::answer(DeviceMessage::Reply(Reply { id, outcome })).await;
+}
+
+fn tare(id: u16, frames: u16, insists: bool) -> Option<Outcome> {
+    order(Order::Tare {
+        id,
+        frames,
+        insists,
+    })
 }
 
 /// Passes an order on; `Busy` when there are too many.

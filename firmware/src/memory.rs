@@ -142,6 +142,8 @@ impl Memory {
             tare,
             ..
         } = used;
+        let drift = tare.zip(self.record.tare);
+        let drift = drift.and_then(|(used, kept)| settings::drift(&used, &kept));
         if asked.id().is_some() {
             outbox::offer(DeviceMessage::Settings(SettingsReport {
                 name,
@@ -151,6 +153,7 @@ impl Memory {
                 found: self.found,
                 erases: self.log.erases(),
                 failures: self.log.failures(),
+                drift,
             }));
         }
         Outcome::Done

@@ -19,7 +19,7 @@ use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{Outcome, Sample};
+use hivtac_wire::message::{DeviceMessage, Outcome, Sample};
 use hivtac_wire::settings::RestPosition;
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
@@ -37,6 +37,8 @@ pub enum Order {
         id: u16,
         /// How many; unchecked.
         frames: u16,
+        /// Also when something moves or touches the film.
+        insists: bool,
     },
     /// Take this as the rest position, or none.
     SetTare {
@@ -217,7 +219,11 @@ impl PipelineTask {
                 }
             }
             Order::Tare { id, .. } if self.taring.is_some() => outbox::reply(id, Outcome::Busy),
-            Order::Tare { id, frames } => match Taring::begin(id, frames) {
+            Order::Tare {
+                id,
+                frames,
+                insists,
+            } => match Taring::begin(id, frames, insists) {
                 Some(taring) => self.taring = Some(taring),
                 None => outbox::reply(id, Outcome::InvalidArgument),
             },
@@ -346,6 +352,8 @@ impl PipelineTask {
         };
         if let Some(outcome) = taring.add(self.sensor, measurement) {
             if let Ok(rest) = outcome {
+                let report = settings::tared(&rest, self.sensor, taring.spread());
+                outbox::offer(DeviceMessage::Tared(report));
                 self.sensor.set_tare(Some(rest));
                 settings::follow(self.sensor, self.model.source);
             }

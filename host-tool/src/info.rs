@@ -1,7 +1,9 @@
 //! `hivtac info`: what the device is and how it fares.
 
+use crate::command::px;
 use crate::lines::to_json;
 use crate::output::{note, print};
+use crate::settings;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
@@ -12,6 +14,7 @@ use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{
     DeviceHello, DeviceMessage, ModelIdentity, ModelSource, Request, Stats,
 };
+use hivtac_wire::settings::SettingsReport;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
@@ -19,7 +22,11 @@ use std::time::Duration;
 pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let (hello, stats) = ask(&mut link, patience, hello)?;
-    let info = Info::new(&link.name, &hello, stats);
+    let settings = settings::ask(&mut link, patience)?;
+    let info = Info {
+        tare: Some(Tare::of(&settings)),
+        ..Info::new(&link.name, &hello, stats)
+    };
     print(&if json {
         to_json(&info)
     } else {
@@ -63,6 +70,41 @@ pub struct Info<'a> {
     dilations: u8,
     centroid: &'static str,
     stats: Option<Stats>,
+    /// `None` in what does not ask for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tare: Option<Tare>,
+}
+
+/// The rest position in use.
+#[derive(Serialize)]
+struct Tare {
+    taken: bool,
+    kept: bool,
+    /// How far it is from the kept one, px.
+    drift_px: Option<f64>,
+}
+
+impl Tare {
+    fn of(settings: &SettingsReport) -> Tare {
+        let taken = settings.tare.is_some();
+        Tare {
+            taken,
+            kept: taken && settings.kept.tare,
+            drift_px: settings.drift.map(px),
+        }
+    }
+
+    fn text(&self) -> String {
+        let state = match self {
+            Tare { taken: false, .. } => "none; take one of the untouched film with `hivtac tare`",
+            Tare { kept: true, .. } => "kept",
+            _ => "taken, until restart",
+        };
+        match self.drift_px.filter(|_| !self.kept) {
+            Some(drift) => format!("{state}; {drift:.3} px from the kept one"),
+            None => state.to_owned(),
+        }
+    }
 }
 
 /// The model in use.
@@ -131,6 +173,7 @@ impl<'a> Info<'a> {
                 CentroidEstimator::RednessWeighted => "redness-weighted",
             },
             stats,
+            tare: None,
         }
     }
 
@@ -168,6 +211,8 @@ impl<'a> Info<'a> {
                     .to_owned(),
             );
         }
+        let tare = self.tare.iter();
+        lines.extend(tare.map(|tare| format!("tare       {}", tare.text())));
         lines.extend(self.stats.iter().flat_map(stats_lines));
         lines
     }

@@ -245,6 +245,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::UseModel => "use model",
         Request::UseBuiltInModel => "use built-in model",
         Request::Reset => "reset",
+        Request::TareAnyway { .. } => "tare",
     }
 }
 
@@ -285,6 +286,10 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::MarkersImplausible => {
             "the images at rest are not those of four whole, equal markers: one may be covered, \
              cut, stained or glare; look at the film and its light, and clean it"
+        }
+        Outcome::Touched => {
+            "something touches the film, as the rest position from before tells; take it away, or \
+             say --force when nothing does"
         }
         Outcome::Unsteady => {
             "the markers moved meanwhile; take away what touches or shakes the film"

@@ -11,6 +11,7 @@ mod force_json;
 mod hsv;
 mod info;
 mod lines;
+mod list;
 mod look;
 mod monitor;
 mod output;
@@ -103,6 +104,19 @@ enum Command {
         #[arg(long)]
         fast: bool,
     },
+    /// List the sensors that are plugged in: serial number, port, name, board and firmware
+    ///
+    /// One that another program uses is listed with what is wrong.
+    ///
+    /// Example: hivtac list
+    List {
+        /// One JSON object a line
+        #[arg(long)]
+        json: bool,
+        /// Longest wait for each one's hello, s
+        #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+        timeout: Duration,
+    },
     /// Show what the device is and how it fares
     Info {
         #[command(flatten)]
@@ -112,6 +126,9 @@ enum Command {
         json: bool,
     },
     /// Take the present position of the film as its rest position, until the device restarts
+    ///
+    /// Refused while something moves, or touches the film as the tare from before tells. Says where
+    /// the markers are, how much they scatter, and how far they are from where they were.
     ///
     /// Example: hivtac tare --keep
     Tare {
@@ -128,6 +145,12 @@ enum Command {
         /// Keep it through restarts
         #[arg(long)]
         keep: bool,
+        /// Though something moves or touches the film
+        #[arg(long)]
+        force: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set which pixels a marker may have, and with that the camera's pixel format, until the
     /// device restarts
@@ -316,7 +339,7 @@ impl UpdateCommand {
             device, file, json, ..
         } = self;
         let options = update::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             json,
         };
@@ -354,7 +377,7 @@ impl SettingsCommand {
             SettingsCommand::Reset { device } => (device, Action::Reset),
         };
         let options = settings::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
         };
         settings::run(&options, &action)
@@ -364,16 +387,23 @@ impl SettingsCommand {
 #[derive(Args)]
 struct Device {
     /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with = "device")]
     port: Option<String>,
+    /// The sensor with this name or serial number, as `list` shows them
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
     /// Longest wait for the device's hello and replies, s
     #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
     timeout: Duration,
 }
 
 impl Device {
-    fn address(&self) -> Address {
-        self.port.as_deref().map_or(Address::Find, Address::parse)
+    fn address(&self) -> Result<Address, Failure> {
+        match (&self.port, &self.device) {
+            (Some(port), _) => Ok(Address::parse(port)),
+            (None, Some(device)) => list::find(device, self.timeout),
+            (None, None) => Ok(Address::Find),
+        }
     }
 }
 
@@ -515,21 +545,21 @@ fn preset(name: &str) -> Result<Preset, String> {
 }
 
 impl MonitorArguments {
-    fn options(self) -> monitor::Options {
+    fn options(self) -> Result<monitor::Options, Failure> {
         let format = match (self.json, self.csv) {
             (true, _) => Format::Json,
             (_, true) => Format::Csv,
             _ => Format::Human,
         };
-        monitor::Options {
-            address: self.device.address(),
+        Ok(monitor::Options {
+            address: self.device.address()?,
             patience: self.device.timeout,
             frames: self.frames,
             duration: self.seconds,
             format,
             reconnect: self.reconnect,
             truth: self.truth,
-        }
+        })
     }
 }
 
@@ -547,9 +577,9 @@ fn run(command: Command) -> Result<(), Failure> {
     stop::install()?;
     match command {
         Command::Sense(arguments) => sense::run(&arguments.options()),
-        Command::Monitor(arguments) => monitor::run(&arguments.options()),
+        Command::Monitor(arguments) => monitor::run(&arguments.options()?),
         Command::Check(arguments) => check::run(&check::Options {
-            address: arguments.device.address(),
+            address: arguments.device.address()?,
             patience: arguments.device.timeout,
             duration: arguments.seconds,
             min_rate_hz: arguments.min_rate,
@@ -561,7 +591,7 @@ fn run(command: Command) -> Result<(), Failure> {
             file,
             seconds,
         } => record::run(&record::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             duration: seconds,
             file,
@@ -571,7 +601,7 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             files,
             json,
-        } => snapshot::run(&device.address(), device.timeout, &files.files(), json),
+        } => snapshot::run(&device.address()?, device.timeout, &files.files(), json),
         Command::View {
             port,
             timeout,
@@ -592,24 +622,35 @@ fn run(command: Command) -> Result<(), Failure> {
             report,
             json,
         } => bring_up::run(&bring_up::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             report,
             json,
         }),
-        Command::Focus { device, json } => focus::run(&device.address(), device.timeout, json),
-        Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
+        Command::List { json, timeout } => list::run(timeout, json),
+        Command::Focus { device, json } => focus::run(&device.address()?, device.timeout, json),
+        Command::Info { device, json } => info::run(&device.address()?, device.timeout, json),
         Command::Tare {
             device,
             frames,
             keep,
-        } => command::tare(&device.address(), device.timeout, frames, keep),
-        Command::Expose { device } => command::expose(&device.address(), device.timeout),
+            force,
+            json,
+        } => {
+            let tare = command::Tare {
+                frames,
+                force,
+                keep,
+                json,
+            };
+            command::tare(&device.address()?, device.timeout, &tare)
+        }
+        Command::Expose { device } => command::expose(&device.address()?, device.timeout),
         Command::Threshold {
             device,
             wanted,
             keep,
-        } => command::threshold(&device.address(), device.timeout, wanted.threshold(), keep),
+        } => command::threshold(&device.address()?, device.timeout, wanted.threshold(), keep),
         Command::Settings(command) => command.run(),
         Command::Update(command) => command.run(),
     }

@@ -268,7 +268,8 @@ impl Player {
             | Request::ModelPart(_)
             | Request::UseModel
             | Request::UseBuiltInModel
-            | Request::Reset => Outcome::Unsupported,
+            | Request::Reset
+            | Request::TareAnyway { .. } => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

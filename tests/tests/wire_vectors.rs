@@ -241,6 +241,15 @@ fn settings() -> DeviceMessage {
         found: Found::Settings,
         erases: 3,
         failures: 0,
+        drift: Some(Px(20_316)),
+    })
+}
+
+fn tared() -> DeviceMessage {
+    DeviceMessage::Tared(TareReport {
+        rest: rest(),
+        spread: Px(789),
+        moved: Some(Px(20_316)),
     })
 }
 
@@ -289,6 +298,8 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("reply-no-camera", reply(10, Outcome::NoCamera)),
         ("inspection", inspection()),
         ("settings", settings()),
+        ("tared", tared()),
+        ("reply-touched", reply(7, Outcome::Touched)),
         ("reply-worn", reply(14, Outcome::Worn)),
         ("reply-model-unusable", reply(18, Outcome::ModelUnusable)),
         ("reply-another-sensor", reply(18, Outcome::AnotherSensor)),
@@ -344,6 +355,10 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("use-model", command(18, Request::UseModel)),
         ("use-built-in-model", command(19, Request::UseBuiltInModel)),
         ("reset", command(20, Request::Reset)),
+        (
+            "tare-anyway",
+            command(7, Request::TareAnyway { frames: 128 }),
+        ),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -395,7 +410,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 9);
+    assert_eq!(distinct.len(), 10);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -404,7 +419,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 18);
+    assert_eq!(requests.len(), 19);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xCA0394843191A69B
+SCHEMA = 0x6F4D5FDB80B0C8C1
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -261,11 +261,21 @@ DEVICE = {
         raw("found: Settings", [1]),
         unsigned("erases", 3),
         unsigned("failures", 0),
+        raw("drift: Some", [1]),
+        signed("drift_q16", 20_316),
+    ],
+    "tared": [
+        raw("Tared", [9]),
+        *REST[1:],
+        signed("spread_q16", 789),
+        raw("moved: Some", [1]),
+        signed("moved_q16", 20_316),
     ],
     "reply-worn": [raw("Reply", [4]), unsigned("id", 14), raw("outcome: Worn", [10])],
     "reply-model-unusable": [
         raw("Reply", [4]), unsigned("id", 18), raw("outcome: ModelUnusable", [11]),
     ],
+    "reply-touched": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Touched", [13])],
     "reply-another-sensor": [
         raw("Reply", [4]), unsigned("id", 18), raw("outcome: AnotherSensor", [12]),
     ],
@@ -297,6 +307,7 @@ HOST = {
        raw("bytes: 4", [4]), raw("the file's CRC-32 0xcafef00d", [0x0D, 0xF0, 0xFE, 0xCA])],
     "use-model": COMMAND + [unsigned("id", 18), raw("UseModel", [15])],
     "use-built-in-model": COMMAND + [unsigned("id", 19), raw("UseBuiltInModel", [16])],
+    "tare-anyway": COMMAND + [unsigned("id", 7), raw("TareAnyway", [18]), unsigned("frames", 128)],
     "reset": COMMAND + [unsigned("id", 20), raw("Reset", [17])],
 }
 

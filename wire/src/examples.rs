@@ -96,6 +96,12 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             found: Found::AnotherVersion,
             erases: u32::MAX,
             failures: u32::MAX,
+            drift: Some(Px(i32::MIN)),
+        }),
+        DeviceMessage::Tared(TareReport {
+            rest: longest_rest(),
+            spread: Px(i32::MIN),
+            moved: Some(Px(i32::MIN)),
         }),
     ]
 }
@@ -203,6 +209,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::UseModel,
         Request::UseBuiltInModel,
         Request::Reset,
+        Request::TareAnyway { frames: u16::MAX },
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -229,6 +236,7 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_part().prop_map(DeviceMessage::SnapshotPart),
         any_inspection().prop_map(DeviceMessage::Inspection),
         any_report().prop_map(DeviceMessage::Settings),
+        any_tared().prop_map(DeviceMessage::Tared),
     ]
 }
 
@@ -253,6 +261,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         Just(Request::UseModel),
         Just(Request::UseBuiltInModel),
         Just(Request::Reset),
+        any::<u16>().prop_map(|frames| Request::TareAnyway { frames }),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -404,6 +413,7 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::Worn),
         Just(Outcome::ModelUnusable),
         Just(Outcome::AnotherSensor),
+        Just(Outcome::Touched),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -471,8 +481,9 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         any_threshold(),
         proptest::option::of(any_rest()),
     );
-    (used, any_selection(), found, any::<[u32; 2]>()).prop_map(
-        |((name, threshold, tare), kept, found, [erases, failures])| SettingsReport {
+    let flash = any::<([u32; 2], Option<i32>)>();
+    (used, any_selection(), found, flash).prop_map(
+        |((name, threshold, tare), kept, found, ([erases, failures], drift))| SettingsReport {
             name,
             threshold,
             tare,
@@ -480,8 +491,17 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
             found,
             erases,
             failures,
+            drift: drift.map(Px),
         },
     )
+}
+
+fn any_tared() -> impl Strategy<Value = TareReport> {
+    (any_rest(), any::<(i32, Option<i32>)>()).prop_map(|(rest, (spread, moved))| TareReport {
+        rest,
+        spread: Px(spread),
+        moved: moved.map(Px),
+    })
 }
 
 fn any_selection() -> impl Strategy<Value = Selection> {

@@ -1,6 +1,6 @@
 //! Every message, both ways.
 
-use crate::settings::{Name, RestPosition, Selection, SettingsReport};
+use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport};
 use heapless::{String, Vec};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::Force;
@@ -35,6 +35,8 @@ pub enum DeviceMessage {
     Inspection(Inspection),
     /// Answer to [`Request::GetSettings`].
     Settings(SettingsReport),
+    /// A tare was taken; before the reply to it.
+    Tared(TareReport),
 }
 
 /// What the host sends.
@@ -308,6 +310,11 @@ pub enum Request {
     UseBuiltInModel,
     /// Forget all that is kept, and go on as a new device does. Answered when it is in use.
     Reset,
+    /// As [`Request::Tare`], though something moves or touches the film.
+    TareAnyway {
+        /// How many frames to average.
+        frames: u16,
+    },
 }
 
 /// Most bytes of a model file that is sent.
@@ -367,4 +374,6 @@ pub enum Outcome {
     /// Refused: the model was made for another sensor, camera or frame. A [`LogLine`] before this
     /// says which.
     AnotherSensor,
+    /// Refused: something touches the film, as the rest position from before tells.
+    Touched,
 }

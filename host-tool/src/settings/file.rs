@@ -96,6 +96,7 @@ pub struct Kept {
     found: &'static str,
     erases: u32,
     failures: u32,
+    drift_q16: Option<i32>,
 }
 
 #[derive(Serialize)]
@@ -127,6 +128,7 @@ impl Kept {
             },
             erases: report.erases,
             failures: report.failures,
+            drift_q16: report.drift.map(|drift| drift.0),
         }
     }
 }
@@ -318,6 +320,7 @@ mod tests {
             found: Found::Settings,
             erases: 1,
             failures: 0,
+            drift: None,
         }
     }
 

@@ -79,6 +79,19 @@ pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
     send(link, Request::Keep(selection), KEEP_PATIENCE)
 }
 
+/// A device's settings.
+///
+/// # Errors
+/// What the device refuses.
+pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failure> {
+    let mut report = None;
+    link.request(Request::GetSettings, patience, |message| match message {
+        DeviceMessage::Settings(newest) => report = Some(newest),
+        other => tell(other),
+    })?;
+    report.ok_or_else(|| link.lost("its settings did not come"))
+}
+
 /// A name for a device: 1 to 24 bytes that can be read.
 ///
 /// # Errors
@@ -106,14 +119,7 @@ struct Device {
 
 impl Device {
     fn settings(&mut self) -> Result<SettingsReport, Failure> {
-        let mut report = None;
-        let patience = self.patience;
-        self.link
-            .request(Request::GetSettings, patience, |message| match message {
-                DeviceMessage::Settings(newest) => report = Some(newest),
-                other => tell(other),
-            })?;
-        report.ok_or_else(|| self.link.lost("its settings did not come"))
+        ask(&mut self.link, self.patience)
     }
 
     fn send(&mut self, request: Request) -> Result<(), Failure> {

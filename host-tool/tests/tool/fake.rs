@@ -122,8 +122,15 @@ impl Conversation {
                 self.reply(id, Outcome::Unsupported);
                 return false;
             }
-            Request::Tare { .. } => {
+            Request::Tare { .. } | Request::TareAnyway { .. } => {
                 if let Some(outcome) = self.tare {
+                    if outcome == Outcome::Done {
+                        self.send(DeviceMessage::Tared(TareReport {
+                            rest: self.settings.tare.unwrap(),
+                            spread: Px(789),
+                            moved: Some(Px(20_316)),
+                        }));
+                    }
                     self.reply(id, outcome);
                 }
                 return false;
@@ -206,6 +213,7 @@ pub fn settings() -> SettingsReport {
         found: Found::Settings,
         erases: 3,
         failures: 0,
+        drift: Some(Px(20_316)),
     }
 }
 
