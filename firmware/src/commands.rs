@@ -3,7 +3,7 @@
 use crate::capture_task::{self, Action};
 use crate::pipeline_task::Order;
 use crate::shared::ORDERS;
-use crate::{info, memory, model_upload, outbox, session, settings, snapshot, stats};
+use crate::{info, loader, memory, model_upload, outbox, session, settings, snapshot, stats};
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -91,6 +91,15 @@ async fn obey(Command { id, request }: Command) {
             Some(outcome) => outcome,
             None => return,
         },
+        Request::GetHealth => match memory::order(memory::Action::Health, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::StartLoader => {
+            let outcome = Outcome::Done;
+            outbox::answer(DeviceMessage::Reply(Reply { id, outcome })).await;
+            loader::start().await
+        }
         Request::Keep(selection) => match memory::order(memory::Action::Keep(selection), id) {
             Some(outcome) => outcome,
             None => return,

@@ -11,9 +11,11 @@ use crate::flash::SecondBank;
 use crate::model::{self, Chosen};
 use crate::model_upload::{self, Whole};
 use crate::pipeline_task::Order;
+use crate::self_test::{self, OfFlash};
 use crate::session::Asked;
 use crate::settings::InUse;
 use crate::shared::{MEMORY_ORDER, MEMORY_ORDERED, NEXT_MODEL, ORDERS};
+use crate::thermometer::Thermometer;
 use crate::{log, model_slots, outbox, settings};
 use core::sync::atomic::Ordering;
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError, blob};
@@ -34,6 +36,8 @@ pub struct MemoryOrder {
 pub enum Action {
     /// Tell what is in use, and what is kept.
     Report,
+    /// Tell what the self-test finds.
+    Health,
     /// Keep what is in use.
     Keep(Selection),
     /// Keep the model that was sent, and use it.
@@ -57,6 +61,7 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
 /// What is kept, and where.
 pub struct Memory {
     log: Log<SecondBank>,
+    thermometer: Thermometer,
     record: Record,
     /// At the start.
     found: Found,
@@ -66,7 +71,7 @@ pub struct Memory {
 
 impl Memory {
     /// Reads what is kept. Call once, at the start.
-    pub fn open(bank: SecondBank) -> Self {
+    pub fn open(bank: SecondBank, thermometer: Thermometer) -> Self {
         let mut payload = [0; PAYLOAD_LIMIT];
         let (log, length) = Log::open(bank, &mut payload);
         let kept = length.map(|length| Record::of_bytes(payload.get(..length).unwrap_or(&[])));
@@ -77,6 +82,7 @@ impl Memory {
         };
         Self {
             log,
+            thermometer,
             record,
             found,
             is_kept: found == Found::Settings,
@@ -110,6 +116,7 @@ impl Memory {
     async fn carry_out(&mut self, MemoryOrder { action, asked }: MemoryOrder) {
         let outcome = match action {
             Action::Report => Err(self.report(asked)),
+            Action::Health => Err(self.health(asked).await),
             Action::Keep(selection) => Err(self.keep(selection).await),
             Action::UseModel => self.keep_model().await,
             Action::UseBuiltInModel => self.forget_model().await,
@@ -128,6 +135,22 @@ impl Memory {
         MEMORY_ORDERED.store(false, Ordering::Relaxed);
         if let Some((id, outcome)) = asked.id().zip(outcome) {
             outbox::reply(id, outcome);
+        }
+    }
+
+    async fn health(&mut self, asked: Asked) -> Outcome {
+        let temperature = self.thermometer.read().await;
+        let health = self_test::health(&self.of_flash(), temperature);
+        if asked.id().is_some() {
+            outbox::offer(DeviceMessage::Health(health));
+        }
+        Outcome::Done
+    }
+
+    fn of_flash(&self) -> OfFlash {
+        OfFlash {
+            found: self.found,
+            failures: self.log.failures(),
         }
     }
 

@@ -29,8 +29,14 @@ pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health 
     let found = [
         (Problem::CameraSilent, health::get() == Condition::NoCamera),
         (Problem::ModelMissing, model.is_none()),
-        (Problem::ModelFallback, source == Some(ModelSource::Fallback)),
-        (Problem::SettingsUnread, flash.found == Found::AnotherVersion),
+        (
+            Problem::ModelFallback,
+            source == Some(ModelSource::Fallback),
+        ),
+        (
+            Problem::SettingsUnread,
+            flash.found == Found::AnotherVersion,
+        ),
         (Problem::FlashFails, flash.failures > 0),
         (Problem::StackLow, stack_used > stack_bytes / 4 * 3),
         (Problem::WatchdogReset, reset == ResetReason::Watchdog),

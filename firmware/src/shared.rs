@@ -39,6 +39,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use hivtac_capture::Edge;
+use hivtac_wire::health::ResetReason;
 use hivtac_wire::message::{DeviceMessage, Sample};
 use hivtac_wire::settings::Name;
 
@@ -123,6 +124,10 @@ pub static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
 
 /// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
 pub static SNAPSHOT_TAKEN: Request<Taken> = Request::new();
+
+/// Why the microcontroller started, a `ResetReason`. Written at boot; read by the memory task
+/// (`faults`).
+pub static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
 
 // What is kept.
 

@@ -18,9 +18,11 @@ pub fn bytes() -> u32 {
 pub fn used() -> u32 {
     let lowest = &raw const _stack_end;
     let words = bytes() / 4;
-    // SAFETY: words of the stack's own memory; volatile as they may change meanwhile.
-    let is_painted =
-        |word: &u32| unsafe { lowest.wrapping_add(*word as usize).read_volatile() } == STACK_PAINT_VALUE;
+    let is_painted = |word: &u32| {
+        let at = lowest.wrapping_add(*word as usize);
+        // SAFETY: a word of the stack's own memory; volatile as it may change meanwhile.
+        unsafe { at.read_volatile() == STACK_PAINT_VALUE }
+    };
     let free = (0..words).take_while(is_painted).count() as u32;
     4 * (words - free)
 }

@@ -23,8 +23,8 @@ pub struct Taring {
 }
 
 impl Taring {
-    /// For command `id`, over `frames` good frames, also when something moves or touches the film if
-    /// the host `insists`; `None` when that number is out of its range.
+    /// For command `id`, over `frames` good frames; when the host `insists`, also while something
+    /// moves or touches the film. `None` when that number is out of its range.
     pub fn begin(id: u16, frames: u16, insists: bool) -> Option<Self> {
         let patience = FRAME_TIME * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
         let builder = TareBuilder::new(frames)?;

@@ -68,8 +68,10 @@ async fn convert() -> Option<u16> {
     ADC3.cr().modify(|w| w.set_aden(true));
     until(|| ADC3.isr().read().adrdy()).await?;
     ADC3.cfgr().modify(|w| w.set_res(Res::BITS16));
-    ADC3.pcsel().modify(|w| w.set_pcsel(CHANNEL, Pcsel::PRESELECTED));
-    ADC3.smpr(1).modify(|w| w.set_smp(CHANNEL - 10, SampleTime::CYCLES810_5));
+    ADC3.pcsel()
+        .modify(|w| w.set_pcsel(CHANNEL, Pcsel::PRESELECTED));
+    ADC3.smpr(1)
+        .modify(|w| w.set_smp(CHANNEL - 10, SampleTime::CYCLES810_5));
     ADC3.sqr1().modify(|w| {
         w.set_l(0);
         w.set_sq(0, CHANNEL as u8);
@@ -103,5 +105,7 @@ fn temperature(word: u16) -> Option<i16> {
     let [cold_at, hot_at] = CALIBRATED_AT;
     let above = (i32::from(word) - cold) * (hot_at - cold_at);
     let centidegrees = cold_at + above.checked_div(hot - cold)?;
-    i16::try_from(centidegrees).ok().filter(|_| SENSIBLE.contains(&centidegrees))
+    i16::try_from(centidegrees)
+        .ok()
+        .filter(|_| SENSIBLE.contains(&centidegrees))
 }

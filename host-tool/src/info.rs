@@ -1,6 +1,7 @@
 //! `hivtac info`: what the device is and how it fares.
 
 use crate::command::px;
+use crate::health::{self, Told};
 use crate::lines::to_json;
 use crate::output::{note, print};
 use crate::settings;
@@ -23,8 +24,10 @@ pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Fail
     let (mut link, hello) = Link::connect(address, patience)?;
     let (hello, stats) = ask(&mut link, patience, hello)?;
     let settings = settings::ask(&mut link, patience)?;
+    let health = health::ask(&mut link, patience)?;
     let info = Info {
         tare: Some(Tare::of(&settings)),
+        health: Some(Told::of(&health)),
         ..Info::new(&link.name, &hello, stats)
     };
     print(&if json {
@@ -73,6 +76,9 @@ pub struct Info<'a> {
     /// `None` in what does not ask for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     tare: Option<Tare>,
+    /// Likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    health: Option<Told>,
 }
 
 /// The rest position in use.
@@ -174,6 +180,7 @@ impl<'a> Info<'a> {
             },
             stats,
             tare: None,
+            health: None,
         }
     }
 
@@ -214,6 +221,7 @@ impl<'a> Info<'a> {
         let tare = self.tare.iter();
         lines.extend(tare.map(|tare| format!("tare       {}", tare.text())));
         lines.extend(self.stats.iter().flat_map(stats_lines));
+        lines.extend(self.health.iter().flat_map(Told::lines));
         lines
     }
 

@@ -246,6 +246,8 @@ fn name_of(request: &Request) -> &'static str {
         Request::UseBuiltInModel => "use built-in model",
         Request::Reset => "reset",
         Request::TareAnyway { .. } => "tare",
+        Request::GetHealth => "get health",
+        Request::StartLoader => "start loader",
     }
 }
 

@@ -6,8 +6,10 @@ mod command;
 mod decimal;
 mod files;
 mod finding;
+mod firmware;
 mod focus;
 mod force_json;
+mod health;
 mod hsv;
 mod info;
 mod lines;
@@ -52,7 +54,7 @@ Exit codes:
   6    the device refused a command or did not answer it
   7    `check`: fewer samples a second than --min-rate
   8    `check`: more frames lost than --max-loss
-  9    `bring-up`: something is not right
+  9    `bring-up`, `self-test`: something is not right
   130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
 
 /// Shows the forces of a HiVTac sensor.
@@ -125,6 +127,18 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Have the device look at itself, and show what it finds, each with its code
+    ///
+    /// Codes are those of docs/wire.md, "Health". Exit code 9 when something is not right.
+    ///
+    /// Example: hivtac self-test
+    SelfTest {
+        #[command(flatten)]
+        device: Device,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
     /// Take the present position of the film as its rest position, until the device restarts
     ///
     /// Refused while something moves, or touches the film as the tare from before tells. Says where
@@ -172,7 +186,7 @@ enum Command {
     /// Show, save, give back or forget what the device keeps through restarts
     #[command(subcommand)]
     Settings(SettingsCommand),
-    /// Give the device a model of its own
+    /// Give the device a model of its own, or new firmware
     #[command(subcommand)]
     Update(UpdateCommand),
     /// Let the camera find exposure and gain for the light that there is, and keep them
@@ -331,21 +345,45 @@ enum UpdateCommand {
         #[arg(long)]
         json: bool,
     },
+    /// Restart the device into its own loader (USB DFU), say how to send it firmware, and wait for
+    /// it to come back
+    ///
+    /// Prints the `dfu-util` command to run meanwhile in another terminal, then the version before
+    /// and after. What the device keeps stays. When the loader was started by mistake, take the
+    /// device off its supply for a moment.
+    ///
+    /// Example: hivtac update firmware hivtac-firmware.bin
+    Firmware {
+        #[command(flatten)]
+        device: Device,
+        /// The program as it lies in flash: `arm-none-eabi-objcopy -O binary ELF FILE.bin`
+        #[arg(value_name = "FILE.bin")]
+        file: String,
+        /// Longest wait for the device to come back, s
+        #[arg(long, value_name = "S", default_value = "300", value_parser = seconds)]
+        wait: Duration,
+    },
 }
 
 impl UpdateCommand {
     fn run(self) -> Result<(), Failure> {
-        let UpdateCommand::Model {
-            device, file, json, ..
-        } = self;
-        let options = update::Options {
-            address: device.address()?,
-            patience: device.timeout,
-            json,
-        };
-        match file {
-            Some(path) => update::model(&options, &path),
-            None => update::built_in_model(&options),
+        match self {
+            UpdateCommand::Model {
+                device, file, json, ..
+            } => {
+                let options = update::Options {
+                    address: device.address()?,
+                    patience: device.timeout,
+                    json,
+                };
+                match file {
+                    Some(path) => update::model(&options, &path),
+                    None => update::built_in_model(&options),
+                }
+            }
+            UpdateCommand::Firmware { device, file, wait } => {
+                firmware::update(&device.address()?, device.timeout, &file, wait)
+            }
         }
     }
 }
@@ -629,6 +667,7 @@ fn run(command: Command) -> Result<(), Failure> {
         }),
         Command::List { json, timeout } => list::run(timeout, json),
         Command::Focus { device, json } => focus::run(&device.address()?, device.timeout, json),
+        Command::SelfTest { device, json } => health::run(&device.address()?, device.timeout, json),
         Command::Info { device, json } => info::run(&device.address()?, device.timeout, json),
         Command::Tare {
             device,

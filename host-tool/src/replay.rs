@@ -269,7 +269,9 @@ impl Player {
             | Request::UseModel
             | Request::UseBuiltInModel
             | Request::Reset
-            | Request::TareAnyway { .. } => Outcome::Unsupported,
+            | Request::TareAnyway { .. }
+            | Request::GetHealth
+            | Request::StartLoader => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

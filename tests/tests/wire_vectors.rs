@@ -13,6 +13,7 @@ use hivtac_terms::units::{
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
+use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
@@ -77,6 +78,7 @@ fn model(threshold: Threshold) -> ModelIdentity {
         name: "11-64-64-3 ov7725".try_into().unwrap(),
         simulated: true,
         threshold,
+        source: ModelSource::Kept,
     }
 }
 
@@ -245,6 +247,16 @@ fn settings() -> DeviceMessage {
     })
 }
 
+fn health() -> DeviceMessage {
+    DeviceMessage::Health(Health {
+        reset: ResetReason::Watchdog,
+        temperature_centidegrees: Some(4_150),
+        stack_used: 6_120,
+        stack_bytes: 24_576,
+        problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit(),
+    })
+}
+
 fn tared() -> DeviceMessage {
     DeviceMessage::Tared(TareReport {
         rest: rest(),
@@ -299,6 +311,7 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("inspection", inspection()),
         ("settings", settings()),
         ("tared", tared()),
+        ("health", health()),
         ("reply-touched", reply(7, Outcome::Touched)),
         ("reply-worn", reply(14, Outcome::Worn)),
         ("reply-model-unusable", reply(18, Outcome::ModelUnusable)),
@@ -355,6 +368,8 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("use-model", command(18, Request::UseModel)),
         ("use-built-in-model", command(19, Request::UseBuiltInModel)),
         ("reset", command(20, Request::Reset)),
+        ("get-health", command(21, Request::GetHealth)),
+        ("start-loader", command(22, Request::StartLoader)),
         (
             "tare-anyway",
             command(7, Request::TareAnyway { frames: 128 }),
@@ -410,7 +425,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 10);
+    assert_eq!(distinct.len(), 11);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -419,7 +434,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 19);
+    assert_eq!(requests.len(), 21);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

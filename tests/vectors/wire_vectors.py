@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x6F4D5FDB80B0C8C1
+SCHEMA = 0x585D7411BAC77BC3
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -264,6 +264,15 @@ DEVICE = {
         raw("drift: Some", [1]),
         signed("drift_q16", 20_316),
     ],
+    "health": [
+        raw("Health", [10]),
+        raw("reset: Watchdog", [4]),
+        raw("temperature_centidegrees: Some", [1]),
+        signed("temperature_centidegrees", 4_150),
+        unsigned("stack_used", 6_120),
+        unsigned("stack_bytes", 24_576),
+        (varint(0x44), "problems 0x44: model_fallback, watchdog_reset"),
+    ],
     "tared": [
         raw("Tared", [9]),
         *REST[1:],
@@ -308,6 +317,8 @@ HOST = {
     "use-model": COMMAND + [unsigned("id", 18), raw("UseModel", [15])],
     "use-built-in-model": COMMAND + [unsigned("id", 19), raw("UseBuiltInModel", [16])],
     "tare-anyway": COMMAND + [unsigned("id", 7), raw("TareAnyway", [18]), unsigned("frames", 128)],
+    "get-health": COMMAND + [unsigned("id", 21), raw("GetHealth", [19])],
+    "start-loader": COMMAND + [unsigned("id", 22), raw("StartLoader", [20])],
     "reset": COMMAND + [unsigned("id", 20), raw("Reset", [17])],
 }
 

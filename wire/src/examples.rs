@@ -1,5 +1,6 @@
 //! Messages for tests: the longest of each kind, and arbitrary ones.
 
+use crate::health::*;
 use crate::message::*;
 use crate::settings::*;
 use crate::version::SCHEMA_HASH;
@@ -97,6 +98,13 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             erases: u32::MAX,
             failures: u32::MAX,
             drift: Some(Px(i32::MIN)),
+        }),
+        DeviceMessage::Health(Health {
+            reset: ResetReason::Other,
+            temperature_centidegrees: Some(i16::MIN),
+            stack_used: u32::MAX,
+            stack_bytes: u32::MAX,
+            problems: u32::MAX,
         }),
         DeviceMessage::Tared(TareReport {
             rest: longest_rest(),
@@ -210,6 +218,8 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::UseBuiltInModel,
         Request::Reset,
         Request::TareAnyway { frames: u16::MAX },
+        Request::GetHealth,
+        Request::StartLoader,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -237,6 +247,7 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_inspection().prop_map(DeviceMessage::Inspection),
         any_report().prop_map(DeviceMessage::Settings),
         any_tared().prop_map(DeviceMessage::Tared),
+        any_health().prop_map(DeviceMessage::Health),
     ]
 }
 
@@ -262,6 +273,8 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         Just(Request::UseBuiltInModel),
         Just(Request::Reset),
         any::<u16>().prop_map(|frames| Request::TareAnyway { frames }),
+        Just(Request::GetHealth),
+        Just(Request::StartLoader),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -492,6 +505,26 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
             erases,
             failures,
             drift: drift.map(Px),
+        },
+    )
+}
+
+fn any_health() -> impl Strategy<Value = Health> {
+    let reset = prop_oneof![
+        Just(ResetReason::PowerOn),
+        Just(ResetReason::BrownOut),
+        Just(ResetReason::Pin),
+        Just(ResetReason::Software),
+        Just(ResetReason::Watchdog),
+        Just(ResetReason::Other)
+    ];
+    (reset, any::<(Option<i16>, u32, u32, u32)>()).prop_map(
+        |(reset, (temperature_centidegrees, stack_used, stack_bytes, problems))| Health {
+            reset,
+            temperature_centidegrees,
+            stack_used,
+            stack_bytes,
+            problems,
         },
     )
 }

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct Health {
     /// Why the microcontroller started last.
     pub reset: ResetReason,
-    /// Of the microcontroller, hundredths of a degree Celsius; `None` when its sensor does not tell.
+    /// Of the microcontroller, hundredths of a degree Celsius; `None` when its sensor does not
+    /// tell.
     pub temperature_centidegrees: Option<i16>,
     /// Bytes of the stack that were in use at most since the start.
     pub stack_used: u32,

@@ -1,5 +1,6 @@
 //! Every message, both ways.
 
+use crate::health::Health;
 use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport};
 use heapless::{String, Vec};
 use hivtac_terms::conditions::CentroidEstimator;
@@ -37,9 +38,15 @@ pub enum DeviceMessage {
     Settings(SettingsReport),
     /// A tare was taken; before the reply to it.
     Tared(TareReport),
+    /// Answer to [`Request::GetHealth`].
+    Health(Health),
 }
 
 /// What the host sends.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "the device has no heap, and one message at a time"
+)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum HostMessage {
     /// First message of a host; the device answers with its own hello and does not stream before.
@@ -295,8 +302,8 @@ pub enum Request {
     SetTare(Option<RestPosition>),
     /// Keep these settings as they are in use, through restarts. Answered when they are kept.
     Keep(Selection),
-    /// A model file of so many bytes follows, 1 to [`MODEL_BYTES`], in [`ModelPart`]s. What was sent
-    /// of another one is forgotten.
+    /// A model file of so many bytes follows, 1 to [`MODEL_BYTES`], in [`ModelPart`]s. What was
+    /// sent of another one is forgotten.
     BeginModel {
         /// Bytes of the file.
         bytes: u32,
@@ -315,6 +322,11 @@ pub enum Request {
         /// How many frames to average.
         frames: u16,
     },
+    /// Look at everything, and send a [`Health`]. Answered behind it.
+    GetHealth,
+    /// Restart into the microcontroller's own loader, which takes new firmware. Answered before
+    /// that.
+    StartLoader,
 }
 
 /// Most bytes of a model file that is sent.

@@ -42,7 +42,9 @@ fn info_for_a_person() {
              camera     0 timeouts, 0 restarts, 0 overruns\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\
              time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after \
-             the middle of its exposure\n",
+             the middle of its exposure\n\
+             health     started by power-on; 41.5 °C; 6120 of 24576 bytes of stack used\n\
+             problems   none\n",
             device.port
         )
     );
@@ -200,7 +202,8 @@ fn a_tare_is_taken_refused_or_not_answered() {
         (done.code, done.stdout.as_str()),
         (
             Some(0),
-            "tare taken over 64 frames: markers at (100.00, 60.00), (220.00, 60.00), (220.00, 180.00), \
+            "tare taken over 64 frames: markers at (100.00, 60.00), (220.00, 60.00), \
+             (220.00, 180.00), \
              (100.00, 180.00) px, spread 0.012 px, 0.310 px from the rest before\n"
         )
     );

@@ -5,6 +5,8 @@ mod bring_up;
 mod commands;
 mod endings;
 mod fake;
+mod firmware;
+mod health;
 mod monitor;
 mod recordings;
 mod run;
