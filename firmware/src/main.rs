@@ -27,22 +27,29 @@ mod faults;
 mod flash;
 mod health;
 mod info;
+mod loader;
 mod log;
 mod memory;
 mod model;
+mod model_slots;
+mod model_upload;
 mod near_table;
+mod next_model;
 mod next_threshold;
 mod outbox;
 mod pipeline_task;
 mod priorities;
 mod seeded_bugs;
+mod self_test;
 mod session;
 mod settings;
 mod shared;
 mod snapshot;
 mod snapshot_copy;
+mod stack;
 mod stats;
 mod tare;
+mod thermometer;
 mod usb;
 mod usb_guard;
 mod vsync;
@@ -52,12 +59,12 @@ use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::settings::Settings;
 use hivtac_sensing::temporal::Temporal;
-use hivtac_terms::threshold::{ByteOrder, Threshold};
+use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
 use memory::Memory;
+use model::Chosen;
+use next_model::InUse;
 use pipeline_task::Sensor;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -80,12 +87,13 @@ fn main() -> ! {
     let board = board::start();
     faults::report_reset();
     vsync::start();
-    let model = model::embedded();
     let sensor = SENSOR.take();
-    let memory = Memory::open(board.flash);
+    let mut memory = Memory::open(board.flash, board.thermometer);
     settings::set_name(memory.record().name.clone());
+    let chosen = memory.model();
+    let model_in_use = InUse::of(&chosen);
     let mut temporal = Temporal::new();
-    let format = configure(sensor, &mut temporal, model, memory.record());
+    let format = configure(sensor, &mut temporal, chosen, memory.record());
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
@@ -103,6 +111,7 @@ fn main() -> ! {
             spawner.spawn(token(pipeline_task::run(
                 sensor,
                 temporal,
+                model_in_use,
                 board.bands,
                 board.snapshots,
             )));
@@ -114,10 +123,11 @@ fn main() -> ! {
 fn configure(
     sensor: &mut Sensor,
     temporal: &mut Temporal,
-    model: Option<Model<'static>>,
+    chosen: Chosen,
     kept: &Record,
 ) -> Format {
-    let mut settings = usual(&model);
+    let Chosen { model, source, .. } = chosen;
+    let mut settings = model::settings(model.as_ref());
     let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
     if let Some(threshold) = kept.threshold.filter(is_sent) {
         settings.threshold = threshold;
@@ -138,28 +148,9 @@ fn configure(
     if temporal.set(kept.temporal).is_err() {
         defmt::warn!("the kept limits of contact, slip or filter are out of range");
     }
-    settings::follow(sensor, temporal);
+    settings::follow(sensor, temporal, source);
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
-}
-
-/// The camera's frames and the threshold that the model was made for, or the usual one of its
-/// pixels. A model for pixels that the camera does not send gives no force then, and every sample
-/// says so.
-fn usual(model: &Option<Model<'static>>) -> Settings {
-    let order = ByteOrder::Swapped;
-    let geometry = camera::GEOMETRY;
-    let sent = |model: &Model| Format::of(model.conditions.threshold.format());
-    match model {
-        Some(model) if sent(model).is_some() => Settings {
-            geometry,
-            ..model.conditions.settings(order)
-        },
-        _ => Settings {
-            threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
-            ..Settings::usual(geometry, order)
-        },
-    }
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

@@ -6,9 +6,10 @@ use crate::camera;
 use crate::capture::{self, CaptureEvent};
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
+use crate::next_model::{self, InUse};
 use crate::next_threshold::NextThreshold;
 use crate::session::Asked;
-use crate::shared::{CAPTURE_EVENTS, ORDERS};
+use crate::shared::{CAPTURE_EVENTS, NEXT_MODEL, ORDERS};
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
 use crate::{outbox, session, settings, stats, vsync};
@@ -21,7 +22,7 @@ use hivtac_sensing::temporal::{Followed, Moment, Temporal};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{Outcome, Sample};
+use hivtac_wire::message::{DeviceMessage, Outcome, Sample};
 use hivtac_wire::settings::RestPosition;
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
@@ -39,6 +40,8 @@ pub enum Order {
         id: u16,
         /// How many; unchecked.
         frames: u16,
+        /// Also when something moves or touches the film.
+        insists: bool,
     },
     /// Take this as the rest position, or none.
     SetTare {
@@ -56,22 +59,31 @@ pub enum Order {
     },
     /// Keep the next whole frame and send it.
     Snapshot(Asked),
+    /// Use the model of [`NEXT_MODEL`].
+    UseModel {
+        /// Of the command.
+        asked: Asked,
+        /// With its threshold and no tare, whatever is in use.
+        afresh: bool,
+    },
 }
 
 /// The pipeline, its table in DTCM.
 pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
-/// Runs for ever in thread mode. `sensor` and `temporal` are configured.
+/// Runs for ever in thread mode. `sensor`, with `model`, and `temporal` are configured.
 #[embassy_executor::task]
 pub async fn run(
     sensor: &'static mut Sensor,
     temporal: Temporal,
+    model: InUse,
     bands: BandCopy,
     snapshots: SnapshotCopy,
 ) {
     let mut task = PipelineTask {
         sensor,
         temporal,
+        model,
         next_threshold: NextThreshold::NONE,
         bands,
         follower: Follower::new(SHAPE),
@@ -104,6 +116,7 @@ pub async fn run(
 struct PipelineTask {
     sensor: &'static mut Sensor,
     temporal: Temporal,
+    model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
     follower: Follower,
@@ -219,7 +232,11 @@ impl PipelineTask {
                 }
             }
             Order::Tare { id, .. } if self.taring.is_some() => outbox::reply(id, Outcome::Busy),
-            Order::Tare { id, frames } => match Taring::begin(id, frames) {
+            Order::Tare {
+                id,
+                frames,
+                insists,
+            } => match Taring::begin(id, frames, insists) {
                 Some(taring) => self.taring = Some(taring),
                 None => outbox::reply(id, Outcome::InvalidArgument),
             },
@@ -231,10 +248,34 @@ impl PipelineTask {
                     Ok(()) => Outcome::Done,
                     Err(_) => Outcome::InvalidArgument,
                 };
-                settings::follow(self.sensor, &self.temporal);
+                self.follow();
                 outbox::reply(id, outcome);
             }
             Order::Snapshot(asked) => self.snapshots.begin(asked),
+            Order::UseModel { asked, afresh } => self.use_model(asked, afresh),
+        }
+    }
+
+    /// Between two frames, so that none is of two models.
+    fn use_model(&mut self, asked: Asked, afresh: bool) {
+        let Some(next) = NEXT_MODEL.try_take() else {
+            return;
+        };
+        self.give_up_tare();
+        let before = self.sensor.threshold();
+        let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
+        if afresh {
+            self.temporal = Temporal::new();
+        }
+        self.temporal.set_tare(self.sensor.tare().copied());
+        if self.sensor.threshold() == before {
+            self.follow();
+        } else {
+            self.threshold_changed();
+        }
+        let waits = wanted.is_some_and(|threshold| self.next_threshold.wait_for(asked, threshold));
+        if let Some(id) = asked.id().filter(|_| !waits) {
+            outbox::reply(id, Outcome::Done);
         }
     }
 
@@ -250,11 +291,16 @@ impl PipelineTask {
         }
     }
 
+    /// Tells what it measures with from now on.
+    fn follow(&self) {
+        settings::follow(self.sensor, &self.temporal, self.model.source);
+    }
+
     /// Measures against this rest position from the next frame on, or against the model's own.
     fn use_tare(&mut self, rest: Option<Rest>) {
         self.sensor.set_tare(rest);
         self.temporal.set_tare(self.sensor.tare().copied());
-        settings::follow(self.sensor, &self.temporal);
+        self.follow();
     }
 
     /// Frames of other pixels come from now on: those of the threshold that waits. Markers have
@@ -272,7 +318,7 @@ impl PipelineTask {
     /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
     /// which frames pass.
     fn threshold_changed(&mut self) {
-        settings::follow(self.sensor, &self.temporal);
+        self.follow();
         self.sensor.forget_motion();
         self.temporal.begin_anew();
         let mut missed = false;
@@ -303,7 +349,7 @@ impl PipelineTask {
         stats::LATENCY_US.set(latency_us as u32);
         if let Some(rest) = followed.rest {
             self.sensor.set_tare(Some(rest));
-            settings::follow(self.sensor, &self.temporal);
+            self.follow();
         }
         self.tare_with(&measurement);
         health::set(match measurement.force {
@@ -353,6 +399,10 @@ impl PipelineTask {
         };
         if let Some(outcome) = taring.add(self.sensor, measurement) {
             let id = taring.id();
+            if let Ok(rest) = outcome {
+                let report = settings::tared(&rest, self.sensor, taring.spread());
+                outbox::offer(DeviceMessage::Tared(report));
+            }
             self.taring = None;
             if let Ok(rest) = outcome {
                 self.use_tare(Some(rest));

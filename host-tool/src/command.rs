@@ -1,15 +1,16 @@
 //! `hivtac tare`, `hivtac threshold` and `hivtac expose`: one command each.
 
-use crate::output;
-use crate::output::note;
+use crate::output::{self, note};
 use crate::settings;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
 use hivtac_host::threshold::{text, to_json};
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
-use hivtac_wire::settings::Selection;
+use hivtac_wire::settings::{Selection, TareReport};
+use serde::Serialize;
 use serde_json::json;
 use std::time::Duration;
 
@@ -18,18 +19,42 @@ const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 /// Time a tare may need besides.
 pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
 
-/// Takes the mean of the next `frames` good frames (1–256) as the rest position, until the device
-/// restarts or for good.
-pub fn tare(
-    address: &Address,
-    patience: Duration,
+/// How to take a tare.
+pub struct Tare {
+    /// Good frames to average, 1–256.
+    pub frames: u16,
+    /// Though something moves or touches the film.
+    pub force: bool,
+    /// Through restarts.
+    pub keep: bool,
+    /// One JSON object instead of a line.
+    pub json: bool,
+}
+
+/// What a tare gave: pixels.
+#[derive(Serialize)]
+struct Tared {
     frames: u16,
-    keep: bool,
-    json: bool,
-) -> Result<(), Failure> {
+    kept: bool,
+    markers: [[f64; 2]; 4],
+    spread_px: f64,
+    moved_px: Option<f64>,
+}
+
+/// Takes the mean of the next good frames as the rest position, and tells it.
+pub fn tare(address: &Address, patience: Duration, tare: &Tare) -> Result<(), Failure> {
+    let Tare { frames, keep, .. } = *tare;
     let wait = TARE_PATIENCE + SLOWEST_FRAME * frames.into();
     let (mut link, _) = Link::connect(address, patience)?;
-    send(&mut link, Request::Tare { frames }, wait)?;
+    let request = match tare.force {
+        true => Request::TareAnyway { frames },
+        false => Request::Tare { frames },
+    };
+    let mut report = None;
+    link.request(request, wait, |message| match message {
+        DeviceMessage::Tared(newest) => report = Some(newest),
+        other => tell(other),
+    })?;
     if keep {
         let selection = Selection {
             tare: true,
@@ -37,12 +62,44 @@ pub fn tare(
         };
         settings::keep(&mut link, selection)?;
     }
-    let kept = if keep { " and kept" } else { "" };
-    output::tell(
-        json,
-        &format!("tare taken over {frames} frames{kept}"),
-        &json!({ "tare_frames": frames, "kept": keep }),
-    )
+    let report = report.map(|report| Tared::of(tare, &report));
+    let line = match &report {
+        Some(report) => report.line(),
+        None => format!("tare taken over {frames} frames"),
+    };
+    output::tell(tare.json, &line, &json!(report))
+}
+
+impl Tared {
+    fn of(tare: &Tare, report: &TareReport) -> Tared {
+        Tared {
+            frames: tare.frames,
+            kept: tare.keep,
+            markers: (report.rest.markers).map(|marker| [px(marker.x), px(marker.y)]),
+            spread_px: px(report.spread),
+            moved_px: report.moved.map(px),
+        }
+    }
+
+    fn line(&self) -> String {
+        let kept = if self.kept { " and kept" } else { "" };
+        let markers = self.markers.map(|[x, y]| format!("({x:.2}, {y:.2})"));
+        let moved = match self.moved_px {
+            Some(moved) => format!("{moved:.3} px from the rest before"),
+            None => "the first one".to_owned(),
+        };
+        format!(
+            "tare taken over {} frames{kept}: markers at {} px, spread {:.3} px, {moved}",
+            self.frames,
+            markers.join(", "),
+            self.spread_px
+        )
+    }
+}
+
+/// Pixels, exactly.
+pub fn px(px: Px) -> f64 {
+    f64::from(px.0) / f64::from(Px::ONE.0)
 }
 
 /// Has exposure and gain found anew for the light that there is.

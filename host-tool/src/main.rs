@@ -7,12 +7,15 @@ mod command;
 mod decimal;
 mod files;
 mod finding;
+mod firmware;
 mod focus;
 mod force_json;
+mod health;
 mod help;
 mod hsv;
 mod info;
 mod lines;
+mod list;
 mod look;
 mod monitor;
 mod output;
@@ -26,6 +29,7 @@ mod snapshot;
 mod tally;
 mod template;
 mod truth;
+mod update;
 mod view;
 
 use clap::{Args, FromArgMatches, Parser, Subcommand};
@@ -102,6 +106,19 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// List the sensors that are plugged in: serial number, port, name, board and firmware
+    ///
+    /// One that another program uses is listed with what is wrong.
+    ///
+    /// Example: hivtac list
+    List {
+        /// One JSON object a line
+        #[arg(long)]
+        json: bool,
+        /// Longest wait for each one's hello, s
+        #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+        timeout: Duration,
+    },
     /// Show what the device is and how it fares
     ///
     /// Example: hivtac info
@@ -112,7 +129,22 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Have the device look at itself, and show what it finds, each with its code
+    ///
+    /// Codes are those of docs/wire.md, "Health". Exit code 9 when something is not right.
+    ///
+    /// Example: hivtac self-test
+    SelfTest {
+        #[command(flatten)]
+        device: Device,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
     /// Take the present position of the film as its rest position, until the device restarts
+    ///
+    /// Refused while something moves, or touches the film as the tare from before tells. Says where
+    /// the markers are, how much they scatter, and how far they are from where they were.
     ///
     /// Example: hivtac tare --keep
     Tare {
@@ -129,6 +161,9 @@ enum Command {
         /// Keep it through restarts
         #[arg(long)]
         keep: bool,
+        /// Though something moves or touches the film
+        #[arg(long)]
+        force: bool,
         /// One JSON object instead of a line
         #[arg(long)]
         json: bool,
@@ -146,6 +181,9 @@ enum Command {
     /// Show, save, give back or forget what the device keeps through restarts
     #[command(subcommand)]
     Settings(SettingsCommand),
+    /// Give the device a model of its own, or new firmware
+    #[command(subcommand)]
+    Update(UpdateCommand),
     /// Let the camera find exposure and gain for the light that there is, and keep them
     ///
     /// It does so by itself when it starts.
@@ -311,7 +349,8 @@ enum SettingsCommand {
         #[arg(long)]
         json: bool,
     },
-    /// Forget everything that was kept: no name, the model's threshold, no tare, the usual limits
+    /// Forget everything that was kept: no name, the built-in model and its threshold, no tare, the
+    /// usual limits
     ///
     /// Example: hivtac settings reset
     Reset {
@@ -331,6 +370,70 @@ struct Told {
     /// One JSON object instead of a line
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Subcommand)]
+enum UpdateCommand {
+    /// Send a model file, which the device checks, keeps through restarts and uses from then on
+    ///
+    /// Forces go on with the model before until then. What is damaged, not sound, or made for
+    /// another camera or unit is refused, and nothing changes.
+    ///
+    /// Example: hivtac update model thumb.hvtm
+    Model {
+        #[command(flatten)]
+        device: Device,
+        /// What `hivtac-calibrate` made
+        #[arg(value_name = "FILE.hvtm", required_unless_present = "built_in")]
+        file: Option<String>,
+        /// The model that is built into the firmware instead of a file; the kept one is forgotten
+        #[arg(long, conflicts_with = "file")]
+        built_in: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
+    },
+    /// Restart the device into its own loader (USB DFU), say how to send it firmware, and wait for
+    /// it to come back
+    ///
+    /// Prints the `dfu-util` command to run meanwhile in another terminal, then the version before
+    /// and after. What the device keeps stays. When the loader was started by mistake, take the
+    /// device off its supply for a moment.
+    ///
+    /// Example: hivtac update firmware hivtac-firmware.bin
+    Firmware {
+        #[command(flatten)]
+        device: Device,
+        /// The program as it lies in flash: `arm-none-eabi-objcopy -O binary ELF FILE.bin`
+        #[arg(value_name = "FILE.bin")]
+        file: String,
+        /// Longest wait for the device to come back, s
+        #[arg(long, value_name = "S", default_value = "300", value_parser = seconds)]
+        wait: Duration,
+    },
+}
+
+impl UpdateCommand {
+    fn run(self) -> Result<(), Failure> {
+        match self {
+            UpdateCommand::Model {
+                device, file, json, ..
+            } => {
+                let options = update::Options {
+                    address: device.address()?,
+                    patience: device.timeout,
+                    json,
+                };
+                match file {
+                    Some(path) => update::model(&options, &path),
+                    None => update::built_in_model(&options),
+                }
+            }
+            UpdateCommand::Firmware { device, file, wait } => {
+                firmware::update(&device.address()?, device.timeout, &file, wait)
+            }
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -531,7 +634,7 @@ impl SettingsCommand {
             SettingsCommand::Reset { device, json } => (device, json, Action::Reset),
         };
         let options = settings::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             json,
         };
@@ -542,16 +645,23 @@ impl SettingsCommand {
 #[derive(Args)]
 struct Device {
     /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with = "device")]
     port: Option<String>,
+    /// The sensor with this name or serial number, as `list` shows them
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
     /// Longest wait for the device's hello and replies, s
     #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
     timeout: Duration,
 }
 
 impl Device {
-    fn address(&self) -> Address {
-        self.port.as_deref().map_or(Address::Find, Address::parse)
+    fn address(&self) -> Result<Address, Failure> {
+        match (&self.port, &self.device) {
+            (Some(port), _) => Ok(Address::parse(port)),
+            (None, Some(device)) => list::find(device, self.timeout),
+            (None, None) => Ok(Address::Find),
+        }
     }
 }
 
@@ -622,14 +732,14 @@ impl ThresholdArguments {
                 dry_run,
                 json,
             }) => auto_threshold::run(&auto_threshold::Options {
-                address: device.address(),
+                address: device.address()?,
                 patience: device.timeout,
                 keep,
                 dry_run,
                 json,
             }),
             None => command::threshold(
-                &self.device.address(),
+                &self.device.address()?,
                 self.device.timeout,
                 self.wanted.and_then(|wanted| wanted.threshold()),
                 self.keep,
@@ -759,21 +869,21 @@ fn preset(name: &str) -> Result<Preset, String> {
 }
 
 impl MonitorArguments {
-    fn options(self) -> monitor::Options {
+    fn options(self) -> Result<monitor::Options, Failure> {
         let format = match (self.json, self.csv) {
             (true, _) => Format::Json,
             (_, true) => Format::Csv,
             _ => Format::Human,
         };
-        monitor::Options {
-            address: self.device.address(),
+        Ok(monitor::Options {
+            address: self.device.address()?,
             patience: self.device.timeout,
             frames: self.frames,
             duration: self.seconds,
             format,
             reconnect: self.reconnect,
             truth: self.truth,
-        }
+        })
     }
 }
 
@@ -791,9 +901,9 @@ fn run(command: Command) -> Result<(), Failure> {
     stop::install()?;
     match command {
         Command::Sense(arguments) => sense::run(&arguments.options()),
-        Command::Monitor(arguments) => monitor::run(&arguments.options()),
+        Command::Monitor(arguments) => monitor::run(&arguments.options()?),
         Command::Check(arguments) => check::run(&check::Options {
-            address: arguments.device.address(),
+            address: arguments.device.address()?,
             patience: arguments.device.timeout,
             duration: arguments.seconds,
             min_rate_hz: arguments.min_rate,
@@ -806,7 +916,7 @@ fn run(command: Command) -> Result<(), Failure> {
             seconds,
             json,
         } => record::run(&record::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             duration: seconds,
             file,
@@ -822,7 +932,7 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             files,
             json,
-        } => snapshot::run(&device.address(), device.timeout, &files.files(), json),
+        } => snapshot::run(&device.address()?, device.timeout, &files.files(), json),
         Command::View {
             port,
             timeout,
@@ -845,24 +955,36 @@ fn run(command: Command) -> Result<(), Failure> {
             report,
             json,
         } => bring_up::run(&bring_up::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             report,
             json,
         }),
-        Command::Focus { device, json } => focus::run(&device.address(), device.timeout, json),
-        Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
+        Command::List { json, timeout } => list::run(timeout, json),
+        Command::Focus { device, json } => focus::run(&device.address()?, device.timeout, json),
+        Command::SelfTest { device, json } => health::run(&device.address()?, device.timeout, json),
+        Command::Info { device, json } => info::run(&device.address()?, device.timeout, json),
         Command::Tare {
             device,
             frames,
             keep,
+            force,
             json,
-        } => command::tare(&device.address(), device.timeout, frames, keep, json),
+        } => {
+            let tare = command::Tare {
+                frames,
+                force,
+                keep,
+                json,
+            };
+            command::tare(&device.address()?, device.timeout, &tare)
+        }
         Command::Expose { device, json } => {
-            command::expose(&device.address(), device.timeout, json)
+            command::expose(&device.address()?, device.timeout, json)
         }
         Command::Threshold(arguments) => arguments.run(),
         Command::Settings(command) => command.run(),
+        Command::Update(command) => command.run(),
         Command::Completion { shell } => help::completion(shell),
         Command::Man { folder } => help::man(&folder),
     }

@@ -269,7 +269,15 @@ impl Player {
             | Request::SetName(_)
             | Request::SetTemporal(_)
             | Request::SetTare(_)
-            | Request::Keep(_) => Outcome::Unsupported,
+            | Request::Keep(_)
+            | Request::BeginModel { .. }
+            | Request::ModelPart(_)
+            | Request::UseModel
+            | Request::UseBuiltInModel
+            | Request::Reset
+            | Request::TareAnyway { .. }
+            | Request::GetHealth
+            | Request::StartLoader => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

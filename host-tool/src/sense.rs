@@ -209,7 +209,8 @@ impl<'a> Bench<'a> {
 /// What is wrong with a tare's picture, and what to do.
 fn complaint(refusal: Refusal) -> &'static str {
     match refusal {
-        Refusal::MarkersImplausible | Refusal::Unsteady => {
+        // One picture has no rest position before it, so that nothing is known to touch it.
+        Refusal::MarkersImplausible | Refusal::Unsteady | Refusal::Touched => {
             "does not show four whole, equal markers: one may be covered, cut, stained or glare; \
              use a picture of a clean film in even light"
         }

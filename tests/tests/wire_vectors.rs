@@ -14,6 +14,7 @@ use hivtac_terms::units::{
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
+use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
@@ -96,6 +97,7 @@ fn model(threshold: Threshold) -> ModelIdentity {
         name: "11-64-64-3 ov7725".try_into().unwrap(),
         simulated: true,
         threshold,
+        source: ModelSource::Kept,
     }
 }
 
@@ -263,6 +265,25 @@ fn settings() -> DeviceMessage {
         failures: 0,
         temporal: OWN,
         rezeroed: Px(1_311),
+        drift: Some(Px(20_316)),
+    })
+}
+
+fn health() -> DeviceMessage {
+    DeviceMessage::Health(Health {
+        reset: ResetReason::Watchdog,
+        temperature_centidegrees: Some(4_150),
+        stack_used: 6_120,
+        stack_bytes: 24_576,
+        problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit(),
+    })
+}
+
+fn tared() -> DeviceMessage {
+    DeviceMessage::Tared(TareReport {
+        rest: rest(),
+        spread: Px(789),
+        moved: Some(Px(20_316)),
     })
 }
 
@@ -328,10 +349,22 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("reply-no-camera", reply(10, Outcome::NoCamera)),
         ("inspection", inspection()),
         ("settings", settings()),
+        ("tared", tared()),
+        ("health", health()),
+        ("reply-touched", reply(7, Outcome::Touched)),
         ("reply-worn", reply(14, Outcome::Worn)),
+        ("reply-model-unusable", reply(18, Outcome::ModelUnusable)),
+        ("reply-another-sensor", reply(18, Outcome::AnotherSensor)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
+}
+
+fn model_part() -> ModelPart {
+    ModelPart {
+        offset: 57_972,
+        bytes: [0x0D, 0xF0, 0xFE, 0xCA].as_slice().try_into().unwrap(),
+    }
 }
 
 fn host_messages() -> BTreeMap<String, HostMessage> {
@@ -379,6 +412,20 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
             command(15, Request::SetTemporal(median)),
         ),
         ("keep", command(14, Request::Keep(NAME_AND_TARE))),
+        (
+            "begin-model",
+            command(16, Request::BeginModel { bytes: 57_976 }),
+        ),
+        ("model-part", command(17, Request::ModelPart(model_part()))),
+        ("use-model", command(18, Request::UseModel)),
+        ("use-built-in-model", command(19, Request::UseBuiltInModel)),
+        ("reset", command(20, Request::Reset)),
+        ("get-health", command(21, Request::GetHealth)),
+        ("start-loader", command(22, Request::StartLoader)),
+        (
+            "tare-anyway",
+            command(7, Request::TareAnyway { frames: 128 }),
+        ),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -430,7 +477,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 9);
+    assert_eq!(distinct.len(), 11);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -439,7 +486,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 14);
+    assert_eq!(requests.len(), 22);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

@@ -141,6 +141,7 @@ MODEL = [
     string("model.name", "11-64-64-3 ov7725"),
     raw("model.simulated: true", [1]),
 ]
+KEPT_MODEL = [raw("model.source: Kept", [1])]
 
 
 def sample(sequence, frame_number, time_us, status, names):
@@ -204,10 +205,10 @@ STATS = [
 ]
 
 DEVICE = {
-    "device-hello": HELLO + MODEL + RED + hello_end(RED) + [string("name", "thumb")]
-    + LOW_PASS,
-    "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR) + [string("name", "thumb")]
-    + NO_FILTER,
+    "device-hello": HELLO + MODEL + RED + KEPT_MODEL + hello_end(RED)
+    + [string("name", "thumb")] + LOW_PASS,
+    "device-hello-yuv422": HELLO + MODEL + RED_CR + KEPT_MODEL + hello_end(RED_CR)
+    + [string("name", "thumb")] + NO_FILTER,
     "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED)
     + [string("name", "")] + NO_FILTER,
     "sample-force": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact") + ANGLES
@@ -286,8 +287,33 @@ DEVICE = {
         unsigned("failures", 0),
         *OWN,
         signed("rezeroed_q16", 1_311),
+        raw("drift: Some", [1]),
+        signed("drift_q16", 20_316),
+    ],
+    "health": [
+        raw("Health", [10]),
+        raw("reset: Watchdog", [4]),
+        raw("temperature_centidegrees: Some", [1]),
+        signed("temperature_centidegrees", 4_150),
+        unsigned("stack_used", 6_120),
+        unsigned("stack_bytes", 24_576),
+        (varint(0x44), "problems 0x44: model_fallback, watchdog_reset"),
+    ],
+    "tared": [
+        raw("Tared", [9]),
+        *REST[1:],
+        signed("spread_q16", 789),
+        raw("moved: Some", [1]),
+        signed("moved_q16", 20_316),
     ],
     "reply-worn": [raw("Reply", [4]), unsigned("id", 14), raw("outcome: Worn", [10])],
+    "reply-model-unusable": [
+        raw("Reply", [4]), unsigned("id", 18), raw("outcome: ModelUnusable", [11]),
+    ],
+    "reply-touched": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Touched", [13])],
+    "reply-another-sensor": [
+        raw("Reply", [4]), unsigned("id", 18), raw("outcome: AnotherSensor", [12]),
+    ],
 }
 
 HOST = {
@@ -313,6 +339,17 @@ HOST = {
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
     + [raw("filter: MedianOfThree", [2])] + NO_REZERO,
+    "begin-model": COMMAND
+    + [unsigned("id", 16), raw("BeginModel", [14]), unsigned("bytes", 57_976)],
+    "model-part": COMMAND
+    + [unsigned("id", 17), raw("ModelPart", [15]), unsigned("offset", 57_972),
+       raw("bytes: 4", [4]), raw("the file's CRC-32 0xcafef00d", [0x0D, 0xF0, 0xFE, 0xCA])],
+    "use-model": COMMAND + [unsigned("id", 18), raw("UseModel", [16])],
+    "use-built-in-model": COMMAND + [unsigned("id", 19), raw("UseBuiltInModel", [17])],
+    "tare-anyway": COMMAND + [unsigned("id", 7), raw("TareAnyway", [19]), unsigned("frames", 128)],
+    "get-health": COMMAND + [unsigned("id", 21), raw("GetHealth", [20])],
+    "start-loader": COMMAND + [unsigned("id", 22), raw("StartLoader", [21])],
+    "reset": COMMAND + [unsigned("id", 20), raw("Reset", [18])],
 }
 
 FOREIGN = {

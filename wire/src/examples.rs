@@ -1,5 +1,6 @@
 //! Messages for tests: the longest of each kind, and arbitrary ones.
 
+use crate::health::*;
 use crate::message::*;
 use crate::settings::*;
 use crate::version::SCHEMA_HASH;
@@ -58,6 +59,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
                 name: full(),
                 simulated: true,
                 threshold: RED,
+                source: ModelSource::Fallback,
             }),
             width: u16::MAX,
             height: u16::MAX,
@@ -100,6 +102,19 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             failures: u32::MAX,
             temporal: longest_temporal(),
             rezeroed: Px(i32::MIN),
+            drift: Some(Px(i32::MIN)),
+        }),
+        DeviceMessage::Health(Health {
+            reset: ResetReason::Other,
+            temperature_centidegrees: Some(i16::MIN),
+            stack_used: u32::MAX,
+            stack_bytes: u32::MAX,
+            problems: u32::MAX,
+        }),
+        DeviceMessage::Tared(TareReport {
+            rest: longest_rest(),
+            spread: Px(i32::MIN),
+            moved: Some(Px(i32::MIN)),
         }),
     ]
 }
@@ -223,6 +238,17 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::SetTare(Some(longest_rest())),
         Request::Keep(Selection::ALL),
         Request::SetTemporal(longest_temporal()),
+        Request::BeginModel { bytes: u32::MAX },
+        Request::ModelPart(ModelPart {
+            offset: u32::MAX,
+            bytes: Bytes::from_array([u8::MAX; MODEL_PART_BYTES]),
+        }),
+        Request::UseModel,
+        Request::UseBuiltInModel,
+        Request::Reset,
+        Request::TareAnyway { frames: u16::MAX },
+        Request::GetHealth,
+        Request::StartLoader,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -249,6 +275,8 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_part().prop_map(DeviceMessage::SnapshotPart),
         any_inspection().prop_map(DeviceMessage::Inspection),
         any_report().prop_map(DeviceMessage::Settings),
+        any_tared().prop_map(DeviceMessage::Tared),
+        any_health().prop_map(DeviceMessage::Health),
     ]
 }
 
@@ -269,6 +297,14 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         proptest::option::of(any_rest()).prop_map(Request::SetTare),
         any_selection().prop_map(Request::Keep),
         any_temporal().prop_map(Request::SetTemporal),
+        any::<u32>().prop_map(|bytes| Request::BeginModel { bytes }),
+        any_model_part().prop_map(Request::ModelPart),
+        Just(Request::UseModel),
+        Just(Request::UseBuiltInModel),
+        Just(Request::Reset),
+        any::<u16>().prop_map(|frames| Request::TareAnyway { frames }),
+        Just(Request::GetHealth),
+        Just(Request::StartLoader),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -287,7 +323,19 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     ];
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
-    let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
+    let source = prop_oneof![
+        Just(ModelSource::BuiltIn),
+        Just(ModelSource::Kept),
+        Just(ModelSource::Fallback)
+    ];
+    let model = (
+        any::<u32>(),
+        any_string(),
+        any::<bool>(),
+        any_threshold(),
+        source,
+    );
+    let model = proptest::option::of(model);
     let identity = (any::<[u8; 12]>(), any_string(), any_temporal());
     (identity, names, size, model, seen).prop_map(
         |((device_id, name, temporal), (board, firmware, preset), (width, height), model, seen)| {
@@ -298,11 +346,12 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
                 firmware,
                 width,
                 height,
-                model: model.map(|(crc, name, simulated, threshold)| ModelIdentity {
+                model: model.map(|(crc, name, simulated, threshold, source)| ModelIdentity {
                     crc,
                     name,
                     simulated,
                     threshold,
+                    source,
                 }),
                 threshold: seen.0,
                 preset,
@@ -406,6 +455,9 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::NotRead),
         Just(Outcome::NoCamera),
         Just(Outcome::Worn),
+        Just(Outcome::ModelUnusable),
+        Just(Outcome::AnotherSensor),
+        Just(Outcome::Touched),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -426,6 +478,14 @@ fn any_snapshot() -> impl Strategy<Value = Snapshot> {
 fn any_part() -> impl Strategy<Value = SnapshotPart> {
     let bytes = proptest::collection::vec(any::<u8>(), 0..=SNAPSHOT_PART_BYTES);
     (any::<u32>(), bytes).prop_map(|(offset, bytes)| SnapshotPart {
+        offset,
+        bytes: Bytes::from_slice(&bytes).unwrap(),
+    })
+}
+
+fn any_model_part() -> impl Strategy<Value = ModelPart> {
+    let bytes = proptest::collection::vec(any::<u8>(), 0..=MODEL_PART_BYTES);
+    (any::<u32>(), bytes).prop_map(|(offset, bytes)| ModelPart {
         offset,
         bytes: Bytes::from_slice(&bytes).unwrap(),
     })
@@ -466,9 +526,14 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         proptest::option::of(any_rest()),
         any_temporal(),
     );
-    let numbers = any::<([u32; 2], i32)>();
+    let numbers = any::<([u32; 2], i32, Option<i32>)>();
     (used, any_selection(), found, numbers).prop_map(
-        |((name, threshold, tare, temporal), kept, found, ([erases, failures], rezeroed))| {
+        |(
+            (name, threshold, tare, temporal),
+            kept,
+            found,
+            ([erases, failures], rezeroed, drift),
+        )| {
             SettingsReport {
                 name,
                 threshold,
@@ -479,9 +544,38 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
                 failures,
                 temporal,
                 rezeroed: Px(rezeroed),
+                drift: drift.map(Px),
             }
         },
     )
+}
+
+fn any_health() -> impl Strategy<Value = Health> {
+    let reset = prop_oneof![
+        Just(ResetReason::PowerOn),
+        Just(ResetReason::BrownOut),
+        Just(ResetReason::Pin),
+        Just(ResetReason::Software),
+        Just(ResetReason::Watchdog),
+        Just(ResetReason::Other)
+    ];
+    (reset, any::<(Option<i16>, u32, u32, u32)>()).prop_map(
+        |(reset, (temperature_centidegrees, stack_used, stack_bytes, problems))| Health {
+            reset,
+            temperature_centidegrees,
+            stack_used,
+            stack_bytes,
+            problems,
+        },
+    )
+}
+
+fn any_tared() -> impl Strategy<Value = TareReport> {
+    (any_rest(), any::<(i32, Option<i32>)>()).prop_map(|(rest, (spread, moved))| TareReport {
+        rest,
+        spread: Px(spread),
+        moved: moved.map(Px),
+    })
 }
 
 fn any_selection() -> impl Strategy<Value = Selection> {

@@ -55,6 +55,21 @@ pub struct SettingsReport {
     /// How far re-zeroing moved the rest position that is in use from `tare`: the coordinate of a
     /// marker that it moved farthest.
     pub rezeroed: Px,
+    /// How far the rest position in use is from the kept one, by the marker that moved most: the
+    /// drift since then. `None` unless there are both, for the same frames.
+    pub drift: Option<Px>,
+}
+
+/// What a tare gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TareReport {
+    /// The rest position, in use from now on.
+    pub rest: RestPosition,
+    /// Largest standard deviation of a marker's coordinate over the frames.
+    pub spread: Px,
+    /// How far it is from the rest position before, by the marker that moved most; `None` when
+    /// there was none.
+    pub moved: Option<Px>,
 }
 
 /// Some of the settings.

@@ -6,7 +6,7 @@ use super::*;
 use crate::focus::tests::{device, frame};
 use hivtac_scene::{Format, Options as Scene, Paint, Patch};
 use hivtac_terms::threshold::{HsvBox, Mono, Yuv422};
-use hivtac_wire::message::ModelIdentity;
+use hivtac_wire::message::{ModelIdentity, ModelSource};
 
 /// A device whose model was made for this threshold.
 fn device_for(threshold: Threshold) -> DeviceHello {
@@ -15,6 +15,7 @@ fn device_for(threshold: Threshold) -> DeviceHello {
         name: "model".try_into().unwrap(),
         simulated: true,
         threshold,
+        source: ModelSource::BuiltIn,
     };
     DeviceHello {
         model: Some(model),

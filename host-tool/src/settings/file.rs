@@ -101,6 +101,7 @@ pub struct Kept {
     found: &'static str,
     erases: u32,
     failures: u32,
+    drift_q16: Option<i32>,
 }
 
 #[derive(Serialize)]
@@ -136,6 +137,7 @@ impl Kept {
             },
             erases: report.erases,
             failures: report.failures,
+            drift_q16: report.drift.map(|drift| drift.0),
         }
     }
 }
@@ -338,6 +340,7 @@ mod tests {
             failures: 0,
             temporal: TemporalSettings::default(),
             rezeroed: Px(0),
+            drift: None,
         }
     }
 

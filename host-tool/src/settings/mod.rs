@@ -88,6 +88,19 @@ pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
     send(link, Request::Keep(selection), KEEP_PATIENCE)
 }
 
+/// A device's settings.
+///
+/// # Errors
+/// What the device refuses.
+pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failure> {
+    let mut report = None;
+    link.request(Request::GetSettings, patience, |message| match message {
+        DeviceMessage::Settings(newest) => report = Some(newest),
+        other => tell(other),
+    })?;
+    report.ok_or_else(|| link.lost("its settings did not come"))
+}
+
 /// A name for a device: 1 to 24 bytes that can be read.
 ///
 /// # Errors
@@ -116,14 +129,7 @@ struct Device {
 
 impl Device {
     fn settings(&mut self) -> Result<SettingsReport, Failure> {
-        let mut report = None;
-        let patience = self.patience;
-        self.link
-            .request(Request::GetSettings, patience, |message| match message {
-                DeviceMessage::Settings(newest) => report = Some(newest),
-                other => tell(other),
-            })?;
-        report.ok_or_else(|| self.link.lost("its settings did not come"))
+        ask(&mut self.link, self.patience)
     }
 
     fn send(&mut self, request: Request) -> Result<(), Failure> {
@@ -193,15 +199,14 @@ impl Device {
         }
         let tare = file.rest().filter(|_| is_own);
         let name = name(&file.name).unwrap_or_default();
-        self.set(name, Some(file.threshold()), tare, file.temporal())?;
+        self.set(name, file.threshold(), tare, file.temporal())?;
         let line = format!("settings of {path} are in use and kept");
         let parts = json!({ "file": path, "kept": true, "tare": tare.is_some() });
         self.tell(&line, parts)
     }
 
     fn reset(&mut self) -> Result<(), Failure> {
-        let threshold = self.hello.model.as_ref().map(|model| model.threshold);
-        self.set(Name::new(), threshold, None, TemporalSettings::default())?;
+        send(&mut self.link, Request::Reset, KEEP_PATIENCE)?;
         let line = "everything that was kept is forgotten; take a tare";
         self.tell(line, json!({ "kept": false }))
     }
@@ -210,7 +215,7 @@ impl Device {
     fn set(
         &mut self,
         name: Name,
-        threshold: Option<Threshold>,
+        threshold: Threshold,
         tare: Option<RestPosition>,
         temporal: TemporalSettings,
     ) -> Result<(), Failure> {
@@ -219,7 +224,7 @@ impl Device {
             Failure::new(failure.kind, format!("{failure}; {what}"))
         };
         // Another pixel format forgets the rest position.
-        if let Some(threshold) = threshold.filter(|threshold| *threshold != self.hello.threshold) {
+        if threshold != self.hello.threshold {
             self.send(Request::SetThreshold(threshold))
                 .map_err(unkept)?;
         }

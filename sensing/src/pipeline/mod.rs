@@ -110,9 +110,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         model: Option<Model<'m>>,
     ) -> Result<(), SettingsError> {
         settings.check()?;
-        self.pixels
-            .set(&settings.threshold, settings.byte_order)
-            .map_err(SettingsError::Threshold)?;
+        let seen = (settings.threshold, settings.byte_order);
+        let is_set = seen == (self.settings.threshold, self.settings.byte_order);
+        // A table of RGB565 takes as long as some frames.
+        if self.prepared.is_none() || !is_set {
+            let set = self.pixels.set(&settings.threshold, settings.byte_order);
+            set.map_err(SettingsError::Threshold)?;
+        }
         self.settings = settings;
         self.model = model;
         self.tare = None;

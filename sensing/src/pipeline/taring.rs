@@ -4,6 +4,7 @@ use super::{Measurement, Sensor};
 use crate::tare::{Refusal, TareBuilder};
 use hivtac_force::rest::Rest;
 use hivtac_markers::tables::Table;
+use hivtac_terms::status::Status;
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Gives a tare the frame that was finished last, of which `measurement` is. A frame without
@@ -18,6 +19,11 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let features = measurement.features.as_ref()?;
         let found = self.find_markers().ok()?;
         let geometry = &self.settings.geometry;
+        // Against the model's rest position every unit is touched.
+        let is_touched = self.tare.is_some() && measurement.status.contains(Status::CONTACT);
+        if is_touched && !tare.insists() {
+            return tare.add_touched().map(Err);
+        }
         // The images of a pressed film are not those of a flat one; that it is pressed matters.
         let is_pressed = !Rest::of_markers(&found.markers).fits(geometry);
         if is_pressed || found.may_rest(&self.settings) {
