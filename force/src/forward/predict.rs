@@ -63,13 +63,12 @@ impl Tables<'_> {
         let mut prediction = Prediction::default();
         let mut seen = [1.0; 2];
         for (marker, (corner, beside_mm)) in CORNERS.into_iter().zip(beside_mm).enumerate() {
-            for along in [0, 1]
-                .into_iter()
-                .filter(|&along| seen[along] != corner[along])
-            {
-                turn(outputs, &mut steps, along);
+            for (along, (seen, corner)) in seen.iter_mut().zip(corner).enumerate() {
+                if *seen != corner {
+                    turn(outputs, &mut steps, along);
+                    *seen = corner;
+                }
             }
-            seen = corner;
             // The place beside which a marker in its place would be as far from the tip.
             let place_mm = [0, 1].map(|i| corner[i] * (pose.place_mm[i] - beside_mm[i]));
             let at = place(&self.moved, place_mm);
@@ -80,8 +79,9 @@ impl Tables<'_> {
             for axis in [0, 1] {
                 let reflection = Reflection { corner, axis };
                 let [x, y] = reflection.vector(*beside_mm);
-                let answer = |(&Output(table, output), steps): (&_, &[Steps; 2]), at| {
-                    table.answer(output, &reflection.swapped(at), &steps[axis])
+                let answer = |(&Output(table, output), [of_x, of_y]): (&_, &[Steps; 2]), at| {
+                    let steps = if axis == 0 { of_x } else { of_y };
+                    table.answer(output, &reflection.swapped(at), steps)
                 };
                 let mut all = outputs.iter().zip(&steps);
                 let mut moved = all
@@ -117,9 +117,11 @@ fn turn(outputs: &[Output<'_>], steps: &mut [[Steps; 2]; 3], along: usize) {
 impl Prediction {
     fn set(&mut self, equation: usize, answer: &Answer) {
         debug_assert!(equation < EQUATIONS);
-        self.moved[equation] = answer.value;
-        for (column, slope) in self.slopes.iter_mut().zip(answer.slopes) {
-            column[equation] = slope;
+        let columns = self.slopes.iter_mut().zip(answer.slopes);
+        for (column, part) in columns.chain([(&mut self.moved, answer.value)]) {
+            if let Some(place) = column.get_mut(equation) {
+                *place = part;
+            }
         }
     }
 }
@@ -156,7 +158,7 @@ impl Reflection {
     /// which comes first.
     fn back(&self, reflected: &Answer) -> Answer {
         let [sx, sy] = self.corner;
-        let sign = self.corner[self.axis];
+        let sign = if self.axis == 0 { sx } else { sy };
         let [size, a, b, x, y] = reflected.slopes;
         let ([a, b], [x, y]) = match self.axis {
             0 => ([a, b], [x, y]),

@@ -95,9 +95,9 @@ pub fn solve<const N: usize>(
         explained: along.iter().fold(0.0, |sum, part| sum + part * part),
         spread: inverse,
     };
-    for row in 0..UNKNOWNS {
+    for (row, unknown) in solved.unknowns.iter_mut().enumerate() {
         for k in row..UNKNOWNS {
-            solved.unknowns[row] += inverse[row][k] * along[k];
+            *unknown += inverse[row][k] * along[k];
         }
     }
     let sound = left_over.is_finite() && solved.unknowns.iter().all(|part| part.is_finite());
