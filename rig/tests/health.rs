@@ -54,5 +54,5 @@ fn the_parts_own_loader_is_started_on_request() {
     let report = &run.report;
     assert_eq!(report.resets, 1, "{:?}", report.usb_log);
     assert_eq!(report.usb.enumerations, 1, "{:?}", report.usb_log);
-    assert_eq!(report.refused, [String::new(); 0]);
+    assert!(report.refused.is_empty(), "{:?}", report.refused);
 }

@@ -37,7 +37,7 @@ pub fn frame(change: impl Fn(&mut Options)) -> Frame {
     let rendered = scene.render_load(&Load::REST, 7).unwrap();
     let in_order = |pixel: u16| match format {
         Format::Rgb565 => pixel.to_be_bytes(),
-        Format::Yuv422 | Format::Mono => pixel.to_le_bytes(),
+        _ => pixel.to_le_bytes(),
     };
     Frame {
         number: 7,
@@ -46,8 +46,8 @@ pub fn frame(change: impl Fn(&mut Options)) -> Frame {
         height: 240,
         threshold: match format {
             Format::Rgb565 => Threshold::Rgb565(HsvBox::of_limits(RED)),
-            Format::Yuv422 => Threshold::Yuv422(Yuv422::RED),
             Format::Mono => Threshold::Mono(Mono::DARK),
+            _ => Threshold::Yuv422(Yuv422::RED),
         },
         bytes: match format {
             Format::Mono => rendered.mono,
