@@ -54,11 +54,13 @@ mod usb;
 mod usb_guard;
 mod vsync;
 
+use band_copy::BandCopy;
 use camera::Format;
 use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
-use embassy_stm32::interrupt;
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{interrupt, peripherals};
 use hivtac_sensing::temporal::Temporal;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
@@ -66,6 +68,7 @@ use memory::Memory;
 use model::Chosen;
 use next_model::InUse;
 use pipeline_task::Sensor;
+use snapshot_copy::SnapshotCopy;
 use static_cell::{ConstStaticCell, StaticCell};
 
 core::arch::global_asm!(include_str!("start.s"));
@@ -77,9 +80,40 @@ static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 /// cache holds.
 #[unsafe(link_section = ".sram.sensor")]
 static SENSOR: ConstStaticCell<Sensor> = ConstStaticCell::new(Sensor::new());
+/// Likewise.
+#[unsafe(link_section = ".sram.temporal")]
+static TEMPORAL: ConstStaticCell<Temporal> = ConstStaticCell::new(Temporal::new());
 
 #[entry]
 fn main() -> ! {
+    let foreground = start();
+    THREAD_EXECUTOR
+        .init(Executor::new())
+        .run(|spawner: Spawner| {
+            spawner.spawn(token(pipeline_task::run(
+                foreground.sensor,
+                foreground.temporal,
+                foreground.model,
+                foreground.bands,
+                foreground.snapshots,
+            )));
+            spawner.spawn(token(faults::feed_watchdog(foreground.watchdog)));
+        })
+}
+
+/// What runs in thread mode.
+struct Foreground {
+    sensor: &'static mut Sensor,
+    temporal: &'static mut Temporal,
+    model: InUse,
+    bands: BandCopy,
+    snapshots: SnapshotCopy,
+    watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
+}
+
+/// Starts everything else. Not in `main`, which never gives its stack back.
+#[inline(never)]
+fn start() -> Foreground {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
     caches::enable(&mut core);
     bands::clear();
@@ -91,9 +125,9 @@ fn main() -> ! {
     let mut memory = Memory::open(board.flash, board.thermometer);
     settings::set_name(memory.record().name.clone());
     let chosen = memory.model();
-    let model_in_use = InUse::of(&chosen);
-    let mut temporal = Temporal::new();
-    let format = configure(sensor, &mut temporal, chosen, memory.record());
+    let model = InUse::of(&chosen);
+    let temporal = TEMPORAL.take();
+    let format = configure(sensor, temporal, chosen, memory.record());
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
@@ -105,18 +139,14 @@ fn main() -> ! {
         board.capture,
         format,
     )));
-    THREAD_EXECUTOR
-        .init(Executor::new())
-        .run(|spawner: Spawner| {
-            spawner.spawn(token(pipeline_task::run(
-                sensor,
-                temporal,
-                model_in_use,
-                board.bands,
-                board.snapshots,
-            )));
-            spawner.spawn(token(faults::feed_watchdog(board.watchdog)));
-        })
+    Foreground {
+        sensor,
+        temporal,
+        model,
+        bands: board.bands,
+        snapshots: board.snapshots,
+        watchdog: board.watchdog,
+    }
 }
 
 /// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.

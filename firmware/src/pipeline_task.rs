@@ -75,7 +75,7 @@ pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 #[embassy_executor::task]
 pub async fn run(
     sensor: &'static mut Sensor,
-    temporal: Temporal,
+    temporal: &'static mut Temporal,
     model: InUse,
     bands: BandCopy,
     snapshots: SnapshotCopy,
@@ -115,7 +115,7 @@ pub async fn run(
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
-    temporal: Temporal,
+    temporal: &'static mut Temporal,
     model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
@@ -265,7 +265,7 @@ impl PipelineTask {
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
         if afresh {
-            self.temporal = Temporal::new();
+            *self.temporal = Temporal::new();
         }
         self.temporal.set_tare(self.sensor.tare().copied());
         if self.sensor.threshold() == before {
@@ -293,7 +293,7 @@ impl PipelineTask {
 
     /// Tells what it measures with from now on.
     fn follow(&self) {
-        settings::follow(self.sensor, &self.temporal, self.model.source);
+        settings::follow(self.sensor, self.temporal, self.model.source);
     }
 
     /// Measures against this rest position from the next frame on, or against the model's own.

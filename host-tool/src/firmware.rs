@@ -2,13 +2,14 @@
 
 use crate::command::send;
 use crate::files::read_at_most;
-use crate::output::{note, print};
+use crate::output::{note, tell};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::stop;
 use hivtac_wire::message::{DeviceHello, Request};
+use serde_json::json;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
@@ -29,22 +30,24 @@ pub fn update(
     patience: Duration,
     path: &str,
     wait: Duration,
+    json: bool,
 ) -> Result<(), Failure> {
     check(path)?;
     let (mut link, before) = Link::connect(address, patience)?;
     send(&mut link, Request::StartLoader, patience)?;
     drop(link);
-    print(&format!(
-        "the device is in its loader; now run\n\n  {}\n\nand it comes back by itself",
-        dfu_util(path)
-    ))?;
+    let line = dfu_util(path);
+    let told =
+        format!("the device is in its loader; now run\n\n  {line}\n\nand it comes back by itself");
+    tell(json, &told, &json!({ "run": line }))?;
     let after = come_back(address, patience, &before, wait)?;
-    print(&format!(
-        "firmware {}, was {}",
-        shown(&after.firmware),
-        shown(&before.firmware)
-    ))
-    .map(|_| ())
+    let [now, was] = [&after.firmware, &before.firmware];
+    let told = format!("firmware {}, was {}", shown(now), shown(was));
+    tell(
+        json,
+        &told,
+        &json!({ "firmware": now.as_str(), "was": was.as_str() }),
+    )
 }
 
 /// The command that sends the file to the loader: to the start of the flash, which is then left.

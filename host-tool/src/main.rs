@@ -410,6 +410,9 @@ enum UpdateCommand {
         /// Longest wait for the device to come back, s
         #[arg(long, value_name = "S", default_value = "300", value_parser = seconds)]
         wait: Duration,
+        /// JSON objects instead of lines: the command to run, then the version before and after
+        #[arg(long)]
+        json: bool,
     },
 }
 
@@ -429,9 +432,12 @@ impl UpdateCommand {
                     None => update::built_in_model(&options),
                 }
             }
-            UpdateCommand::Firmware { device, file, wait } => {
-                firmware::update(&device.address()?, device.timeout, &file, wait)
-            }
+            UpdateCommand::Firmware {
+                device,
+                file,
+                wait,
+                json,
+            } => firmware::update(&device.address()?, device.timeout, &file, wait, json),
         }
     }
 }

@@ -53,49 +53,41 @@ impl Tables<'_> {
             true => outputs.get(..1).unwrap_or_default(),
             false => &outputs,
         };
+        let mut prediction = Prediction::default();
         // Under the load as marker 2 has it, for what moves along x and for what moves along y.
-        let mut steps: [[Steps; 2]; 3] = Default::default();
-        for (&Output(table, output), steps) in outputs.iter().zip(&mut steps) {
+        let mut steps: [Steps; 2] = Default::default();
+        for (nth, &Output(table, output)) in outputs.iter().enumerate() {
             for (steps, tilts) in steps.iter_mut().zip(&tilts) {
                 table.set(steps, output, &sizes, tilts);
             }
-        }
-        let mut prediction = Prediction::default();
-        let mut seen = [1.0; 2];
-        for (marker, (corner, beside_mm)) in CORNERS.into_iter().zip(beside_mm).enumerate() {
-            for (along, (seen, corner)) in seen.iter_mut().zip(corner).enumerate() {
-                if *seen != corner {
-                    turn(outputs, &mut steps, along);
-                    *seen = corner;
+            let mut seen = [1.0; 2];
+            for (marker, (corner, beside_mm)) in CORNERS.into_iter().zip(beside_mm).enumerate() {
+                for (along, (seen, corner)) in seen.iter_mut().zip(corner).enumerate() {
+                    if *seen != corner {
+                        turn(table, &mut steps, along);
+                        *seen = corner;
+                    }
                 }
-            }
-            // The place beside which a marker in its place would be as far from the tip.
-            let place_mm = [0, 1].map(|i| corner[i] * (pose.place_mm[i] - beside_mm[i]));
-            let at = place(&self.moved, place_mm);
-            let beside_at = match outputs {
-                [_] => at,
-                _ => place(&self.beside, place_mm),
-            };
-            for axis in [0, 1] {
-                let reflection = Reflection { corner, axis };
-                let [x, y] = reflection.vector(*beside_mm);
-                let answer = |(&Output(table, output), [of_x, of_y]): (&_, &[Steps; 2]), at| {
-                    let steps = if axis == 0 { of_x } else { of_y };
-                    table.answer(output, &reflection.swapped(at), steps)
-                };
-                let mut all = outputs.iter().zip(&steps);
-                let mut moved = all
-                    .next()
-                    .map_or(Answer::default(), |first| answer(first, at));
-                // What gluing changes of the slopes is far less than they are.
-                for (more, part) in all.zip([x, y]) {
-                    moved.value += part * answer(more, beside_at).value;
+                // The place beside which a marker in its place would be as far from the tip.
+                let place_mm = [0, 1].map(|i| corner[i] * (pose.place_mm[i] - beside_mm[i]));
+                let at = place(table, place_mm);
+                for (axis, steps) in steps.iter().enumerate() {
+                    let reflection = Reflection { corner, axis };
+                    let answer = table.answer(output, &reflection.swapped(at), steps);
+                    let equation = 2 * marker + axis;
+                    let [x, y] = reflection.vector(*beside_mm);
+                    // What gluing changes of the slopes is far less than they are.
+                    let more = |part: f32| reflection.sign() * part * answer.value;
+                    match nth {
+                        0 => prediction.set(equation, &reflection.back(&answer)),
+                        1 => prediction.add(equation, more(x)),
+                        _ => prediction.add(equation, more(y)),
+                    }
                 }
-                prediction.set(2 * marker + axis, &reflection.back(&moved));
             }
         }
         if let Some(own) = &self.own {
-            let [[steps, _], ..] = &mut steps;
+            let [steps, _] = &mut steps;
             let at = place(own, pose.place_mm);
             for (k, moved) in prediction.moved.iter_mut().enumerate() {
                 own.set(steps, k, &sizes, &tilts[0]);
@@ -107,11 +99,9 @@ impl Tables<'_> {
 }
 
 /// Sees the load in a mirror: its part along x (0) or y (1) turned around.
-fn turn(outputs: &[Output<'_>], steps: &mut [[Steps; 2]; 3], along: usize) {
-    for (Output(table, _), [of_x, of_y]) in outputs.iter().zip(steps) {
-        table.turn(of_x, along);
-        table.turn(of_y, 1 - along);
-    }
+fn turn(table: &Table<'_>, [of_x, of_y]: &mut [Steps; 2], along: usize) {
+    table.turn(of_x, along);
+    table.turn(of_y, 1 - along);
 }
 
 impl Prediction {
@@ -124,6 +114,12 @@ impl Prediction {
             }
         }
     }
+
+    fn add(&mut self, equation: usize, moved: f32) {
+        if let Some(place) = self.moved.get_mut(equation) {
+            *place += moved;
+        }
+    }
 }
 
 /// The reflection in which a marker is in the lower right corner, and moves along x where it moves
@@ -134,6 +130,12 @@ struct Reflection {
 }
 
 impl Reflection {
+    /// Of what moves, reflected.
+    fn sign(&self) -> f32 {
+        let [sx, sy] = self.corner;
+        if self.axis == 0 { sx } else { sy }
+    }
+
     /// A vector along the film, reflected; and a reflected one, as it is.
     fn vector(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sx, sy] = self.corner;
@@ -157,8 +159,7 @@ impl Reflection {
     /// What was reflected, as it is: its slopes by tilt are those by the tilt as it is, but for
     /// which comes first.
     fn back(&self, reflected: &Answer) -> Answer {
-        let [sx, sy] = self.corner;
-        let sign = if self.axis == 0 { sx } else { sy };
+        let ([sx, sy], sign) = (self.corner, self.sign());
         let [size, a, b, x, y] = reflected.slopes;
         let ([a, b], [x, y]) = match self.axis {
             0 => ([a, b], [x, y]),

@@ -2,8 +2,8 @@
 //!
 //! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each
 //! seeded bug, `yuv422.elf` with the model for YUV422, and `openmv-h7.elf` for that board.
-//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed, `HIVTAC_BUSY_BUS` on a busy
-//! bus.
+//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed, `HIVTAC_BUSY_BUS` on a
+//! busy bus.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
