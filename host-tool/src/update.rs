@@ -42,7 +42,7 @@ pub fn model(options: &Options, path: &str) -> Result<(), Failure> {
     for part in parts(&file) {
         send(&mut link, Request::ModelPart(part), options.patience)?;
     }
-    link.request(Request::UseModel, KEEP_PATIENCE, tell)?;
+    link.request(Request::UseModel, options.patience.max(KEEP_PATIENCE), tell)?;
     let (hello, _) = info::ask(&mut link, options.patience, hello)?;
     let used = in_use(&link, hello, |used| {
         used.source == ModelSource::Kept && used.crc == model.crc()
@@ -57,7 +57,11 @@ pub fn model(options: &Options, path: &str) -> Result<(), Failure> {
 pub fn built_in_model(options: &Options) -> Result<(), Failure> {
     let begun = Instant::now();
     let (mut link, hello) = Link::connect(&options.address, options.patience)?;
-    link.request(Request::UseBuiltInModel, KEEP_PATIENCE, tell)?;
+    link.request(
+        Request::UseBuiltInModel,
+        options.patience.max(KEEP_PATIENCE),
+        tell,
+    )?;
     let (hello, _) = info::ask(&mut link, options.patience, hello)?;
     let used = in_use(&link, hello, |used| used.source == ModelSource::BuiltIn)?;
     say(options, &used, begun.elapsed())

@@ -304,7 +304,7 @@ fn nothing_that_a_device_says_acts_on_the_terminal() {
                         text: evil.try_into().unwrap(),
                     }));
                     device.send(DeviceMessage::Hello(hello.clone()));
-                    device.settings.name = evil.try_into().unwrap();
+                    device.settings.name = "\u{9b}2J\u{202e}".try_into().unwrap();
                     device.answer_to(HostMessage::Command(command));
                 }
             }
