@@ -69,9 +69,9 @@ fn frames_back_to_back_are_all_measured() {
     // All words of every frame that has ended, and some of the one under way, or all.
     let under_way = dcmi.words - dcmi.frames * 38_400;
     assert!((0..=38_400).contains(&under_way), "{dcmi:?}");
-    // Each band reached the core once.
+    // Each band reached the core once; on a busy bus the last ones are under way.
     let words = run.report.mdma_bytes / 4;
-    assert!(dcmi.words.abs_diff(words) <= 2 * 640, "{words} of {dcmi:?}");
+    assert!(dcmi.words.abs_diff(words) <= 4 * 640, "{words} of {dcmi:?}");
 }
 
 #[test]
