@@ -2,7 +2,7 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_wire::message::{Command, DeviceMessage, HostMessage, LogLevel, LogLine, Outcome};
+use hivtac_wire::message::{DeviceMessage, HostMessage, LogLevel, LogLine};
 use std::io::{BufRead, BufReader, Read};
 use std::time::{Duration, Instant};
 
