@@ -6,6 +6,7 @@
     .syntax unified
     .section .text.__pre_init, "ax", %progbits
     .global __pre_init
+    .weak   LOADER_WANTED           // a program that never asks has none
     .type __pre_init, %function
     .thumb_func
 __pre_init:
@@ -14,6 +15,7 @@ __pre_init:
     tst     r1, #0x01000000         // SFTRSTF: after a reset by software memory holds what it held
     beq     7f
     ldr     r0, =LOADER_WANTED
+    cbz     r0, 7f
     ldr     r1, [r0]
     ldr     r2, =0x21554644         // "DFU!"
     cmp     r1, r2
