@@ -4,9 +4,7 @@
 //! `HIVTAC_ATTACKS` is how many runs there are, from seed `HIVTAC_ATTACK_SEED` on; each is 0.9 s of
 //! virtual time.
 
-mod common;
-
-use common::{Run, Setup, command, firmware, hello};
+use crate::common::{Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;

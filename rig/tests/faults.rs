@@ -1,8 +1,6 @@
 //! Each fault ends in the status or counter that the firmware's documents name, and is survived.
 
-mod common;
-
-use common::{HELLO_MS, Setup, command, firmware, hello};
+use crate::common::{HELLO_MS, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
 use hivtac_terms::status::Status;

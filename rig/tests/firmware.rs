@@ -1,8 +1,6 @@
 //! The firmware as it is flashed: what it sends is what the camera saw.
 
-mod common;
-
-use common::{Setup, firmware};
+use crate::common::{Setup, firmware};
 use hivtac_rig::run::INSTRUCTIONS_PER_SECOND;
 use hivtac_terms::status::Status;
 
@@ -17,7 +15,7 @@ const PICTURE: Status = Status(
         | Status::FRAME_INCOMPLETE.0,
 );
 
-fn undisturbed(setup: Setup) -> common::Run {
+fn undisturbed(setup: Setup) -> crate::common::Run {
     let run = setup.run();
     assert_eq!(run.rejected.frames(), 0, "{:?}", run.rejected);
     assert_eq!((run.report.dcmi.overruns, run.report.resets), (0, 0));

@@ -1,8 +1,6 @@
 //! What the flashed firmware says of itself, and how it gives way to the part's own loader.
 
-mod common;
-
-use common::{Setup, command, firmware};
+use crate::common::{Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::{DeviceMessage, Outcome, Request};

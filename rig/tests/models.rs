@@ -1,12 +1,10 @@
 //! Models that a host sends to the flashed firmware: used from a frame on, kept through restarts
 //! and power cuts, or refused.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{Run, Setup, command, firmware};
+use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
@@ -427,7 +425,7 @@ fn an_update_ends_with_its_conversation() {
         .at(SEND_MS, Action::Send(half))
         .at(SEND_MS + 20, Action::Close)
         .at(SEND_MS + 40, Action::Open)
-        .at(SEND_MS + 50, Action::Send(common::hello()))
+        .at(SEND_MS + 50, Action::Send(crate::common::hello()))
         .at(SEND_MS + 60, send(LATER, Request::UseModel))
         .run();
     let replies: Vec<_> = run

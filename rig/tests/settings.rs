@@ -1,11 +1,9 @@
 //! What the flashed firmware keeps in its flash, through restarts and power cuts.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{Setup, command, firmware};
+use crate::common::{Setup, command, firmware};
 use hivtac_rig::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;

@@ -1,9 +1,7 @@
 //! Contact, slip and filter of the flashed firmware: those that the sensing on this computer makes
 //! of the same forces, bit for bit.
 
-mod common;
-
-use common::{Run, Setup, command, firmware};
+use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::temporal::{Moment, Temporal};

@@ -1,8 +1,6 @@
 //! A tare of the flashed firmware: taken of a film at rest, refused with the reason otherwise.
 
-mod common;
-
-use common::{Run, Setup, command, firmware};
+use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceMessage, Outcome, Request};

@@ -5,8 +5,6 @@
 //! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed, `HIVTAC_BUSY_BUS` on a
 //! busy bus.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
