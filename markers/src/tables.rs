@@ -34,7 +34,7 @@ pub trait Pixels {
     fn mask_each_row(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         let rows = rows.chunks(self.row_length(width).max(1));
         let mut any = false;
-        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
+        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width).max(1))) {
             any |= self.mask_row(row, mask);
         }
         any
