@@ -100,7 +100,7 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
         width,
         height,
         format: model.conditions.threshold.format(),
-        centroid: model.conditions.centroid.into(),
+        centroid: model.conditions.centroid,
         contact: match model.conditions.contact {
             ContactReading::Force => Contact::Force,
             ContactReading::Stick => Contact::Stick,

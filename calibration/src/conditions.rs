@@ -20,7 +20,6 @@ pub struct Conditions {
     /// Rows of a frame.
     pub height: u16,
     /// What a pixel is.
-    #[serde(with = "names::pixel_format")]
     pub pixel_format: PixelFormat,
     /// Threshold, as the model file has it: lowest and highest hue, saturation and value (OpenCV's
     /// 8-bit HSV; hue may wrap through 0); the lowest Cr of YUV422 and zeros; the lowest and
@@ -29,22 +28,12 @@ pub struct Conditions {
     /// 3×3 dilations of the mask.
     pub dilations: u8,
     /// How a marker's position is taken from its pixels.
-    pub centroid: CentroidName,
+    pub centroid: CentroidEstimator,
     /// What the labels mean; model files leave the friction ratio of `slip` out.
     #[serde(with = "names::contact")]
     pub contact: Contact,
     /// Where the data came from.
     pub origin: OriginName,
-}
-
-/// Centroid estimators by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CentroidName {
-    /// The mean of a marker's pixels in the mask.
-    BinaryMask,
-    /// The mean of the same pixels, weighted with their redness.
-    RednessWeighted,
 }
 
 /// Origins by name.
@@ -84,16 +73,6 @@ impl OriginName {
     }
 }
 
-impl CentroidName {
-    /// The same as the model file holds it.
-    pub fn to_model(self) -> CentroidEstimator {
-        match self {
-            CentroidName::BinaryMask => CentroidEstimator::BinaryMask,
-            CentroidName::RednessWeighted => CentroidEstimator::RednessWeighted,
-        }
-    }
-}
-
 /// What α, β and |F| mean in a contact reading, for reports.
 pub fn meaning(contact: Contact) -> &'static str {
     match contact {
@@ -109,15 +88,6 @@ pub fn meaning(contact: Contact) -> &'static str {
     }
 }
 
-impl From<CentroidEstimator> for CentroidName {
-    fn from(estimator: CentroidEstimator) -> Self {
-        match estimator {
-            CentroidEstimator::BinaryMask => CentroidName::BinaryMask,
-            CentroidEstimator::RednessWeighted => CentroidName::RednessWeighted,
-        }
-    }
-}
-
 impl Conditions {
     /// What the scene renders and the pipeline does by default, at a frame size and in a pixel
     /// format.
@@ -129,7 +99,7 @@ impl Conditions {
             pixel_format,
             threshold: Threshold::red(pixel_format).limits(),
             dilations: 1,
-            centroid: CentroidName::BinaryMask,
+            centroid: CentroidEstimator::BinaryMask,
             contact: Contact::default(),
             origin: OriginName::Simulated,
         }
@@ -155,7 +125,7 @@ impl Conditions {
             geometry: Geometry::preset(preset, self.width, self.height),
             threshold: Threshold::of_limits(self.pixel_format, self.threshold)?,
             dilations: self.dilations,
-            centroid: self.centroid.to_model(),
+            centroid: self.centroid,
             contact: match self.contact {
                 Contact::Force => ContactReading::Force,
                 Contact::Stick => ContactReading::Stick,
@@ -188,20 +158,6 @@ pub fn pixel_format(name: &str) -> Result<PixelFormat> {
 
 /// What files hold by its name.
 mod names {
-    pub mod pixel_format {
-        use hivtac_terms::threshold::PixelFormat;
-        use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-        pub fn serialize<S: Serializer>(format: &PixelFormat, to: S) -> Result<S::Ok, S::Error> {
-            to.serialize_str(format.name())
-        }
-
-        pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<PixelFormat, D::Error> {
-            let name = String::deserialize(from)?;
-            super::super::pixel_format(&name).map_err(D::Error::custom)
-        }
-    }
-
     pub mod contact {
         use hivtac_scene::Contact;
         use serde::{Deserialize, Deserializer, Serializer, de::Error};

@@ -2,7 +2,6 @@
 
 use std::sync::LazyLock;
 
-use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::evaluate::Evaluation;
 use hivtac_calibration::fit::fit;
@@ -10,6 +9,7 @@ use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::Range;
+use hivtac_terms::conditions::CentroidEstimator;
 
 /// A tip in the film's middle.
 const MIDDLE: Range = Range {
@@ -87,7 +87,7 @@ fn what_does_not_fit_is_refused() {
         loads: Loads::Random(30),
         rest: 2,
         range: MIDDLE,
-        centroid: CentroidName::BinaryMask,
+        centroid: CentroidEstimator::BinaryMask,
         ..Recipe::default()
     };
     let other = generate(&recipe, || ()).unwrap();

@@ -72,7 +72,7 @@ pub struct Info<'a> {
     threshold: Threshold,
     preset: &'a str,
     dilations: u8,
-    centroid: &'static str,
+    centroid: CentroidEstimator,
     filter: FilterJson,
     stats: Option<Stats>,
     /// `None` in what does not ask for it.
@@ -176,10 +176,7 @@ impl<'a> Info<'a> {
             threshold: hello.threshold,
             preset: &hello.preset,
             dilations: hello.dilations,
-            centroid: match hello.centroid {
-                CentroidEstimator::BinaryMask => "binary-mask",
-                CentroidEstimator::RednessWeighted => "redness-weighted",
-            },
+            centroid: hello.centroid,
             filter: FilterJson::new(hello.filter),
             stats,
             tare: None,
@@ -201,7 +198,7 @@ impl<'a> Info<'a> {
                 "markers    preset {}, dilations {}, centroids {}",
                 shown(self.preset),
                 self.dilations,
-                self.centroid
+                self.centroid.name()
             ),
         ];
         let model = self.model.as_ref().map(|model| &model.threshold);

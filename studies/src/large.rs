@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
@@ -14,6 +13,7 @@ use hivtac_calibration::weights::{Range, Weights};
 use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_scene::Options;
 use hivtac_sensing::model::Model;
+use hivtac_terms::conditions::CentroidEstimator;
 use rayon::prelude::*;
 
 use crate::page;
@@ -81,7 +81,7 @@ impl Large {
     /// # Errors
     /// When frames cannot be rendered, or training fails.
     pub fn weights(&self) -> Result<Weights> {
-        let dataset = dataset(CentroidName::RednessWeighted, self.frames, 1)?;
+        let dataset = dataset(CentroidEstimator::RednessWeighted, self.frames, 1)?;
         let options = Training {
             hidden: vec![32, 32],
             meaning: Meaning::ForceAndPlace,
@@ -99,7 +99,7 @@ impl Large {
 ///
 /// # Errors
 /// When they cannot be rendered.
-pub fn dataset(centroid: CentroidName, frames: usize, seed: u64) -> Result<Dataset> {
+pub fn dataset(centroid: CentroidEstimator, frames: usize, seed: u64) -> Result<Dataset> {
     let [width, height] = SIZE;
     let recipe = Recipe {
         width,

@@ -4,7 +4,6 @@
 use anyhow::{Result, anyhow};
 use clap::Args;
 use hivtac_calibration::answer::Chip;
-use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::{Dataset, Observation};
 use hivtac_calibration::errors::{angle_deg, norm};
 use hivtac_calibration::fit::fit;
@@ -12,6 +11,7 @@ use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
 use hivtac_sensing::model::Model;
+use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
@@ -102,7 +102,7 @@ impl Paper {
 
     /// Plain means of masks, and a network of three layers of 512 in floats.
     fn theirs(&self) -> Result<Vec<Judged>> {
-        let training = dataset(CentroidName::BinaryMask, self.frames, 1)?;
+        let training = dataset(CentroidEstimator::BinaryMask, self.frames, 1)?;
         let options = Training {
             hidden: vec![512; 3],
             meaning: Meaning::ForceAndPlace,
@@ -116,7 +116,7 @@ impl Paper {
             ..Training::default()
         };
         let weights = fit(&training, &options, |_| ())?.weights;
-        let test = dataset(CentroidName::BinaryMask, self.judged, TEST_SEED)?;
+        let test = dataset(CentroidEstimator::BinaryMask, self.judged, TEST_SEED)?;
         Ok(judged(&test, |row| {
             let features = row.features_px();
             let place_mm = weights.network.place_mm(&features)?;
@@ -133,7 +133,7 @@ impl Paper {
         };
         let bytes = export(&large.weights()?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        let test = dataset(CentroidName::RednessWeighted, self.judged, TEST_SEED)?;
+        let test = dataset(CentroidEstimator::RednessWeighted, self.judged, TEST_SEED)?;
         let mut chip = Chip::new(model, &test.rest()?)?;
         Ok(judged(&test, |row| {
             let (force, status) = chip.force(row).ok()?;

@@ -1,10 +1,11 @@
 //! What changes the features of a frame beside its geometry and threshold, and what forces mean.
 
 /// How a marker's position is taken from its pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(
     feature = "wire",
-    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema),
+    serde(rename_all = "kebab-case")
 )]
 pub enum CentroidEstimator {
     /// The mean of its pixels in the mask (the paper's).
@@ -12,6 +13,16 @@ pub enum CentroidEstimator {
     /// The mean of the same pixels, each weighted with how much of it a marker covers: by the
     /// redness of RGB565, the Cr of YUV422, the luma of mono.
     RednessWeighted,
+}
+
+impl CentroidEstimator {
+    /// Its name in files and reports: `binary-mask` or `redness-weighted`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            CentroidEstimator::BinaryMask => "binary-mask",
+            CentroidEstimator::RednessWeighted => "redness-weighted",
+        }
+    }
 }
 
 /// What α and β label.

@@ -8,7 +8,8 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
-    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema),
+    serde(rename_all = "lowercase")
 )]
 pub enum PixelFormat {
     /// 16 bits: red in bits 15–11, green in 10–5, blue in 4–0.

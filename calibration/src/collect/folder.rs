@@ -16,13 +16,12 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_scene::Contact;
-use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceHello, Sample};
 use serde::{Deserialize, Serialize};
 
 use super::poses::{self, Pose};
-use crate::conditions::{CentroidName, Conditions, OriginName};
+use crate::conditions::{Conditions, OriginName};
 
 const SAMPLES: &str = "samples.csv";
 const GAUGE: &str = "gauge.csv";
@@ -223,10 +222,7 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
         pixel_format: threshold.format(),
         threshold: threshold.limits(),
         dilations: hello.dilations,
-        centroid: match hello.centroid {
-            CentroidEstimator::BinaryMask => CentroidName::BinaryMask,
-            CentroidEstimator::RednessWeighted => CentroidName::RednessWeighted,
-        },
+        centroid: hello.centroid,
         contact: Contact::default(),
         origin: OriginName::unit(hello.device_id),
     })
@@ -408,6 +404,7 @@ pub fn done(folder: &Path) -> Result<Vec<Pose>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::conditions::CentroidEstimator;
     use hivtac_terms::marker::Marker;
     use hivtac_terms::threshold::PixelFormat;
     use hivtac_terms::threshold::Yuv422;

@@ -42,7 +42,7 @@ impl Sensing<'static> {
         let mut sensor = Box::new(Sensor::new());
         let settings = Settings {
             threshold: Threshold::red(recipe.format),
-            centroid: recipe.centroid.to_model(),
+            centroid: recipe.centroid,
             ..Settings::usual(geometry, ByteOrder::Native)
         };
         let configured = sensor.configure(settings, None);

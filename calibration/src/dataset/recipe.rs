@@ -3,13 +3,14 @@
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use hivtac_scene::{Contact, Format, Load, Options, Preset as ScenePreset, Scene};
+use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 use serde::{Deserialize, Serialize};
 
 use super::session::Session;
 use super::{About, Place};
-use crate::conditions::{CentroidName, Conditions, pixel_format};
+use crate::conditions::{Conditions, pixel_format};
 use crate::loads::{PaperPoses, RandomLoads};
 use crate::range::Range;
 
@@ -46,7 +47,7 @@ pub struct Recipe {
     pub format: PixelFormat,
     /// How markers' positions are taken.
     #[arg(skip = Recipe::default().centroid)]
-    pub centroid: CentroidName,
+    pub centroid: CentroidEstimator,
     /// What the loads' labels mean.
     #[arg(skip)]
     pub contact: Contact,
@@ -101,7 +102,7 @@ impl Default for Recipe {
             width: 320,
             height: 240,
             format: PixelFormat::Rgb565,
-            centroid: CentroidName::RednessWeighted,
+            centroid: CentroidEstimator::RednessWeighted,
             contact: Contact::Force,
             loads: Loads::Random(80_000),
             rest: 64,

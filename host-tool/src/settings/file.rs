@@ -59,9 +59,9 @@ enum Limits {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rest {
-    format: Format,
+    format: PixelFormat,
     dilations: u8,
-    centroid: Centroid,
+    centroid: CentroidEstimator,
     markers: [Seen; 4],
     rect_center_q16: [i32; 2],
     rect_area_q16: i64,
@@ -73,21 +73,6 @@ struct Seen {
     x_q16: i32,
     y_q16: i32,
     area_px: u32,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Format {
-    Rgb565,
-    Yuv422,
-    Mono,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Centroid {
-    BinaryMask,
-    RednessWeighted,
 }
 
 /// The settings in use, and which of them are kept: `settings get --json`.
@@ -228,16 +213,9 @@ fn limits(threshold: &Threshold) -> Limits {
 impl Rest {
     fn of(position: &RestPosition) -> Rest {
         Rest {
-            format: match position.format {
-                PixelFormat::Rgb565 => Format::Rgb565,
-                PixelFormat::Yuv422 => Format::Yuv422,
-                PixelFormat::Mono => Format::Mono,
-            },
+            format: position.format,
             dilations: position.dilations,
-            centroid: match position.centroid {
-                CentroidEstimator::BinaryMask => Centroid::BinaryMask,
-                CentroidEstimator::RednessWeighted => Centroid::RednessWeighted,
-            },
+            centroid: position.centroid,
             markers: position.markers.map(|marker| Seen {
                 x_q16: marker.x.0,
                 y_q16: marker.y.0,
@@ -251,16 +229,9 @@ impl Rest {
     fn position(&self) -> RestPosition {
         let [x, y] = self.rect_center_q16;
         RestPosition {
-            format: match self.format {
-                Format::Rgb565 => PixelFormat::Rgb565,
-                Format::Yuv422 => PixelFormat::Yuv422,
-                Format::Mono => PixelFormat::Mono,
-            },
+            format: self.format,
             dilations: self.dilations,
-            centroid: match self.centroid {
-                Centroid::BinaryMask => CentroidEstimator::BinaryMask,
-                Centroid::RednessWeighted => CentroidEstimator::RednessWeighted,
-            },
+            centroid: self.centroid,
             markers: self.markers.map(|marker| Marker {
                 x: Px(marker.x_q16),
                 y: Px(marker.y_q16),

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::{
     Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files,
 };
@@ -13,6 +12,7 @@ use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::Range;
 use hivtac_scene::Contact;
 use hivtac_sensing::model::Model;
+use hivtac_terms::conditions::CentroidEstimator;
 
 use super::PeersArgs;
 use super::models::How;
@@ -51,7 +51,7 @@ impl Frames {
                 preset: args.preset,
                 width: u16::try_from(size.width)?,
                 height: u16::try_from(size.height)?,
-                centroid: CentroidName::RednessWeighted,
+                centroid: CentroidEstimator::RednessWeighted,
                 contact,
                 loads,
                 rest,
@@ -69,7 +69,7 @@ impl Frames {
                 args.file(contact, size, &format!("{part}.csv")),
                 about.clone(),
             );
-            about.conditions.centroid = CentroidName::BinaryMask;
+            about.conditions.centroid = CentroidEstimator::BinaryMask;
             about.scene.push_str("; markers by the peer");
             let theirs = args.file(contact, size, &format!("{part}-peer.csv"));
             if args.kept_frames {

@@ -27,7 +27,7 @@ fn a_small_comparison_runs_and_goes_on_where_it_was() {
             preset: Preset::Paper,
             width,
             height,
-            centroid: hivtac_calibration::conditions::CentroidName::BinaryMask,
+            centroid: hivtac_terms::conditions::CentroidEstimator::BinaryMask,
             ..Recipe::default()
         };
         Ok(Box::new(Sensing::unmodelled(&recipe)?))

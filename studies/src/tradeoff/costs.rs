@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use hivtac_calibration::conditions::CentroidName;
+use hivtac_terms::conditions::CentroidEstimator;
 use serde::Deserialize;
 
 use super::plan::{Estimator, Numbers};
@@ -42,7 +42,7 @@ struct Counted {
 #[derive(Clone, Debug, Deserialize)]
 struct FramePart {
     size: [u16; 2],
-    centroid: CentroidName,
+    centroid: CentroidEstimator,
     whole: Counted,
     latency: Counted,
     /// Whether the model is run after the last pixel, too.
@@ -157,7 +157,7 @@ impl Costs {
     pub fn of(
         &self,
         size: [u16; 2],
-        centroid: CentroidName,
+        centroid: CentroidEstimator,
         behind: Behind<'_>,
     ) -> Result<Option<Cost>> {
         let Some(name) = behind.estimator.cost_name(behind.numbers) else {
@@ -254,7 +254,7 @@ pub(super) mod tests {
                 numbers,
                 looks: 0.0,
             };
-            costs.of(size, CentroidName::BinaryMask, behind)
+            costs.of(size, CentroidEstimator::BinaryMask, behind)
         };
         let cost = of([320, 240], 3, Numbers::Int8PerChannel);
         let cost = cost.unwrap().unwrap();
@@ -283,7 +283,7 @@ pub(super) mod tests {
                 numbers: Numbers::Int8PerChannel,
                 looks,
             };
-            let cost = costs.of([320, 240], CentroidName::BinaryMask, behind);
+            let cost = costs.of([320, 240], CentroidEstimator::BinaryMask, behind);
             cost.unwrap().unwrap()
         };
         let (alone, one, more) = (of(0.0), of(2.0), of(2.5));

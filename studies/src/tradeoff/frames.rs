@@ -5,7 +5,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow, ensure};
-use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
 use hivtac_calibration::network::{INPUTS, Layer, Meaning, Network, Standardization};
 use hivtac_calibration::quantize::export;
@@ -15,6 +14,7 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
+use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::ByteOrder;
 use rayon::prelude::*;
@@ -86,7 +86,7 @@ pub fn frames(
     Ok(frames)
 }
 
-fn recipe(plan: &Plan, [width, height]: [u16; 2], centroid: CentroidName) -> Recipe {
+fn recipe(plan: &Plan, [width, height]: [u16; 2], centroid: CentroidEstimator) -> Recipe {
     Recipe {
         preset: preset([width, height]),
         width,
@@ -100,8 +100,8 @@ fn recipe(plan: &Plan, [width, height]: [u16; 2], centroid: CentroidName) -> Rec
 
 fn file(folder: &Path, recipe: &Recipe) -> PathBuf {
     let centroid = match recipe.centroid {
-        CentroidName::BinaryMask => "binary",
-        CentroidName::RednessWeighted => "weighted",
+        CentroidEstimator::BinaryMask => "binary",
+        CentroidEstimator::RednessWeighted => "weighted",
     };
     folder.join(format!("{}x{}-{centroid}.csv", recipe.width, recipe.height))
 }
@@ -190,7 +190,7 @@ fn anything(dataset: &Dataset) -> Result<Vec<u8>> {
 fn eye<'m>(recipe: &Recipe, model: Option<Model<'m>>) -> Result<Box<Sensor<'m>>> {
     let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
     let settings = Settings {
-        centroid: recipe.centroid.to_model(),
+        centroid: recipe.centroid,
         ..Settings::usual(geometry, ByteOrder::Native)
     };
     let mut sensor = Box::new(Sensor::new());

@@ -155,7 +155,7 @@ pub(super) mod tests {
     use crate::tradeoff::costs::Cost;
     use crate::tradeoff::plan::{Estimator, Numbers};
     use crate::tradeoff::table::Mean;
-    use hivtac_calibration::conditions::CentroidName;
+    use hivtac_terms::conditions::CentroidEstimator;
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
     /// (mN).
@@ -166,7 +166,7 @@ pub(super) mod tests {
         };
         Configuration {
             size,
-            centroid: CentroidName::RednessWeighted,
+            centroid: CentroidEstimator::RednessWeighted,
             estimator: Estimator::all()[0].clone(),
             numbers: Numbers::Int16,
             steps: 1,

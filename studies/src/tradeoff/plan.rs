@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use hivtac_calibration::conditions::CentroidName;
 use hivtac_calibration::dataset::Recipe;
 use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::weights::Range;
+use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use serde::{Deserialize, Serialize};
 
@@ -44,7 +44,10 @@ pub const RENDERED: Range = Range {
 pub const JUDGED_N: f64 = 0.2;
 pub const JUDGED_MM: f64 = 4.0;
 /// Both ways to take a marker's position.
-pub const CENTROIDS: [CentroidName; 2] = [CentroidName::BinaryMask, CentroidName::RednessWeighted];
+pub const CENTROIDS: [CentroidEstimator; 2] = [
+    CentroidEstimator::BinaryMask,
+    CentroidEstimator::RednessWeighted,
+];
 /// Hidden layers of the paper's network.
 const PAPER: [usize; 3] = [512; 3];
 
@@ -91,7 +94,7 @@ pub struct Task {
     /// Columns and rows of the frames.
     pub size: [u16; 2],
     /// How markers' positions are taken.
-    pub centroid: CentroidName,
+    pub centroid: CentroidEstimator,
     /// What is trained.
     pub estimator: Estimator,
     /// From 1.

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use anyhow::Result;
-use hivtac_calibration::conditions::CentroidName;
+use hivtac_terms::conditions::CentroidEstimator;
 
 use super::costs::{Behind, Cost, Costs};
 use super::plan::{Estimator, Numbers, firmware_size, has_camera};
@@ -25,7 +25,7 @@ pub struct Configuration {
     /// Columns and rows of a frame.
     pub size: [u16; 2],
     /// How markers' positions are taken.
-    pub centroid: CentroidName,
+    pub centroid: CentroidEstimator,
     /// What makes a force of features.
     pub estimator: Estimator,
     /// How its numbers are held.
@@ -70,10 +70,10 @@ impl fmt::Display for Configuration {
 }
 
 /// A centroid estimator in a word.
-pub fn words(centroid: CentroidName) -> &'static str {
+pub fn words(centroid: CentroidEstimator) -> &'static str {
     match centroid {
-        CentroidName::BinaryMask => "binary",
-        CentroidName::RednessWeighted => "weighted",
+        CentroidEstimator::BinaryMask => "binary",
+        CentroidEstimator::RednessWeighted => "weighted",
     }
 }
 

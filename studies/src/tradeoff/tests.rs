@@ -86,7 +86,7 @@ fn the_committed_results_pick_the_default_model() {
     assert_eq!(picked.reach(), Reach::Firmware);
     let bytes = fs::read(folder.join("../calibration/models/default.hvtm")).unwrap();
     let model = hivtac_sensing::model::Model::parse(&bytes).unwrap();
-    assert_eq!(model.conditions.centroid, picked.centroid.to_model());
+    assert_eq!(model.conditions.centroid, picked.centroid);
     let name = format!("11-{}-5 ov7725", picked.estimator);
     assert_eq!(model.name().as_str(), name);
     assert_eq!(model.forward.map_or(0, |film| film.steps), picked.steps);
