@@ -18,7 +18,7 @@ use crate::shared::{MEMORY_ORDER, MEMORY_ORDERED, NEXT_MODEL, ORDERS};
 use crate::thermometer::Thermometer;
 use crate::{log, model_slots, outbox, settings};
 use core::sync::atomic::Ordering;
-use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError, blob};
+use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
 use hivtac_wire::kept::{KeptModel, MAX_BYTES, Record};
 use hivtac_wire::message::{DeviceMessage, LogLevel, ModelSource, Outcome};
 use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
@@ -242,7 +242,7 @@ impl Memory {
             log::say(LogLevel::Error, format_args!("{refusal}"));
             refusal.outcome()
         })?;
-        let written = blob::write(self.log.flash(), model::sector(slot), file).await;
+        let written = self.log.write_blob(model::sector(slot), file).await;
         written.map_err(|_| {
             say_worn();
             Outcome::Worn
