@@ -1,5 +1,5 @@
 //! Links anew when the memory map changes, which cargo does not look at by itself, and names the
-//! model file to embed and the camera's frame rate.
+//! model file to embed.
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ fn main() {
     println!("cargo:rerun-if-changed=../memory.x");
     println!("cargo:rerun-if-env-changed=HIVTAC_MODEL");
     let second_board = std::env::var_os("CARGO_FEATURE_BOARD_OPENMV_H7").is_some();
-    let (usual_model, usual_rate) = match second_board {
-        false => ("calibration/models/default.hvtm", "156"),
-        true => ("calibration/models/mt9v034/default.hvtm", "244"),
+    let usual_model = match second_board {
+        false => "calibration/models/default.hvtm",
+        true => "calibration/models/mt9v034/default.hvtm",
     };
     let model = std::env::var("HIVTAC_MODEL");
     let named = model.as_deref().unwrap_or(usual_model);
@@ -23,7 +23,4 @@ fn main() {
     });
     println!("cargo:rerun-if-changed={}", file.display());
     println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());
-    println!("cargo:rerun-if-env-changed=HIVTAC_FRAME_RATE");
-    let rate = std::env::var("HIVTAC_FRAME_RATE").unwrap_or_else(|_| usual_rate.into());
-    println!("cargo:rustc-env=HIVTAC_FRAME_RATE={rate}");
 }
