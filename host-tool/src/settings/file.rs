@@ -1,11 +1,13 @@
 //! Settings as JSON: what `export` writes and `import` reads.
 
+use super::camera::{CameraJson, InUse};
 use super::temporal::TemporalJson;
 use super::{name, unusable};
 use crate::files::read_at_most;
 use crate::lines::to_json;
 use hivtac_host::failure::Failure;
 use hivtac_host::shown::unit_number;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
@@ -32,6 +34,7 @@ pub struct File {
     /// The rest position, when one was taken.
     pub tare: Option<Rest>,
     temporal: TemporalJson,
+    camera: CameraJson,
 }
 
 /// A threshold as everywhere in the tool's JSON.
@@ -101,6 +104,7 @@ pub struct Kept {
     found: &'static str,
     erases: u32,
     failures: u32,
+    camera_in_use: InUse,
     drift_q16: Option<i32>,
 }
 
@@ -110,6 +114,7 @@ struct KeptParts {
     threshold: bool,
     tare: bool,
     temporal: bool,
+    camera: bool,
 }
 
 impl Kept {
@@ -120,6 +125,7 @@ impl Kept {
             threshold,
             tare,
             temporal,
+            camera,
         } = report.kept;
         Kept {
             file: File::new(device_id, report),
@@ -129,6 +135,7 @@ impl Kept {
                 threshold,
                 tare,
                 temporal,
+                camera,
             },
             found: match report.found {
                 Found::Nothing => "nothing",
@@ -137,6 +144,7 @@ impl Kept {
             },
             erases: report.erases,
             failures: report.failures,
+            camera_in_use: InUse::new(&report.camera),
             drift_q16: report.drift.map(|drift| drift.0),
         }
     }
@@ -152,6 +160,7 @@ impl File {
             threshold: limits(&report.threshold),
             tare: report.tare.as_ref().map(Rest::of),
             temporal: TemporalJson::new(&report.temporal),
+            camera: CameraJson::new(&report.camera.settings),
         }
     }
 
@@ -192,6 +201,11 @@ impl File {
     /// How forces are followed from frame to frame.
     pub fn temporal(&self) -> TemporalSettings {
         self.temporal.settings()
+    }
+
+    /// How the camera is set.
+    pub fn camera(&self) -> CameraSettings {
+        self.camera.settings()
     }
 
     /// The rest position.
