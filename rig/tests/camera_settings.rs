@@ -90,6 +90,21 @@ fn frame_times_ms(run: &Run, frames: std::ops::Range<u32>) -> Vec<f64> {
     frames.map(|sample| time(sample.frame)).collect()
 }
 
+/// Asserts that each frame was measured or passed while the camera was set, but for the one under
+/// way then and the one under way now.
+fn assert_counted(run: &Run) {
+    let stats = run.stats();
+    assert_eq!(
+        [stats.dropped_overrun, stats.dropped_size],
+        [0; 2],
+        "{stats:?}"
+    );
+    assert!(stats.dropped_busy <= 1, "{stats:?}");
+    let counted = stats.frames_processed + stats.dropped_setup + stats.dropped_busy;
+    assert!(stats.frames_exposed - counted <= 1, "{stats:?}");
+    assert_eq!(stats.camera_restarts, 0);
+}
+
 /// The light of the scene exposes the film well in 4 ms at a gain of one: here in half of that,
 /// twice amplified.
 #[test]
@@ -107,7 +122,7 @@ fn exposure_and_gain_that_are_set_are_in_use_while_frames_are_counted() {
     assert!(exposure.0.abs_diff(2_000) <= 12, "{exposure}");
     assert_eq!(gain, Sixteenths(32));
     assert!(!run.settings().kept.camera);
-    run.assert_only_setup_drops();
+    assert_counted(&run);
     let missing = run.missing_frames();
     let [gap] = run.frames_after_a_loss()[..] else {
         panic!("one gap: {missing:?}");
@@ -181,12 +196,12 @@ fn what_is_out_of_its_range_is_refused_and_nothing_changes() {
         exposed(2_000, Some(15)),
         exposed(2_000, Some(65)),
     ];
-    let mut setup = Setup::new(firmware(), 230);
+    let mut setup = Setup::new(firmware(), 270);
     for (nth, settings) in (0..).zip(bad) {
         let id = SET + nth as u16;
         setup = setup.at(SET_MS + 5 * nth, send(id, Request::SetCamera(settings)));
     }
-    let run = setup.at(210, send(REPORT, Request::GetSettings)).run();
+    let run = setup.at(250, send(REPORT, Request::GetSettings)).run();
     for nth in 0..bad.len() as u16 {
         assert_eq!(run.outcome(SET + nth), Outcome::InvalidArgument, "{nth}");
     }
@@ -204,7 +219,7 @@ fn the_rate_is_changed_while_forces_are_read_and_kept() {
     let Device { flash, .. } = &Device::new();
     let run = keeping(flash, at(Rate::Half), AT_HALF_RATE_MS).run();
     assert_eq!([SET, KEEP].map(|id| run.outcome(id)), [Outcome::Done; 2]);
-    run.assert_only_setup_drops();
+    assert_counted(&run);
     run.assert_times();
     let gap = *run.missing_frames().last().unwrap();
     let [before, after] = [0..gap, gap + 1..u32::MAX].map(|frames| frame_times_ms(&run, frames));
@@ -225,7 +240,7 @@ fn the_rate_is_changed_while_forces_are_read_and_kept() {
     };
     let run = setting(setup, at(Rate::Full)).run();
     assert_eq!(run.outcome(SET), Outcome::Done);
-    run.assert_only_setup_drops();
+    assert_counted(&run);
     run.assert_times();
     let gap = *run.missing_frames().last().unwrap();
     let [before, after] = [0..gap, gap + 1..u32::MAX].map(|frames| frame_times_ms(&run, frames));
@@ -288,11 +303,11 @@ fn the_global_shutter_camera_takes_exposure_gain_and_rate() {
     assert!(exposure.0.abs_diff(1_000) <= 13, "{exposure}");
     assert_eq!(gain, Sixteenths(32));
     assert_eq!(limits.at(Rate::Half).frames_per_second, 122);
-    run.assert_only_setup_drops();
+    assert_counted(&run);
     run.assert_times();
     let gap = *run.missing_frames().last().unwrap();
     let after = frame_times_ms(&run, gap + 1..u32::MAX);
-    assert!(after.len() > 10, "{after:?}");
+    assert!(after.len() >= 8, "{after:?}");
     assert!(after.iter().all(|ms| (8.1..8.3).contains(ms)), "{after:?}");
     let last = run.samples().last().unwrap().force;
     assert!(last.is_some(), "{}", run.log());
