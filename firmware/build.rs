@@ -1,6 +1,9 @@
 //! Links anew when the memory map changes, which cargo does not look at by itself, and names the
-//! model file to embed.
+//! model file to embed, with its answer to the known question.
 
+use hivtac_sensing::known_answer::{self, Answer};
+use hivtac_sensing::model::Model;
+use hivtac_sensing::network::Network;
 use std::path::Path;
 
 fn main() {
@@ -23,4 +26,16 @@ fn main() {
     });
     println!("cargo:rerun-if-changed={}", file.display());
     println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());
+    write_answer(&file);
+}
+
+/// What this computer has for the model's answer; none of a file that is no model, which the
+/// firmware says itself.
+fn write_answer(file: &Path) {
+    let bytes = std::fs::read(file).expect("it was found");
+    let model = Model::parse(&bytes).ok();
+    let answer: Option<Answer> = model.map(|model| known_answer::of(&model, &mut Network::new()));
+    let folder = std::env::var("OUT_DIR").expect("cargo sets it");
+    let source = Path::new(&folder).join("known_answer.rs");
+    std::fs::write(source, format!("{answer:?}")).expect("cargo's own folder is written");
 }

@@ -7,7 +7,7 @@ use crate::capture::Capture;
 use crate::health::{self, Condition};
 use crate::session::Asked;
 use crate::shared::{CAMERA_AFRESH, CAMERA_ORDER, CAMERA_ORDERED, REQUESTED_FORMAT};
-use crate::{log, outbox, stats, vsync};
+use crate::{log, outbox, self_test, stats, vsync};
 use core::sync::atomic::Ordering;
 use embassy_futures::select::{Either4, select4};
 use embassy_time::{Duration, Timer};
@@ -66,6 +66,7 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
         camera,
         capture,
         numbering: false,
+        starting: true,
         activity: 0,
         quiet: 0,
         silences: 0,
@@ -89,6 +90,8 @@ struct CaptureTask {
     capture: Capture,
     /// VSYNC edges count since the first register reset.
     numbering: bool,
+    /// The camera was not set up yet.
+    starting: bool,
     /// [`Capture::activity`] when it was looked at last.
     activity: u32,
     /// Frame times without activity.
@@ -236,12 +239,16 @@ impl CaptureTask {
     async fn try_until_it_answers(&mut self) {
         while let Err(error) = self.try_camera().await {
             health::set(Condition::NoCamera);
+            self_test::camera_failed(&error, self.starting);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             if let Some(order) = CAMERA_ORDER.try_take() {
                 end_order(order.asked, Outcome::NoCamera);
             }
             Timer::after(RETRY).await;
         }
+        let should_us = self.camera.frame_time().as_micros() as u32;
+        self_test::camera_answers(self.camera.pace.frame_us(), should_us, self.starting);
+        self.starting = false;
     }
 
     async fn try_camera(&mut self) -> Result<(), camera::Error> {

@@ -130,6 +130,7 @@ fn start() -> Foreground {
     let temporal = TEMPORAL.take();
     let format = configure(sensor, temporal, chosen, memory.record());
     set_camera(memory.record().camera);
+    self_test::at_start(&memory.of_flash(), sensor);
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));

@@ -148,7 +148,8 @@ impl Memory {
         Outcome::Done
     }
 
-    fn of_flash(&self) -> OfFlash {
+    /// What the self-test asks of it.
+    pub fn of_flash(&self) -> OfFlash {
         OfFlash {
             found: self.found,
             failures: self.log.failures(),

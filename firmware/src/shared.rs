@@ -148,6 +148,14 @@ pub static SNAPSHOT_TAKEN: Request<Taken> = Request::new();
 /// (`faults`).
 pub static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
 
+/// What the self-test found at the start, bits of `Problem`. Written at boot and by the capture
+/// task; read by the memory task and the LED task (`self_test`).
+pub static AT_START: AtomicU32 = AtomicU32::new(0);
+
+/// Why the camera could not be set up, a bit of `Problem`; 0 when it could. Written by the capture
+/// task; read by the memory task (`self_test`).
+pub static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
+
 // What is kept.
 
 /// The device's name. Written at boot and by the USB tasks; read by them and the memory task

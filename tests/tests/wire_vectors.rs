@@ -303,6 +303,7 @@ fn health() -> DeviceMessage {
         stack_used: 6_120,
         stack_bytes: 24_576,
         problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit(),
+        at_start: Problem::ModelFallback.bit() | Problem::Arithmetic.bit(),
     })
 }
 

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xC97B68F663A92DA8
+SCHEMA = 0x33549E33729C10D1
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -320,6 +320,7 @@ DEVICE = {
         unsigned("stack_used", 6_120),
         unsigned("stack_bytes", 24_576),
         (varint(0x44), "problems 0x44: model_fallback, watchdog_reset"),
+        (varint(0x1004), "at_start 0x1004: model_fallback, arithmetic"),
     ],
     "tared": [
         raw("Tared", [9]),

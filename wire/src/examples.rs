@@ -112,6 +112,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             stack_used: u32::MAX,
             stack_bytes: u32::MAX,
             problems: u32::MAX,
+            at_start: u32::MAX,
         }),
         DeviceMessage::Tared(TareReport {
             rest: longest_rest(),
@@ -588,13 +589,16 @@ fn any_health() -> impl Strategy<Value = Health> {
         Just(ResetReason::Watchdog),
         Just(ResetReason::Other)
     ];
-    (reset, any::<(Option<i16>, u32, u32, u32)>()).prop_map(
-        |(reset, (temperature_centidegrees, stack_used, stack_bytes, problems))| Health {
-            reset,
-            temperature_centidegrees,
-            stack_used,
-            stack_bytes,
-            problems,
+    (reset, any::<(Option<i16>, u32, u32, [u32; 2])>()).prop_map(
+        |(reset, (temperature_centidegrees, stack_used, stack_bytes, [problems, at_start]))| {
+            Health {
+                reset,
+                temperature_centidegrees,
+                stack_used,
+                stack_bytes,
+                problems,
+                at_start,
+            }
         },
     )
 }

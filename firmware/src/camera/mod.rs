@@ -23,7 +23,9 @@ mod ov7725_registers;
 pub use {ov7725::*, ov7725_registers::Format};
 
 use crate::shared::{CAMERA, EXPOSURE_MIDDLE_US};
+use crate::vsync;
 use core::sync::atomic::Ordering;
+use hivtac_capture::Edge;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
@@ -31,6 +33,34 @@ use hivtac_wire::settings::CameraReport;
 
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
+
+/// How long frames take by the device's own clock, by the newest two that were looked at.
+#[derive(Default)]
+pub struct Pace {
+    before: Edge,
+    frame_us: Option<u32>,
+}
+
+impl Pace {
+    /// Looks at the newest frame.
+    fn look(&mut self) {
+        let Edge { number, time_us } = vsync::newest();
+        let (frames, us) = (
+            number.wrapping_sub(self.before.number),
+            time_us.wrapping_sub(self.before.time_us),
+        );
+        if frames > 0 {
+            let frame_us = (us as u32).checked_div(frames);
+            self.frame_us = frame_us.filter(|_| self.before.number > 0);
+            self.before = Edge { number, time_us };
+        }
+    }
+
+    /// How long the newest ones took, µs; nothing before there were two.
+    pub fn frame_us(&self) -> Option<u32> {
+        self.frame_us
+    }
+}
 
 /// What a camera is set to.
 pub struct Setting {

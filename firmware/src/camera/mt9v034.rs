@@ -7,7 +7,7 @@ use super::mt9v034_registers::{
     ROW_CLOCKS, SHUTTER_WIDTH, TABLE, blank_rows, longest_exposure, rows_for,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Setting, store};
+use super::{Bus, Error, Pace, Setting, store};
 use crate::board::{CameraLines, XCLK_HZ};
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_sensing::motion::Motion;
@@ -70,6 +70,8 @@ pub struct Camera {
     registers: Registers,
     lines: CameraLines,
     settings: CameraSettings,
+    /// Of the frames at the newest search for exposure and gain.
+    pub pace: Pace,
     /// What gain and exposure are kept at.
     locked: [(u8, u16); 3],
 }
@@ -81,6 +83,7 @@ impl Camera {
             registers: Registers(bus),
             lines,
             settings: CameraSettings::default(),
+            pace: Pace::default(),
             locked: [
                 (ANALOG_GAIN, 0),
                 (SHUTTER_WIDTH, 0),
@@ -138,10 +141,12 @@ impl Camera {
         }
         self.registers
             .write(AEC_AGC_ENABLE, LOCKED | self.automatic())?;
+        self.pace = Pace::default();
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
             Timer::after(self.frame_time()).await;
+            self.pace.look();
             let now = self.exposure()?;
             steady = if now == found { steady + 1 } else { 1 };
             found = now;

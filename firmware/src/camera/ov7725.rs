@@ -7,7 +7,7 @@ use super::ov7725_registers::{
     clock,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Setting, store};
+use super::{Bus, Error, Pace, Setting, store};
 use crate::board::{CameraLines, XCLK_HZ};
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_sensing::motion::Motion;
@@ -81,6 +81,8 @@ pub struct Camera {
     registers: Registers,
     lines: CameraLines,
     settings: CameraSettings,
+    /// Of the frames at the newest search for exposure and gain.
+    pub pace: Pace,
     /// What exposure and gain are kept at.
     locked: [(u8, u8); 4],
 }
@@ -93,6 +95,7 @@ impl Camera {
             registers: Registers(bus),
             lines,
             settings: CameraSettings::default(),
+            pace: Pace::default(),
             locked: [(COM8, LOCKED), (gain, 0), (low, 0), (high, 0)],
         }
     }
@@ -114,11 +117,11 @@ impl Camera {
         settings: CameraSettings,
     ) -> Result<(), Error> {
         Timer::after(SETTLE).await;
-        for table in [format.registers(), TABLE] {
+        self.settings = settings;
+        // The clock first: frames are of the new rate when exposure is sought.
+        for table in [clock(settings.rate), format.registers(), TABLE] {
             self.registers.set(table).await?;
         }
-        self.settings = settings;
-        self.registers.set(clock(settings.rate)).await?;
         self.lock_exposure().await
     }
 
@@ -160,10 +163,12 @@ impl Camera {
             self.registers.set(&self.locked).await?;
         }
         self.registers.write(COM8, LOCKED | self.automatic())?;
+        self.pace = Pace::default();
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
             Timer::after(self.frame_time()).await;
+            self.pace.look();
             let now = self.exposure()?;
             steady = if now == found { steady + 1 } else { 1 };
             found = now;
