@@ -211,7 +211,7 @@ fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
 }
 
 /// The flash of a device whose record has another first byte, and the checksum for it.
-fn of_another_version(flash: &Path) {
+pub fn of_another_version(flash: &Path) {
     let mut contents = Contents::load(flash).unwrap();
     let sector = &mut contents.array[..SECTOR_BYTES];
     // Of the storage's layout: 10 bytes before the record, of which the last four are a checksum

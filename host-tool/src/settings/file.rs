@@ -330,6 +330,27 @@ pub fn write(path: &str, file: &File) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::camera::{CameraLimits, Rate, RateLimits};
+    use hivtac_terms::units::{Microseconds, Sixteenths};
+    use hivtac_wire::settings::CameraReport;
+
+    fn camera() -> CameraReport {
+        let limits = RateLimits {
+            frames_per_second: 156,
+            shortest: Microseconds(24),
+            longest: Microseconds(6_405),
+        };
+        CameraReport {
+            settings: CameraSettings {
+                exposure: Some(Microseconds(2_500)),
+                gain: None,
+                rate: Rate::Quarter,
+            },
+            exposure: Microseconds(2_512),
+            gain: Sixteenths(16),
+            limits: CameraLimits([limits; 3]),
+        }
+    }
 
     fn report(threshold: Threshold) -> SettingsReport {
         let marker = |nth: i32| Marker {
@@ -355,6 +376,7 @@ mod tests {
             temporal: TemporalSettings::default(),
             rezeroed: Px(0),
             drift: None,
+            camera: camera(),
         }
     }
 
@@ -370,6 +392,7 @@ mod tests {
             let read = parse(to_json(&file).as_bytes()).unwrap();
             assert_eq!(read, file);
             assert_eq!((read.threshold(), read.rest()), (threshold, report.tare));
+            assert_eq!(read.camera(), report.camera.settings);
             assert!(read.is_of(&[7; 12]) && !read.is_of(&[8; 12]));
         }
     }

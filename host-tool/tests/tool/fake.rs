@@ -177,6 +177,7 @@ pub const HEALTHY: Health = Health {
     stack_used: 6_120,
     stack_bytes: 24_576,
     problems: 0,
+    at_start: 0,
 };
 
 /// What its model was made for.
