@@ -13,7 +13,7 @@ use hivtac_wire::message::{DeviceMessage, Outcome, Request};
 const ASKED: u16 = 40;
 const ASKED_MS: u64 = 200;
 /// While registers are read back that were written.
-const FORGETS: &str = "camera-forgets@75";
+const FORGETS: &str = "camera-forgets@97";
 
 fn ask(request: Request, virtual_ms: u64) -> Setup {
     let asked = Action::Send(command(ASKED, request));
@@ -83,7 +83,9 @@ fn a_register_that_does_not_hold_what_was_written_is_told() {
 /// The camera's clock loop multiplies half as much as it should.
 #[test]
 fn frames_that_take_another_time_than_they_should_are_told() {
-    let run = ask(Request::GetHealth, 300).fault("camera-slow").run();
+    let asked = Action::Send(command(ASKED, Request::GetHealth));
+    let setup = Setup::new(firmware(), 340).at(320, asked);
+    let run = setup.fault("camera-slow").run();
     let health = told(&run);
     let clocks = Problem::Clocks.bit();
     assert_eq!((health.problems, health.at_start), (clocks, clocks));
