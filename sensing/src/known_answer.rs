@@ -117,7 +117,7 @@ mod tests {
     fn crc32(bytes: &[u8]) -> u32 {
         !bytes.iter().fold(u32::MAX, |crc, byte| {
             (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-                crc >> 1 ^ 0xEDB8_8320 * (crc & 1)
+                (crc >> 1) ^ (0xEDB8_8320 * (crc & 1))
             })
         })
     }
