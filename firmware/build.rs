@@ -1,15 +1,18 @@
 //! Links anew when the memory map changes, which cargo does not look at by itself, and names the
-//! model file to embed and the camera's frame rate.
+//! model file to embed, with its answer to the known question.
 
+use hivtac_sensing::known_answer::{self, Answer};
+use hivtac_sensing::model::Model;
+use hivtac_sensing::network::Network;
 use std::path::Path;
 
 fn main() {
     println!("cargo:rerun-if-changed=../memory.x");
     println!("cargo:rerun-if-env-changed=HIVTAC_MODEL");
     let second_board = std::env::var_os("CARGO_FEATURE_BOARD_OPENMV_H7").is_some();
-    let (usual_model, usual_rate) = match second_board {
-        false => ("calibration/models/default.hvtm", "156"),
-        true => ("calibration/models/mt9v034/default.hvtm", "244"),
+    let usual_model = match second_board {
+        false => "calibration/models/default.hvtm",
+        true => "calibration/models/mt9v034/default.hvtm",
     };
     let model = std::env::var("HIVTAC_MODEL");
     let named = model.as_deref().unwrap_or(usual_model);
@@ -23,7 +26,16 @@ fn main() {
     });
     println!("cargo:rerun-if-changed={}", file.display());
     println!("cargo:rustc-env=HIVTAC_MODEL_FILE={}", file.display());
-    println!("cargo:rerun-if-env-changed=HIVTAC_FRAME_RATE");
-    let rate = std::env::var("HIVTAC_FRAME_RATE").unwrap_or_else(|_| usual_rate.into());
-    println!("cargo:rustc-env=HIVTAC_FRAME_RATE={rate}");
+    write_answer(&file);
+}
+
+/// What this computer has for the model's answer; none of a file that is no model, which the
+/// firmware says itself.
+fn write_answer(file: &Path) {
+    let bytes = std::fs::read(file).expect("it was found");
+    let model = Model::parse(&bytes).ok();
+    let answer: Option<Answer> = model.map(|model| known_answer::of(&model, &mut Network::new()));
+    let folder = std::env::var("OUT_DIR").expect("cargo sets it");
+    let source = Path::new(&folder).join("known_answer.rs");
+    std::fs::write(source, format!("{answer:?}")).expect("cargo's own folder is written");
 }

@@ -2,16 +2,17 @@
 //! it again when it falls silent.
 
 use crate::board;
-use crate::camera::{self, Camera, FRAME_TIME, Format, Setting};
+use crate::camera::{self, Camera, Format, Setting};
 use crate::capture::Capture;
 use crate::health::{self, Condition};
 use crate::session::Asked;
-use crate::shared::{CAMERA_ORDER, CAMERA_ORDERED, REQUESTED_FORMAT};
-use crate::{log, outbox, stats, vsync};
+use crate::shared::{CAMERA_AFRESH, CAMERA_ORDER, CAMERA_ORDERED, REQUESTED_FORMAT};
+use crate::{log, outbox, self_test, stats, vsync};
 use core::sync::atomic::Ordering;
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::{Either4, select4};
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::message::{DeviceMessage, Inspection, LogLevel, Outcome};
 
 /// So many frame times without a band or the end of a frame are a silence. Bands come all the
@@ -31,8 +32,10 @@ pub struct CameraOrder {
 /// What the camera is to do for a command.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Find exposure and gain anew.
+    /// Find what is automatic of exposure and gain anew.
     Expose,
+    /// Be set so; unchecked.
+    Set(CameraSettings),
     /// Tell what it is set to.
     Inspect,
 }
@@ -63,19 +66,21 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
         camera,
         capture,
         numbering: false,
+        starting: true,
         activity: 0,
         quiet: 0,
         silences: 0,
     };
     task.start_camera().await;
     loop {
-        let frame_time = Timer::after(FRAME_TIME);
+        let frame_time = Timer::after(task.camera.frame_time());
         let (format, order) = (REQUESTED_FORMAT.wait(), CAMERA_ORDER.wait());
-        match select3(format, order, frame_time).await {
-            Either3::First(format) => task.change_format(format).await,
-            Either3::Second(order) => task.carry_out(order).await,
-            Either3::Third(()) if task.is_silent() => task.silent().await,
-            Either3::Third(()) => {}
+        match select4(format, order, CAMERA_AFRESH.wait(), frame_time).await {
+            Either4::First(format) => task.change_format(format).await,
+            Either4::Second(order) => task.carry_out(order).await,
+            Either4::Third(()) => task.set_up(CameraSettings::default()).await,
+            Either4::Fourth(()) if task.is_silent() => task.silent().await,
+            Either4::Fourth(()) => {}
         }
     }
 }
@@ -85,6 +90,8 @@ struct CaptureTask {
     capture: Capture,
     /// VSYNC edges count since the first register reset.
     numbering: bool,
+    /// The camera was not set up yet.
+    starting: bool,
     /// [`Capture::activity`] when it was looked at last.
     activity: u32,
     /// Frame times without activity.
@@ -149,12 +156,31 @@ impl CaptureTask {
     async fn carry_out(&mut self, CameraOrder { action, asked }: CameraOrder) {
         let outcome = match action {
             Action::Expose => self.expose().await,
+            Action::Set(settings) => self.set(settings).await,
             Action::Inspect => self.inspect(asked).await,
         };
         end_order(asked, outcome);
     }
 
-    /// Has the camera find exposure and gain anew.
+    async fn set(&mut self, settings: CameraSettings) -> Outcome {
+        match camera::LIMITS.check(&settings) {
+            Ok(()) => {
+                self.set_up(settings).await;
+                Outcome::Done
+            }
+            Err(_) => Outcome::InvalidArgument,
+        }
+    }
+
+    /// Sets the camera so.
+    async fn set_up(&mut self, settings: CameraSettings) {
+        let from = self.stop();
+        camera::tell(settings);
+        let answered = self.camera.set(settings).await;
+        self.go_on_when_set_up(from, answered).await;
+    }
+
+    /// Has the camera find what is automatic of exposure and gain anew.
     async fn expose(&mut self) -> Outcome {
         let from = self.stop();
         let answered = self.camera.lock_exposure().await;
@@ -164,10 +190,12 @@ impl CaptureTask {
 
     /// Tells what the camera is set to, while it goes on.
     async fn inspect(&mut self, asked: Asked) -> Outcome {
+        let frame_time = self.camera.frame_time();
         match self.camera.setting(self.capture.format()).await {
             Ok(setting) => {
                 if asked.id().is_some() {
-                    outbox::offer(DeviceMessage::Inspection(inspection(setting)));
+                    let inspection = inspection(setting, frame_time);
+                    outbox::offer(DeviceMessage::Inspection(inspection));
                 }
                 Outcome::Done
             }
@@ -211,12 +239,16 @@ impl CaptureTask {
     async fn try_until_it_answers(&mut self) {
         while let Err(error) = self.try_camera().await {
             health::set(Condition::NoCamera);
+            self_test::camera_failed(&error, self.starting);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             if let Some(order) = CAMERA_ORDER.try_take() {
                 end_order(order.asked, Outcome::NoCamera);
             }
             Timer::after(RETRY).await;
         }
+        let should_us = self.camera.frame_time().as_micros() as u32;
+        self_test::camera_answers(self.camera.pace.frame_us(), should_us, self.starting);
+        self.starting = false;
     }
 
     async fn try_camera(&mut self) -> Result<(), camera::Error> {
@@ -225,19 +257,21 @@ impl CaptureTask {
             self.numbering = true;
             vsync::restart_count();
         }
-        self.camera.configure(self.capture.format()).await
+        let settings = camera::report().settings;
+        let format = self.capture.format();
+        self.camera.configure(format, settings).await
     }
 }
 
-fn inspection(setting: Setting) -> Inspection {
+fn inspection(setting: Setting, frame_time: Duration) -> Inspection {
     Inspection {
         silicon: board::silicon_revision(),
         camera_id: setting.id,
         registers: setting.comparison.registers,
         different: setting.comparison.different,
-        frame_time_us: FRAME_TIME.as_micros() as u32,
-        exposure_us: setting.exposure_us,
-        longest_exposure_us: setting.longest_exposure_us,
-        gain_sixteenths: setting.gain_sixteenths,
+        frame_time_us: frame_time.as_micros() as u32,
+        exposure_us: setting.exposure.0,
+        longest_exposure_us: setting.longest_exposure.0,
+        gain_sixteenths: setting.gain.0,
     }
 }

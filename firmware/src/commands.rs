@@ -59,6 +59,10 @@ async fn obey(Command { id, request }: Command) {
             Some(outcome) => outcome,
             None => return,
         },
+        Request::SetCamera(settings) => match capture_task::order(Action::Set(settings), id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
         Request::Inspect => match capture_task::order(Action::Inspect, id) {
             Some(outcome) => outcome,
             None => return,

@@ -5,9 +5,11 @@
 //! | breathes, 4 s | frames give forces |
 //! | blinks once a second | frames arrive but give no force: markers, light or model |
 //! | blinks five times a second | no camera |
+//! | three flashes every two seconds | the self-test found something at the start |
 //! | two flashes a second | silicon too old: `board/silicon.rs` |
 
 use crate::board::StatusLed;
+use crate::self_test;
 use crate::shared::CONDITION;
 use core::sync::atomic::Ordering;
 use embassy_time::{Duration, Instant, Timer};
@@ -29,6 +31,7 @@ pub enum Condition {
 const PERIOD: Duration = Duration::from_millis(10);
 const BREATH: Duration = Duration::from_secs(4);
 const SLOW_BLINK: Duration = Duration::from_secs(1);
+const FLASHES: Duration = Duration::from_secs(2);
 const FAST_BLINK: Duration = Duration::from_millis(200);
 
 /// Tells how the sensor is doing from now on.
@@ -64,12 +67,23 @@ pub async fn run(mut led: StatusLed) {
 /// How long the LED is on in the dimming period that begins at `now`.
 fn lit_time(now: Instant) -> Duration {
     match get() {
+        Condition::NoCamera => blink(now, FAST_BLINK),
+        _ if self_test::failed_at_start() => three_flashes(now),
         Condition::Good => {
             let brightness = brightness(phase(now, BREATH));
             Duration::from_micros((brightness * PERIOD.as_micros() as f32) as u64)
         }
         Condition::NoForce => blink(now, SLOW_BLINK),
-        Condition::NoCamera => blink(now, FAST_BLINK),
+    }
+}
+
+/// Three flashes of a tenth of a period each, a tenth apart, and a pause.
+fn three_flashes(now: Instant) -> Duration {
+    let tenth = (phase(now, FLASHES) * 10.0) as u32;
+    if matches!(tenth, 0 | 2 | 4) {
+        PERIOD
+    } else {
+        Duration::MIN
     }
 }
 

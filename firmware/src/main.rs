@@ -62,6 +62,7 @@ use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
 use hivtac_sensing::temporal::Temporal;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
 use memory::Memory;
@@ -128,6 +129,8 @@ fn start() -> Foreground {
     let model = InUse::of(&chosen);
     let temporal = TEMPORAL.take();
     let format = configure(sensor, temporal, chosen, memory.record());
+    set_camera(memory.record().camera);
+    self_test::at_start(&memory.of_flash(), sensor);
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
@@ -181,6 +184,14 @@ fn configure(
     settings::follow(sensor, temporal, source);
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
+}
+
+/// Has the camera begin as it is kept.
+fn set_camera(kept: CameraSettings) {
+    match camera::LIMITS.check(&kept) {
+        Ok(()) => camera::tell(kept),
+        Err(_) => defmt::warn!("the kept exposure or gain is out of the camera's range"),
+    }
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

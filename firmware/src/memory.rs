@@ -14,11 +14,12 @@ use crate::pipeline_task::Order;
 use crate::self_test::{self, OfFlash};
 use crate::session::Asked;
 use crate::settings::InUse;
-use crate::shared::{MEMORY_ORDER, MEMORY_ORDERED, NEXT_MODEL, ORDERS};
+use crate::shared::{CAMERA_AFRESH, MEMORY_ORDER, MEMORY_ORDERED, NEXT_MODEL, ORDERS};
 use crate::thermometer::Thermometer;
-use crate::{log, model_slots, outbox, settings};
+use crate::{camera, log, model_slots, outbox, settings};
 use core::sync::atomic::Ordering;
-use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError, blob};
+use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
+use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::kept::{KeptModel, MAX_BYTES, Record};
 use hivtac_wire::message::{DeviceMessage, LogLevel, ModelSource, Outcome};
 use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
@@ -147,7 +148,8 @@ impl Memory {
         Outcome::Done
     }
 
-    fn of_flash(&self) -> OfFlash {
+    /// What the self-test asks of it.
+    pub fn of_flash(&self) -> OfFlash {
         OfFlash {
             found: self.found,
             failures: self.log.failures(),
@@ -181,6 +183,7 @@ impl Memory {
                 temporal,
                 rezeroed,
                 drift,
+                camera: camera::report(),
             }));
         }
         Outcome::Done
@@ -193,6 +196,7 @@ impl Memory {
             threshold: used.own_threshold() == self.record.threshold,
             tare: used.tare == self.record.tare,
             temporal: used.temporal == self.record.temporal,
+            camera: camera::report().settings == self.record.camera,
         }
     }
 
@@ -212,6 +216,9 @@ impl Memory {
         }
         if selection.temporal {
             record.temporal = used.temporal;
+        }
+        if selection.camera {
+            record.camera = camera::report().settings;
         }
         if record == self.record && self.is_kept {
             return Outcome::Done;
@@ -242,7 +249,7 @@ impl Memory {
             log::say(LogLevel::Error, format_args!("{refusal}"));
             refusal.outcome()
         })?;
-        let written = blob::write(self.log.flash(), model::sector(slot), file).await;
+        let written = self.log.write_blob(model::sector(slot), file).await;
         written.map_err(|_| {
             say_worn();
             Outcome::Worn
@@ -270,6 +277,9 @@ impl Memory {
     async fn reset(&mut self) -> Result<Chosen, Outcome> {
         self.save_or_say(Record::default()).await?;
         settings::set_name(Name::new());
+        if camera::report().settings != CameraSettings::default() {
+            CAMERA_AFRESH.signal(());
+        }
         Ok(Chosen::built_in(ModelSource::BuiltIn))
     }
 

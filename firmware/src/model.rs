@@ -3,7 +3,9 @@
 use crate::camera::{self, Format};
 use crate::flash::SecondBank;
 use crate::model_slots;
+use crate::pipeline_task::Sensor;
 use core::fmt;
+use hivtac_sensing::known_answer::Answer;
 use hivtac_sensing::model::{AlignedFile, Model, ModelError, Origin};
 use hivtac_sensing::settings::Settings;
 use hivtac_storage::blob;
@@ -14,6 +16,9 @@ use hivtac_wire::message::{ModelSource, Outcome};
 /// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels
 /// run it.
 static FILE: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!(env!("HIVTAC_MODEL_FILE")));
+
+/// What a computer has for the model's answer to the known question (`build.rs`).
+static ANSWER: Option<Answer> = include!(concat!(env!("OUT_DIR"), "/known_answer.rs"));
 
 /// A file of at most so many bytes is copied to DTCM at the start, where its weights are read
 /// without waiting; a larger one is read in flash.
@@ -69,6 +74,12 @@ fn built_in() -> Option<Model<'static>> {
             None
         }
     }
+}
+
+/// Whether the built-in model answers the known question as on a computer; false when it is none.
+pub fn answers_right(sensor: &mut Sensor) -> bool {
+    let answer = built_in().map(|model| sensor.known_answer(&model));
+    answer.is_some() && answer == ANSWER
 }
 
 /// The sector of the flash's second bank that keeps the model of a slot: behind those of the log.

@@ -1,9 +1,18 @@
-//! What the device finds when it looks at itself: at the start, for the log, and on request.
+//! What the device finds when it looks at itself: at the start, before the first sample, and on
+//! request.
+//!
+//! # Design
+//! At the start it looks at what costs next to nothing: flash, model and stack by what is
+//! known of them, and the arithmetic by one answer of the built-in model. Whether the camera is the
+//! right one, its registers hold what was written and its frames take the time that they should,
+//! its set-up finds out anyhow. Only the temperature is left out, whose converter needs time.
 
 use crate::health::{self, Condition};
+use crate::model;
+use crate::pipeline_task::Sensor;
 use crate::settings;
-use crate::shared::RESET_REASON;
-use crate::stack;
+use crate::shared::{AT_START, CAMERA_PROBLEM, RESET_REASON};
+use crate::{camera, stack};
 use core::sync::atomic::Ordering;
 use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::ModelSource;
@@ -11,6 +20,10 @@ use hivtac_wire::settings::Found;
 
 /// Above this the microcontroller is hotter than its data sheet has it, hundredths of a degree.
 const HOTTEST: i16 = 8_500;
+
+/// Frames that are longer or shorter by one part in so many say that a clock is wrong: crystals
+/// differ by a tenth of a thousandth.
+const FRAME_TIME_PART: u32 = 100;
 
 /// What the flash's owner knows.
 pub struct OfFlash {
@@ -22,12 +35,38 @@ pub struct OfFlash {
 
 /// Looks at everything. The temperature is as it was read, hundredths of a degree.
 pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health {
-    let (stack_used, stack_bytes) = (stack::used(), stack::bytes());
+    let at_start = AT_START.load(Ordering::Relaxed);
+    let is_hot = temperature_centidegrees.is_none_or(|temperature| temperature > HOTTEST);
+    let found = [
+        (Problem::CameraSilent, health::get() == Condition::NoCamera),
+        (Problem::Temperature, is_hot),
+    ];
+    Health {
+        reset: reset_reason(),
+        temperature_centidegrees,
+        stack_used: stack::used(),
+        stack_bytes: stack::bytes(),
+        problems: bits(&found)
+            | standing(flash)
+            | CAMERA_PROBLEM.load(Ordering::Relaxed)
+            | at_start & Problem::Arithmetic.bit(),
+        at_start,
+    }
+}
+
+/// Looks at what costs next to nothing. Call once, when `sensor` is configured.
+pub fn at_start(flash: &OfFlash, sensor: &mut Sensor) {
+    let wrong = !model::answers_right(sensor);
+    let problems = standing(flash) | bits(&[(Problem::Arithmetic, wrong)]);
+    AT_START.store(problems, Ordering::Relaxed);
+}
+
+/// What can be looked at any time.
+fn standing(flash: &OfFlash) -> u32 {
     let reset = reset_reason();
     let model = settings::of_pipeline().and_then(|told| told.model);
     let source = model.as_ref().map(|model| model.source);
-    let found = [
-        (Problem::CameraSilent, health::get() == Condition::NoCamera),
+    bits(&[
         (Problem::ModelMissing, model.is_none()),
         (
             Problem::ModelFallback,
@@ -38,22 +77,53 @@ pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health 
             flash.found == Found::AnotherVersion,
         ),
         (Problem::FlashFails, flash.failures > 0),
-        (Problem::StackLow, stack_used > stack_bytes / 4 * 3),
+        (Problem::StackLow, stack::used() > stack::bytes() / 4 * 3),
         (Problem::WatchdogReset, reset == ResetReason::Watchdog),
         (Problem::SoftwareReset, reset == ResetReason::Software),
-        (
-            Problem::Temperature,
-            temperature_centidegrees.is_none_or(|temperature| temperature > HOTTEST),
-        ),
-    ];
-    let is_there = |(problem, is): (Problem, bool)| if is { problem.bit() } else { 0 };
-    Health {
-        reset,
-        temperature_centidegrees,
-        stack_used,
-        stack_bytes,
-        problems: found.map(is_there).iter().sum(),
+    ])
+}
+
+fn bits(found: &[(Problem, bool)]) -> u32 {
+    let bit = |(problem, is_there): &(Problem, bool)| if *is_there { problem.bit() } else { 0 };
+    found.iter().map(bit).fold(0, |all, bit| all | bit)
+}
+
+/// The camera could not be set up; `starting` until it was for the first time.
+pub fn camera_failed(error: &camera::Error, starting: bool) {
+    let problem = match error {
+        camera::Error::Bus(_) => Problem::CameraSilent,
+        camera::Error::Other(_) | camera::Error::WrongId { .. } => Problem::AnotherCamera,
+        camera::Error::Register { .. } => Problem::CameraRegisters,
+    };
+    CAMERA_PROBLEM.store(problem.bit(), Ordering::Relaxed);
+    if starting {
+        AT_START.fetch_or(problem.bit(), Ordering::Relaxed);
     }
+}
+
+/// The camera was set up, and frames took so long; nothing when none came. `starting` the first
+/// time.
+pub fn camera_answers(frame_us: Option<u32>, should_us: u32, starting: bool) {
+    let off = |us: u32| us.abs_diff(should_us) > should_us / FRAME_TIME_PART;
+    let problem = bits(&[(Problem::Clocks, frame_us.is_some_and(off))]);
+    CAMERA_PROBLEM.store(problem, Ordering::Relaxed);
+    if starting {
+        AT_START.fetch_or(problem, Ordering::Relaxed);
+    }
+}
+
+/// Whether something was found at the start that no other pattern of the LED tells.
+pub fn failed_at_start() -> bool {
+    const TOLD_OTHERWISE: [Problem; 5] = [
+        Problem::CameraSilent,
+        Problem::AnotherCamera,
+        Problem::CameraRegisters,
+        Problem::WatchdogReset,
+        Problem::SoftwareReset,
+    ];
+    let otherwise = TOLD_OTHERWISE.map(Problem::bit);
+    let otherwise = otherwise.iter().fold(0, |all, bit| all | bit);
+    AT_START.load(Ordering::Relaxed) & !otherwise != 0
 }
 
 fn reset_reason() -> ResetReason {

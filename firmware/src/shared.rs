@@ -20,7 +20,7 @@
 //! Not shared: memory with one owner, which takes it once (`main::SENSOR`, `near_table::TABLE`),
 //! and constants (`model`).
 
-use crate::camera::{Format, USUAL_FORMAT};
+use crate::camera::{Format, LIMITS, USUAL_FORMAT};
 use crate::capture::{CaptureEvent, Running};
 use crate::capture_task::CameraOrder;
 use crate::health::Condition;
@@ -39,9 +39,11 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use hivtac_capture::Edge;
+use hivtac_terms::camera::{CameraSettings, Rate};
+use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::health::ResetReason;
 use hivtac_wire::message::{DeviceMessage, Sample};
-use hivtac_wire::settings::Name;
+use hivtac_wire::settings::{CameraReport, Name};
 
 /// What waits for one receiver; whoever sends never waits longer than for room.
 type Queue<T, const N: usize> = Channel<CriticalSectionRawMutex, T, N>;
@@ -97,6 +99,23 @@ pub static CAMERA_ORDERED: AtomicBool = AtomicBool::new(false);
 /// (`camera`).
 pub static EXPOSURE_MIDDLE_US: AtomicI32 = AtomicI32::new(0);
 
+/// How the camera is set. Written at boot and by the capture task; read by the USB tasks, the
+/// memory task and the pipeline (`camera`).
+pub static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
+    CriticalSectionMutex::new(Cell::new(CameraReport {
+        settings: CameraSettings {
+            exposure: None,
+            gain: None,
+            rate: Rate::Full,
+        },
+        exposure: Microseconds(0),
+        gain: Sixteenths(0),
+        limits: LIMITS,
+    }));
+
+/// The camera is to be set as a new device's. From the memory task to the capture task.
+pub static CAMERA_AFRESH: Request<()> = Request::new();
+
 /// Number of the newest frame before the camera's set-up, while that lasts. Written by the capture
 /// task; read by the USB tasks (`stats`).
 pub static PASSING_OVER: AtomicU32 = AtomicU32::new(stats::NOT_PASSING);
@@ -128,6 +147,14 @@ pub static SNAPSHOT_TAKEN: Request<Taken> = Request::new();
 /// Why the microcontroller started, a `ResetReason`. Written at boot; read by the memory task
 /// (`faults`).
 pub static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
+
+/// What the self-test found at the start, bits of `Problem`. Written at boot and by the capture
+/// task; read by the memory task and the LED task (`self_test`).
+pub static AT_START: AtomicU32 = AtomicU32::new(0);
+
+/// Why the camera could not be set up, a bit of `Problem`; 0 when it could. Written by the capture
+/// task; read by the memory task (`self_test`).
+pub static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
 
 // What is kept.
 

@@ -1,6 +1,6 @@
 //! A tare under way: which command it answers, what it has, and when it gives up.
 
-use crate::camera::FRAME_TIME;
+use crate::camera;
 use crate::pipeline_task::Sensor;
 use crate::session;
 use embassy_time::{Duration, Instant};
@@ -26,7 +26,9 @@ impl Taring {
     /// For command `id`, over `frames` good frames; when the host `insists`, also while something
     /// moves or touches the film. `None` when that number is out of its range.
     pub fn begin(id: u16, frames: u16, insists: bool) -> Option<Self> {
-        let patience = FRAME_TIME * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
+        let frame_us = camera::frame_us(camera::report().settings.rate);
+        let frame_time = Duration::from_micros(frame_us.into());
+        let patience = frame_time * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
         let builder = TareBuilder::new(frames)?;
         Some(Self {
             id,

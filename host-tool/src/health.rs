@@ -21,6 +21,7 @@ pub struct Told {
     stack_used: u32,
     stack_bytes: u32,
     problems: Vec<&'static str>,
+    at_start: Vec<&'static str>,
 }
 
 /// What a self-test found.
@@ -46,7 +47,8 @@ impl Told {
             temperature_c: (health.temperature_centidegrees).map(|it| f64::from(it) / 100.0),
             stack_used: health.stack_used,
             stack_bytes: health.stack_bytes,
-            problems: problems(health).map(Problem::name).collect(),
+            problems: problems(health.problems).map(Problem::name).collect(),
+            at_start: problems(health.at_start).map(Problem::name).collect(),
         }
     }
 
@@ -60,12 +62,17 @@ impl Told {
             [] => "none".to_owned(),
             names => format!("{}; `hivtac self-test` says what to do", names.join(", ")),
         };
+        let at_start = match self.at_start.as_slice() {
+            [] => "no problem".to_owned(),
+            names => names.join(", "),
+        };
         vec![
             format!(
                 "health     started by {}; {temperature}; {} of {} bytes of stack used",
                 self.reset, self.stack_used, self.stack_bytes
             ),
             format!("problems   {problems}"),
+            format!("at start   {at_start}"),
         ]
     }
 }
@@ -77,7 +84,7 @@ impl Told {
 pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let health = ask(&mut link, patience)?;
-    let found: Vec<Problem> = problems(&health).collect();
+    let found: Vec<Problem> = problems(health.problems).collect();
     let report = Report {
         device_id: unit_number(&hello.device_id),
         good: found.is_empty(),
@@ -119,18 +126,18 @@ pub fn ask(link: &mut Link, patience: Duration) -> Result<Health, Failure> {
     health.ok_or_else(|| link.lost("its health did not come"))
 }
 
-fn problems(health: &Health) -> impl Iterator<Item = Problem> {
-    let bits = health.problems;
+fn problems(bits: u32) -> impl Iterator<Item = Problem> {
     let is_there = move |problem: &Problem| bits & problem.bit() != 0;
     Problem::ALL.into_iter().filter(is_there)
 }
 
 fn lines(health: &Health) -> Vec<String> {
     let line = |problem: Problem| {
-        let there = health.problems & problem.bit() != 0;
-        let (state, advice) = match there {
-            true => ("PROBLEM", format!(": {}", advice(problem))),
-            false => ("good   ", String::new()),
+        let is_in = |bits: u32| bits & problem.bit() != 0;
+        let (state, advice) = match (is_in(health.problems), is_in(health.at_start)) {
+            (true, _) => ("PROBLEM", format!(": {}", advice(problem))),
+            (false, true) => ("good   ", ": not so at the start".to_owned()),
+            (false, false) => ("good   ", String::new()),
         };
         format!("{:>2}  {state}  {}{advice}", problem.code(), problem.name())
     };
@@ -157,6 +164,16 @@ fn advice(problem: Problem) -> &'static str {
             "a fault, unless a debug probe was at work; report it, with what the device was doing"
         }
         Problem::Temperature => "above 85 °C, or the sensor for it does not tell; let it cool",
+        Problem::AnotherCamera => {
+            "fit the camera that this firmware is for, or flash that of the camera"
+        }
+        Problem::CameraRegisters => "look at its cable; restart it; else it is broken",
+        Problem::Clocks => {
+            "the board's crystal or the camera's clock is wrong; `hivtac bring-up` measures them"
+        }
+        Problem::Arithmetic => {
+            "its forces mean nothing; flash it again, and when it stays, use another board"
+        }
     }
 }
 

@@ -249,6 +249,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::TareAnyway { .. } => "tare",
         Request::GetHealth => "get health",
         Request::StartLoader => "start loader",
+        Request::SetCamera(_) => "set the camera",
     }
 }
 

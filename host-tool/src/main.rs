@@ -41,9 +41,12 @@ use hivtac_terms::geometry::Preset;
 use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
-use hivtac_terms::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
+use hivtac_terms::units::{
+    Micrometres, Microseconds, MilliPx, Milliseconds, Permille, Sixteenths, UnsignedMicroNewtons,
+};
 use hivtac_wire::settings::Name;
 use lines::Format;
+use settings::camera::{self, Wanted};
 use settings::temporal::{Change, RezeroChange, small_thousandths, thousandths};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -184,9 +187,9 @@ enum Command {
     /// Give the device a model of its own, or new firmware
     #[command(subcommand)]
     Update(UpdateCommand),
-    /// Let the camera find exposure and gain for the light that there is, and keep them
+    /// Let the camera find exposure and gain for the light that there is, until it restarts
     ///
-    /// It does so by itself when it starts.
+    /// It does so by itself when it starts. What `settings set` gave it stays.
     ///
     /// Example: hivtac expose
     Expose {
@@ -500,6 +503,44 @@ enum SetCommand {
     /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
     #[command(subcommand)]
     Rezero(RezeroCommand),
+    /// How long the camera exposes each row
+    ///
+    /// Automatic, it finds what the light needs when it starts and with `hivtac expose`, and then
+    /// stays. At a lower rate there is time for a longer one.
+    ///
+    /// Example: hivtac settings set exposure 2.5
+    Exposure {
+        #[command(flatten)]
+        device: Told,
+        /// ms, or `auto`
+        #[arg(value_name = "MS", value_parser = camera::exposure)]
+        time: Wanted<Microseconds>,
+    },
+    /// How much the camera amplifies what it exposed
+    ///
+    /// Automatic as the exposure, and only when that alone is not enough.
+    ///
+    /// Example: hivtac settings set gain 1.5
+    Gain {
+        #[command(flatten)]
+        device: Told,
+        /// 1 to 4 in sixteenths, or `auto`
+        #[arg(value_name = "GAIN", value_parser = camera::gain)]
+        gain: Wanted<Sixteenths>,
+    },
+    /// How many frames the camera sends a second, and so how many forces come
+    ///
+    /// An OV7725 sends 156, 78 or 39, an MT9V034 244, 122 or 61. A lower rate leaves more time for
+    /// light.
+    ///
+    /// Example: hivtac settings set rate 78
+    Rate {
+        #[command(flatten)]
+        device: Told,
+        /// Frames a second
+        #[arg(value_name = "FPS")]
+        rate: u16,
+    },
 }
 
 #[derive(Subcommand)]
@@ -597,6 +638,18 @@ impl SetCommand {
         let (device, change) = match self {
             SetCommand::Name { device, name } => {
                 return (device, settings::Action::SetName(name));
+            }
+            SetCommand::Exposure { device, time } => {
+                let change = camera::Change::Exposure(time);
+                return (device, settings::Action::SetCamera(change));
+            }
+            SetCommand::Gain { device, gain } => {
+                let change = camera::Change::Gain(gain);
+                return (device, settings::Action::SetCamera(change));
+            }
+            SetCommand::Rate { device, rate } => {
+                let change = camera::Change::Rate(rate);
+                return (device, settings::Action::SetCamera(change));
             }
             SetCommand::Contact {
                 device,

@@ -277,7 +277,8 @@ impl Player {
             | Request::Reset
             | Request::TareAnyway { .. }
             | Request::GetHealth
-            | Request::StartLoader => Outcome::Unsupported,
+            | Request::StartLoader
+            | Request::SetCamera(_) => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

@@ -5,6 +5,7 @@ mod common;
 
 mod attack;
 mod camera;
+mod camera_settings;
 mod command;
 mod faults;
 mod firmware;

@@ -91,14 +91,14 @@ fn old() -> (Vec<u8>, SettingsReport) {
 }
 
 /// A folder, and in it that flash.
-struct Device {
+pub struct Device {
     directory: tempfile::TempDir,
-    flash: PathBuf,
+    pub flash: PathBuf,
     kept: SettingsReport,
 }
 
 impl Device {
-    fn new() -> Device {
+    pub fn new() -> Device {
         let (contents, kept) = &*OLD;
         let directory = tempfile::tempdir().unwrap();
         let flash = directory.path().join("flash");
@@ -111,7 +111,7 @@ impl Device {
     }
 
     /// A copy of its flash.
-    fn copy(&self, name: &str) -> PathBuf {
+    pub fn copy(&self, name: &str) -> PathBuf {
         let copy = self.directory.path().join(name);
         std::fs::copy(&self.flash, &copy).unwrap();
         copy
@@ -211,7 +211,7 @@ fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
 }
 
 /// The flash of a device whose record has another first byte, and the checksum for it.
-fn of_another_version(flash: &Path) {
+pub fn of_another_version(flash: &Path) {
     let mut contents = Contents::load(flash).unwrap();
     let sector = &mut contents.array[..SECTOR_BYTES];
     // Of the storage's layout: 10 bytes before the record, of which the last four are a checksum
@@ -223,7 +223,7 @@ fn of_another_version(flash: &Path) {
         record.extend(&word[1..]);
     }
     record.truncate(length);
-    assert_eq!(record[0], 2, "the version");
+    assert_eq!(record[0], 3, "the version");
     sector[10] = 200;
     record[0] = 200;
     let mut checked = sector[2..6].to_vec();

@@ -16,6 +16,7 @@ extern crate std;
 pub use hivtac_force::{features, force, forward, layer, model, network, packing, rest};
 pub use hivtac_markers::{blob, formats, rules, scanner, screen, settings, tables};
 
+pub mod known_answer;
 pub mod motion;
 pub mod pipeline;
 pub mod tare;

@@ -7,7 +7,11 @@ use crate::flash::{self, Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
 ///
 /// # Errors
 /// [`Failed`]: the bytes do not fit the sector, or do not read back.
-pub async fn write<F: Flash>(flash: &mut F, sector: u32, bytes: &[u8]) -> Result<(), Failed> {
+pub(crate) async fn write<F: Flash>(
+    flash: &mut F,
+    sector: u32,
+    bytes: &[u8],
+) -> Result<(), Failed> {
     if bytes.len() > F::SECTOR_WORDS as usize * WORD_BYTES {
         return Err(Failed);
     }

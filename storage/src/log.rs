@@ -15,6 +15,7 @@
 //! A word that does not read back as it was programmed is left behind, and the record is written
 //! anew behind it.
 
+use crate::blob;
 use crate::flash::{self, BLANK, Failed, Flash, Place};
 use crate::record::{self, Header};
 
@@ -80,7 +81,7 @@ impl<F: Flash> Log<F> {
         self.settled
     }
 
-    /// Attempts to write a record that failed since the log was opened.
+    /// Attempts to write a record or a blob that failed since the log was opened.
     pub fn failures(&self) -> u32 {
         self.failures
     }
@@ -88,6 +89,18 @@ impl<F: Flash> Log<F> {
     /// Sectors erased so far in the life of this log.
     pub fn erases(&self) -> u32 {
         self.generation
+    }
+
+    /// Erases a sector that is none of the log's, writes a [`blob`] into it, and reads it back.
+    ///
+    /// # Errors
+    /// [`Failed`]: the bytes do not fit the sector, or do not read back.
+    pub async fn write_blob(&mut self, sector: u32, bytes: &[u8]) -> Result<(), Failed> {
+        let written = blob::write(&mut self.flash, sector, bytes).await;
+        if written.is_err() {
+            self.count_failure();
+        }
+        written
     }
 
     /// The flash, for its other sectors.
@@ -108,10 +121,14 @@ impl<F: Flash> Log<F> {
                     self.newest = Some(Newest { sector, length });
                     return Ok(());
                 }
-                Err(Failed) => self.failures = self.failures.saturating_add(1),
+                Err(Failed) => self.count_failure(),
             }
         }
         Err(SaveError::Worn)
+    }
+
+    fn count_failure(&mut self) {
+        self.failures = self.failures.saturating_add(1);
     }
 
     /// Writes a record and its seal behind what was written before; tells in which sector.

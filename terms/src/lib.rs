@@ -8,6 +8,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod camera;
 pub mod conditions;
 pub mod force;
 pub mod geometry;

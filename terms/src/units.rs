@@ -1,5 +1,6 @@
 //! The units that cross module borders. Each is a transparent newtype: no bare integer does.
 
+use core::fmt;
 use core::ops::{Add, Sub};
 
 /// A pixel coordinate or distance in Q16.16: 65,536 steps a pixel. The centre of pixel (0, 0) is
@@ -118,3 +119,26 @@ pub struct Permille(pub u16);
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct MilliPx(pub u16);
+
+/// A short time, in millionths of a second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Microseconds(pub u32);
+
+impl fmt::Display for Microseconds {
+    /// In milliseconds, without the unit.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{:03}", self.0 / 1_000, self.0 % 1_000)
+    }
+}
+
+/// A gain, in sixteenths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Sixteenths(pub u16);

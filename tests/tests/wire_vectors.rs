@@ -2,6 +2,7 @@
 //! shares nothing with the Rust one, equals what `hivtac-wire` writes and reads, and what
 //! `docs/wire.md` quotes.
 
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -9,8 +10,8 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, MilliPx, Milliseconds, Px, SignedMicrometres,
-    UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Px,
+    SignedMicrometres, Sixteenths, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
@@ -252,7 +253,32 @@ const NAME_AND_TARE: Selection = Selection {
     threshold: false,
     tare: true,
     temporal: true,
+    camera: true,
 };
+
+const CAMERA: CameraSettings = CameraSettings {
+    exposure: Some(Microseconds(2_500)),
+    gain: None,
+    rate: Rate::Half,
+};
+
+fn camera() -> CameraReport {
+    let limits = |frames_per_second, shortest, longest| RateLimits {
+        frames_per_second,
+        shortest: Microseconds(shortest),
+        longest: Microseconds(longest),
+    };
+    CameraReport {
+        settings: CAMERA,
+        exposure: Microseconds(2_512),
+        gain: Sixteenths(24),
+        limits: CameraLimits([
+            limits(156, 24, 6_405),
+            limits(78, 47, 12_810),
+            limits(39, 93, 25_620),
+        ]),
+    }
+}
 
 fn settings() -> DeviceMessage {
     DeviceMessage::Settings(SettingsReport {
@@ -266,6 +292,7 @@ fn settings() -> DeviceMessage {
         temporal: OWN,
         rezeroed: Px(1_311),
         drift: Some(Px(20_316)),
+        camera: camera(),
     })
 }
 
@@ -276,6 +303,7 @@ fn health() -> DeviceMessage {
         stack_used: 6_120,
         stack_bytes: 24_576,
         problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit(),
+        at_start: Problem::ModelFallback.bit() | Problem::Arithmetic.bit(),
     })
 }
 
@@ -422,6 +450,11 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ("reset", command(20, Request::Reset)),
         ("get-health", command(21, Request::GetHealth)),
         ("start-loader", command(22, Request::StartLoader)),
+        ("set-camera", command(23, Request::SetCamera(CAMERA))),
+        (
+            "set-camera-automatic",
+            command(23, Request::SetCamera(CameraSettings::default())),
+        ),
         (
             "tare-anyway",
             command(7, Request::TareAnyway { frames: 128 }),
@@ -486,7 +519,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 22);
+    assert_eq!(requests.len(), 23);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xBE1B83752B1982C6
+SCHEMA = 0x33549E33729C10D1
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -98,6 +98,22 @@ def hello_end(threshold):
         string("preset", "ov7725"),
         raw("dilations 1", [1]),
         raw("centroid: RednessWeighted", [1]),
+    ]
+
+
+CAMERA = [
+    raw("exposure: Some", [1]),
+    unsigned("exposure_us", 2_500),
+    raw("gain: None", [0]),
+    raw("rate: Half", [1]),
+]
+
+
+def at_rate(rate, frames_per_second, shortest, longest):
+    return [
+        unsigned(f"{rate} rate: frames_per_second", frames_per_second),
+        unsigned("shortest_us", shortest),
+        unsigned("longest_us", longest),
     ]
 
 
@@ -281,7 +297,7 @@ DEVICE = {
         string("name", "thumb"),
         *RED,
         *REST,
-        raw("kept: name, not threshold, tare, temporal", [1, 0, 1, 1]),
+        raw("kept: name, not threshold, tare, temporal, camera", [1, 0, 1, 1, 1]),
         raw("found: Settings", [1]),
         unsigned("erases", 3),
         unsigned("failures", 0),
@@ -289,6 +305,12 @@ DEVICE = {
         signed("rezeroed_q16", 1_311),
         raw("drift: Some", [1]),
         signed("drift_q16", 20_316),
+        *CAMERA,
+        unsigned("exposure_us", 2_512),
+        unsigned("gain_sixteenths", 24),
+        *at_rate("full", 156, 24, 6_405),
+        *at_rate("half", 78, 47, 12_810),
+        *at_rate("quarter", 39, 93, 25_620),
     ],
     "health": [
         raw("Health", [10]),
@@ -298,6 +320,7 @@ DEVICE = {
         unsigned("stack_used", 6_120),
         unsigned("stack_bytes", 24_576),
         (varint(0x44), "problems 0x44: model_fallback, watchdog_reset"),
+        (varint(0x1004), "at_start 0x1004: model_fallback, arithmetic"),
     ],
     "tared": [
         raw("Tared", [9]),
@@ -334,7 +357,7 @@ HOST = {
     "set-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), *REST],
     "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
     "keep": COMMAND + [unsigned("id", 14), raw("Keep", [12])]
-    + [raw("name, not threshold, tare, temporal", [1, 0, 1, 1])],
+    + [raw("name, not threshold, tare, temporal, camera", [1, 0, 1, 1, 1])],
     "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
@@ -349,6 +372,9 @@ HOST = {
     "tare-anyway": COMMAND + [unsigned("id", 7), raw("TareAnyway", [19]), unsigned("frames", 128)],
     "get-health": COMMAND + [unsigned("id", 21), raw("GetHealth", [20])],
     "start-loader": COMMAND + [unsigned("id", 22), raw("StartLoader", [21])],
+    "set-camera": COMMAND + [unsigned("id", 23), raw("SetCamera", [22]), *CAMERA],
+    "set-camera-automatic": COMMAND + [unsigned("id", 23), raw("SetCamera", [22])]
+    + [raw("exposure: None", [0]), raw("gain: None", [0]), raw("rate: Full", [0])],
     "reset": COMMAND + [unsigned("id", 20), raw("Reset", [18])],
 }
 

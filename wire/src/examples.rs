@@ -5,6 +5,7 @@ use crate::message::*;
 use crate::settings::*;
 use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -12,8 +13,8 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, Rezero, SlipLimits, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
-    SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
+    SignedMicrometres, Sixteenths, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
@@ -103,6 +104,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             temporal: longest_temporal(),
             rezeroed: Px(i32::MIN),
             drift: Some(Px(i32::MIN)),
+            camera: longest_camera_report(),
         }),
         DeviceMessage::Health(Health {
             reset: ResetReason::Other,
@@ -110,6 +112,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             stack_used: u32::MAX,
             stack_bytes: u32::MAX,
             problems: u32::MAX,
+            at_start: u32::MAX,
         }),
         DeviceMessage::Tared(TareReport {
             rest: longest_rest(),
@@ -184,6 +187,29 @@ pub fn longest_temporal() -> TemporalSettings {
     }
 }
 
+/// Camera settings, each number as long as it can be.
+pub fn longest_camera() -> CameraSettings {
+    CameraSettings {
+        exposure: Some(Microseconds(u32::MAX)),
+        gain: Some(Sixteenths(u16::MAX)),
+        rate: Rate::Quarter,
+    }
+}
+
+fn longest_camera_report() -> CameraReport {
+    let limits = RateLimits {
+        frames_per_second: u16::MAX,
+        shortest: Microseconds(u32::MAX),
+        longest: Microseconds(u32::MAX),
+    };
+    CameraReport {
+        settings: longest_camera(),
+        exposure: Microseconds(u32::MAX),
+        gain: Sixteenths(u16::MAX),
+        limits: CameraLimits([limits; 3]),
+    }
+}
+
 fn longest_inspection() -> Inspection {
     let register = DifferentRegister {
         address: u8::MAX,
@@ -249,6 +275,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::TareAnyway { frames: u16::MAX },
         Request::GetHealth,
         Request::StartLoader,
+        Request::SetCamera(longest_camera()),
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -305,6 +332,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         any::<u16>().prop_map(|frames| Request::TareAnyway { frames }),
         Just(Request::GetHealth),
         Just(Request::StartLoader),
+        any_camera().prop_map(Request::SetCamera),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -527,12 +555,13 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         any_temporal(),
     );
     let numbers = any::<([u32; 2], i32, Option<i32>)>();
-    (used, any_selection(), found, numbers).prop_map(
+    (used, any_selection(), found, numbers, any_camera_report()).prop_map(
         |(
             (name, threshold, tare, temporal),
             kept,
             found,
             ([erases, failures], rezeroed, drift),
+            camera,
         )| {
             SettingsReport {
                 name,
@@ -545,6 +574,7 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
                 temporal,
                 rezeroed: Px(rezeroed),
                 drift: drift.map(Px),
+                camera,
             }
         },
     )
@@ -559,13 +589,16 @@ fn any_health() -> impl Strategy<Value = Health> {
         Just(ResetReason::Watchdog),
         Just(ResetReason::Other)
     ];
-    (reset, any::<(Option<i16>, u32, u32, u32)>()).prop_map(
-        |(reset, (temperature_centidegrees, stack_used, stack_bytes, problems))| Health {
-            reset,
-            temperature_centidegrees,
-            stack_used,
-            stack_bytes,
-            problems,
+    (reset, any::<(Option<i16>, u32, u32, [u32; 2])>()).prop_map(
+        |(reset, (temperature_centidegrees, stack_used, stack_bytes, [problems, at_start]))| {
+            Health {
+                reset,
+                temperature_centidegrees,
+                stack_used,
+                stack_bytes,
+                problems,
+                at_start,
+            }
         },
     )
 }
@@ -579,11 +612,41 @@ fn any_tared() -> impl Strategy<Value = TareReport> {
 }
 
 fn any_selection() -> impl Strategy<Value = Selection> {
-    any::<[bool; 4]>().prop_map(|[name, threshold, tare, temporal]| Selection {
+    any::<[bool; 5]>().prop_map(|[name, threshold, tare, temporal, camera]| Selection {
         name,
         threshold,
         tare,
         temporal,
+        camera,
+    })
+}
+
+/// Any camera settings.
+pub fn any_camera() -> impl Strategy<Value = CameraSettings> {
+    let rate = any::<prop::sample::Index>().prop_map(|nth| *nth.get(&Rate::ALL));
+    (any::<(Option<u32>, Option<u16>)>(), rate).prop_map(|((exposure, gain), rate)| {
+        CameraSettings {
+            exposure: exposure.map(Microseconds),
+            gain: gain.map(Sixteenths),
+            rate,
+        }
+    })
+}
+
+fn any_camera_report() -> impl Strategy<Value = CameraReport> {
+    let limits = any::<[(u16, u32, u32); 3]>();
+    (any_camera(), any::<(u32, u16)>(), limits).prop_map(|(settings, (exposure, gain), limits)| {
+        let limits = limits.map(|(frames_per_second, shortest, longest)| RateLimits {
+            frames_per_second,
+            shortest: Microseconds(shortest),
+            longest: Microseconds(longest),
+        });
+        CameraReport {
+            settings,
+            exposure: Microseconds(exposure),
+            gain: Sixteenths(gain),
+            limits: CameraLimits(limits),
+        }
     })
 }
 

@@ -17,6 +17,8 @@ pub struct Health {
     pub stack_bytes: u32,
     /// What is not right: bits of [`Problem`].
     pub problems: u32,
+    /// What was not right at the start, before the first sample: bits of [`Problem`].
+    pub at_start: u32,
 }
 
 /// Why a microcontroller started.
@@ -59,11 +61,20 @@ pub enum Problem {
     SoftwareReset = 7,
     /// The temperature is above 85 °C, or the sensor for it does not tell.
     Temperature = 8,
+    /// Another camera answers than the firmware is for.
+    AnotherCamera = 9,
+    /// A register of the camera did not hold what was written.
+    CameraRegisters = 10,
+    /// Frames take another time than they should, by the device's own clock: that or the camera's is
+    /// wrong.
+    Clocks = 11,
+    /// The built-in model's answer to a known question is another than on a computer.
+    Arithmetic = 12,
 }
 
 impl Problem {
     /// All of them, by their numbers.
-    pub const ALL: [Problem; 9] = [
+    pub const ALL: [Problem; 13] = [
         Problem::CameraSilent,
         Problem::ModelMissing,
         Problem::ModelFallback,
@@ -73,6 +84,10 @@ impl Problem {
         Problem::WatchdogReset,
         Problem::SoftwareReset,
         Problem::Temperature,
+        Problem::AnotherCamera,
+        Problem::CameraRegisters,
+        Problem::Clocks,
+        Problem::Arithmetic,
     ];
 
     /// Its number.
@@ -97,6 +112,10 @@ impl Problem {
             Problem::WatchdogReset => "watchdog_reset",
             Problem::SoftwareReset => "software_reset",
             Problem::Temperature => "temperature",
+            Problem::AnotherCamera => "another_camera",
+            Problem::CameraRegisters => "camera_registers",
+            Problem::Clocks => "clocks",
+            Problem::Arithmetic => "arithmetic",
         }
     }
 }

@@ -2,15 +2,16 @@
 //! a whole or not at all.
 
 use crate::settings::{Name, RestPosition};
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
 use serde::{Deserialize, Serialize};
 
 /// First byte of a record. Raised on every change of what follows.
-const VERSION: u8 = 2;
+const VERSION: u8 = 3;
 
 /// Longest record.
-pub const MAX_BYTES: usize = 171;
+pub const MAX_BYTES: usize = 182;
 
 /// All that a device keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +26,8 @@ pub struct Record {
     pub model: Option<KeptModel>,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
+    /// How the camera is set.
+    pub camera: CameraSettings,
 }
 
 /// A model file that lies in flash.
@@ -64,8 +67,13 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::examples::{any_rest, any_temporal, any_threshold, longest_rest, longest_temporal};
+    use crate::examples::{
+        any_camera, any_rest, any_temporal, any_threshold, longest_camera, longest_rest,
+        longest_temporal,
+    };
+    use hivtac_terms::camera::Rate;
     use hivtac_terms::threshold::HsvBox;
+    use hivtac_terms::units::Microseconds;
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -80,6 +88,7 @@ mod tests {
                 crc: u32::MAX,
             }),
             temporal: longest_temporal(),
+            camera: longest_camera(),
         }
     }
 
@@ -93,7 +102,7 @@ mod tests {
 
     /// The record of a device in use must be read by every firmware with this version's number.
     #[test]
-    fn the_bytes_of_version_2() {
+    fn the_bytes_of_version_3() {
         let record = Record {
             name: Name::try_from("thumb").unwrap(),
             threshold: Some(Threshold::Rgb565(HsvBox::of_limits([
@@ -106,10 +115,16 @@ mod tests {
                 crc: 0xcafe_f00d,
             }),
             temporal: TemporalSettings::default(),
+            camera: CameraSettings {
+                exposure: Some(Microseconds(2_500)),
+                gain: None,
+                rate: Rate::Half,
+            },
         };
         let bytes = [
-            2, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
-            0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c, 0xd0, 0x0f, 0xe8, 0x07, 60, 50, 100, 0, 0,
+            3, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
+            0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c, 0xd0, 0x0f, 0xe8, 0x07, 60, 50, 100, 0, 0, 1, 0xc4,
+            0x13, 0, 1,
         ];
         let mut buffer = [0; MAX_BYTES];
         assert_eq!(record.to_bytes(&mut buffer), bytes);
@@ -137,6 +152,7 @@ mod tests {
             tare in proptest::option::of(any_rest()),
             model in proptest::option::of(any::<(u8, u32, u32)>()),
             temporal in any_temporal(),
+            camera in any_camera(),
         ) {
             let record = Record {
                 name: Name::try_from(name.as_str()).unwrap(),
@@ -144,6 +160,7 @@ mod tests {
                 tare,
                 model: model.map(|(slot, bytes, crc)| KeptModel { slot, bytes, crc }),
                 temporal,
+                camera,
             };
             let mut buffer = [0; MAX_BYTES];
             prop_assert_eq!(Record::of_bytes(record.to_bytes(&mut buffer)), Ok(record));

@@ -3,6 +3,7 @@
 use crate::health::Health;
 use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport};
 use heapless::{String, Vec};
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
@@ -291,7 +292,8 @@ pub enum Request {
     },
     /// Start streaming samples with their markers, and stats.
     StartWithMarkers,
-    /// Let exposure and gain find what the light needs, and keep that. Answered when done.
+    /// Let what is automatic of exposure and gain find what the light needs, and stay so. Answered
+    /// when done.
     Expose,
     /// Send the next whole frame. Answered behind its last part.
     Snapshot,
@@ -332,6 +334,8 @@ pub enum Request {
     /// Restart into the microcontroller's own loader, which takes new firmware. Answered before
     /// that.
     StartLoader,
+    /// Set the camera. Answered when it sends frames so.
+    SetCamera(CameraSettings),
 }
 
 /// Most bytes of a model file that is sent.

@@ -1,11 +1,12 @@
 //! A device's settings: what its user gave it, in use and kept.
 
 use heapless::String;
+use hivtac_terms::camera::{CameraLimits, CameraSettings};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{Microseconds, Px, Sixteenths};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -58,6 +59,21 @@ pub struct SettingsReport {
     /// How far the rest position in use is from the kept one, by the marker that moved most: the
     /// drift since then. `None` unless there are both, for the same frames.
     pub drift: Option<Px>,
+    /// How the camera is set.
+    pub camera: CameraReport,
+}
+
+/// How the camera is set, and what it can be set to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct CameraReport {
+    /// What was asked for.
+    pub settings: CameraSettings,
+    /// How long a row is exposed, as it was set or found; 0 before the camera was set up.
+    pub exposure: Microseconds,
+    /// The gain, likewise.
+    pub gain: Sixteenths,
+    /// What it can be set to.
+    pub limits: CameraLimits,
 }
 
 /// What a tare gave.
@@ -83,6 +99,8 @@ pub struct Selection {
     pub tare: bool,
     /// How forces are followed from frame to frame.
     pub temporal: bool,
+    /// How the camera is set.
+    pub camera: bool,
 }
 
 impl Selection {
@@ -92,6 +110,7 @@ impl Selection {
         threshold: false,
         tare: false,
         temporal: false,
+        camera: false,
     };
     /// All of them.
     pub const ALL: Selection = Selection {
@@ -99,6 +118,7 @@ impl Selection {
         threshold: true,
         tare: true,
         temporal: true,
+        camera: true,
     };
 }
 

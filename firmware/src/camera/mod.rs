@@ -22,12 +22,45 @@ mod ov7725_registers;
 #[cfg(feature = "board-weact")]
 pub use {ov7725::*, ov7725_registers::Format};
 
-use crate::shared::EXPOSURE_MIDDLE_US;
+use crate::shared::{CAMERA, EXPOSURE_MIDDLE_US};
+use crate::vsync;
 use core::sync::atomic::Ordering;
+use hivtac_capture::Edge;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::geometry::Geometry;
+use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_wire::settings::CameraReport;
 
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
+
+/// How long frames take by the device's own clock, by the newest two that were looked at.
+#[derive(Default)]
+pub struct Pace {
+    before: Edge,
+    frame_us: Option<u32>,
+}
+
+impl Pace {
+    /// Looks at the newest frame.
+    fn look(&mut self) {
+        let Edge { number, time_us } = vsync::newest();
+        let (frames, us) = (
+            number.wrapping_sub(self.before.number),
+            time_us.wrapping_sub(self.before.time_us),
+        );
+        if frames > 0 {
+            let frame_us = (us as u32).checked_div(frames);
+            self.frame_us = frame_us.filter(|_| self.before.number > 0);
+            self.before = Edge { number, time_us };
+        }
+    }
+
+    /// How long the newest ones took, µs; nothing before there were two.
+    pub fn frame_us(&self) -> Option<u32> {
+        self.frame_us
+    }
+}
 
 /// What a camera is set to.
 pub struct Setting {
@@ -35,16 +68,40 @@ pub struct Setting {
     pub id: u16,
     /// Its registers beside what was written.
     pub comparison: Comparison,
-    /// How long a row is exposed, µs.
-    pub exposure_us: u32,
-    /// The longest that it can be, µs.
-    pub longest_exposure_us: u32,
-    /// Its gain, sixteenths.
-    pub gain_sixteenths: u16,
+    /// How long a row is exposed.
+    pub exposure: Microseconds,
+    /// The longest that it can be.
+    pub longest_exposure: Microseconds,
+    /// Its gain.
+    pub gain: Sixteenths,
 }
 
 /// From the VSYNC edge that begins a frame to the middle of its middle row's exposure, µs. Negative
 /// where that was before.
 pub fn exposure_middle_us() -> i32 {
     EXPOSURE_MIDDLE_US.load(Ordering::Relaxed)
+}
+
+/// How it is set, and what it can be set to.
+pub fn report() -> CameraReport {
+    CAMERA.lock(|cell| cell.get())
+}
+
+/// Tells how it is going to be set, before it is.
+pub fn tell(settings: CameraSettings) {
+    let before = report();
+    CAMERA.lock(|cell| cell.set(CameraReport { settings, ..before }));
+}
+
+/// Tells how it is set, and where in a frame that has the middle of the exposure.
+fn store(middle_us: i32, settings: CameraSettings, exposure: Microseconds, gain: Sixteenths) {
+    EXPOSURE_MIDDLE_US.store(middle_us, Ordering::Relaxed);
+    let limits = LIMITS;
+    let report = CameraReport {
+        settings,
+        exposure,
+        gain,
+        limits,
+    };
+    CAMERA.lock(|cell| cell.set(report));
 }

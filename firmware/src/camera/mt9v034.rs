@@ -3,17 +3,17 @@
 
 use super::identity::{self, Identity};
 use super::mt9v034_registers::{
-    AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC, BLANK_ROWS, FOUND, Format, LOCKED, LONGEST_EXPOSURE,
-    RESET, ROW_CLOCKS, SHUTTER_WIDTH, TABLE,
+    AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, FOUND, Format, LOCKED, RESET,
+    ROW_CLOCKS, SHUTTER_WIDTH, TABLE, blank_rows, longest_exposure, rows_for,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Setting};
+use super::{Bus, Error, Pace, Setting, store};
 use crate::board::{CameraLines, XCLK_HZ};
-use crate::shared::EXPOSURE_MIDDLE_US;
-use core::sync::atomic::Ordering;
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_sensing::motion::Motion;
+use hivtac_terms::camera::{CameraLimits, CameraSettings, LEAST_GAIN, Rate, RateLimits};
 use hivtac_terms::geometry::Preset;
+use hivtac_terms::units::{Microseconds, Sixteenths};
 
 /// What it says it is.
 pub const IDENTITY: Identity = identity::MT9V034;
@@ -28,17 +28,28 @@ pub const WIDTH: u16 = 160;
 /// Rows of a frame, px: what the markers reach in the calibrated range.
 pub const HEIGHT: u16 = 152;
 
-/// 244, 122 or 61: which frame rate the firmware was built for (`HIVTAC_FRAME_RATE`, `build.rs`).
-pub const FRAMES_PER_SECOND: u32 = match u32::from_str_radix(env!("HIVTAC_FRAME_RATE"), 10) {
-    Ok(rate) => rate,
-    Err(_) => panic!("HIVTAC_FRAME_RATE must be 244, 122 or 61 with this camera"),
-};
 /// When its rows are exposed: all at once.
 pub const MOTION: Motion = Motion::GLOBAL;
-/// Clocks from frame to frame: rows with data and blank ones.
-const FRAME_CLOCKS: u64 = (HEIGHT + BLANK_ROWS) as u64 * ROW_CLOCKS as u64;
-/// Time from frame to frame.
-pub const FRAME_TIME: Duration = Duration::from_micros(FRAME_CLOCKS * 1_000_000 / XCLK_HZ as u64);
+
+/// Time from frame to frame, µs: rows with data and blank ones.
+pub const fn frame_us(rate: Rate) -> u32 {
+    rows_us(HEIGHT + blank_rows(rate))
+}
+
+/// What it can be set to: exposures of a row to the longest.
+pub const LIMITS: CameraLimits = CameraLimits([
+    limits(Rate::Full),
+    limits(Rate::Half),
+    limits(Rate::Quarter),
+]);
+
+const fn limits(rate: Rate) -> RateLimits {
+    RateLimits {
+        frames_per_second: (1_000_000 / frame_us(rate)) as u16,
+        shortest: Microseconds(rows_us(1) + 1),
+        longest: Microseconds(rows_us(longest_exposure(rate))),
+    }
+}
 
 /// PIXCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
@@ -58,6 +69,9 @@ const PATIENCE: Duration = Duration::from_millis(300);
 pub struct Camera {
     registers: Registers,
     lines: CameraLines,
+    settings: CameraSettings,
+    /// Of the frames at the newest search for exposure and gain.
+    pub pace: Pace,
     /// What gain and exposure are kept at.
     locked: [(u8, u16); 3],
 }
@@ -68,6 +82,8 @@ impl Camera {
         Self {
             registers: Registers(bus),
             lines,
+            settings: CameraSettings::default(),
+            pace: Pace::default(),
             locked: [
                 (ANALOG_GAIN, 0),
                 (SHUTTER_WIDTH, 0),
@@ -84,12 +100,28 @@ impl Camera {
         self.registers.write(RESET, 1_u16)
     }
 
-    /// Writes the register table after a reset; returns when the camera sends well exposed frames
-    /// so.
-    pub async fn configure(&mut self, _format: Format) -> Result<(), Error> {
+    /// Writes the register table after a reset, and sets it so, within [`LIMITS`]; returns when the
+    /// camera sends well exposed frames so.
+    pub async fn configure(
+        &mut self,
+        _format: Format,
+        settings: CameraSettings,
+    ) -> Result<(), Error> {
         Timer::after(SETTLE).await;
         self.registers.set(TABLE).await?;
+        self.set(settings).await
+    }
+
+    /// Sets it so, within [`LIMITS`]; returns when it sends well exposed frames so.
+    pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
+        self.settings = settings;
+        self.registers.set(rows_for(settings.rate)).await?;
         self.lock_exposure().await
+    }
+
+    /// Time from frame to frame.
+    pub fn frame_time(&self) -> Duration {
+        Duration::from_micros(frame_us(self.settings.rate).into())
     }
 
     /// There is but one format.
@@ -97,40 +129,81 @@ impl Camera {
         Ok(())
     }
 
-    /// Lets exposure and gain find what the light needs, and keeps that: markers do not change
-    /// their brightness with what presses the film.
+    /// Lets what is automatic of exposure and gain find what the light needs, and keeps that:
+    /// markers do not change their brightness with what presses the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
-        self.registers.write(AEC_AGC_ENABLE, AUTOMATIC)?;
+        let CameraSettings { exposure, gain, .. } = self.settings;
+        if exposure.is_some() || gain.is_some() {
+            let before = self.exposure()?;
+            self.take(before);
+            // What is not automatic is in force while the rest is sought.
+            self.registers.set(&self.locked).await?;
+        }
+        self.registers
+            .write(AEC_AGC_ENABLE, LOCKED | self.automatic())?;
+        self.pace = Pace::default();
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
-            Timer::after(FRAME_TIME).await;
+            Timer::after(self.frame_time()).await;
+            self.pace.look();
             let now = self.exposure()?;
             steady = if now == found { steady + 1 } else { 1 };
             found = now;
         }
-        let [gain, rows] = found;
-        let rows = rows.clamp(1, LONGEST_EXPOSURE);
-        let [(_, kept_gain), (_, kept_rows), _] = &mut self.locked;
-        (*kept_gain, *kept_rows) = (gain, rows);
+        self.take(found);
         self.registers.set(&self.locked).await?;
         // What was set is in force from the next frame on.
-        Timer::after(2 * FRAME_TIME).await;
+        Timer::after(2 * self.frame_time()).await;
+        let exposed = self.exposed();
         // All rows' exposure ends before the first one is read.
-        EXPOSURE_MIDDLE_US.store(-(rows_us(rows) as i32) / 2, Ordering::Relaxed);
+        store(-(exposed.0 as i32) / 2, self.settings, exposed, self.gain());
         Ok(())
+    }
+
+    /// The bits of [`AEC_AGC_ENABLE`] for what is automatic.
+    fn automatic(&self) -> u16 {
+        let CameraSettings { exposure, gain, .. } = self.settings;
+        let bits = |is_automatic, bits| if is_automatic { bits } else { 0 };
+        bits(exposure.is_none(), AUTOMATIC_EXPOSURE) | bits(gain.is_none(), AUTOMATIC_GAIN)
+    }
+
+    /// What exposure and gain are to be kept at: as they were found, unless they are set.
+    fn take(&mut self, [found_gain, found_rows]: [u16; 2]) {
+        let CameraSettings {
+            exposure,
+            gain,
+            rate,
+        } = self.settings;
+        let [(_, kept_gain), (_, kept_rows), _] = &mut self.locked;
+        *kept_gain = gain.map_or(found_gain, |gain| gain.0).max(LEAST_GAIN.0);
+        let rows = exposure.map_or(found_rows, rows_in);
+        *kept_rows = rows.clamp(1, longest_exposure(rate));
     }
 
     /// What it is set to, while frames are captured.
     pub async fn setting(&mut self, _format: Format) -> Result<Setting, Error> {
-        let [(_, gain), (_, rows), _] = self.locked;
+        let tables = [TABLE, rows_for(self.settings.rate), &self.locked];
+        let longest = longest_exposure(self.settings.rate);
         Ok(Setting {
             id: identity::id(&mut self.registers.0)?,
-            comparison: self.registers.compare(&[TABLE, &self.locked]).await?,
-            exposure_us: rows_us(rows),
-            longest_exposure_us: rows_us(LONGEST_EXPOSURE),
-            gain_sixteenths: gain,
+            comparison: self.registers.compare(&tables).await?,
+            exposure: self.exposed(),
+            longest_exposure: Microseconds(rows_us(longest)),
+            gain: self.gain(),
         })
+    }
+
+    /// How long all rows are exposed, as it was kept.
+    fn exposed(&self) -> Microseconds {
+        let [_, (_, rows), _] = self.locked;
+        Microseconds(rows_us(rows))
+    }
+
+    /// The gain, as it was kept.
+    fn gain(&self) -> Sixteenths {
+        let [(_, gain), ..] = self.locked;
+        Sixteenths(gain)
     }
 
     /// What [`FOUND`]'s registers hold.
@@ -141,6 +214,13 @@ impl Camera {
 }
 
 /// So many rows' time, µs.
-fn rows_us(rows: u16) -> u32 {
-    (u64::from(rows) * u64::from(ROW_CLOCKS) * 1_000_000 / u64::from(XCLK_HZ)) as u32
+const fn rows_us(rows: u16) -> u32 {
+    (rows as u64 * ROW_CLOCKS as u64 * 1_000_000 / XCLK_HZ as u64) as u32
+}
+
+/// Whole rows that are nearest to a time.
+fn rows_in(exposure: Microseconds) -> u16 {
+    let clocks = u64::from(exposure.0) * u64::from(XCLK_HZ) / 1_000_000;
+    let row_clocks = u64::from(ROW_CLOCKS);
+    u16::try_from((clocks + row_clocks / 2) / row_clocks).unwrap_or(u16::MAX)
 }

@@ -4,8 +4,9 @@
 //! Numbers and names: onsemi's MT9V034 data sheet, beside the drivers of Linux (`mt9v032.c`) and
 //! OpenMV (`mt9v0xx.c`).
 
-use super::{FRAMES_PER_SECOND, HEIGHT, WIDTH};
+use super::{HEIGHT, WIDTH};
 use crate::seeded_bugs;
+use hivtac_terms::camera::Rate;
 use hivtac_terms::threshold::PixelFormat;
 
 /// Bit 0: every register back to its power-up value.
@@ -13,8 +14,10 @@ pub const RESET: u8 = 0x0C;
 /// What is automatic: exposure (bit 0) and gain (bit 1), for both of the sensor's contexts; the
 /// other one has them eight bits above.
 pub const AEC_AGC_ENABLE: u8 = 0xAF;
-/// [`AEC_AGC_ENABLE`]: both.
-pub const AUTOMATIC: u16 = 0x0303;
+/// [`AEC_AGC_ENABLE`]: exposure.
+pub const AUTOMATIC_EXPOSURE: u16 = 0x0101;
+/// [`AEC_AGC_ENABLE`]: gain.
+pub const AUTOMATIC_GAIN: u16 = 0x0202;
 /// [`AEC_AGC_ENABLE`]: neither.
 pub const LOCKED: u16 = 0x0000;
 /// Exposure, rows, when it is not automatic.
@@ -23,13 +26,14 @@ pub const SHUTTER_WIDTH: u8 = 0x0B;
 pub const ANALOG_GAIN: u8 = 0x35;
 /// What the automatic control has found: gain, as in [`ANALOG_GAIN`]; exposure in rows.
 pub const FOUND: [u8; 2] = [0xBA, 0xBB];
-/// Longest automatic exposure, rows. At 244 frames a second 2.5 ms: half of it is a part of a
-/// force's latency.
-pub const LONGEST_EXPOSURE: u16 = match FRAMES_PER_SECOND {
-    244 => 96,
-    122 => 210,
-    _ => 420,
-};
+/// Longest exposure, rows. At the full rate 2.5 ms: half of it is a part of a force's latency.
+pub const fn longest_exposure(rate: Rate) -> u16 {
+    match rate {
+        Rate::Full => 96,
+        Rate::Half => 210,
+        Rate::Quarter => 420,
+    }
+}
 
 /// Columns and rows of the array that make one pixel.
 const BINNING: u16 = 2;
@@ -43,16 +47,37 @@ pub const ROW_CLOCKS: u16 = 690;
 /// Shortest horizontal blanking while columns are binned by two, clocks.
 const LEAST_BLANKING: u16 = 71;
 /// Blank rows of a frame, at least 4.
-pub const BLANK_ROWS: u16 = match FRAMES_PER_SECOND {
-    244 => 6,
-    122 => 164,
-    61 => 480,
-    _ => panic!("HIVTAC_FRAME_RATE must be 244, 122 or 61 with this camera"),
-};
+pub const fn blank_rows(rate: Rate) -> u16 {
+    match rate {
+        Rate::Full => 6,
+        Rate::Half => 164,
+        Rate::Quarter => 480,
+    }
+}
+
+/// [`TABLE`]'s companion: how often the camera sends a frame, and how long it exposes at most.
+pub const fn rows_for(rate: Rate) -> &'static [(u8, u16)] {
+    match rate {
+        Rate::Full => const { &rows_registers(Rate::Full) },
+        Rate::Half => const { &rows_registers(Rate::Half) },
+        Rate::Quarter => const { &rows_registers(Rate::Quarter) },
+    }
+}
+
+const fn rows_registers(rate: Rate) -> [(u8, u16); 3] {
+    let longest = longest_exposure(rate);
+    // A longer exposure would lengthen the frame.
+    assert!(longest + 2 <= HEIGHT + blank_rows(rate));
+    [
+        // Vertical blanking, rows.
+        (0x06, blank_rows(rate)),
+        // Longest automatic exposure, and the one before the control has looked.
+        (0xAD, longest),
+        (SHUTTER_WIDTH, longest),
+    ]
+}
 
 const _: () = assert!(WINDOW[0] + LEAST_BLANKING <= ROW_CLOCKS);
-// A longer exposure would lengthen the frame.
-const _: () = assert!(LONGEST_EXPOSURE + 2 <= HEIGHT + BLANK_ROWS);
 
 /// The only pixel format of a sensor that sees no colours: a byte a pixel, the upper eight of its
 /// ten bits.
@@ -88,9 +113,8 @@ pub const TABLE: &[(u8, u16)] = &[
     (0x02, FIRST[1] + (ARRAY[1] - WINDOW[1]) / 2),
     (0x03, WINDOW[1]),
     (0x04, WINDOW[0]),
-    // Horizontal blanking, clocks; vertical blanking, rows.
+    // Horizontal blanking, clocks.
     (0x05, ROW_CLOCKS - WINDOW[0]),
-    (0x06, BLANK_ROWS),
     // Read mode: rows (bits 1:0 = 1) and columns (bits 3:2 = 1) binned by two, neither flipped.
     // Bits 9:8 are reserved and set.
     (
@@ -115,10 +139,7 @@ pub const TABLE: &[(u8, u16)] = &[
     (0xA5, 35),
     // Largest gain, sixteenths: beyond 4× noise costs more than light gains.
     (0xAB, 64),
-    // Longest automatic exposure, and the one before the control has looked.
-    (0xAD, LONGEST_EXPOSURE),
-    (SHUTTER_WIDTH, LONGEST_EXPOSURE),
     // Pixels that the automatic control counts: an eighth of the frame's, as in OpenMV's driver.
     (0xB0, WIDTH * HEIGHT / 8),
-    (AEC_AGC_ENABLE, AUTOMATIC),
+    (AEC_AGC_ENABLE, AUTOMATIC_EXPOSURE | AUTOMATIC_GAIN),
 ];

@@ -2,15 +2,18 @@
 //! read).
 
 use super::identity::{self, Identity};
-use super::ov7725_registers::{AUTOMATIC, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, TABLE};
+use super::ov7725_registers::{
+    AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, TABLE,
+    clock,
+};
 use super::registers::Registers;
-use super::{Bus, Error, Setting};
+use super::{Bus, Error, Pace, Setting, store};
 use crate::board::{CameraLines, XCLK_HZ};
-use crate::shared::EXPOSURE_MIDDLE_US;
-use core::sync::atomic::Ordering;
 use embassy_time::{Duration, Instant, Timer};
 use hivtac_sensing::motion::Motion;
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::geometry::Preset;
+use hivtac_terms::units::{Microseconds, Sixteenths};
 
 /// What it says it is.
 pub const IDENTITY: Identity = identity::OV7725;
@@ -25,11 +28,6 @@ pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
 
-/// 156, 78 or 39: which frame rate the firmware was built for (`HIVTAC_FRAME_RATE`, `build.rs`).
-pub const FRAMES_PER_SECOND: u32 = match u32::from_str_radix(env!("HIVTAC_FRAME_RATE"), 10) {
-    Ok(rate) => rate,
-    Err(_) => panic!("HIVTAC_FRAME_RATE must be 156, 78 or 39"),
-};
 /// Lines from frame to frame, blank ones included.
 const LINES: u16 = 278;
 /// When its rows are exposed: one after the other.
@@ -39,15 +37,28 @@ const FRAME_CLOCKS: u64 = LINES as u64 * 576 * 2;
 /// From the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the rows.
 /// A row's exposure ends when it is read, which is when it is sent.
 const LINES_TO_MIDDLE_ROW: u32 = 22 + HEIGHT as u32 / 2;
-/// PCLK at 156 frames a second: XCLK times the sensor's loop. Lower rates divide it.
+/// PCLK at the full rate: XCLK times the sensor's loop. Lower rates divide it.
 const FULL_PCLK_HZ: u64 = 4 * XCLK_HZ as u64;
-/// Time from frame to frame.
-pub const FRAME_TIME: Duration = Duration::from_micros(
-    FRAME_CLOCKS * (156 / FRAMES_PER_SECOND as u64) * 1_000_000 / FULL_PCLK_HZ,
-);
 
-/// [`FRAME_TIME`], µs.
-const FRAME_US: u32 = FRAME_TIME.as_micros() as u32;
+/// Time from frame to frame, µs.
+pub const fn frame_us(rate: Rate) -> u32 {
+    (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
+}
+
+/// What it can be set to: exposures of a line to a frame.
+pub const LIMITS: CameraLimits = CameraLimits([
+    limits(Rate::Full),
+    limits(Rate::Half),
+    limits(Rate::Quarter),
+]);
+
+const fn limits(rate: Rate) -> RateLimits {
+    RateLimits {
+        frames_per_second: (1_000_000 / frame_us(rate)) as u16,
+        shortest: Microseconds(frame_us(rate).div_ceil(LINES as u32)),
+        longest: Microseconds(frame_us(rate)),
+    }
+}
 
 /// PCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
@@ -69,6 +80,9 @@ const PATIENCE: Duration = Duration::from_millis(300);
 pub struct Camera {
     registers: Registers,
     lines: CameraLines,
+    settings: CameraSettings,
+    /// Of the frames at the newest search for exposure and gain.
+    pub pace: Pace,
     /// What exposure and gain are kept at.
     locked: [(u8, u8); 4],
 }
@@ -80,6 +94,8 @@ impl Camera {
         Self {
             registers: Registers(bus),
             lines,
+            settings: CameraSettings::default(),
+            pace: Pace::default(),
             locked: [(COM8, LOCKED), (gain, 0), (low, 0), (high, 0)],
         }
     }
@@ -93,59 +109,117 @@ impl Camera {
         self.registers.write(COM7, COM7_RESET)
     }
 
-    /// Writes the register table after a reset; returns when the camera sends well exposed frames
-    /// so.
-    pub async fn configure(&mut self, format: Format) -> Result<(), Error> {
+    /// Writes the register table after a reset, and sets it so, within [`LIMITS`]; returns when the
+    /// camera sends well exposed frames so.
+    pub async fn configure(
+        &mut self,
+        format: Format,
+        settings: CameraSettings,
+    ) -> Result<(), Error> {
         Timer::after(SETTLE).await;
-        for table in [format.registers(), TABLE] {
+        self.settings = settings;
+        // The clock first: frames are of the new rate when exposure is sought.
+        for table in [clock(settings.rate), format.registers(), TABLE] {
             self.registers.set(table).await?;
         }
         self.lock_exposure().await
+    }
+
+    /// Sets it so, within [`LIMITS`]; returns when it sends well exposed frames so.
+    pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
+        let before = core::mem::replace(&mut self.settings, settings);
+        if settings.rate != before.rate {
+            self.registers.set(clock(settings.rate)).await?;
+            Timer::after(self.frame_time() * FRAMES_TO_SETTLE).await;
+        }
+        self.lock_exposure().await
+    }
+
+    /// Time from frame to frame.
+    pub fn frame_time(&self) -> Duration {
+        Duration::from_micros(self.frame_us().into())
+    }
+
+    fn frame_us(&self) -> u32 {
+        frame_us(self.settings.rate)
     }
 
     /// Changes the pixel format of a configured camera; returns when it sends frames so. Exposure
     /// and gain stay.
     pub async fn set_format(&mut self, format: Format) -> Result<(), Error> {
         self.registers.set(format.registers()).await?;
-        Timer::after(FRAME_TIME * FRAMES_TO_SETTLE).await;
+        Timer::after(self.frame_time() * FRAMES_TO_SETTLE).await;
         Ok(())
     }
 
-    /// Lets exposure and gain find what the light needs, and keeps that: markers do not change
-    /// their brightness with what presses the film.
+    /// Lets what is automatic of exposure and gain find what the light needs, and keeps that:
+    /// markers do not change their brightness with what presses the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
-        self.registers.write(COM8, AUTOMATIC)?;
+        let CameraSettings { exposure, gain, .. } = self.settings;
+        if exposure.is_some() || gain.is_some() {
+            let before = self.exposure()?;
+            self.take(before);
+            // What is not automatic is in force while the rest is sought.
+            self.registers.set(&self.locked).await?;
+        }
+        self.registers.write(COM8, LOCKED | self.automatic())?;
+        self.pace = Pace::default();
         let begun = Instant::now();
         let (mut found, mut steady) = (self.exposure()?, 1);
         while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
-            Timer::after(FRAME_TIME).await;
+            Timer::after(self.frame_time()).await;
+            self.pace.look();
             let now = self.exposure()?;
             steady = if now == found { steady + 1 } else { 1 };
             found = now;
         }
-        for ((_, value), found) in self.locked.iter_mut().skip(1).zip(found) {
-            *value = found;
-        }
+        self.take(found);
         self.registers.set(&self.locked).await?;
         let half_lines = 2 * LINES_TO_MIDDLE_ROW - self.lines();
-        let middle_us = half_lines * FRAME_US / (2 * u32::from(LINES));
-        EXPOSURE_MIDDLE_US.store(middle_us as i32, Ordering::Relaxed);
+        let middle_us = half_lines * self.frame_us() / (2 * u32::from(LINES));
+        store(middle_us as i32, self.settings, self.exposed(), self.gain());
         Ok(())
+    }
+
+    /// The bits of [`COM8`] for what is automatic.
+    fn automatic(&self) -> u8 {
+        let CameraSettings { exposure, gain, .. } = self.settings;
+        let bit = |is_automatic, bit| if is_automatic { bit } else { 0 };
+        bit(exposure.is_none(), AUTOMATIC_EXPOSURE) | bit(gain.is_none(), AUTOMATIC_GAIN)
+    }
+
+    /// What exposure and gain are to be kept at: as they were found, unless they are set.
+    fn take(&mut self, [found_gain, found_low, found_high]: [u8; 3]) {
+        let CameraSettings { exposure, gain, .. } = self.settings;
+        let lines = exposure.map(|time| lines(time, self.frame_us()).to_le_bytes());
+        let [set_low, set_high] = lines.unwrap_or([found_low, found_high]);
+        let [_, (_, gain_register), (_, low), (_, high)] = &mut self.locked;
+        *gain_register = gain.map_or(found_gain, register_of);
+        (*low, *high) = (set_low, set_high);
     }
 
     /// What it is set to, while frames of `format` are captured.
     pub async fn setting(&mut self, format: Format) -> Result<Setting, Error> {
-        let [_, (_, gain), ..] = self.locked;
+        let clock = clock(self.settings.rate);
+        let tables = [format.registers(), TABLE, clock, &self.locked];
         Ok(Setting {
             id: identity::id(&mut self.registers.0)?,
-            comparison: self
-                .registers
-                .compare(&[format.registers(), TABLE, &self.locked])
-                .await?,
-            exposure_us: self.lines() * FRAME_US / u32::from(LINES),
-            longest_exposure_us: FRAME_US,
-            gain_sixteenths: gain_sixteenths(gain),
+            comparison: self.registers.compare(&tables).await?,
+            exposure: self.exposed(),
+            longest_exposure: Microseconds(self.frame_us()),
+            gain: self.gain(),
         })
+    }
+
+    /// How long a row is exposed, as it was kept.
+    fn exposed(&self) -> Microseconds {
+        Microseconds(self.lines() * self.frame_us() / u32::from(LINES))
+    }
+
+    /// The gain, as it was kept.
+    fn gain(&self) -> Sixteenths {
+        let [_, (_, register), ..] = self.locked;
+        gain_of(register)
     }
 
     /// Lines that a row is exposed, as it was kept.
@@ -166,7 +240,22 @@ impl Camera {
     }
 }
 
+/// Whole lines, at least one and at most a frame, that are nearest to a time.
+fn lines(exposure: Microseconds, frame_us: u32) -> u16 {
+    let lines = (exposure.0.min(frame_us) * u32::from(LINES) + frame_us / 2) / frame_us.max(1);
+    (lines as u16).clamp(1, LINES)
+}
+
 /// The gain register's: each of the upper four bits doubles, the lower ones are sixteenths more.
-fn gain_sixteenths(register: u8) -> u16 {
-    (16 + u16::from(register & 0x0F)) << (register >> 4).count_ones()
+fn gain_of(register: u8) -> Sixteenths {
+    Sixteenths((16 + u16::from(register & 0x0F)) << (register >> 4).count_ones())
+}
+
+/// The gain register for the gain that is next below, of at most four.
+fn register_of(Sixteenths(gain): Sixteenths) -> u8 {
+    match gain {
+        ..32 => gain.saturating_sub(16) as u8,
+        32..64 => 0x10 | (gain / 2 - 16) as u8,
+        64.. => 0x30,
+    }
 }

@@ -3,8 +3,8 @@
 //!
 //! Numbers and names: OV7725 data sheet 1.31, table 17. Application note: OV7725 1.04.
 
-use super::FRAMES_PER_SECOND;
 use crate::seeded_bugs;
+use hivtac_terms::camera::Rate;
 use hivtac_terms::threshold::PixelFormat;
 
 /// Output format, size and register reset.
@@ -62,33 +62,36 @@ impl Format {
     }
 }
 
-/// What is automatic: [`AUTOMATIC`] or [`LOCKED`].
+/// What is automatic: [`LOCKED`] and the bits of what is.
 pub const COM8: u8 = 0x13;
-/// [`COM8`]: exposure and gain, fast and to a part of a line. White balance off: it would turn the
-/// hue that the threshold asks for with whatever is in view. Banding filter off: the light is DC.
-pub const AUTOMATIC: u8 = 0x8D;
-/// [`COM8`]: nothing. What exposure and gain were they stay.
+/// [`COM8`]: nothing; what is, fast and to a part of a line. What exposure and gain were they stay.
+/// White balance off: it would turn the hue that the threshold asks for with whatever is in view.
+/// Banding filter off: the light is DC.
 pub const LOCKED: u8 = 0x88;
+/// [`COM8`]: exposure.
+pub const AUTOMATIC_EXPOSURE: u8 = 0x01;
+/// [`COM8`]: gain.
+pub const AUTOMATIC_GAIN: u8 = 0x04;
 /// Gain, and exposure in lines, low and high byte: what the automatic control has found.
 pub const EXPOSURE: [u8; 3] = [0x00, 0x10, 0x08];
 
-/// How often the camera sends a frame. A lower rate leaves more time for light.
-const CLOCK: (u8, u8) = match FRAMES_PER_SECOND {
-    // No prescaler: PCLK = XCLK · 4 = 50 MHz.
-    156 => (CLKRC, 0xC0),
-    // Prescaler 2 · (0 + 1).
-    78 => (CLKRC, 0x80),
-    // Prescaler 2 · (1 + 1).
-    39 => (CLKRC, 0x81),
-    _ => panic!("HIVTAC_FRAME_RATE must be 156, 78 or 39"),
-};
+/// [`TABLE`]'s companion: how often the camera sends a frame.
+pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
+    match rate {
+        // No prescaler: PCLK = XCLK · 4 = 50 MHz.
+        Rate::Full => &[(CLKRC, 0xC0)],
+        // Prescaler 2 · (0 + 1).
+        Rate::Half => &[(CLKRC, 0x80)],
+        // Prescaler 2 · (1 + 1).
+        Rate::Quarter => &[(CLKRC, 0x81)],
+    }
+}
 const CLKRC: u8 = 0x11;
 
 /// Register, value: written in this order after a reset and a [`Format`]'s, and read back. It has
 /// every register that the picture depends on and whose value after a reset is not the same in all
 /// of OmniVision's data sheets and the drivers of Linux and OpenMV.
 pub const TABLE: &[(u8, u8)] = &[
-    CLOCK,
     // COM4: PLL × 4; exposure is judged on the whole frame.
     (0x0D, 0x41),
     // COM5: no automatic frame rate. Dim light must not change the time between frames.
@@ -112,7 +115,7 @@ pub const TABLE: &[(u8, u8)] = &[
     // COM8, COM9: automatic exposure and gain until the film is well exposed. Gain at most 4×:
     // beyond it noise costs more than light gains. COM9's bits 2 and 1 clear: never drop the VSYNC
     // or HREF of a frame during an exposure change, so that every VSYNC edge has a whole frame.
-    (COM8, AUTOMATIC),
+    (COM8, LOCKED | AUTOMATIC_EXPOSURE | AUTOMATIC_GAIN),
     (0x14, 0x18),
     // AEW, AEB, VPT: mean luma between 0x64 and 0x96, as in OpenMV's table: a white film is bright
     // and not saturated.

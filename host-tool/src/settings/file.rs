@@ -1,11 +1,13 @@
 //! Settings as JSON: what `export` writes and `import` reads.
 
+use super::camera::{CameraJson, InUse};
 use super::temporal::TemporalJson;
 use super::{name, unusable};
 use crate::files::read_at_most;
 use crate::lines::to_json;
 use hivtac_host::failure::Failure;
 use hivtac_host::shown::unit_number;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
@@ -32,6 +34,7 @@ pub struct File {
     /// The rest position, when one was taken.
     pub tare: Option<Rest>,
     temporal: TemporalJson,
+    camera: CameraJson,
 }
 
 /// A threshold as everywhere in the tool's JSON.
@@ -86,6 +89,7 @@ pub struct Kept {
     found: &'static str,
     erases: u32,
     failures: u32,
+    camera_in_use: InUse,
     drift_q16: Option<i32>,
 }
 
@@ -95,6 +99,7 @@ struct KeptParts {
     threshold: bool,
     tare: bool,
     temporal: bool,
+    camera: bool,
 }
 
 impl Kept {
@@ -105,6 +110,7 @@ impl Kept {
             threshold,
             tare,
             temporal,
+            camera,
         } = report.kept;
         Kept {
             file: File::new(device_id, report),
@@ -114,6 +120,7 @@ impl Kept {
                 threshold,
                 tare,
                 temporal,
+                camera,
             },
             found: match report.found {
                 Found::Nothing => "nothing",
@@ -122,6 +129,7 @@ impl Kept {
             },
             erases: report.erases,
             failures: report.failures,
+            camera_in_use: InUse::new(&report.camera),
             drift_q16: report.drift.map(|drift| drift.0),
         }
     }
@@ -137,6 +145,7 @@ impl File {
             threshold: limits(&report.threshold),
             tare: report.tare.as_ref().map(Rest::of),
             temporal: TemporalJson::new(&report.temporal),
+            camera: CameraJson::new(&report.camera.settings),
         }
     }
 
@@ -177,6 +186,11 @@ impl File {
     /// How forces are followed from frame to frame.
     pub fn temporal(&self) -> TemporalSettings {
         self.temporal.settings()
+    }
+
+    /// How the camera is set.
+    pub fn camera(&self) -> CameraSettings {
+        self.camera.settings()
     }
 
     /// The rest position.
@@ -287,6 +301,27 @@ pub fn write(path: &str, file: &File) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::camera::{CameraLimits, Rate, RateLimits};
+    use hivtac_terms::units::{Microseconds, Sixteenths};
+    use hivtac_wire::settings::CameraReport;
+
+    fn camera() -> CameraReport {
+        let limits = RateLimits {
+            frames_per_second: 156,
+            shortest: Microseconds(24),
+            longest: Microseconds(6_405),
+        };
+        CameraReport {
+            settings: CameraSettings {
+                exposure: Some(Microseconds(2_500)),
+                gain: None,
+                rate: Rate::Quarter,
+            },
+            exposure: Microseconds(2_512),
+            gain: Sixteenths(16),
+            limits: CameraLimits([limits; 3]),
+        }
+    }
 
     fn report(threshold: Threshold) -> SettingsReport {
         let marker = |nth: i32| Marker {
@@ -312,6 +347,7 @@ mod tests {
             temporal: TemporalSettings::default(),
             rezeroed: Px(0),
             drift: None,
+            camera: camera(),
         }
     }
 
@@ -327,6 +363,7 @@ mod tests {
             let read = parse(to_json(&file).as_bytes()).unwrap();
             assert_eq!(read, file);
             assert_eq!((read.threshold(), read.rest()), (threshold, report.tare));
+            assert_eq!(read.camera(), report.camera.settings);
             assert!(read.is_of(&[7; 12]) && !read.is_of(&[8; 12]));
         }
     }

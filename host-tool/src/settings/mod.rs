@@ -1,6 +1,7 @@
 //! `hivtac settings`: what a device keeps through restarts, shown, named, saved, given back and
 //! forgotten.
 
+pub mod camera;
 mod file;
 pub mod temporal;
 
@@ -14,8 +15,7 @@ use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
-use hivtac_terms::temporal::TemporalSettings;
-use hivtac_terms::threshold::Threshold;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
@@ -45,6 +45,8 @@ pub enum Action {
     SetName(Name),
     /// Change how forces are followed, and keep that.
     SetTemporal(Change),
+    /// Set the camera, and keep that.
+    SetCamera(camera::Change),
     /// Save them in a file.
     Export(String),
     /// Set and keep those of a file.
@@ -74,6 +76,7 @@ pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
         Action::Get => device.show(),
         Action::SetName(name) => device.set_name(name),
         Action::SetTemporal(change) => device.set_temporal(*change),
+        Action::SetCamera(change) => device.set_camera(*change),
         Action::Export(path) => device.export(path),
         Action::Import(path) => imported.map_or(Ok(()), |file| device.import(path, &file)),
         Action::Reset => device.reset(),
@@ -174,6 +177,27 @@ impl Device {
         let named = |(name, _): &(&str, String)| *name == change.name();
         let texts = temporal::texts(&settings).into_iter().find(named);
         let (name, text) = texts.unwrap_or_default();
+        self.tell_set(name, &text)
+    }
+
+    fn set_camera(&mut self, change: camera::Change) -> Result<(), Failure> {
+        let settings = change
+            .of(&self.settings()?.camera)
+            .map_err(|error| Failure::new(Kind::Input, format!("{error}; nothing was changed")))?;
+        self.send(Request::SetCamera(settings))?;
+        let selection = Selection {
+            camera: true,
+            ..Selection::NONE
+        };
+        keep(&mut self.link, selection)?;
+        let named = |(name, _): &(&str, String)| *name == change.name();
+        let texts = camera::texts(&self.settings()?.camera);
+        let (name, text) = texts.into_iter().find(named).unwrap_or_default();
+        self.tell_set(name, &text)
+    }
+
+    /// What was set and kept.
+    fn tell_set(&self, name: &str, text: &str) -> Result<(), Failure> {
         let line = format!("{name} set and kept: {text}");
         self.tell(
             &line,
@@ -198,8 +222,10 @@ impl Device {
             ));
         }
         let tare = file.rest().filter(|_| is_own);
-        let name = name(&file.name).unwrap_or_default();
-        self.set(name, file.threshold(), tare, file.temporal())?;
+        let camera = self.settings()?.camera;
+        let can = camera.limits.check(&file.camera());
+        can.map_err(|error| unusable(path, format!("{error}; nothing was changed")))?;
+        self.set(file, tare, camera.settings)?;
         let line = format!("settings of {path} are in use and kept");
         let parts = json!({ "file": path, "kept": true, "tare": tare.is_some() });
         self.tell(&line, parts)
@@ -211,14 +237,15 @@ impl Device {
         self.tell(line, json!({ "kept": false }))
     }
 
-    /// Sets and keeps all.
+    /// Sets and keeps all, with this rest position; the camera is set so before.
     fn set(
         &mut self,
-        name: Name,
-        threshold: Threshold,
+        file: &File,
         tare: Option<RestPosition>,
-        temporal: TemporalSettings,
+        camera: CameraSettings,
     ) -> Result<(), Failure> {
+        let name = name(&file.name).unwrap_or_default();
+        let threshold = file.threshold();
         let unkept = |failure: Failure| {
             let what = "nothing was kept: a restart brings back the settings from before";
             Failure::new(failure.kind, format!("{failure}; {what}"))
@@ -228,7 +255,12 @@ impl Device {
             self.send(Request::SetThreshold(threshold))
                 .map_err(unkept)?;
         }
+        if file.camera() != camera {
+            self.send(Request::SetCamera(file.camera()))
+                .map_err(unkept)?;
+        }
         self.send(Request::SetTare(tare)).map_err(unkept)?;
+        let temporal = file.temporal();
         self.send(Request::SetTemporal(temporal)).map_err(unkept)?;
         self.send(Request::SetName(name)).map_err(unkept)?;
         keep(&mut self.link, Selection::ALL)
@@ -269,6 +301,9 @@ fn lines(report: &SettingsReport) -> Vec<String> {
     let temporal = until(report.kept.temporal);
     let texts = temporal::texts(&report.temporal).into_iter();
     lines.extend(texts.map(|(name, text)| format!("{name:<11}{text} ({temporal})")));
+    let camera = until(report.kept.camera);
+    let texts = camera::texts(&report.camera).into_iter();
+    lines.extend(texts.map(|(name, text)| format!("{name:<11}{text} ({camera})")));
     lines.extend([
         format!("flash      {found}"),
         format!(

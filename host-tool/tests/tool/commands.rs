@@ -45,7 +45,8 @@ fn info_for_a_person() {
              time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after \
              the middle of its exposure\n\
              health     started by power-on; 41.5 °C; 6120 of 24576 bytes of stack used\n\
-             problems   none\n",
+             problems   none\n\
+             at start   no problem\n",
             device.port
         )
     );

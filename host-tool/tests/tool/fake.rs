@@ -1,5 +1,6 @@
 //! A device that follows a script, on TCP or on a pseudo-terminal.
 
+use hivtac_terms::camera::{CameraLimits, CameraSettings, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -7,8 +8,8 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Microseconds, MilliDegrees, Px, SignedMicrometres, Sixteenths,
+    UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
@@ -145,6 +146,15 @@ impl Conversation {
             }
             Request::GetHealth => self.send(DeviceMessage::Health(self.health)),
             Request::SetName(name) => self.settings.name = name.clone(),
+            Request::SetCamera(settings) => {
+                let found = camera();
+                self.settings.camera = CameraReport {
+                    settings: *settings,
+                    exposure: settings.exposure.unwrap_or(found.exposure),
+                    gain: settings.gain.unwrap_or(found.gain),
+                    ..found
+                };
+            }
             Request::Keep(_) => {
                 self.reply(id, self.flash);
                 return false;
@@ -167,6 +177,7 @@ pub const HEALTHY: Health = Health {
     stack_used: 6_120,
     stack_bytes: 24_576,
     problems: 0,
+    at_start: 0,
 };
 
 /// What its model was made for.
@@ -225,6 +236,7 @@ pub fn settings() -> SettingsReport {
             threshold: true,
             tare: false,
             temporal: true,
+            camera: true,
         },
         found: Found::Settings,
         erases: 3,
@@ -232,6 +244,26 @@ pub fn settings() -> SettingsReport {
         temporal: TemporalSettings::default(),
         rezeroed: Px(0),
         drift: Some(Px(20_316)),
+        camera: camera(),
+    }
+}
+
+/// The camera as the light needs it.
+fn camera() -> CameraReport {
+    let limits = |frames_per_second, shortest, longest| RateLimits {
+        frames_per_second,
+        shortest: Microseconds(shortest),
+        longest: Microseconds(longest),
+    };
+    CameraReport {
+        settings: CameraSettings::default(),
+        exposure: Microseconds(5_922),
+        gain: Sixteenths(24),
+        limits: CameraLimits([
+            limits(156, 24, 6_405),
+            limits(78, 47, 12_810),
+            limits(39, 93, 25_620),
+        ]),
     }
 }
 

@@ -18,6 +18,7 @@ fn ill() -> FakeDevice {
         temperature_centidegrees: None,
         // A problem that a later version has is passed over.
         problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit() | 1 << 30,
+        at_start: Problem::ModelFallback.bit() | Problem::CameraRegisters.bit(),
         ..HEALTHY
     })
 }
@@ -48,7 +49,9 @@ fn problems_are_told_with_code_and_advice() {
         "{problems:?}"
     );
     assert_eq!(problems.len(), 2);
-    assert!(run.stderr.contains("2 of 9"), "{}", run.stderr);
+    assert!(run.stderr.contains("2 of 13"), "{}", run.stderr);
+    let gone = "10  good     camera_registers: not so at the start\n";
+    assert!(run.stdout.contains(gone), "{}", run.stdout);
 }
 
 #[test]
@@ -62,6 +65,8 @@ fn a_self_test_as_json() {
         json!({ "code": 6, "name": "watchdog_reset" })
     );
     assert_eq!(report["health"]["temperature_c"], Value::Null);
+    let at_start = json!(["model_fallback", "camera_registers"]);
+    assert_eq!(report["health"]["at_start"], at_start);
 }
 
 #[test]
@@ -69,6 +74,8 @@ fn info_names_problems() {
     let run = run(&["info", "--port", &ill().port]);
     let expected = "problems   model_fallback, watchdog_reset; ";
     assert!(run.stdout.contains(expected), "{}", run.stdout);
+    let at_start = "at start   model_fallback, camera_registers\n";
+    assert!(run.stdout.contains(at_start), "{}", run.stdout);
     assert!(
         run.stdout
             .contains("started by watchdog; temperature unknown")

@@ -2,8 +2,9 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::temporal::{Filter, Rezero, TemporalSettings};
-use hivtac_terms::units::{MilliPx, Milliseconds, Px};
+use hivtac_terms::units::{Microseconds, MilliPx, Milliseconds, Px, Sixteenths};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use serde_json::Value;
@@ -16,6 +17,7 @@ fn only(name: bool, threshold: bool, tare: bool) -> Request {
         threshold,
         tare,
         temporal: false,
+        camera: false,
     })
 }
 
@@ -40,6 +42,9 @@ fn settings_for_a_person() {
          slip       60 µm within 50 ms, from 0.100 of the normal force on (kept)\n\
          filter     none: each frame's own force (kept)\n\
          rezero     off (kept)\n\
+         exposure   5.922 ms, as the light needs (kept)\n\
+         gain       1.5, as the light needs (kept)\n\
+         rate       156 frames a second (kept)\n\
          flash      settings found at the start\n\
          \x20          3 sectors erased in its life, 0 failed attempts to write since the start\n"
     );
@@ -59,6 +64,11 @@ fn settings_as_json() {
     assert_eq!(settings["found"], "settings");
     assert_eq!(settings["erases"], 3);
     assert_eq!(settings["drift_q16"], 20_316);
+    assert_eq!(settings["camera"]["exposure_us"], Value::Null);
+    assert_eq!(settings["camera"]["rate"], "full");
+    assert_eq!(settings["camera_in_use"]["exposure_us"], 5_922);
+    assert_eq!(settings["camera_in_use"]["frames_per_second"], 156);
+    assert_eq!(settings["kept"]["camera"], true);
 }
 
 #[test]
@@ -140,6 +150,7 @@ fn what_was_exported_is_set_and_kept_again() {
     assert_eq!((run.stdout, run.stderr), (text, String::new()));
     let settings = settings();
     let expected = [
+        Request::GetSettings,
         Request::SetTare(settings.tare),
         Request::SetTemporal(settings.temporal),
         Request::SetName(settings.name),
@@ -156,7 +167,7 @@ fn another_devices_rest_position_is_left_out() {
     let run = run(&["settings", "import", &file, "--port", &device.port]);
     assert_eq!(run.code, Some(0));
     assert!(run.stderr.contains("of another device"), "{}", run.stderr);
-    assert_eq!(commands(&device)[0], Request::SetTare(None));
+    assert_eq!(commands(&device)[1], Request::SetTare(None));
 }
 
 #[test]
@@ -193,7 +204,7 @@ fn an_import_that_is_refused_keeps_nothing() {
     let run = run(&["settings", "import", &file, "--port", &device.port]);
     assert_eq!(run.code, Some(6));
     assert!(run.stderr.contains("nothing was kept"), "{}", run.stderr);
-    assert!(commands(&device).is_empty(), "no Keep");
+    assert_eq!(commands(&device), [Request::GetSettings], "no Keep");
 }
 
 #[test]
@@ -321,9 +332,105 @@ fn the_guide_shows_what_setting_prints() {
             .into_iter()
             .chain(rest.split(' '))
             .collect();
-        let (_, printed) = changed(&arguments);
+        let of_camera = ["exposure", "gain", "rate"].contains(&arguments[2]);
+        let printed = match of_camera {
+            true => camera_changed(&arguments).1,
+            false => changed(&arguments).1,
+        };
         assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
         shown += 1;
     }
-    assert_eq!(shown, 7);
+    assert_eq!(shown, 10);
+}
+
+/// What a device's camera is set to, and what the tool says that it keeps.
+fn camera_changed(arguments: &[&str]) -> (CameraSettings, String) {
+    let device = device();
+    let run = run(&[arguments, &["--port", &device.port]].concat());
+    assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
+    let commands = commands(&device);
+    let [
+        Request::GetSettings,
+        Request::SetCamera(settings),
+        keep,
+        Request::GetSettings,
+    ] = &commands[..]
+    else {
+        panic!("{commands:?}");
+    };
+    let only_camera = Selection {
+        camera: true,
+        ..Selection::NONE
+    };
+    assert_eq!(*keep, Request::Keep(only_camera));
+    (*settings, run.stdout)
+}
+
+#[test]
+fn exposure_gain_and_rate_are_set_one_by_one_and_kept() {
+    let automatic = CameraSettings::default();
+    let (exposed, text) = camera_changed(&["settings", "set", "exposure", "2.5"]);
+    let exposure = Some(Microseconds(2_500));
+    assert_eq!(
+        exposed,
+        CameraSettings {
+            exposure,
+            ..automatic
+        }
+    );
+    assert_eq!(text, "exposure set and kept: 2.500 ms\n");
+    let (amplified, _) = camera_changed(&["settings", "set", "gain", "1.5"]);
+    assert_eq!(amplified.gain, Some(Sixteenths(24)));
+    let (slower, text) = camera_changed(&["settings", "set", "rate", "39", "--json"]);
+    assert_eq!(slower.rate, Rate::Quarter);
+    let told: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(told["text"], "39 frames a second");
+    let (found, text) = camera_changed(&["settings", "set", "exposure", "auto"]);
+    assert_eq!(found, automatic);
+    assert_eq!(
+        text,
+        "exposure set and kept: 5.922 ms, as the light needs\n"
+    );
+}
+
+#[test]
+fn what_the_camera_cannot_do_changes_nothing() {
+    for (arguments, word) in [
+        (["exposure", "6.406"], "0.024 to 6.405 ms"),
+        (["rate", "100"], "156, 78 or 39"),
+    ] {
+        let device = device();
+        let arguments = [&["settings", "set"], &arguments[..]].concat();
+        let run = run(&[&arguments[..], &["--port", &device.port]].concat());
+        assert_eq!(run.code, Some(1), "{arguments:?}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{}", run.stderr);
+        assert_eq!(commands(&device), [Request::GetSettings]);
+    }
+    for arguments in [["gain", "5"], ["exposure", "bright"], ["rate", "fast"]] {
+        let run = run(&[&["settings", "set"], &arguments[..]].concat());
+        assert_eq!(run.code, Some(2), "{arguments:?}: {}", run.stderr);
+    }
+}
+
+/// Of another camera, or another rate: nothing else of the file is set either.
+#[test]
+fn a_file_with_an_exposure_that_the_camera_has_not_changes_nothing() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = exported(&directory, "\"exposure_us\":null", "\"exposure_us\":9000");
+    let device = device();
+    let refused = run(&["settings", "import", &file, "--port", &device.port]);
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("6.405 ms"), "{}", refused.stderr);
+    assert_eq!(commands(&device), [Request::GetSettings]);
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("\"full\"", "\"half\"")).unwrap();
+    let device = self::device();
+    let taken = run(&["settings", "import", &file, "--port", &device.port]);
+    assert_eq!(taken.code, Some(0), "{}", taken.stderr);
+    let set = Request::SetCamera(CameraSettings {
+        exposure: Some(Microseconds(9_000)),
+        gain: None,
+        rate: Rate::Half,
+    });
+    assert_eq!(commands(&device)[1], set);
 }

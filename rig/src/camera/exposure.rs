@@ -60,7 +60,12 @@ impl Exposure {
         }
         if control & AUTOMATIC_GAIN != 0 {
             let ceiling = f64::from(2u32 << (registers.get(reg::COM9) >> 4 & 7));
-            let short = wanted / f64::from(output.lines);
+            // Exposure comes before gain, where it is automatic.
+            let lines = match control & AUTOMATIC_EXPOSURE {
+                0 => self.lines.max(1.0),
+                _ => f64::from(output.lines),
+            };
+            let short = wanted / lines;
             self.gain = approach(self.gain, short.max(1.0), ceiling);
             registers.measured(reg::GAIN, code_of(self.gain));
         } else {
@@ -131,6 +136,18 @@ mod tests {
         registers.write(reg::AEC, 20);
         let dark = lights(&mut registers, 1)[0];
         assert!(dark < 0.3, "{dark}");
+    }
+
+    #[test]
+    fn a_gain_alone_makes_up_for_an_exposure_that_is_set() {
+        let mut registers = Registers::default();
+        registers.write(reg::COM8, 0x8C);
+        registers.write(reg::AECH, 0);
+        registers.write(reg::AEC, 100);
+        let lights = lights(&mut registers, 20);
+        assert_eq!(registers.get(reg::AEC), 100);
+        assert_eq!(*lights.last().unwrap(), 1.0, "{lights:?}");
+        assert!(registers.get(reg::GAIN) > 0, "it amplifies");
     }
 
     #[test]

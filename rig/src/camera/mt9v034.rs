@@ -146,7 +146,12 @@ impl Mt9v034 {
         let registers = &self.registers;
         let wide = |address| f64::from(registers.get(address));
         let wanted = wide(reg::DESIRED_BIN) / WELL_EXPOSED * WELL_EXPOSED_NS / row_ns;
-        let (mut rows, mut gain) = (wide(reg::AEC_EXPOSURE).max(1.0), wide(reg::AGC_GAIN) / 16.0);
+        let gain = match agc {
+            true => reg::AGC_GAIN,
+            false => reg::ANALOG_GAIN,
+        };
+        let mut rows = wide(self.exposure_register()).max(1.0);
+        let mut gain = (wide(gain) / 16.0).max(1.0);
         let ratio = wanted / (rows * gain);
         if (ratio - 1.0).abs() < CLOSE {
             return;
@@ -158,9 +163,13 @@ impl Mt9v034 {
         if agc {
             gain = (aim / rows).clamp(1.0, wide(reg::MAX_GAIN) / 16.0);
         }
-        self.registers.measured(reg::AEC_EXPOSURE, rows as u16);
-        let gain = (gain * 16.0).round() as u16;
-        self.registers.measured(reg::AGC_GAIN, gain);
+        if aec {
+            self.registers.measured(reg::AEC_EXPOSURE, rows as u16);
+        }
+        if agc {
+            let gain = (gain * 16.0).round() as u16;
+            self.registers.measured(reg::AGC_GAIN, gain);
+        }
     }
 }
 

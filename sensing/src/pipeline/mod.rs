@@ -7,6 +7,7 @@ mod taring;
 #[cfg(test)]
 mod tests;
 
+use crate::known_answer::{self, Answer};
 use crate::motion::Motion;
 use ahead::Ahead;
 use hivtac_force::features::Features;
@@ -333,6 +334,12 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             return Err(Status::IMAGE_SATURATED);
         }
         Ok(())
+    }
+
+    /// What a model says of a question whose answer is known; frames go on as if it had not been
+    /// asked.
+    pub fn known_answer(&mut self, model: &Model<'_>) -> Answer {
+        known_answer::of(model, &mut self.network)
     }
 
     fn find_markers(&self) -> Result<Found, Status> {

@@ -115,7 +115,7 @@ impl<'c> Device<'c> {
                 Action::Update(model) => {
                     let slot = 1 - record.blob.map_or(1, |(slot, ..)| slot);
                     let sector = SLOTS[usize::from(slot)];
-                    let written = blob::write(self.log.flash(), sector, model).await;
+                    let written = self.log.write_blob(sector, model).await;
                     written.map_err(|_| SaveError::Worn)?;
                     record.blob = Some((slot, model.len() as u16, sum(model)));
                 }

@@ -65,6 +65,7 @@ fn a_model_in_worn_flash_is_refused_and_the_one_before_stays() {
     cells.worn = vec![3 * SECTOR_WORDS + 3];
     let mut device = Device::start(&mut cells, None).unwrap();
     assert!(device.act(&Action::Update(vec![8; 128])).unwrap().is_err());
+    assert_eq!(device.failures(), 1);
     assert_eq!(device.kept(), kept);
     assert_eq!(Device::start(&mut cells, None).unwrap().kept(), kept);
 }

@@ -77,8 +77,9 @@ const REASONS: [(&str, usize, &str); 20] = [
     ),
     (
         "hivtac_firmware8commands",
-        3,
-        "the USB tasks wait for each answer once: what has ended is not polled again",
+        4,
+        "the USB tasks wait for each answer once: what has ended is not polled again; a queue's \
+         cell is borrowed in a critical section",
     ),
     (
         "hivtac_firmware..flash",

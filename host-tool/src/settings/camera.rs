@@ -1,0 +1,268 @@
+//! Exposure, gain and rate of the camera, as JSON, as lines, and as what `settings set` changes of
+//! them.
+
+use super::temporal::thousandths;
+use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
+use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_wire::settings::CameraReport;
+use serde::{Deserialize, Serialize};
+
+/// In whole numbers of the units that the device keeps; null where the camera finds what the light
+/// needs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraJson {
+    exposure_us: Option<u32>,
+    gain_sixteenths: Option<u16>,
+    rate: RateJson,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum RateJson {
+    Full,
+    Half,
+    Quarter,
+}
+
+/// What the camera is set to, and found.
+#[derive(Serialize)]
+pub struct InUse {
+    exposure_us: u32,
+    gain_sixteenths: u16,
+    frames_per_second: u16,
+}
+
+impl CameraJson {
+    /// Of a device's settings.
+    pub fn new(settings: &CameraSettings) -> CameraJson {
+        CameraJson {
+            exposure_us: settings.exposure.map(|exposure| exposure.0),
+            gain_sixteenths: settings.gain.map(|gain| gain.0),
+            rate: match settings.rate {
+                Rate::Full => RateJson::Full,
+                Rate::Half => RateJson::Half,
+                Rate::Quarter => RateJson::Quarter,
+            },
+        }
+    }
+
+    /// A device's settings; whether its camera can be set so is not looked at.
+    pub fn settings(&self) -> CameraSettings {
+        CameraSettings {
+            exposure: self.exposure_us.map(Microseconds),
+            gain: self.gain_sixteenths.map(Sixteenths),
+            rate: match self.rate {
+                RateJson::Full => Rate::Full,
+                RateJson::Half => Rate::Half,
+                RateJson::Quarter => Rate::Quarter,
+            },
+        }
+    }
+}
+
+impl InUse {
+    /// Of what a device reports.
+    pub fn new(report: &CameraReport) -> InUse {
+        InUse {
+            exposure_us: report.exposure.0,
+            gain_sixteenths: report.gain.0,
+            frames_per_second: frames_per_second(report),
+        }
+    }
+}
+
+fn frames_per_second(report: &CameraReport) -> u16 {
+    report.limits.at(report.settings.rate).frames_per_second
+}
+
+/// What they are, for a person: name and text of each.
+pub fn texts(report: &CameraReport) -> [(&'static str, String); 3] {
+    let automatic = |is_automatic| {
+        if is_automatic {
+            ", as the light needs"
+        } else {
+            ""
+        }
+    };
+    let CameraSettings { exposure, gain, .. } = report.settings;
+    let [exposed, amplified] = match report.exposure {
+        Microseconds(0) => ["not known before the camera answers"; 2].map(str::to_owned),
+        known => [
+            format!("{known} ms{}", automatic(exposure.is_none())),
+            format!(
+                "{}{}",
+                f64::from(report.gain.0) / 16.0,
+                automatic(gain.is_none())
+            ),
+        ],
+    };
+    let rate = format!("{} frames a second", frames_per_second(report));
+    [("exposure", exposed), ("gain", amplified), ("rate", rate)]
+}
+
+/// What to change; the rest stays.
+#[derive(Clone, Copy, Debug)]
+pub enum Change {
+    /// How long each row is exposed.
+    Exposure(Wanted<Microseconds>),
+    /// The gain.
+    Gain(Wanted<Sixteenths>),
+    /// Frames a second.
+    Rate(u16),
+}
+
+/// A value, or none for what the light needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted<T>(Option<T>);
+
+impl Change {
+    /// The settings of a device with it.
+    ///
+    /// # Errors
+    /// Why its camera cannot be set so.
+    pub fn of(self, report: &CameraReport) -> Result<CameraSettings, String> {
+        let mut settings = report.settings;
+        match self {
+            Change::Exposure(Wanted(exposure)) => settings.exposure = exposure,
+            Change::Gain(Wanted(gain)) => settings.gain = gain,
+            Change::Rate(frames_per_second) => {
+                let limits = report.limits;
+                let sends = |rate: &Rate| limits.at(*rate).frames_per_second == frames_per_second;
+                settings.rate = Rate::ALL.into_iter().find(sends).ok_or_else(|| {
+                    let [full, half, quarter] =
+                        Rate::ALL.map(|rate| limits.at(rate).frames_per_second);
+                    format!("the camera sends {full}, {half} or {quarter} frames a second")
+                })?;
+            }
+        }
+        let checked = report.limits.check(&settings);
+        checked.map_err(|error| error.to_string())?;
+        Ok(settings)
+    }
+
+    /// What it is about, by [`texts`].
+    pub fn name(self) -> &'static str {
+        match self {
+            Change::Exposure(_) => "exposure",
+            Change::Gain(_) => "gain",
+            Change::Rate(_) => "rate",
+        }
+    }
+}
+
+const AUTOMATIC: &str = "auto";
+
+/// An exposure, ms, or `auto`.
+///
+/// # Errors
+/// When it is neither.
+pub fn exposure(text: &str) -> Result<Wanted<Microseconds>, String> {
+    match text {
+        AUTOMATIC => Ok(Wanted(None)),
+        _ => Ok(Wanted(Some(Microseconds(thousandths(text)?)))),
+    }
+}
+
+/// A gain, or `auto`; taken to the next sixteenth.
+///
+/// # Errors
+/// When it is neither, or out of its range.
+pub fn gain(text: &str) -> Result<Wanted<Sixteenths>, String> {
+    if text == AUTOMATIC {
+        return Ok(Wanted(None));
+    }
+    let number: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    let sixteenths = (number * 16.0).round();
+    let [least, most] = [LEAST_GAIN, MOST_GAIN].map(|gain| f64::from(gain.0));
+    match (least..=most).contains(&sixteenths) {
+        true => Ok(Wanted(Some(Sixteenths(sixteenths as u16)))),
+        false => Err(format!("a gain is {} to {}", least / 16.0, most / 16.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_terms::camera::{CameraLimits, RateLimits};
+
+    fn report(settings: CameraSettings) -> CameraReport {
+        let limits = |frames_per_second, shortest, longest| RateLimits {
+            frames_per_second,
+            shortest: Microseconds(shortest),
+            longest: Microseconds(longest),
+        };
+        CameraReport {
+            settings,
+            exposure: Microseconds(2_512),
+            gain: Sixteenths(24),
+            limits: CameraLimits([
+                limits(156, 24, 6_405),
+                limits(78, 47, 12_810),
+                limits(39, 93, 25_620),
+            ]),
+        }
+    }
+
+    #[test]
+    fn they_come_back_from_json() {
+        for rate in Rate::ALL {
+            let settings = CameraSettings {
+                exposure: Some(Microseconds(2_500)),
+                gain: None,
+                rate,
+            };
+            let text = serde_json::to_string(&CameraJson::new(&settings)).unwrap();
+            let read: CameraJson = serde_json::from_str(&text).unwrap();
+            assert_eq!(read.settings(), settings, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_the_camera_cannot_do_says_what_it_can() {
+        let now = report(CameraSettings::default());
+        let long = Change::Exposure(exposure("12").unwrap());
+        let error = long.of(&now).unwrap_err();
+        assert_eq!(
+            error,
+            "at 156 frames a second an exposure is 0.024 to 6.405 ms"
+        );
+        let error = Change::Rate(100).of(&now).unwrap_err();
+        assert_eq!(error, "the camera sends 156, 78 or 39 frames a second");
+        let half = Change::Rate(78).of(&now).unwrap();
+        assert_eq!(half.rate, Rate::Half);
+        let set = long.of(&report(half)).unwrap();
+        assert_eq!(set.exposure, Some(Microseconds(12_000)));
+        // Which the full rate has no time for.
+        assert!(Change::Rate(156).of(&report(set)).is_err());
+        let automatic = Change::Exposure(exposure("auto").unwrap());
+        assert_eq!(automatic.of(&report(set)).unwrap().exposure, None);
+    }
+
+    #[test]
+    fn a_person_reads_what_is_in_use_and_who_chose_it() {
+        let settings = CameraSettings {
+            exposure: Some(Microseconds(2_500)),
+            ..CameraSettings::default()
+        };
+        let text = texts(&report(settings)).map(|(_, text)| text);
+        let expected = ["2.512 ms", "1.5, as the light needs", "156 frames a second"];
+        assert_eq!(text, expected);
+        let unknown = CameraReport {
+            exposure: Microseconds(0),
+            ..report(settings)
+        };
+        let [_, (_, gain), _] = texts(&unknown);
+        assert_eq!(gain, "not known before the camera answers");
+    }
+
+    #[test]
+    fn gains_are_sixteenths_from_1_to_4() {
+        assert_eq!(gain("1.5"), Ok(Wanted(Some(Sixteenths(24)))));
+        assert_eq!(gain("4"), Ok(Wanted(Some(Sixteenths(64)))));
+        assert_eq!(gain("auto"), Ok(Wanted(None)));
+        for bad in ["0.9", "4.1", "nan", "", "x"] {
+            assert!(gain(bad).is_err(), "{bad}");
+        }
+    }
+}
