@@ -16,7 +16,6 @@ mod hsv;
 mod info;
 mod lines;
 mod list;
-mod look;
 mod monitor;
 mod output;
 mod picture;
@@ -35,6 +34,7 @@ mod view;
 use clap::{Args, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::named;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use hivtac_terms::geometry::Preset;
@@ -96,6 +96,9 @@ enum Command {
     Replay {
         /// What `record` made; also one that was cut
         file: PathBuf,
+        /// The sensor with this name or serial number, where it holds several
+        #[arg(long, value_name = "NAME")]
+        device: Option<String>,
         /// The port; one that is free when not given
         #[arg(long, value_name = "PORT", default_value_t = 0)]
         tcp: u16,
@@ -665,7 +668,7 @@ impl Device {
     fn address(&self) -> Result<Address, Failure> {
         match (&self.port, &self.device) {
             (Some(port), _) => Ok(Address::parse(port)),
-            (None, Some(device)) => list::find(device, self.timeout),
+            (None, Some(device)) => named::find(device, self.timeout),
             (None, None) => Ok(Address::Find),
         }
     }
@@ -930,10 +933,17 @@ fn run(command: Command) -> Result<(), Failure> {
         }),
         Command::Replay {
             file,
+            device,
             tcp,
             fast,
             json,
-        } => replay::run(&file, tcp, fast, json),
+        } => replay::run(&replay::Options {
+            file,
+            device,
+            port: tcp,
+            fast,
+            json,
+        }),
         Command::Snapshot {
             device,
             files,

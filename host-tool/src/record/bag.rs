@@ -2,6 +2,7 @@
 //! and beside it every message of the device as it came, which `hivtac replay` reads.
 
 use super::ros::{self, Definition};
+use hivtac_host::recording::WIRE;
 use hivtac_host::shown::unit_number;
 use hivtac_terms::status::Status;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
@@ -18,8 +19,6 @@ const CHUNK: u64 = 1 << 18;
 const FILM_FRAME: &str = "hivtac_film";
 /// The frame of the markers.
 const IMAGE_FRAME: &str = "hivtac_image";
-/// End of the topic of the device's messages.
-pub const WIRE: &str = "/wire";
 
 /// Channels, in the order of [`Bag::create`].
 #[derive(Clone, Copy)]

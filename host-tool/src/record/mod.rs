@@ -4,9 +4,6 @@ mod bag;
 mod ros;
 mod table;
 
-pub use bag::WIRE;
-pub use ros::BEFORE_BYTES;
-
 use crate::output::{note, print};
 use crate::tally::Tally;
 use bag::Bag;
