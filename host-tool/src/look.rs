@@ -1,7 +1,7 @@
 //! What a frame looks like, as levels of red, green and blue, and which of its pixels the sensing
 //! takes for markers.
 
-use hivtac_host::frame::Frame;
+use crate::frame::Frame;
 use hivtac_sensing::formats::Formats;
 use hivtac_sensing::tables::{ByteTable, Pixels};
 use hivtac_terms::hsv::rgb888;

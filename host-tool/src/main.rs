@@ -16,7 +16,6 @@ mod hsv;
 mod info;
 mod lines;
 mod list;
-mod look;
 mod monitor;
 mod output;
 mod picture;
@@ -35,6 +34,7 @@ mod view;
 use clap::{Args, FromArgMatches, Parser, Subcommand};
 use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::named;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use hivtac_terms::geometry::Preset;
@@ -70,16 +70,17 @@ enum Command {
     ///
     /// Example: hivtac check --seconds 10 --min-rate 150 --max-loss 0
     Check(CheckArguments),
-    /// Record everything that the device says, with both clocks, until Ctrl-C
+    /// Record everything that one or several devices say, with both clocks, until Ctrl-C
     ///
     /// FILE.mcap has ROS 2's profile: `ros2 bag play`, Foxglove and PlotJuggler read it, and
     /// `hivtac replay`. FILE.csv has a row a sample, with units in its header. Until its end it is
-    /// FILE.partial; it keeps that name when the connection was lost.
+    /// FILE.partial; it keeps that name when the connection was lost. Several sensors are recorded
+    /// into one FILE.mcap, each with its own topics.
     ///
     /// Example: hivtac record press.mcap --seconds 60
     Record {
         #[command(flatten)]
-        device: Device,
+        devices: Devices,
         /// The file to make, ….mcap or ….csv
         file: PathBuf,
         /// End after so many seconds
@@ -99,6 +100,9 @@ enum Command {
     Replay {
         /// What `record` made; also one that was cut
         file: PathBuf,
+        /// The sensor with this name or serial number, where it holds several
+        #[arg(long, value_name = "NAME")]
+        device: Option<String>,
         /// The port; one that is free when not given
         #[arg(long, value_name = "PORT", default_value_t = 0)]
         tcp: u16,
@@ -714,11 +718,37 @@ struct Device {
     timeout: Duration,
 }
 
+/// One device, or several.
+#[derive(Args)]
+struct Devices {
+    /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given. May be
+    /// repeated
+    #[arg(long, value_name = "PORT")]
+    port: Vec<String>,
+    /// The sensor with this name or serial number, as `list` shows them. May be repeated
+    #[arg(long, value_name = "NAME")]
+    device: Vec<String>,
+    /// Longest wait for each device's hello and replies, s
+    #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+    timeout: Duration,
+}
+
+impl Devices {
+    fn addresses(&self) -> Result<Vec<Address>, Failure> {
+        if self.port.is_empty() && self.device.is_empty() {
+            return Ok(vec![Address::Find]);
+        }
+        let ports = self.port.iter().map(|port| Ok(Address::parse(port)));
+        let named = |device: &String| named::find(device, self.timeout);
+        ports.chain(self.device.iter().map(named)).collect()
+    }
+}
+
 impl Device {
     fn address(&self) -> Result<Address, Failure> {
         match (&self.port, &self.device) {
             (Some(port), _) => Ok(Address::parse(port)),
-            (None, Some(device)) => list::find(device, self.timeout),
+            (None, Some(device)) => named::find(device, self.timeout),
             (None, None) => Ok(Address::Find),
         }
     }
@@ -970,23 +1000,30 @@ fn run(command: Command) -> Result<(), Failure> {
             json: arguments.json,
         }),
         Command::Record {
-            device,
+            devices,
             file,
             seconds,
             json,
         } => record::run(&record::Options {
-            address: device.address()?,
-            patience: device.timeout,
+            addresses: devices.addresses()?,
+            patience: devices.timeout,
             duration: seconds,
             file,
             json,
         }),
         Command::Replay {
             file,
+            device,
             tcp,
             fast,
             json,
-        } => replay::run(&file, tcp, fast, json),
+        } => replay::run(&replay::Options {
+            file,
+            device,
+            port: tcp,
+            fast,
+            json,
+        }),
         Command::Snapshot {
             device,
             files,

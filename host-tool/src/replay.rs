@@ -1,33 +1,43 @@
 //! `hivtac replay`: a recording that answers like the device that it was made of.
 
 use crate::output::{Reader, note, print};
-use crate::record::{BEFORE_BYTES, WIRE};
 use hivtac_host::failure::Failure;
+use hivtac_host::recording::Recording;
 use hivtac_host::stop;
 use hivtac_wire::decoder::{Decoder, Received};
-use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
+use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{
     Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Reply, Request, Stats,
 };
-use mcap::records::Record;
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use serde_json::json;
-use std::fmt::Display;
-use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// How often is looked whether there is a command, or a program at the port.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
-/// Longest record of a recording.
-const LONGEST_RECORD: usize = 1 << 24;
 
-/// Waits for a program at a port of this computer, 0 for any, and plays the recording to it.
-pub fn run(file: &Path, port: u16, fast: bool, json: bool) -> Result<(), Failure> {
-    let mut recording = Recording::open(file)?;
-    let hello = recording.hello()?;
+/// What to play, and to whom.
+pub struct Options {
+    /// What `record` made.
+    pub file: PathBuf,
+    /// Whose messages, by name or serial number; not needed where there is one device.
+    pub device: Option<String>,
+    /// A port of this computer; 0 for any that is free.
+    pub port: u16,
+    /// As fast as the other program reads, not as it was recorded.
+    pub fast: bool,
+    /// One JSON object instead of the line that says where it is.
+    pub json: bool,
+}
+
+/// Waits for a program at the port, and plays the recording to it.
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let Options {
+        port, fast, json, ..
+    } = *options;
+    let (mut recording, hello) = Recording::open(&options.file, options.device.as_deref())?;
     let listener = TcpListener::bind(("127.0.0.1", port))
         .map_err(|error| Failure::input(format!("cannot listen at port {port}: {error}")))?;
     let failed = |error| Failure::input(format!("cannot listen: {error}"));
@@ -56,103 +66,12 @@ pub fn run(file: &Path, port: u16, fast: bool, json: bool) -> Result<(), Failure
         streaming: None,
         is_gone: false,
     };
-    player.play(&mut recording, fast)
-}
-
-/// A message and when it came, ns since 1970.
-type Kept = (u64, DeviceMessage);
-
-/// A recording that is read as it is played.
-struct Recording {
-    name: String,
-    file: File,
-    reader: LinearReader,
-    /// The channel of the device's messages.
-    channel: Option<u16>,
-    is_over: bool,
-}
-
-impl Recording {
-    fn open(path: &Path) -> Result<Recording, Failure> {
-        let name = path.display().to_string();
-        let file = File::open(path)
-            .map_err(|error| Failure::input(format!("cannot read {name}: {error}")))?;
-        let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
-        Ok(Recording {
-            name,
-            file,
-            reader: LinearReader::new_with_options(options),
-            channel: None,
-            is_over: false,
-        })
+    player.play(&mut recording, fast)?;
+    if recording.is_cut() {
+        let name = &recording.name;
+        note(&format!("hivtac: {name} is cut: it ends before its end"));
     }
-
-    fn failure(&self, what: impl Display) -> Failure {
-        let name = &self.name;
-        Failure::input(format!("{name} is no recording of `hivtac record`: {what}"))
-    }
-
-    /// The device's hello, which a recording begins with.
-    fn hello(&mut self) -> Result<DeviceHello, Failure> {
-        match self.next()? {
-            Some((_, DeviceMessage::Hello(hello))) => Ok(hello),
-            _ => Err(self.failure("it does not begin with a hello of this release's version")),
-        }
-    }
-
-    /// The next message; `None` at the end, also where the recording was cut.
-    fn next(&mut self) -> Result<Option<Kept>, Failure> {
-        while !self.is_over {
-            let event = match self.reader.next_event() {
-                None => break,
-                Some(Ok(event)) => event,
-                Some(Err(error)) if self.channel.is_none() => return Err(self.failure(error)),
-                Some(Err(_)) => {
-                    self.is_over = true;
-                    note(&format!(
-                        "hivtac: {} is cut: it ends before its end",
-                        self.name
-                    ));
-                    break;
-                }
-            };
-            match event {
-                LinearReadEvent::ReadRequest(wanted) => {
-                    let read = self.file.read(self.reader.insert(wanted));
-                    let read = read.map_err(|error| {
-                        let name = &self.name;
-                        Failure::input(format!("cannot read {name}: {error}"))
-                    })?;
-                    self.reader.notify_read(read);
-                }
-                LinearReadEvent::Record { data, opcode } => {
-                    match mcap::parse_record(opcode, data) {
-                        Ok(Record::Channel(channel)) if channel.topic.ends_with(WIRE) => {
-                            self.channel = Some(channel.id);
-                        }
-                        Ok(Record::Message { header, data })
-                            if Some(header.channel_id) == self.channel =>
-                        {
-                            if let Some(message) = decoded(&data) {
-                                return Ok(Some((header.log_time, message)));
-                            }
-                        }
-                        _ => (),
-                    }
-                }
-            }
-        }
-        Ok(None)
-    }
-}
-
-/// The message in a frame that was kept; `None` of another version's.
-fn decoded(data: &[u8]) -> Option<DeviceMessage> {
-    let mut frame = data.get(BEFORE_BYTES..)?;
-    match Decoder::<DEVICE_FRAME_LIMIT>::new().feed(&mut frame)? {
-        Received::Message(message) => Some(message),
-        Received::ForeignHello(_) => None,
-    }
+    Ok(())
 }
 
 /// The other program, and what it is told.
@@ -180,7 +99,7 @@ impl Player {
                 stop::check()?;
                 continue;
             }
-            let Some((came_ns, message)) = recording.next()? else {
+            let Some((came_ns, message)) = recording.next_message()? else {
                 break;
             };
             let (since, first_ns) = *begun.get_or_insert((Instant::now(), came_ns));

@@ -3,13 +3,13 @@
 use crate::command::tell;
 use crate::finding::MarkerJson;
 use crate::lines::{status_text, to_json};
-use crate::look;
 use crate::output::print;
 use crate::picture::{Channels, encode};
 use crate::raw;
 use hivtac_host::failure::Failure;
 use hivtac_host::frame::{Frame, Taken, take};
 use hivtac_host::link::Link;
+use hivtac_host::look;
 use hivtac_host::port::Address;
 use hivtac_host::threshold;
 use hivtac_wire::message::Request;

@@ -1,6 +1,6 @@
 """Reads a recording with PyPI's `mcap` and `mcap-ros2-support`, and prints what is in it as JSON:
-how many messages of each type, the last wrench, the summary, and how many messages are read of the
-file cut at some places.
+how many messages of each type and topic, the last wrench, the summaries, and how many messages are
+read of the file cut at some places.
 
     python3 read_mcap.py FOLDER FILE
 
@@ -34,9 +34,10 @@ def read(file):
 
     data = Path(file).read_bytes()
     reader = make_reader(io.BytesIO(data), decoder_factories=[DecoderFactory()])
-    counts, last = Counter(), {}
+    counts, topics, last = Counter(), Counter(), {}
     for schema, channel, _, message in reader.iter_decoded_messages():
         counts[schema.name] += 1
+        topics[channel.topic] += 1
         last[channel.topic.rsplit("/", 1)[1]] = message
     cut = []
     for part in range(1, 20):
@@ -56,8 +57,10 @@ def read(file):
         "counts": counts,
         "force_n": [force.x, force.y, force.z],
         "frame_id": last["wrench"].header.frame_id,
-        "markers": len(last["markers"].polygon.points),
-        "summary": summary["hivtac"],
+        "markers": len(last["markers"].polygon.points) if "markers" in last else 0,
+        "topics": topics,
+        "summary": summary.get("hivtac"),
+        "summaries": summary,
         "cut": cut,
     }
 

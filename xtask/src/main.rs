@@ -9,6 +9,7 @@ mod licences;
 mod numbers;
 mod packages;
 mod process;
+mod python;
 mod raw_strings;
 mod report;
 mod rig;

@@ -9,7 +9,7 @@ use clap::Args;
 use crate::artifacts::Board;
 use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
-use crate::{artifacts, bench, columns, fuzz, licences, packages, process, workspace};
+use crate::{artifacts, bench, columns, fuzz, licences, packages, process, python, workspace};
 
 /// The workspaces: folder, and whether it has more than one package.
 const WORKSPACES: [(&str, bool); 4] = [
@@ -75,21 +75,26 @@ impl Test {
             });
         }
         if self.all {
-            self.optional(&mut report);
+            self.optional(&mut report, toolchain);
         }
         report.finish()
     }
 
     /// What needs programs that nothing else here does.
-    fn optional(&self, report: &mut Report) {
+    fn optional(&self, report: &mut Report, toolchain: &Toolchain) {
         if self.wants("licences") {
             let folders = WORKSPACES.iter().map(|(folder, _)| *folder);
-            report.optional("licences", licences::obstacle(), || {
+            report.optional("licences", licences::obstacle(), |_| {
                 licences::check(folders)
             });
         }
         if self.wants("attacks") {
-            report.optional("attacks", fuzz::obstacle(), fuzz::run);
+            report.optional("attacks", fuzz::obstacle(), |_| fuzz::run());
+        }
+        if self.wants("tests: python") {
+            report.optional("tests: python", python::obstacle(), |tally| {
+                python::test(&artifacts::firmware(toolchain)?, tally)
+            });
         }
     }
 

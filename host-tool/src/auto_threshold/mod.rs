@@ -8,13 +8,13 @@ mod tests;
 
 use crate::command::set_threshold;
 use crate::lines::to_json;
-use crate::look::{self, PASSED};
 use crate::output::print;
 use crate::snapshot::snapshot;
 use find::{Found, find};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::Frame;
 use hivtac_host::link::Link;
+use hivtac_host::look::{self, PASSED};
 use hivtac_host::port::Address;
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::threshold::{PixelFormat, Threshold};

@@ -1,8 +1,8 @@
 //! Colours: what the camera makes of white.
 
 use super::report::Step;
-use crate::look;
 use hivtac_host::frame::Frame;
+use hivtac_host::look;
 use serde_json::json;
 
 /// Largest saturation of white, of 255: half of what the usual threshold asks of a marker.

@@ -1,8 +1,8 @@
 //! What a frame shows of the four markers: their edges, colours and pattern.
 
 use super::rim::{Edge, Field, edge};
-use crate::look;
 use hivtac_host::frame::Frame;
+use hivtac_host::look;
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::geometry::{Geometry, Preset};

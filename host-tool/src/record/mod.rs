@@ -1,11 +1,11 @@
-//! `hivtac record`: everything that the device says, into a file.
+//! `hivtac record`: everything that one or several devices say, into a file.
 
 mod bag;
+mod listen;
 mod ros;
 mod table;
 
-pub use bag::WIRE;
-pub use ros::BEFORE_BYTES;
+pub use listen::Heard;
 
 use crate::output::{note, print};
 use crate::tally::Tally;
@@ -13,27 +13,28 @@ use bag::Bag;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_host::shown::shown;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
+use hivtac_host::shown::{shown, unit_number};
+use hivtac_wire::message::{DeviceHello, DeviceMessage};
+use listen::{Until, listen};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use table::Table;
 
 /// Time between two flushes, and two lines of progress.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
-/// A device that sends nothing for so long is gone.
-const SILENCE: Duration = Duration::from_secs(10);
 
 /// What to do.
 pub struct Options {
-    /// Where the device is.
-    pub address: Address,
-    /// Longest wait for the device's answers.
+    /// Where the devices are.
+    pub addresses: Vec<Address>,
+    /// Longest wait for a device's answers.
     pub patience: Duration,
     /// End after so long; else at Ctrl-C.
     pub duration: Option<Duration>,
@@ -43,36 +44,40 @@ pub struct Options {
     pub json: bool,
 }
 
-/// Records until the time is over, Ctrl-C, or the device is gone.
+/// Records until the time is over, Ctrl-C, or a device is gone.
 pub fn run(options: &Options) -> Result<(), Failure> {
-    check(&options.file)?;
-    let (mut link, hello) = Link::connect(&options.address, options.patience)?;
-    let mut recording = Recording::create(&options.file, &hello)?;
-    let result = recording.follow(&mut link, options);
-    recording.tally.rejected(link.rejected());
-    let counts = recording.tally.counts();
-    let ended = recording.end(&hello, result);
+    check(&options.file, options.addresses.len())?;
+    let connect = |address| Link::connect(address, options.patience);
+    let connected: Result<Vec<_>, _> = options.addresses.iter().map(connect).collect();
+    let (mut links, hellos): (Vec<Link>, Vec<DeviceHello>) = connected?.into_iter().unzip();
+    let mut recording = Recording::create(&options.file, &hellos)?;
+    let result = recording.follow(&mut links, options);
+    for (link, sensor) in links.iter().zip(&mut recording.sensors) {
+        sensor.tally.rejected(link.rejected());
+    }
+    let counts: Vec<Value> = recording.sensors.iter().map(Sensor::counts).collect();
+    let ended = recording.end(result);
     if options.json {
         print(&summary(options, counts, &ended).to_string())?;
     }
     ended
 }
 
-/// What became of a recording, as one JSON object.
-fn summary(
-    options: &Options,
-    counts: impl IntoIterator<Item = (&'static str, u64)>,
-    ended: &Result<(), Failure>,
-) -> Value {
+/// What became of a recording, as one JSON object: of one sensor with its counts, of several with
+/// those of each.
+fn summary(options: &Options, mut counts: Vec<Value>, ended: &Result<(), Failure>) -> Value {
     let is_whole = is_clean(ended);
     let file = options.file.display();
-    let mut summary = json!({
-        "file": if is_whole { file.to_string() } else { format!("{file}.partial") },
-        "whole": is_whole,
-    });
-    for (name, count) in counts {
-        summary[name] = count.into();
+    let mut summary = match &mut counts[..] {
+        [only] => only.take(),
+        _ => json!({ "sensors": counts }),
+    };
+    summary["file"] = match is_whole {
+        true => file.to_string(),
+        false => format!("{file}.partial"),
     }
+    .into();
+    summary["whole"] = is_whole.into();
     summary
 }
 
@@ -82,9 +87,13 @@ fn is_clean(ended: &Result<(), Failure>) -> bool {
     ended.as_ref().err().is_none_or(asked)
 }
 
-/// Says whether a file can be made.
-fn check(file: &Path) -> Result<Format, Failure> {
+/// Says whether a file can be made of so many sensors.
+fn check(file: &Path, sensors: usize) -> Result<Format, Failure> {
     let format = Format::of(file)?;
+    if matches!(format, Format::Csv) && sensors > 1 {
+        let what = "a table has one sensor; record several into a name that ends with .mcap";
+        return Err(input(file, what));
+    }
     match file.exists() {
         true => {
             let what = "there is such a file already; choose another name";
@@ -119,6 +128,62 @@ enum Sink {
     Table(Table),
 }
 
+/// A sensor, and what came of it.
+struct Sensor {
+    hello: DeviceHello,
+    tally: Tally,
+}
+
+impl Sensor {
+    fn new(hello: &DeviceHello) -> Sensor {
+        Sensor {
+            hello: hello.clone(),
+            tally: Tally::default(),
+        }
+    }
+
+    fn unit(&self) -> String {
+        unit_number(&self.hello.device_id)
+    }
+
+    /// Says what was recorded of it, one of so many.
+    fn tell(&self, of: usize) {
+        if of > 1 {
+            note(&format!("{} {}:", self.unit(), shown(&self.hello.name)));
+        }
+        note(self.tally.summary_of_recorded().trim_end());
+    }
+
+    fn counts(&self) -> Value {
+        let mut counts = json!({ "unit": self.unit() });
+        for (name, count) in self.tally.counts() {
+            counts[name] = count.into();
+        }
+        counts
+    }
+
+    /// What the file says of it at its end.
+    fn summary(&self, ended: &str, lasted: Duration) -> BTreeMap<String, String> {
+        let counts = self.tally.counts().into_iter();
+        let counts = counts.map(|(name, count)| (name, count.to_string()));
+        let model = self.hello.model.as_ref();
+        let about = [
+            ("unit", self.unit()),
+            ("name", self.hello.name.to_string()),
+            ("ended", ended.to_owned()),
+            ("seconds", format!("{:.3}", lasted.as_secs_f64())),
+            ("board", self.hello.board.to_string()),
+            ("firmware", self.hello.firmware.to_string()),
+            (
+                "model",
+                model.map_or("none", |model| &model.name).to_owned(),
+            ),
+        ];
+        let texts = counts.chain(about);
+        texts.map(|(name, text)| (name.to_owned(), text)).collect()
+    }
+}
+
 /// A file under way.
 pub struct Recording {
     file: PathBuf,
@@ -127,16 +192,21 @@ pub struct Recording {
     /// This program's clock, which never jumps, and what time it was when it began, ns since 1970.
     begun: Instant,
     begun_ns: u64,
-    tally: Tally,
+    sensors: Vec<Sensor>,
 }
 
 impl Recording {
-    /// Begins `….mcap` or `….csv` with a device's hello, as `….partial`.
+    /// Begins `….mcap` or `….csv` with the devices' hellos, as `….partial`.
     ///
     /// # Errors
-    /// When there is such a file already, or it cannot be made.
-    pub fn create(file: &Path, hello: &DeviceHello) -> Result<Recording, Failure> {
-        let kind = check(file)?;
+    /// When there is such a file already, it cannot be made, or two devices are the same.
+    pub fn create(file: &Path, hellos: &[DeviceHello]) -> Result<Recording, Failure> {
+        let kind = check(file, hellos.len())?;
+        let sensors: Vec<Sensor> = hellos.iter().map(Sensor::new).collect();
+        let units: BTreeSet<String> = sensors.iter().map(Sensor::unit).collect();
+        if units.len() < sensors.len() {
+            return Err(input(file, "the same sensor is named twice"));
+        }
         let file = file.to_owned();
         let mut partial = file.clone().into_os_string();
         partial.push(".partial");
@@ -152,7 +222,7 @@ impl Recording {
             .unwrap_or_default();
         let begun_ns = since.as_nanos() as u64;
         let sink = match kind {
-            Format::Mcap => Bag::create(open, hello, begun_ns).map(|bag| Sink::Bag(Box::new(bag))),
+            Format::Mcap => Bag::create(open, hellos, begun_ns).map(|bag| Sink::Bag(Box::new(bag))),
             Format::Csv => Table::create(open).map(Sink::Table).map_err(Into::into),
         };
         Ok(Recording {
@@ -161,57 +231,83 @@ impl Recording {
             partial,
             begun: Instant::now(),
             begun_ns,
-            tally: Tally::default(),
+            sensors,
         })
     }
 
-    /// Keeps what comes until the end.
-    fn follow(&mut self, link: &mut Link, options: &Options) -> Result<(), Failure> {
-        for request in [Request::GetInfo, Request::StartWithMarkers] {
-            let mut early = Vec::new();
-            link.request(request, options.patience, |message| early.push(message))?;
-            early.iter().try_for_each(|message| self.keep(message))?;
-        }
-        let end = options.duration.map(|duration| Instant::now() + duration);
-        let (mut heard, mut flushed) = (Instant::now(), Instant::now());
-        while end.is_none_or(|end| Instant::now() < end) {
-            let next = flushed + FLUSH_EVERY;
-            if let Some(message) = link.receive(end.map_or(next, |end| end.min(next)))? {
-                heard = Instant::now();
-                self.keep(&message)?;
+    /// Keeps what comes until the end; what goes wrong with one device ends it for all.
+    fn follow(&mut self, links: &mut [Link], options: &Options) -> Result<(), Failure> {
+        let is_over = AtomicBool::new(false);
+        let until = &Until {
+            duration: options.duration,
+            is_over: &is_over,
+        };
+        let (said, heard) = mpsc::channel();
+        std::thread::scope(|scope| {
+            let each = links.iter_mut().enumerate();
+            let threads: Vec<_> = each
+                .map(|(sensor, link)| {
+                    let said = said.clone();
+                    scope.spawn(move || {
+                        let result = listen(link, sensor, options.patience, until, &said);
+                        if result.is_err() {
+                            until.is_over.store(true, Ordering::Relaxed);
+                        }
+                        result
+                    })
+                })
+                .collect();
+            drop(said);
+            let kept = self.keep_all(&heard);
+            is_over.store(true, Ordering::Relaxed);
+            let results = threads.into_iter().map(|thread| match thread.join() {
+                Ok(result) => result,
+                Err(panic) => std::panic::resume_unwind(panic),
+            });
+            std::iter::once(kept).chain(results).collect()
+        })
+    }
+
+    /// Keeps what is heard until nobody listens any more.
+    fn keep_all(&mut self, heard: &Receiver<Heard>) -> Result<(), Failure> {
+        let mut flushed = Instant::now();
+        loop {
+            match heard.recv_timeout(FLUSH_EVERY.saturating_sub(flushed.elapsed())) {
+                Ok(heard) => self.keep(&heard)?,
+                Err(RecvTimeoutError::Timeout) => (),
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
             if flushed.elapsed() >= FLUSH_EVERY {
                 flushed = Instant::now();
                 self.flush()?;
                 self.show_progress();
             }
-            if heard.elapsed() >= SILENCE {
-                return Err(link.lost("the device sends nothing"));
-            }
         }
-        let mut late = Vec::new();
-        for request in [Request::Stop, Request::GetInfo] {
-            link.request(request, options.patience, |message| late.push(message))?;
-        }
-        late.iter().try_for_each(|message| self.keep(message))
     }
 
-    /// Keeps a message that has just come.
+    /// Keeps what a device said.
     ///
     /// # Errors
     /// When the disk is full, or gone.
-    pub fn keep(&mut self, message: &DeviceMessage) -> Result<(), Failure> {
+    pub fn keep(&mut self, heard: &Heard) -> Result<(), Failure> {
+        let Heard {
+            sensor,
+            at,
+            message,
+        } = heard;
+        let tally = &mut self.sensors[*sensor].tally;
         match message {
-            DeviceMessage::Sample(sample) => drop(self.tally.sample(sample)),
-            DeviceMessage::Stats(stats) => self.tally.stats(stats),
+            DeviceMessage::Sample(sample) => drop(tally.sample(sample)),
+            DeviceMessage::Stats(stats) => tally.stats(stats),
             DeviceMessage::Log(line) => note(&log_text(line)),
             // An answer to this program: no part of what the device measured.
             _ => return Ok(()),
         }
-        let now_ns = self.begun_ns + self.begun.elapsed().as_nanos() as u64;
+        let since = at.saturating_duration_since(self.begun);
+        let came_ns = self.begun_ns + since.as_nanos() as u64;
         let kept = match &mut self.sink {
-            Sink::Bag(bag) => bag.message(message, now_ns),
-            Sink::Table(table) => table.message(message, now_ns).map_err(Into::into),
+            Sink::Bag(bag) => bag.message(*sensor, message, came_ns),
+            Sink::Table(table) => table.message(message, came_ns).map_err(Into::into),
         };
         kept.map_err(|error| input(&self.partial, error))
     }
@@ -231,7 +327,11 @@ impl Recording {
     /// For a person, how long it lasts and what came.
     pub fn progress(&self) -> String {
         let seconds = self.begun.elapsed().as_secs();
-        format!("{seconds} s, {}", self.tally.received_line())
+        let lines = self
+            .sensors
+            .iter()
+            .map(|sensor| sensor.tally.received_line());
+        format!("{seconds} s, {}", lines.collect::<Vec<_>>().join("; "))
     }
 
     fn show_progress(&self) {
@@ -245,42 +345,34 @@ impl Recording {
     ///
     /// # Errors
     /// What ended it, or that it could not be ended.
-    pub fn end(self, hello: &DeviceHello, result: Result<(), Failure>) -> Result<(), Failure> {
+    pub fn end(self, result: Result<(), Failure>) -> Result<(), Failure> {
         let Recording {
             file,
             partial,
             sink,
             begun,
-            tally,
+            sensors,
             ..
         } = self;
+        let tell_counts = || sensors.iter().for_each(|sensor| sensor.tell(sensors.len()));
         let is_clean = is_clean(&result);
         if let Err(failure) = &result
             && failure.kind == Kind::Input
         {
             // The disk is full, or gone: nothing more can be written. What was flushed can be read.
             drop(sink);
-            note(tally.summary_of_recorded().trim_end());
+            tell_counts();
             return result;
         }
         let ended = result
             .as_ref()
             .err()
             .map_or("as asked".to_owned(), ToString::to_string);
-        let counts = tally.counts().into_iter();
-        let texts = counts.map(|(name, count)| (name.to_owned(), count.to_string()));
-        let mut summary: BTreeMap<String, String> = texts.collect();
-        summary.insert("ended".to_owned(), ended);
-        summary.insert(
-            "seconds".to_owned(),
-            format!("{:.3}", begun.elapsed().as_secs_f64()),
-        );
-        summary.insert("board".to_owned(), hello.board.to_string());
-        summary.insert("firmware".to_owned(), hello.firmware.to_string());
-        let model = hello.model.as_ref().map_or("none", |model| &model.name);
-        summary.insert("model".to_owned(), model.to_owned());
-        finish(sink, summary).map_err(|error| input(&partial, error))?;
-        note(tally.summary_of_recorded().trim_end());
+        let lasted = begun.elapsed();
+        let summaries = sensors.iter().map(|sensor| sensor.summary(&ended, lasted));
+        let summaries = summaries.collect();
+        finish(sink, summaries).map_err(|error| input(&partial, error))?;
+        tell_counts();
         if is_clean {
             fs::rename(&partial, &file).map_err(|error| input(&file, error))?;
             note(&format!(
@@ -298,9 +390,9 @@ impl Recording {
 }
 
 /// Ends a file, and waits until the disk has it.
-fn finish(sink: Sink, summary: BTreeMap<String, String>) -> Result<(), mcap::McapError> {
+fn finish(sink: Sink, summaries: Vec<BTreeMap<String, String>>) -> Result<(), mcap::McapError> {
     let file: File = match sink {
-        Sink::Bag(bag) => bag.finish(summary)?,
+        Sink::Bag(bag) => bag.finish(summaries)?,
         Sink::Table(table) => table.finish()?,
     };
     Ok(file.sync_all()?)

@@ -121,9 +121,6 @@ uint32 stride
 ",
 };
 
-/// Bytes of a [`BYTES`] message before its data: the encoding, no dimensions, no offset, a length.
-pub const BEFORE_BYTES: usize = 16;
-
 /// Little-endian CDR: numbers lie at multiples of their size, counted from behind its first four
 /// bytes.
 struct Cdr(Vec<u8>);
@@ -227,6 +224,7 @@ pub fn bytes(bytes: &[u8]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_host::recording::BEFORE_BYTES;
 
     #[test]
     fn numbers_are_aligned_behind_the_encoding() {

@@ -1,6 +1,6 @@
 //! The page's record button: a file at a time, beside what the page shows.
 
-use crate::record::Recording;
+use crate::record::{Heard, Recording};
 use hivtac_host::failure::Failure;
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
@@ -21,7 +21,6 @@ pub struct Recorder {
 
 struct UnderWay {
     recording: Recording,
-    hello: DeviceHello,
     name: String,
     flushed: Instant,
 }
@@ -53,8 +52,7 @@ impl Recorder {
         if self.under_way.is_none() {
             let file = free_name(&self.folder, &unit_number(&hello.device_id));
             self.under_way = Some(UnderWay {
-                recording: Recording::create(&file, hello)?,
-                hello: hello.clone(),
+                recording: Recording::create(&file, std::slice::from_ref(hello))?,
                 name: shown(&file.display().to_string()),
                 flushed: Instant::now(),
             });
@@ -67,7 +65,11 @@ impl Recorder {
         let Some(under_way) = &mut self.under_way else {
             return;
         };
-        let mut result = under_way.recording.keep(message);
+        let mut result = under_way.recording.keep(&Heard {
+            sensor: 0,
+            at: Instant::now(),
+            message: message.clone(),
+        });
         if result.is_ok() && under_way.flushed.elapsed() >= FLUSH_EVERY {
             under_way.flushed = Instant::now();
             result = under_way.recording.flush();
@@ -81,13 +83,10 @@ impl Recorder {
     pub fn end(&mut self, why: Result<(), Failure>) -> String {
         if let Some(under_way) = self.under_way.take() {
             let UnderWay {
-                recording,
-                hello,
-                name,
-                ..
+                recording, name, ..
             } = under_way;
             let progress = recording.progress();
-            self.last = match recording.end(&hello, why) {
+            self.last = match recording.end(why) {
                 Ok(()) => format!("recorded {name}: {progress}"),
                 Err(failure) => format!("{name}.partial: {progress}; it ended: {failure}"),
             };

@@ -37,6 +37,8 @@ pub struct Conversation {
     pub commands: mpsc::Sender<Request>,
     /// What a tare is answered with; `None`: nothing.
     pub tare: Option<Outcome>,
+    /// What it says of itself.
+    pub hello: DeviceHello,
     /// Its settings.
     pub settings: SettingsReport,
     /// How it is doing.
@@ -114,13 +116,13 @@ impl Conversation {
     /// Answers one message; true for start.
     fn answer(&mut self, message: HostMessage) -> bool {
         let HostMessage::Command(Command { id, request }) = message else {
-            self.send(DeviceMessage::Hello(hello()));
+            self.send(DeviceMessage::Hello(self.hello.clone()));
             return false;
         };
         let _ = self.commands.send(request.clone());
         match &request {
             Request::GetInfo => {
-                self.send(DeviceMessage::Hello(hello()));
+                self.send(DeviceMessage::Hello(self.hello.clone()));
                 self.send(DeviceMessage::Stats(self.stats));
             }
             Request::SetThreshold(Threshold::Mono { .. }) => {
@@ -304,6 +306,7 @@ fn conversation(stream: Box<dyn Stream>, commands: &mpsc::Sender<Request>) -> Co
         stats: Stats::default(),
         commands: commands.clone(),
         tare: Some(Outcome::Done),
+        hello: hello(),
         settings: settings(),
         health: HEALTHY,
         flash: Outcome::Done,

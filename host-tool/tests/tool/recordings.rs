@@ -83,8 +83,8 @@ impl Folder {
 }
 
 /// What `monitor` shows of a recording, as fast as it reads.
-pub fn replayed(file: &str, frames: &str) -> Vec<u64> {
-    let mut replay = start(&["replay", "--fast", "--json", file]);
+pub fn replayed(options: &[&str], frames: &str) -> Vec<u64> {
+    let mut replay = start(&[&["replay", "--fast", "--json"], options].concat());
     let mut said = String::new();
     let stdout = replay.child().stdout.take().unwrap();
     BufReader::new(stdout).read_line(&mut said).unwrap();
@@ -122,7 +122,7 @@ fn what_was_recorded_is_played_as_it_came() {
         "{recorded:?}"
     );
     assert!(!std::path::Path::new(&format!("{file}.partial")).exists());
-    assert!(replayed(&file, "37").into_iter().eq(3..40));
+    assert!(replayed(&[&file], "37").into_iter().eq(3..40));
     let again = run(&["record", &file, "--port", &device.port]);
     assert_eq!(again.code, Some(1));
     assert!(
@@ -193,7 +193,7 @@ fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
     let told = format!("what came until then is in {partial}");
     assert!(recorded.stderr.contains(&told), "{recorded:?}");
     assert!(!std::path::Path::new(&file).exists());
-    assert!(replayed(&partial, "30").into_iter().eq(0..30));
+    assert!(replayed(&[&partial], "30").into_iter().eq(0..30));
 }
 
 #[test]
@@ -242,4 +242,129 @@ fn a_full_disk_ends_a_recording_with_what_fits() {
         "{}",
         text.len()
     );
+}
+
+/// A sensor with another number and name, which sends these numbers.
+fn another(number: u8, name: &'static str, numbers: Vec<u32>) -> FakeDevice {
+    let script = paced(numbers);
+    FakeDevice::on_tcp([Box::new(move |device: &mut Conversation| {
+        device.hello.device_id[11] = number;
+        device.hello.name = name.try_into().unwrap();
+        script(device);
+    })])
+}
+
+/// Records these sensors.
+fn record_all(devices: &[&FakeDevice], file: &str) -> Finished {
+    let ports = devices.iter().flat_map(|device| ["--port", &device.port]);
+    let common = ["record", file, "--seconds", "0.6", "--json"];
+    run(&common.into_iter().chain(ports).collect::<Vec<_>>())
+}
+
+#[test]
+fn several_sensors_are_recorded_into_one_file_and_played_one_by_one() {
+    let folder = Folder::new();
+    let file = folder.path("two.mcap");
+    let thumb = another(1, "thumb", (0..30).collect());
+    let index = another(2, "index", (100..120).collect());
+    let recorded = record_all(&[&thumb, &index], &file);
+    assert_eq!(recorded.code, Some(0), "{recorded:?}");
+    let told: Value = serde_json::from_str(&recorded.stdout).unwrap();
+    let samples = [0, 1].map(|sensor| told["sensors"][sensor]["samples"].clone());
+    assert_eq!(samples, [json!(30), json!(20)], "{told}");
+    for (device, numbers) in [("thumb", 0..30), ("00010203040506070809 0A02", 100..120)] {
+        let device = device.replace(' ', "");
+        let played = replayed(
+            &["--device", &device, &file],
+            &(numbers.end - numbers.start).to_string(),
+        );
+        assert!(played.into_iter().eq(numbers), "{device}");
+    }
+    for (options, said) in [
+        (&[][..], "more than one sensor; choose one with --device: "),
+        (
+            &["--device", "ring"],
+            "no sensor with the name or serial number ring",
+        ),
+    ] {
+        let refused = run(&[&["replay", &file], options].concat());
+        assert_eq!(refused.code, Some(1), "{refused:?}");
+        assert!(refused.stderr.contains(said), "{refused:?}");
+        assert!(
+            refused.stderr.contains("000102030405060708090a02 index"),
+            "{refused:?}"
+        );
+    }
+}
+
+#[test]
+fn one_lost_sensor_of_several_ends_a_recording_with_what_came_of_all() {
+    let folder = Folder::new();
+    let file = folder.path("two.mcap");
+    let thumb = another(1, "thumb", (0..30).collect());
+    let pulled = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| {
+        device.hello.name = "index".try_into().unwrap();
+        device.answer_one();
+        device.answer_one();
+        device.answer_one();
+        samples(0..5)
+            .into_iter()
+            .for_each(|message| device.send(message));
+        std::thread::sleep(Duration::from_millis(200));
+    })]);
+    let recorded = record_all(&[&thumb, &pulled], &file);
+    assert_eq!(recorded.code, Some(5), "{recorded:?}");
+    let partial = format!("{file}.partial");
+    assert!(
+        replayed(&["--device", "thumb", &partial], "20")
+            .into_iter()
+            .eq(0..20)
+    );
+}
+
+#[test]
+fn several_sensors_go_into_no_table_and_none_is_named_twice() {
+    let folder = Folder::new();
+    let thumb = another(1, "thumb", vec![]);
+    let table = record_all(&[&thumb, &thumb], &folder.path("two.csv"));
+    assert_eq!(table.code, Some(1), "{table:?}");
+    assert!(table.stderr.contains("a table has one sensor"), "{table:?}");
+    let (first, second) = (another(7, "a", vec![]), another(7, "b", vec![]));
+    let twice = record_all(&[&first, &second], &folder.path("two.mcap"));
+    assert_eq!(twice.code, Some(1), "{twice:?}");
+    assert!(
+        twice.stderr.contains("the same sensor is named twice"),
+        "{twice:?}"
+    );
+    assert!(std::fs::read_dir(folder.0.path()).unwrap().next().is_none());
+}
+
+#[test]
+#[ignore = "needs PyPI's packages: run by cargo xtask test --all"]
+fn several_sensors_in_one_file_are_read_by_pypis_reader() {
+    let folder = Folder::new();
+    let file = folder.path("two.mcap");
+    let thumb = another(1, "thumb", (0..30).collect());
+    let index = another(2, "index", (100..120).collect());
+    assert_eq!(record_all(&[&thumb, &index], &file).code, Some(0));
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = std::process::Command::new("python3")
+        .arg(root.join("tests/python/read_mcap.py"))
+        .arg(root.join("target/python-mcap"))
+        .arg(&file)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&read.stderr);
+    assert!(read.status.success(), "{said}");
+    let read: Value = serde_json::from_slice(&read.stdout).unwrap();
+    for (number, name, samples) in [("01", "thumb", 30), ("02", "index", 20)] {
+        let unit = format!("unit_000102030405060708090a{number}");
+        let statuses = &read["topics"][format!("/hivtac/{unit}/status")];
+        assert_eq!(statuses, samples, "{read}");
+        let summary = &read["summaries"][format!("hivtac/{unit}")];
+        assert_eq!(
+            (&summary["name"], &summary["samples"]),
+            (&json!(name), &json!(samples.to_string()))
+        );
+    }
 }

@@ -164,7 +164,7 @@ fn a_recording_begins_and_ends_with_its_button() {
     );
     let replay = file.to_str().unwrap();
     assert!(
-        crate::recordings::replayed(replay, "20")
+        crate::recordings::replayed(&[replay], "20")
             .into_iter()
             .eq(0..20)
     );

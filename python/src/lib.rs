@@ -1,0 +1,28 @@
+//! The native half of Python's `hivtac`: connections and recordings, by the code of the tool.
+//! Numbers leave it in SI units; `hivtac/__init__.py` makes arrays of them, and is what users see.
+
+mod connection;
+mod error;
+mod interrupt;
+mod reader;
+mod told;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _hivtac {
+    #[pymodule_export]
+    use crate::connection::Connection;
+    #[pymodule_export]
+    use crate::error::{Error, LostError, NoDeviceError, RefusedError, VersionError};
+    #[pymodule_export]
+    use crate::reader::Reader;
+
+    use super::*;
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        hivtac_host::stop::ask_besides(crate::interrupt::is_interrupted);
+        Ok(())
+    }
+}

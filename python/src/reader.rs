@@ -1,0 +1,61 @@
+//! A recording that is read sample by sample.
+
+use crate::error::raised;
+use crate::told::{self, SampleNumbers};
+use hivtac_host::recording::Recording;
+use hivtac_wire::message::{DeviceHello, DeviceMessage};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+/// A recording of one device.
+#[pyclass(frozen)]
+pub struct Reader {
+    recording: Mutex<Recording>,
+    hello: DeviceHello,
+}
+
+#[pymethods]
+impl Reader {
+    #[new]
+    fn open(py: Python<'_>, path: PathBuf, device: Option<String>) -> PyResult<Reader> {
+        let opened = py.detach(|| Recording::open(&path, device.as_deref()));
+        let (recording, hello) = opened.map_err(raised)?;
+        let recording = Mutex::new(recording);
+        Ok(Reader { recording, hello })
+    }
+
+    /// Who the device was.
+    fn hello<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        told::hello(py, &self.hello)
+    }
+
+    /// The next sample; `None` at the end.
+    fn next(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
+        let next = py.detach(|| {
+            let mut recording = self
+                .recording
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            while let Some((came_ns, message)) = recording.next_message()? {
+                if let DeviceMessage::Sample(sample) = message {
+                    return Ok(Some(told::sample(&sample, came_ns)));
+                }
+            }
+            Ok(None)
+        });
+        next.map_err(raised)
+    }
+
+    /// True once its end was reached and it had been cut before its own.
+    fn is_cut(&self, py: Python<'_>) -> bool {
+        py.detach(|| {
+            let recording = self
+                .recording
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            recording.is_cut()
+        })
+    }
+}

@@ -1,0 +1,93 @@
+//! What the device tells, as tuples and dictionaries in SI units.
+
+use hivtac_host::shown::{shown, unit_number};
+use hivtac_terms::force::Force;
+use hivtac_terms::units::Px;
+use hivtac_wire::message::{DeviceHello, Sample};
+use hivtac_wire::settings::TareReport;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Force, N; α, β, rad; |F|, N; standard uncertainties of the direction, rad, and of |F|, N; place,
+/// m, and its standard uncertainty, m.
+type ForceNumbers = ([f64; 3], [f64; 2], f64, f64, f64, Option<([f64; 2], f64)>);
+
+/// Sequence, frame, device time, s, host time, s, status bits, names of these, force, and column,
+/// row and area of each marker, px.
+pub type SampleNumbers = (
+    u32,
+    u32,
+    f64,
+    f64,
+    u32,
+    Vec<&'static str>,
+    Option<ForceNumbers>,
+    Option<[(f64, f64, u32); 4]>,
+);
+
+/// A sample that came at a time, ns since 1970.
+pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
+    let markers = sample
+        .markers
+        .map(|four| four.map(|marker| (px(marker.x), px(marker.y), marker.area)));
+    (
+        sample.sequence,
+        sample.frame,
+        sample.time_us as f64 / 1e6,
+        came_ns as f64 / 1e9,
+        sample.status.0,
+        sample.status.names().collect(),
+        sample.force.as_ref().map(force),
+        markers,
+    )
+}
+
+fn force(force: &Force) -> ForceNumbers {
+    let newtons = |micro: i32| f64::from(micro) / 1e6;
+    let radians = |milli: f64| (milli / 1e3).to_radians();
+    let place = force.place.map(|place| {
+        let metres = [place.x, place.y].map(|micro| f64::from(micro.0) / 1e6);
+        (metres, f64::from(place.sigma.0) / 1e6)
+    });
+    (
+        force.cartesian.map(|part| newtons(part.0)),
+        [force.alpha, force.beta].map(|angle| radians(f64::from(angle.0))),
+        newtons(force.magnitude.0),
+        radians(f64::from(force.direction_sigma.0)),
+        f64::from(force.magnitude_sigma.0) / 1e6,
+        place,
+    )
+}
+
+/// Who the device is.
+pub fn hello<'py>(py: Python<'py>, hello: &DeviceHello) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    told.set_item("serial", unit_number(&hello.device_id))?;
+    told.set_item("name", shown(&hello.name))?;
+    told.set_item("board", shown(&hello.board))?;
+    told.set_item("firmware", shown(&hello.firmware))?;
+    let model = hello.model.as_ref();
+    told.set_item("model", model.map(|model| shown(&model.name)))?;
+    told.set_item("width", hello.width)?;
+    told.set_item("height", hello.height)?;
+    Ok(told)
+}
+
+/// Markers at rest, px; how far they spread, px; how far they moved from the rest before, px.
+pub type TareNumbers = ([(f64, f64); 4], f64, Option<f64>);
+
+/// What a tare gave.
+pub fn tare(report: &TareReport) -> TareNumbers {
+    (
+        report
+            .rest
+            .markers
+            .map(|marker| (px(marker.x), px(marker.y))),
+        px(report.spread),
+        report.moved.map(px),
+    )
+}
+
+fn px(px: Px) -> f64 {
+    px.to_f64()
+}
