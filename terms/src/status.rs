@@ -65,6 +65,9 @@ bits! {
     PLACE_OUT_OF_RANGE = 19, "place_out_of_range";
     /// No single contact fits the positions of the four markers: no force.
     UNEXPLAINED = 20, "unexplained";
+    /// The frame is disturbed: the markers' places were reconstructed from what is left of their
+    /// edges, and the standard uncertainties are larger.
+    MARKERS_RECONSTRUCTED = 21, "markers_reconstructed";
 }
 
 impl Status {

@@ -124,6 +124,11 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "no single contact explains where the markers are",
             "press with one tip; at rest, take a new tare",
         ),
+        Status::MARKERS_RECONSTRUCTED => (
+            "something disturbs the picture: places of markers are those of what is left of their \
+             edges, and less certain",
+            "look at the picture for reflections, specks and dim light",
+        ),
         _ => (
             "this tool does not know of it",
             "use the hivtac of the firmware's release",
