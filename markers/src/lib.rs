@@ -10,6 +10,8 @@
 //! | `mask`, `dilate`, `history`, `runs` | rows of bits, and runs of them |
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
 //! | `scanner` | from rows to blobs, as they come |
+//! | `majority` | specks and holes taken out of rows of bits |
+//! | `closeup`, `outline` | a marker's edge fitted where its centroid is not to be trusted |
 //! | `rules` | which four blobs are the markers, and whether to trust them |
 //! | `settings` | what must be told before the first frame |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
@@ -21,6 +23,7 @@
 extern crate std;
 
 pub mod blob;
+pub mod closeup;
 pub mod formats;
 pub mod rules;
 pub mod scanner;
@@ -32,8 +35,10 @@ mod dilate;
 mod history;
 mod kernels;
 mod label;
+mod majority;
 mod mask;
 mod moments;
 #[cfg(test)]
 mod numerics;
+pub mod outline;
 mod runs;

@@ -6,6 +6,7 @@ use crate::blob::Blob;
 use crate::dilate::{Dilation, MAX_ROWS};
 use crate::history::{Band, History};
 use crate::label::Labeller;
+use crate::majority::Majority;
 use crate::mask::{last_word_bits, words_of};
 use crate::tables::Pixels;
 use hivtac_terms::status::Status;
@@ -31,6 +32,10 @@ pub struct ScanSettings {
     /// A frame of more runs is not looked at to its end: [`Status::BLOB_OVERFLOW`]. It bounds the
     /// time that noise takes.
     pub max_runs: u32,
+    /// Whether the mask is of the pixels that a marker covers at least half, whatever the light
+    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: a frame with
+    /// specks, noise or little light.
+    pub cleaned: bool,
 }
 
 /// Why a frame cannot be scanned.
@@ -111,6 +116,7 @@ pub struct Scan<'a> {
 #[derive(Clone, Debug)]
 pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
+    majority: Majority,
     dilation: Dilation,
     labels: Labeller<BLOBS>,
     /// The pixels of rows that the dilation still holds, when they are weighed and may not stay
@@ -135,7 +141,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
                 min_area: 0,
                 weighted: false,
                 max_runs: u32::MAX,
+                cleaned: false,
             },
+            majority: Majority::new(),
             dilation: Dilation::new(),
             labels: Labeller::new(),
             history: History::new(),
@@ -159,6 +167,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         settings.check()?;
         self.settings = settings;
         self.dilation.begin(settings.width, settings.dilations);
+        if settings.cleaned {
+            self.majority.begin();
+        }
         self.history.clear();
         self.status = Status::OK;
         self.active = true;
@@ -189,7 +200,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
 
     /// The same without copying: the rows that came last are still in memory when the next ones
     /// come, and are then `above`: all of the frame, or at least as many as there are dilations,
-    /// one after the other. With fewer, a frame whose pixels are weighed becomes incomplete where
+    /// one after the other; one more in a frame that is
+    /// [cleaned](ScanSettings::cleaned). With fewer, a frame whose pixels are weighed becomes incomplete where
     /// one of them would have been needed.
     pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
         self.push_whole(pixels, above, rows, Stay::Here);
@@ -229,16 +241,22 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             let rows = left.min(MAX_ROWS);
             if !self.labels.is_exhausted() {
                 let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
-                pixels.mask_rows(part, width, self.dilation.incoming(rows));
+                let incoming = self.dilation.incoming(rows);
+                if self.settings.cleaned {
+                    pixels.mask_covered_rows(part, width, incoming);
+                    (self.majority).filter(incoming, words_of(width), last_word_bits(width));
+                } else {
+                    pixels.mask_rows(part, width, incoming);
+                }
             }
             self.take(pixels, band, rows);
             left -= rows;
         }
         // What ends a frame is weighed when it is finished.
-        let ends = self.rows_in == self.settings.height && !self.is_quiet();
+        let ends =
+            self.rows_in == self.settings.height && (self.settings.cleaned || !self.is_quiet());
         if self.settings.weighted && (stay == Stay::Gone || ends) {
-            self.history
-                .keep(band, self.rows_in, self.settings.dilations);
+            self.history.keep(band, self.rows_in, self.late());
         }
     }
 
@@ -254,6 +272,10 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         incoming.copy_from_slice(words);
         if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
+        }
+        if self.settings.cleaned {
+            let width = self.settings.width;
+            (self.majority).filter(incoming, words_of(width), last_word_bits(width));
         }
         self.take(&(), &Band::WITHOUT_PIXELS, 1);
     }
@@ -284,6 +306,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.labels.is_idle()
     }
 
+    /// Rows that come out behind those that come in.
+    #[inline(always)]
+    fn late(&self) -> u8 {
+        self.dilation.radius() + u8::from(self.settings.cleaned)
+    }
+
     /// How many rows are still missing.
     fn room(&self) -> usize {
         let missing = self.settings.height.saturating_sub(self.rows_in);
@@ -309,7 +337,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
 
     /// Passes rows through the dilation to the labels, where the pixels of their runs are weighed.
     fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
-        let late = u16::from(self.dilation.radius());
+        let late = u16::from(self.late());
         let near = self.dilation.near();
         // Nothing of the frame lies above its first row.
         let above = usize::from(late.saturating_sub(self.rows_in));
@@ -337,9 +365,15 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if self.rows_in < self.settings.height {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        let late = usize::from(self.dilation.radius());
+        let late = usize::from(self.late());
         if !self.labels.is_exhausted() {
-            self.dilation.incoming(late).fill(0);
+            let incoming = self.dilation.incoming(late);
+            incoming.fill(0);
+            if self.settings.cleaned {
+                let width = self.settings.width;
+                (self.majority).filter(incoming, words_of(width), last_word_bits(width));
+                self.dilation.look(late);
+            }
             let band = match pixels.row_length(self.settings.width) {
                 0 => Band::WITHOUT_PIXELS,
                 _ => Band::EMPTY,

@@ -31,6 +31,21 @@ pub trait Pixels {
         }
     }
 
+    /// Masks several rows, as [`mask_rows`](Self::mask_rows) does, by the pixels that a marker
+    /// covers to [`HALF_WEIGHT`] at least, whatever the light.
+    #[inline(never)]
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        let rows = rows.chunks(self.row_length(width).max(1));
+        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width).max(1))) {
+            for (word, first) in mask.iter_mut().zip((0..width).step_by(32)) {
+                let columns = first..(first + 32).min(width);
+                *word = columns.rev().fold(0, |bits, column| {
+                    bits << 1 | u32::from(self.weight(row, column) >= HALF_WEIGHT)
+                });
+            }
+        }
+    }
+
     /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the
     /// row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
@@ -76,6 +91,10 @@ pub trait Table: Pixels {
 
 /// The largest weight. A pixel that a marker covers wholly has about 95.
 pub const FULL_WEIGHT: u8 = 127;
+
+/// Of a pixel that a marker covers half: one that a threshold just takes in YUV422 and mono; in
+/// RGB565 one of two thirds.
+pub const HALF_WEIGHT: u8 = 64;
 
 /// Sums of weights over the pixels of one run.
 ///
@@ -147,6 +166,17 @@ impl ByteTable {
         Ok(table)
     }
 
+    /// Bit i is set where pixel i of up to four has bit 7 of its byte set.
+    #[inline(always)]
+    fn covered(&self, pixels: &[u16]) -> u32 {
+        let mut bytes = [0; 4];
+        let filled = bytes.iter_mut().zip(pixels);
+        filled.for_each(|(byte, raw)| *byte = self.byte(*raw));
+        // Bit 8·i moves to bit 28 + i by the factor's bit 28 − 7·i; no two terms meet.
+        let tops = (u32::from_le_bytes(bytes) >> 7) & 0x0101_0101;
+        tops.wrapping_mul(0x1020_4080) >> 28
+    }
+
     /// The byte of the pixel that lies in memory as `raw`.
     #[inline(always)]
     pub const fn byte(&self, raw: u16) -> u8 {
@@ -179,6 +209,18 @@ impl Pixels for ByteTable {
 
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
         threshold_bytes(&self.bytes, row, mask);
+    }
+
+    /// A weight of [`HALF_WEIGHT`] and more has bit 7 of a byte set.
+    #[inline(never)]
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        let rows = rows.chunks(usize::from(width).max(1));
+        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width).max(1))) {
+            for (word, pixels) in mask.iter_mut().zip(row.chunks(32)) {
+                let fours = pixels.chunks(4).rev();
+                *word = fours.fold(0, |bits, four| bits << 4 | self.covered(four));
+            }
+        }
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {

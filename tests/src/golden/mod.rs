@@ -170,6 +170,7 @@ impl<'b> Runner<'b> {
             min_area,
             weighted: self.sent.weighted,
             max_runs: u32::MAX,
+            cleaned: false,
         };
         self.scanner.begin(settings).map_err(ScriptError::Scan)?;
         let (scanner, pixels) = (&mut self.scanner, &self.pixels);
