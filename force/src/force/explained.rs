@@ -10,7 +10,7 @@ use crate::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before there is a frame.
@@ -73,7 +73,12 @@ impl Resting {
     }
 
     /// How markers moved from there.
-    fn observed(&self, forward: &Forward<'_>, markers: &[Marker; 4]) -> Observed {
+    fn observed(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker; 4],
+        blur: Option<&[Px; 4]>,
+    ) -> Observed {
         let mut moved: Column = [0.0; 8];
         let mut sigma = [0.0; 8];
         let scale = self.mounting.scale();
@@ -94,7 +99,14 @@ impl Resting {
             for i in [0, 1] {
                 let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
-                let seen = scale * at_rest_px[i] * growth.max(0.1);
+                let usual = scale * at_rest_px[i] * growth.max(0.1);
+                let seen = match blur {
+                    None => usual,
+                    Some(blur) => {
+                        let blur = scale * blur[k].to_f32();
+                        libm::sqrtf(usual * usual + blur * blur)
+                    }
+                };
                 let unknown = shape * (x * x + y * y);
                 // What is wrong with another unit is more than noise, and no two markers share it.
                 sigma[2 * k + i] = match self.is_own {
@@ -118,11 +130,38 @@ impl Resting {
         markers: &[Marker; 4],
         output: &Output,
     ) -> Estimate {
-        let newtons = output.values.map(|part| part as f32 * 1e-6);
-        let place_mm = output.place.map(|part| part as f32 * 1e-3);
-        let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
-        let observed = self.observed(forward, markers);
-        forward.estimate(&observed, &self.mounting, guess)
+        let observed = self.observed(forward, markers, None);
+        forward.estimate(&observed, &self.mounting, guess_of(forward, output))
+    }
+
+    /// The force of [`Self::force`] of markers that are known less well than usual: each by a
+    /// standard uncertainty beside that of noise.
+    pub fn force_of_blurred(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        (markers, blur): (&[Marker; 4], &[Px; 4]),
+        output: &Output,
+    ) -> (Force, Status) {
+        self.force_of(forward, range, (markers, Some(blur)), output)
+    }
+
+    /// One function for all frames: it is large, and lies in the memory nearest to the core.
+    #[inline(never)]
+    fn force_of(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        (markers, blur): (&[Marker; 4], Option<&[Px; 4]>),
+        output: &Output,
+    ) -> (Force, Status) {
+        let observed = self.observed(forward, markers, blur);
+        let guess = guess_of(forward, output);
+        self.told(
+            forward,
+            range,
+            &forward.estimate(&observed, &self.mounting, guess),
+        )
     }
 
     /// The force of [`Self::estimate`]; [`Status::UNEXPLAINED`] when it explains the markers badly,
@@ -134,7 +173,7 @@ impl Resting {
         markers: &[Marker; 4],
         output: &Output,
     ) -> (Force, Status) {
-        self.told(forward, range, &self.estimate(forward, markers, output))
+        self.force_of(forward, range, (markers, None), output)
     }
 
     /// What a sample says of a load that was found.
@@ -155,6 +194,13 @@ impl Resting {
         }
         (force, status)
     }
+}
+
+/// Where steps begin: the network's answer.
+fn guess_of(forward: &Forward<'_>, output: &Output) -> Pose {
+    let newtons = output.values.map(|part| part as f32 * 1e-6);
+    let place_mm = output.place.map(|part| part as f32 * 1e-3);
+    Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits)
 }
 
 /// Whether a rest position is that of the unit that a model was made on, as it may have drifted
