@@ -123,8 +123,11 @@ impl<'a> Bench<'a> {
             }
             sensor.set_tare(Some(tare.rest));
         }
-        let measurement = sensor.measure_frame(&picture.pixels);
-        let finding = Finding::new(path, sensor.settings(), sensor.blobs(), measurement);
+        // What the threshold makes of the picture, and what all looks at it give.
+        sensor.measure_frame(&picture.pixels);
+        let blobs = sensor.blobs().to_vec();
+        let measurement = sensor.measure_frame_closely(&picture.pixels);
+        let finding = Finding::new(path, sensor.settings(), &blobs, measurement);
         Ok(if self.options.json {
             finding.json()
         } else {

@@ -40,6 +40,11 @@ impl Motion {
         self.before = None;
     }
 
+    /// Whether it is known how markers move, where that matters.
+    pub fn is_known(&self) -> bool {
+        self.lines.is_none() || self.before.is_some()
+    }
+
     /// The frame ended, and showed these markers or none.
     pub fn ended(&mut self, seen: Option<&[Marker; 4]>) {
         self.before = seen.copied();

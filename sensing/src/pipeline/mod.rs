@@ -1,5 +1,6 @@
 //! Rows in, measurement out.
 
+mod again;
 mod ahead;
 #[cfg(test)]
 mod marker_tests;
@@ -8,6 +9,7 @@ mod taring;
 mod tests;
 
 use crate::motion::Motion;
+use again::Again;
 use ahead::Ahead;
 use hivtac_force::features::Features;
 use hivtac_force::force::{self, Force, Resting};
@@ -45,7 +47,7 @@ const SATURATED_PART: u32 = 2;
 /// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
 /// up in a `T`.
 ///
-/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it shall stay:
+/// It holds all its storage, about 84 KiB and the table (64 KiB), so build it where it shall stay:
 /// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
 /// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
 /// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
@@ -62,6 +64,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     prepared: Option<Prepared>,
     ahead: Ahead,
     motion: Motion,
+    again: Again,
 }
 
 /// What follows from settings, model and tare before there is a frame.
@@ -96,6 +99,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             prepared: None,
             ahead: Ahead::Off,
             motion: Motion::GLOBAL,
+            again: Again::new(),
         }
     }
 
@@ -163,15 +167,19 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// once.
     pub fn set_motion(&mut self, motion: Motion) {
         self.motion = motion;
+        self.again.forget();
     }
 
     /// The next frame does not follow the one before at once: how the markers move is not known.
     pub fn forget_motion(&mut self) {
         self.motion.forget();
+        self.again.forget();
     }
 
     /// Starts a frame and forgets the one before, but for where its markers were.
     pub fn begin_frame(&mut self) {
+        let seen = self.again.begin_frame();
+        self.motion.ended(seen.as_ref());
         // An error cannot happen after `configure`, and makes every frame incomplete before it.
         let _ = self.scanner.begin(self.settings.scan());
         self.ahead = Ahead::Nothing;
@@ -179,6 +187,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Takes the next row of pixels, as they lie in memory: a `u16` for each, or for two of mono.
     pub fn push_row(&mut self, row: &[u16]) {
+        if self.again.takes_closeups() {
+            return self.again.push_rows(&self.pixels, row);
+        }
         self.scanner.push_row(&self.pixels, row);
         self.look_ahead();
     }
@@ -186,6 +197,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than
     /// one by one.
     pub fn push_rows(&mut self, rows: &[u16]) {
+        if self.again.takes_closeups() {
+            return self.again.push_rows(&self.pixels, rows);
+        }
         self.scanner.push_rows(&self.pixels, rows);
         self.look_ahead();
     }
@@ -194,6 +208,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// all of the frame, or at least as many as there are [`Settings::dilations`]. Nothing is
     /// copied then ([`Scanner::push_rows_below`]).
     pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
+        if self.again.takes_closeups() {
+            return self.again.push_rows(&self.pixels, rows);
+        }
         self.scanner.push_rows_below(&self.pixels, above, rows);
         self.look_ahead();
     }
@@ -205,10 +222,24 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.finish_frame()
     }
 
+    /// The same, and [looks again](Self::look_again) when that may help.
+    pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
+        let mut measurement = self.measure_frame(frame);
+        while self.look_again() {
+            self.push_rows(frame);
+            measurement = self.finish_frame();
+        }
+        measurement
+    }
+
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
+        if self.again.is_looking() {
+            return self.finish_look();
+        }
         let measurement = self.measure_scanned();
-        self.motion.ended(measurement.markers.as_ref());
+        let wanted = self.wants_again(&measurement);
+        self.again.ended(&measurement, wanted);
         measurement
     }
 
@@ -270,6 +301,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Works out anew what follows from settings, model and tare.
     fn prepare(&mut self) {
         self.ahead = Ahead::Off;
+        self.again.give_up();
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self
@@ -315,6 +347,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     }
 
     /// Brings out the last blobs; says why the frame as a whole has no markers.
+    #[inline(never)]
     fn end_scan(&mut self) -> Result<(), Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
