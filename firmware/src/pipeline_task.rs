@@ -58,6 +58,7 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: Snapsh
         sensor,
         next_threshold: NextThreshold::NONE,
         bands,
+        last_band: 0,
         follower: Follower::new(SHAPE),
         busy_us: 0,
         newest: 0,
@@ -89,6 +90,8 @@ struct PipelineTask {
     sensor: &'static mut Sensor,
     next_threshold: NextThreshold,
     bands: BandCopy,
+    /// Sequence number of the band that was scanned last.
+    last_band: u32,
     follower: Follower,
     /// Spent on the frame under way, µs.
     busy_us: u32,
@@ -182,6 +185,7 @@ impl PipelineTask {
         let fetched = self.bands.fetch(band, capture::finished);
         let rows = fetched.as_ref().map(|fetched| fetched.rows);
         self.snapshots.band(band.index, rows);
+        self.last_band = band.sequence;
         if let Some(band) = &fetched {
             self.sensor.push_rows_below(band.above, band.rows);
         }
@@ -260,7 +264,10 @@ impl PipelineTask {
     /// Measures the frame whose rows were scanned.
     fn deliver(&mut self, delivery: &Delivery) {
         let begun = Instant::now();
-        let measurement = self.sensor.finish_frame();
+        let mut measurement = self.sensor.finish_frame();
+        if self.taring.is_none() {
+            self.look_again(&mut measurement, delivery);
+        }
         self.newest = delivery.edge.number;
         let sample = self.sample(delivery, &measurement);
         let (frame, time_us) = (sample.frame, sample.time_us);
@@ -280,6 +287,30 @@ impl PipelineTask {
         // Behind the sample, which goes first.
         let threshold = self.sensor.threshold();
         self.snapshots.frame(frame, time_us, threshold);
+    }
+
+    /// Looks at the frame again, while the pipeline asks for it and all its bands are still in the
+    /// ring: until the next frame's first band is finished, a millisecond at the usual rate, and
+    /// then band by band, ten times as slowly as it is read. What is overwritten leaves the
+    /// measurement as it is.
+    fn look_again(&mut self, measurement: &mut Measurement, delivery: &Delivery) {
+        while self.sensor.look_again() {
+            self.bands.rewind();
+            let first = self.last_band.wrapping_sub(u32::from(SHAPE.bands()) - 1);
+            for index in 0..SHAPE.bands() {
+                let band = Band {
+                    sequence: first.wrapping_add(u32::from(index)),
+                    index,
+                    edge: delivery.edge,
+                };
+                let Some(fetched) = self.bands.fetch(&band, capture::finished) else {
+                    self.bands.rewind();
+                    return;
+                };
+                self.sensor.push_rows_below(fetched.above, fetched.rows);
+            }
+            *measurement = self.sensor.finish_frame();
+        }
     }
 
     fn sample(&mut self, delivery: &Delivery, measurement: &Measurement) -> Sample {
