@@ -8,6 +8,7 @@
 //! lies on the edge.
 
 use crate::closeup::Window;
+use hivtac_terms::division::Divisor;
 use hivtac_terms::root::root;
 use hivtac_terms::units::Px;
 
@@ -83,7 +84,7 @@ impl Ellipse {
         let [[c2, s2], [c4, s4]] = [2, 4].map(|times| cos_sin(ray, times));
         let [c, s] = self.second;
         // An ellipse's fourth harmonic is ¾ of the second's square over the mean.
-        let over = 4 * self.mean.max(1);
+        let over = (4 * self.mean).max(1);
         let fourth = [3 * (c * c - s * s) / over, 6 * c * s / over];
         self.mean + ((c * c2 + s * s2 + fourth[0] * c4 + fourth[1] * s4) >> 14)
     }
@@ -136,7 +137,7 @@ fn edge(window: &Window, ellipse: &Ellipse, level: i32, ray: usize) -> Option<i3
     for at in 1..SAMPLES {
         let outer = sample(at);
         if inner >= level && outer < level {
-            let part = STEP * (inner - level) / (inner - outer);
+            let part = STEP * (inner - level) / (inner - outer).max(1);
             let beyond = STEP * (at as i32 - 1) - REACH + part;
             if nearest.is_none_or(|other| beyond.abs() < other.abs()) {
                 nearest = Some(beyond);
@@ -204,7 +205,7 @@ fn solved(
         let left = (*side.get(k)? << 4) - known.map(|(a, x)| a * i64::from(x)).sum::<i64>();
         let unknown = unknowns.get_mut(k)?;
         // Beyond a few pixels it is no fit.
-        *unknown = (left / *row.get(k)?).clamp(-(8 << 12), 8 << 12) as i32;
+        *unknown = (left / (*row.get(k)?).max(1)).clamp(-(8 << 12), 8 << 12) as i32;
     }
     Some(unknowns)
 }
@@ -223,7 +224,7 @@ fn weights(left: &[Option<i32>; RAYS]) -> [i32; RAYS] {
     let sizes = left.map(|left| left.map(i32::abs));
     // Of a normal distribution 1.48 times the median is the standard deviation.
     let scatter = (median(&sizes) * 95 / 64).max(LEAST_SCATTER);
-    let limit = 4 * scatter;
+    let limit = (4 * scatter).max(1);
     sizes.map(|size| {
         let part = size.map_or(limit, |size| size.min(limit)) * 256 / limit;
         let rest = 65_536 - part * part;
@@ -264,11 +265,14 @@ fn expected(window: &Window, [x, y]: [Px; 2], [xx, xy, yy]: [i32; 3]) -> Option<
     let mean = (xx + yy) / 2;
     // Twice the root: an ellipse's radius.
     let radius = 2 * (root((mean.max(0) as u64) << 4) as i32);
+    let by_mean = Divisor::new(mean.max(1) as u32);
     (mean > 0 && radius < 24 << 8).then(|| Ellipse {
         center: center.map(|(at, origin)| (at.0 >> 4) - (i32::from(origin) << 12)),
         mean: radius,
-        second: [(xx - yy) / 2, xy]
-            .map(|part| (i64::from(radius) * i64::from(part) / i64::from(2 * mean)) as i32),
+        second: [(xx - yy) / 2, xy].map(|part| {
+            let product = i64::from(radius) * i64::from(part);
+            (by_mean.signed_quotient(product) / 2) as i32
+        }),
     })
 }
 

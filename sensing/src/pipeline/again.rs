@@ -221,7 +221,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let markers = &candidate.markers;
         let looked_good = !first.status.intersects(OF_IMAGES);
         let is_disturbed = outlines.iter().zip(markers).any(is_disturbed);
-        if !outlines.iter().zip(markers).all(is_sound) || looked_good && !is_disturbed {
+        let is_sound = outlines.iter().zip(markers).all(is_sound) && are_alike(&outlines);
+        if !is_sound || looked_good && !is_disturbed {
             return None;
         }
         let seen = candidate.outlined(&outlines);
@@ -315,6 +316,16 @@ fn is_sound((outline, marker): (&Outline, &Marker)) -> bool {
         && outline.gap <= LARGEST_GAP
         && outline.scatter <= LARGEST_SCATTER
         && far(outline, marker) <= FARTHEST
+}
+
+/// Whether no outline is wider than another by more than a quarter of that: two discs that overlap
+/// by half look like one that is a third wider, and their middle like a marker's.
+fn are_alike(outlines: &[Outline; 4]) -> bool {
+    let radii = outlines.map(|outline| i64::from(outline.radius));
+    let (least, most) = (radii.iter().min(), radii.iter().max());
+    least
+        .zip(most)
+        .is_some_and(|(least, most)| 4 * most <= 5 * least)
 }
 
 /// Whether an edge shows that its frame is disturbed.
