@@ -59,6 +59,12 @@ impl Window {
     }
 }
 
+impl Default for Closeups {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Closeups {
     /// For no frame yet.
     pub const fn new() -> Closeups {

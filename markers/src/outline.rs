@@ -224,10 +224,12 @@ fn weights(left: &[Option<i32>; RAYS]) -> [i32; RAYS] {
     let sizes = left.map(|left| left.map(i32::abs));
     // Of a normal distribution 1.48 times the median is the standard deviation.
     let scatter = (median(&sizes) * 95 / 64).max(LEAST_SCATTER);
-    let limit = (4 * scatter).max(1);
+    let limit = (4 * scatter).unsigned_abs();
+    let by_limit = Divisor::new(limit);
     sizes.map(|size| {
-        let part = size.map_or(limit, |size| size.min(limit)) * 256 / limit;
-        let rest = 65_536 - part * part;
+        let size = size.map_or(limit, |size| size.unsigned_abs().min(limit));
+        let part = by_limit.quotient(u64::from(256 * size)) as u32;
+        let rest = 65_536 - (part * part) as i32;
         ((rest >> 8) * (rest >> 8)) / (65_536 / WHOLE)
     })
 }
