@@ -97,7 +97,8 @@ impl Ellipse {
     }
 }
 
-/// The smallest of values from −1,024 to 1,023 that half of those are not above, of which there are.
+/// The smallest of values from −1,024 to 1,023 that half of those are not above, of which there
+/// are.
 fn median(values: &[Option<i32>; RAYS]) -> i32 {
     let count = |limit: i32| values.iter().flatten().filter(|it| **it <= limit).count();
     let half = values.iter().flatten().count().div_ceil(2);

@@ -33,7 +33,8 @@ pub struct ScanSettings {
     /// time that noise takes.
     pub max_runs: u32,
     /// Whether the mask is of the pixels that a marker covers at least half, whatever the light
-    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: a frame with
+    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: a frame
+    /// with
     /// specks, noise or little light.
     pub cleaned: bool,
 }
@@ -201,7 +202,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     /// The same without copying: the rows that came last are still in memory when the next ones
     /// come, and are then `above`: all of the frame, or at least as many as there are dilations,
     /// one after the other; one more in a frame that is
-    /// [cleaned](ScanSettings::cleaned). With fewer, a frame whose pixels are weighed becomes incomplete where
+    /// [cleaned](ScanSettings::cleaned). With fewer, a frame whose pixels are weighed becomes
+    /// incomplete where
     /// one of them would have been needed.
     pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
         self.push_whole(pixels, above, rows, Stay::Here);
