@@ -16,6 +16,7 @@
 //! | `quantize` | weights to a model file, the same bytes on every machine |
 //! | `uncertainty` | what a model's errors say of its next ones |
 //! | `evaluate`, `check`, `errors` | how far the model's forces are from the truth |
+//! | `unit` | a person led through a unit's loads, to its own model |
 //! | `plot` | SVG |
 //! | `progress` | bars on the terminal |
 
@@ -38,4 +39,5 @@ pub mod range;
 pub mod rest;
 pub mod train;
 pub mod uncertainty;
+pub mod unit;
 pub mod weights;

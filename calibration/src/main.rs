@@ -23,9 +23,10 @@ enum Command {
     /// Calibration data from a real unit and a force gauge.
     #[command(subcommand)]
     Collect(CollectCommand),
-    /// Fit a unit's film and camera to a handful of known loads (4 and more, best ten: some tilted,
-    /// four of them 2 to 3 mm off the middle, several frames each), and print what was found;
-    /// writes a weights file for that unit.
+    /// A unit's own model from ten known loads, step by step (`--into FOLDER`): what to do next,
+    /// live numbers, and at the end the model and how good it is on loads left out. Or from a data
+    /// set (`--data`): 4 loads and more, some tilted, four of them 2 to 3 mm off the middle,
+    /// several frames each; prints what was found of the unit and writes its weights file.
     Unit(UnitArgs),
     /// Quantize a weights file; writes a model file. The same weights give the same bytes on every
     /// machine.

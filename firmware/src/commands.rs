@@ -3,7 +3,7 @@
 use crate::capture_task::{self, Action};
 use crate::pipeline_task::Order;
 use crate::shared::ORDERS;
-use crate::{info, memory, outbox, session, settings, snapshot, stats};
+use crate::{info, loader, memory, model_upload, outbox, session, settings, snapshot, stats};
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -68,7 +68,11 @@ async fn obey(Command { id, request }: Command) {
             Some(outcome) => outcome,
             None => return,
         },
-        Request::Tare { frames } => match order(Order::Tare { id, frames }) {
+        Request::Tare { frames } => match tare(id, frames, false) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::TareAnyway { frames } => match tare(id, frames, true) {
             Some(outcome) => outcome,
             None => return,
         },
@@ -80,17 +84,52 @@ async fn obey(Command { id, request }: Command) {
             settings::set_name(name);
             Outcome::Done
         }
-        // The memory task replies itself, when it has done so.
+        Request::SetTemporal(settings) => match order(Order::SetTemporal { id, settings }) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::BeginModel { bytes } => model_upload::begin(bytes),
+        Request::ModelPart(part) => model_upload::part(&part),
+        // The memory task replies itself, when it has done so, or the pipeline then.
         Request::GetSettings => match memory::order(memory::Action::Report, id) {
             Some(outcome) => outcome,
             None => return,
         },
+        Request::GetHealth => match memory::order(memory::Action::Health, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::StartLoader => {
+            let outcome = Outcome::Done;
+            outbox::answer(DeviceMessage::Reply(Reply { id, outcome })).await;
+            loader::start().await
+        }
         Request::Keep(selection) => match memory::order(memory::Action::Keep(selection), id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::UseModel => match memory::order(memory::Action::UseModel, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::UseBuiltInModel => match memory::order(memory::Action::UseBuiltInModel, id) {
+            Some(outcome) => outcome,
+            None => return,
+        },
+        Request::Reset => match memory::order(memory::Action::Reset, id) {
             Some(outcome) => outcome,
             None => return,
         },
     };
     outbox::answer(DeviceMessage::Reply(Reply { id, outcome })).await;
+}
+
+fn tare(id: u16, frames: u16, insists: bool) -> Option<Outcome> {
+    order(Order::Tare {
+        id,
+        frames,
+        insists,
+    })
 }
 
 /// Passes an order on; `Busy` when there are too many.

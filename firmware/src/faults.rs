@@ -7,20 +7,33 @@
 //! | interrupt without a handler | reset |
 //! | thread mode stands still for 2 s, or the core is locked up | reset by the watchdog |
 
+use crate::shared::RESET_REASON;
+use core::sync::atomic::Ordering;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use embassy_stm32::pac::{DBGMCU, RCC};
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Timer};
+use hivtac_wire::health::ResetReason;
 use panic_probe as _;
 
 /// A quarter of the watchdog's time.
 const FEED_PERIOD: Duration = Duration::from_millis(500);
 
-/// Logs why the microcontroller was reset, and clears the reasons.
+/// Logs why the microcontroller was reset, keeps that for the host, and clears the reasons.
 pub fn report_reset() {
     let reasons = RCC.rsr().read();
+    // Each reset pulls the reset line, too, and the supply's comes with the others of it.
+    let reason = match () {
+        () if reasons.porrstf() => ResetReason::PowerOn,
+        () if reasons.borrstf() => ResetReason::BrownOut,
+        () if reasons.iwdg1rstf() => ResetReason::Watchdog,
+        () if reasons.sftrstf() => ResetReason::Software,
+        () if reasons.pinrstf() => ResetReason::Pin,
+        () => ResetReason::Other,
+    };
+    RESET_REASON.store(reason as u8, Ordering::Relaxed);
     defmt::info!(
         "reset: power {=bool}, pin {=bool}, software or fault {=bool}, watchdog {=bool}",
         reasons.porrstf(),

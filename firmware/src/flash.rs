@@ -38,9 +38,13 @@ const ERASE_STEP: Duration = Duration::from_millis(10);
 const WORD_LOOKS: u32 = 100;
 const ERASE_LOOKS: u32 = 400;
 
+/// Words that are read at once: a few of them cost as much as one.
+const BLOCK_WORDS: usize = 32;
+const BLOCK_BYTES: usize = BLOCK_WORDS * WORD_BYTES;
+
 /// What the MDMA read, in DTCM, which is not cached.
 #[repr(C, align(32))]
-struct Buffer(Word);
+struct Buffer([Word; BLOCK_WORDS]);
 
 /// The bank. Holding it says that nobody else uses it.
 pub struct SecondBank {
@@ -48,6 +52,8 @@ pub struct SecondBank {
     _channel: Peri<'static, peripherals::MDMA_CH2>,
     mover: BlockMove<CHANNEL>,
     buffer: Buffer,
+    /// Where the block in the buffer begins; nothing when one of its words is unreadable.
+    block: Option<u32>,
 }
 
 impl SecondBank {
@@ -60,8 +66,26 @@ impl SecondBank {
             _flash: flash,
             _channel: channel,
             mover: BlockMove::new(),
-            buffer: Buffer([0; WORD_BYTES]),
+            buffer: Buffer([[0; WORD_BYTES]; BLOCK_WORDS]),
+            block: None,
         }
+    }
+
+    /// Has the MDMA read into the front of the buffer; whether it could.
+    fn fetch(&mut self, source: u32, bytes: usize) -> bool {
+        let to = End::Tcm(&raw mut self.buffer as u32);
+        self.mover.start(End::Axi(source), to, bytes);
+        let read = self.mover.wait();
+        clear_errors(registers());
+        read
+    }
+
+    /// A word of the buffer.
+    fn fetched(&self, nth: usize) -> Word {
+        let words = &raw const self.buffer.0;
+        // SAFETY: the buffer is ours, and the MDMA has ended; it is volatile as the compiler does
+        // not see who wrote it.
+        unsafe { words.cast::<Word>().add(nth % BLOCK_WORDS).read_volatile() }
     }
 
     /// Opens the control register for one operation, and closes it behind that.
@@ -71,6 +95,7 @@ impl SecondBank {
         step: Duration,
         looks: u32,
     ) -> Result<(), Failed> {
+        self.block = None;
         let bank = registers();
         if bank.cr().read().lock() {
             for key in KEYS {
@@ -95,15 +120,15 @@ impl Flash for SecondBank {
 
     fn read(&mut self, place: Place) -> Result<Word, Unreadable> {
         let source = address(place).ok_or(Unreadable)?;
-        let to = &raw mut self.buffer;
-        let ends = (End::Axi(source), End::Tcm(to as u32));
-        self.mover.start(ends.0, ends.1, WORD_BYTES);
-        let read = self.mover.wait();
-        clear_errors(registers());
-        // SAFETY: the buffer is ours, and the MDMA has ended; it is volatile as the compiler does
-        // not see who wrote it.
-        let word = unsafe { to.read_volatile().0 };
-        if read { Ok(word) } else { Err(Unreadable) }
+        let block = source & !(BLOCK_BYTES as u32 - 1);
+        if self.block != Some(block) {
+            self.block = self.fetch(block, BLOCK_BYTES).then_some(block);
+        }
+        if let Some(block) = self.block {
+            return Ok(self.fetched((source - block) as usize / WORD_BYTES));
+        }
+        let read = self.fetch(source, WORD_BYTES);
+        read.then(|| self.fetched(0)).ok_or(Unreadable)
     }
 
     async fn program(&mut self, place: Place, word: &Word) -> Result<(), Failed> {

@@ -36,6 +36,15 @@ pub fn set(condition: Condition) {
     CONDITION.store(condition as u8, Ordering::Relaxed);
 }
 
+/// How it is doing.
+pub fn get() -> Condition {
+    match CONDITION.load(Ordering::Relaxed) {
+        condition if condition == Condition::Good as u8 => Condition::Good,
+        condition if condition == Condition::NoForce as u8 => Condition::NoForce,
+        _ => Condition::NoCamera,
+    }
+}
+
 /// Drives the LED for ever.
 #[embassy_executor::task]
 pub async fn run(mut led: StatusLed) {
@@ -54,15 +63,13 @@ pub async fn run(mut led: StatusLed) {
 
 /// How long the LED is on in the dimming period that begins at `now`.
 fn lit_time(now: Instant) -> Duration {
-    let good = Condition::Good as u8;
-    let no_force = Condition::NoForce as u8;
-    match CONDITION.load(Ordering::Relaxed) {
-        condition if condition == good => {
+    match get() {
+        Condition::Good => {
             let brightness = brightness(phase(now, BREATH));
             Duration::from_micros((brightness * PERIOD.as_micros() as f32) as u64)
         }
-        condition if condition == no_force => blink(now, SLOW_BLINK),
-        _ => blink(now, FAST_BLINK),
+        Condition::NoForce => blink(now, SLOW_BLINK),
+        Condition::NoCamera => blink(now, FAST_BLINK),
     }
 }
 

@@ -5,15 +5,19 @@ use crate::{board, camera};
 use core::fmt::Write;
 use heapless::String;
 use hivtac_sensing::settings::Settings;
+use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_wire::message::DeviceHello;
 use hivtac_wire::version::HelloPrefix;
 
 /// The device's hello.
 pub fn hello() -> DeviceHello {
-    let (settings, model) = match of_pipeline() {
-        Some(told) => (told.settings, told.model),
-        None => (Settings::usual(camera::GEOMETRY, ByteOrder::Swapped), None),
+    let (settings, model, filter) = match of_pipeline() {
+        Some(told) => (told.settings, told.model, told.temporal.filter),
+        None => {
+            let settings = Settings::usual(camera::GEOMETRY, ByteOrder::Swapped);
+            (settings, None, Filter::None)
+        }
     };
     DeviceHello {
         protocol: HelloPrefix::OURS.protocol,
@@ -29,6 +33,7 @@ pub fn hello() -> DeviceHello {
         dilations: settings.dilations,
         centroid: settings.centroid,
         name: name(),
+        filter,
     }
 }
 

@@ -27,37 +27,48 @@ mod faults;
 mod flash;
 mod health;
 mod info;
+mod loader;
 mod log;
 mod memory;
 mod model;
+mod model_slots;
+mod model_upload;
 mod near_table;
+mod next_model;
 mod next_threshold;
 mod outbox;
 mod pipeline_task;
 mod priorities;
 mod seeded_bugs;
+mod self_test;
 mod session;
 mod settings;
 mod shared;
 mod snapshot;
 mod snapshot_copy;
+mod stack;
 mod stats;
 mod tare;
+mod thermometer;
 mod usb;
 mod usb_guard;
 mod vsync;
 
+use band_copy::BandCopy;
 use camera::Format;
 use cortex_m_rt::entry;
 use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
-use embassy_stm32::interrupt;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::settings::Settings;
-use hivtac_terms::threshold::{ByteOrder, Threshold};
+use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::{interrupt, peripherals};
+use hivtac_sensing::temporal::Temporal;
+use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
 use memory::Memory;
+use model::Chosen;
+use next_model::InUse;
 use pipeline_task::Sensor;
+use snapshot_copy::SnapshotCopy;
 use static_cell::{ConstStaticCell, StaticCell};
 
 core::arch::global_asm!(include_str!("start.s"));
@@ -69,9 +80,40 @@ static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 /// cache holds.
 #[unsafe(link_section = ".sram.sensor")]
 static SENSOR: ConstStaticCell<Sensor> = ConstStaticCell::new(Sensor::new());
+/// Likewise.
+#[unsafe(link_section = ".sram.temporal")]
+static TEMPORAL: ConstStaticCell<Temporal> = ConstStaticCell::new(Temporal::new());
 
 #[entry]
 fn main() -> ! {
+    let foreground = start();
+    THREAD_EXECUTOR
+        .init(Executor::new())
+        .run(|spawner: Spawner| {
+            spawner.spawn(token(pipeline_task::run(
+                foreground.sensor,
+                foreground.temporal,
+                foreground.model,
+                foreground.bands,
+                foreground.snapshots,
+            )));
+            spawner.spawn(token(faults::feed_watchdog(foreground.watchdog)));
+        })
+}
+
+/// What runs in thread mode.
+struct Foreground {
+    sensor: &'static mut Sensor,
+    temporal: &'static mut Temporal,
+    model: InUse,
+    bands: BandCopy,
+    snapshots: SnapshotCopy,
+    watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
+}
+
+/// Starts everything else. Not in `main`, which never gives its stack back.
+#[inline(never)]
+fn start() -> Foreground {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
     caches::enable(&mut core);
     bands::clear();
@@ -79,11 +121,13 @@ fn main() -> ! {
     let board = board::start();
     faults::report_reset();
     vsync::start();
-    let model = model::embedded();
     let sensor = SENSOR.take();
-    let memory = Memory::open(board.flash);
+    let mut memory = Memory::open(board.flash, board.thermometer);
     settings::set_name(memory.record().name.clone());
-    let format = configure(sensor, model, memory.record());
+    let chosen = memory.model();
+    let model = InUse::of(&chosen);
+    let temporal = TEMPORAL.take();
+    let format = configure(sensor, temporal, chosen, memory.record());
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
@@ -95,21 +139,25 @@ fn main() -> ! {
         board.capture,
         format,
     )));
-    THREAD_EXECUTOR
-        .init(Executor::new())
-        .run(|spawner: Spawner| {
-            spawner.spawn(token(pipeline_task::run(
-                sensor,
-                board.bands,
-                board.snapshots,
-            )));
-            spawner.spawn(token(faults::feed_watchdog(board.watchdog)));
-        })
+    Foreground {
+        sensor,
+        temporal,
+        model,
+        bands: board.bands,
+        snapshots: board.snapshots,
+        watchdog: board.watchdog,
+    }
 }
 
 /// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
-fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) -> Format {
-    let mut settings = usual(&model);
+fn configure(
+    sensor: &mut Sensor,
+    temporal: &mut Temporal,
+    chosen: Chosen,
+    kept: &Record,
+) -> Format {
+    let Chosen { model, source, .. } = chosen;
+    let mut settings = model::settings(model.as_ref());
     let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
     if let Some(threshold) = kept.threshold.filter(is_sent) {
         settings.threshold = threshold;
@@ -120,32 +168,19 @@ fn configure(sensor: &mut Sensor, model: Option<Model<'static>>, kept: &Record) 
     sensor.set_motion(camera::MOTION);
     let tare = kept.tare.as_ref();
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
-        Some(Ok(rest)) => sensor.set_tare(Some(rest)),
+        Some(Ok(rest)) => {
+            sensor.set_tare(Some(rest));
+            temporal.set_tare(Some(rest));
+        }
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
         None => {}
     }
-    settings::follow(sensor);
+    if temporal.set(kept.temporal).is_err() {
+        defmt::warn!("the kept limits of contact, slip or filter are out of range");
+    }
+    settings::follow(sensor, temporal, source);
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
-}
-
-/// The camera's frames and the threshold that the model was made for, or the usual one of its
-/// pixels. A model for pixels that the camera does not send gives no force then, and every sample
-/// says so.
-fn usual(model: &Option<Model<'static>>) -> Settings {
-    let order = ByteOrder::Swapped;
-    let geometry = camera::GEOMETRY;
-    let sent = |model: &Model| Format::of(model.conditions.threshold.format());
-    match model {
-        Some(model) if sent(model).is_some() => Settings {
-            geometry,
-            ..model.conditions.settings(order)
-        },
-        _ => Settings {
-            threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
-            ..Settings::usual(geometry, order)
-        },
-    }
 }
 
 /// Each task is started once, at boot; a second start would be a bug of this file.

@@ -4,18 +4,24 @@
 //! # Design
 //! The first two sectors of the flash's second bank hold a log of one record ([`Log`]): after a
 //! power cut at any moment the device has what it had kept before, or what it was to keep. A record
-//! of another version is not read, nor written over before something is kept.
+//! of another version is not read, nor written over before something is kept. The next two sectors
+//! hold a model each; the record names the one that is kept, once it was read back.
 
 use crate::flash::SecondBank;
+use crate::model::{self, Chosen};
+use crate::model_upload::{self, Whole};
+use crate::pipeline_task::Order;
+use crate::self_test::{self, OfFlash};
 use crate::session::Asked;
 use crate::settings::InUse;
-use crate::shared::{MEMORY_ORDER, MEMORY_ORDERED};
-use crate::{log, outbox, settings};
+use crate::shared::{MEMORY_ORDER, MEMORY_ORDERED, NEXT_MODEL, ORDERS};
+use crate::thermometer::Thermometer;
+use crate::{log, model_slots, outbox, settings};
 use core::sync::atomic::Ordering;
-use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
-use hivtac_wire::kept::{MAX_BYTES, Record};
-use hivtac_wire::message::{DeviceMessage, LogLevel, Outcome};
-use hivtac_wire::settings::{Found, Selection, SettingsReport};
+use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError, blob};
+use hivtac_wire::kept::{KeptModel, MAX_BYTES, Record};
+use hivtac_wire::message::{DeviceMessage, LogLevel, ModelSource, Outcome};
+use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
 
 const _: () = assert!(MAX_BYTES <= PAYLOAD_LIMIT);
 
@@ -30,8 +36,16 @@ pub struct MemoryOrder {
 pub enum Action {
     /// Tell what is in use, and what is kept.
     Report,
+    /// Tell what the self-test finds.
+    Health,
     /// Keep what is in use.
     Keep(Selection),
+    /// Keep the model that was sent, and use it.
+    UseModel,
+    /// Forget the kept model, and use the built-in one.
+    UseBuiltInModel,
+    /// Forget all that is kept, and use what a new device does.
+    Reset,
 }
 
 /// Has something done for the command `id`; `Busy` while something is.
@@ -47,6 +61,7 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
 /// What is kept, and where.
 pub struct Memory {
     log: Log<SecondBank>,
+    thermometer: Thermometer,
     record: Record,
     /// At the start.
     found: Found,
@@ -56,7 +71,7 @@ pub struct Memory {
 
 impl Memory {
     /// Reads what is kept. Call once, at the start.
-    pub fn open(bank: SecondBank) -> Self {
+    pub fn open(bank: SecondBank, thermometer: Thermometer) -> Self {
         let mut payload = [0; PAYLOAD_LIMIT];
         let (log, length) = Log::open(bank, &mut payload);
         let kept = length.map(|length| Record::of_bytes(payload.get(..length).unwrap_or(&[])));
@@ -67,6 +82,7 @@ impl Memory {
         };
         Self {
             log,
+            thermometer,
             record,
             found,
             is_kept: found == Found::Settings,
@@ -76,6 +92,14 @@ impl Memory {
     /// What is kept.
     pub fn record(&self) -> &Record {
         &self.record
+    }
+
+    /// The model to begin with.
+    pub fn model(&mut self) -> Chosen {
+        match self.record.model {
+            Some(kept) => model::kept(self.log.flash(), &kept),
+            None => Chosen::built_in(ModelSource::BuiltIn),
+        }
     }
 
     /// What was written when the power was cut may not read so the next time: it is written again.
@@ -91,12 +115,42 @@ impl Memory {
 
     async fn carry_out(&mut self, MemoryOrder { action, asked }: MemoryOrder) {
         let outcome = match action {
-            Action::Report => self.report(asked),
-            Action::Keep(selection) => self.keep(selection).await,
+            Action::Report => Err(self.report(asked)),
+            Action::Health => Err(self.health(asked).await),
+            Action::Keep(selection) => Err(self.keep(selection).await),
+            Action::UseModel => self.keep_model().await,
+            Action::UseBuiltInModel => self.forget_model().await,
+            Action::Reset => self.reset().await,
+        };
+        let outcome = match outcome {
+            Err(outcome) => Some(outcome),
+            // The pipeline replies, when it uses the model.
+            Ok(next) => {
+                NEXT_MODEL.signal(next);
+                let afresh = matches!(action, Action::Reset);
+                ORDERS.send(Order::UseModel { asked, afresh }).await;
+                None
+            }
         };
         MEMORY_ORDERED.store(false, Ordering::Relaxed);
-        if let Some(id) = asked.id() {
+        if let Some((id, outcome)) = asked.id().zip(outcome) {
             outbox::reply(id, outcome);
+        }
+    }
+
+    async fn health(&mut self, asked: Asked) -> Outcome {
+        let temperature = self.thermometer.read().await;
+        let health = self_test::health(&self.of_flash(), temperature);
+        if asked.id().is_some() {
+            outbox::offer(DeviceMessage::Health(health));
+        }
+        Outcome::Done
+    }
+
+    fn of_flash(&self) -> OfFlash {
+        OfFlash {
+            found: self.found,
+            failures: self.log.failures(),
         }
     }
 
@@ -109,8 +163,12 @@ impl Memory {
             name,
             threshold,
             tare,
+            temporal,
+            rezeroed,
             ..
         } = used;
+        let drift = tare.zip(self.record.tare);
+        let drift = drift.and_then(|(used, kept)| settings::drift(&used, &kept));
         if asked.id().is_some() {
             outbox::offer(DeviceMessage::Settings(SettingsReport {
                 name,
@@ -120,6 +178,9 @@ impl Memory {
                 found: self.found,
                 erases: self.log.erases(),
                 failures: self.log.failures(),
+                temporal,
+                rezeroed,
+                drift,
             }));
         }
         Outcome::Done
@@ -131,6 +192,7 @@ impl Memory {
             name: used.name == self.record.name,
             threshold: used.own_threshold() == self.record.threshold,
             tare: used.tare == self.record.tare,
+            temporal: used.temporal == self.record.temporal,
         }
     }
 
@@ -148,16 +210,74 @@ impl Memory {
         if selection.name {
             record.name = used.name;
         }
+        if selection.temporal {
+            record.temporal = used.temporal;
+        }
         if record == self.record && self.is_kept {
             return Outcome::Done;
         }
-        match self.save(record).await {
+        match self.save_or_say(record).await {
             Ok(()) => Outcome::Done,
-            Err(_) => {
-                say_worn();
-                Outcome::Worn
-            }
+            Err(outcome) => outcome,
         }
+    }
+
+    /// Checks the model that was sent before the flash is touched, and keeps it.
+    async fn keep_model(&mut self) -> Result<Chosen, Outcome> {
+        let whole = model_upload::finish().ok_or(Outcome::InvalidArgument)?;
+        let file = model_slots::lend(whole.slot, whole.bytes).ok_or(Outcome::Busy)?;
+        let kept = self.keep_file(whole, file).await;
+        if kept.is_err() {
+            model_slots::give_back(whole.slot);
+        }
+        kept
+    }
+
+    async fn keep_file(
+        &mut self,
+        Whole { slot, bytes }: Whole,
+        file: &'static [u8],
+    ) -> Result<Chosen, Outcome> {
+        let model = model::check(file).map_err(|refusal| {
+            log::say(LogLevel::Error, format_args!("{refusal}"));
+            refusal.outcome()
+        })?;
+        let written = blob::write(self.log.flash(), model::sector(slot), file).await;
+        written.map_err(|_| {
+            say_worn();
+            Outcome::Worn
+        })?;
+        let crc = model.crc();
+        let kept = Some(KeptModel { slot, bytes, crc });
+        self.name_model(kept).await?;
+        Ok(Chosen {
+            model: Some(model),
+            source: ModelSource::Kept,
+            slot: Some(slot),
+        })
+    }
+
+    async fn forget_model(&mut self) -> Result<Chosen, Outcome> {
+        self.name_model(None).await?;
+        Ok(Chosen::built_in(ModelSource::BuiltIn))
+    }
+
+    async fn name_model(&mut self, model: Option<KeptModel>) -> Result<(), Outcome> {
+        let record = self.record.clone();
+        self.save_or_say(Record { model, ..record }).await
+    }
+
+    async fn reset(&mut self) -> Result<Chosen, Outcome> {
+        self.save_or_say(Record::default()).await?;
+        settings::set_name(Name::new());
+        Ok(Chosen::built_in(ModelSource::BuiltIn))
+    }
+
+    async fn save_or_say(&mut self, record: Record) -> Result<(), Outcome> {
+        self.save(record).await.map_err(|_| {
+            say_worn();
+            Outcome::Worn
+        })
     }
 
     async fn save(&mut self, record: Record) -> Result<(), SaveError> {

@@ -1,6 +1,15 @@
-//! The model.
+//! The model: the built-in one, or one that a host sent; and whether it is one for this sensor.
 
-use hivtac_sensing::model::{AlignedFile, Model};
+use crate::camera::{self, Format};
+use crate::flash::SecondBank;
+use crate::model_slots;
+use core::fmt;
+use hivtac_sensing::model::{AlignedFile, Model, ModelError, Origin};
+use hivtac_sensing::settings::Settings;
+use hivtac_storage::blob;
+use hivtac_terms::threshold::{ByteOrder, Threshold};
+use hivtac_wire::kept::KeptModel;
+use hivtac_wire::message::{ModelSource, Outcome};
 
 /// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels
 /// run it.
@@ -29,9 +38,29 @@ const fn beginning<const N: usize>(bytes: &[u8]) -> [u8; N] {
     copy
 }
 
-/// The model; `None`, with a log line, when the file is not usable. Samples then say so and have no
-/// force.
-pub fn embedded() -> Option<Model<'static>> {
+/// A model, and where it is from.
+pub struct Chosen {
+    /// `None` when there is no usable one: samples then say so and have no force.
+    pub model: Option<Model<'static>>,
+    /// Where it came from.
+    pub source: ModelSource,
+    /// The slot that it lies in, which is lent; none for a built-in one.
+    pub slot: Option<u8>,
+}
+
+impl Chosen {
+    /// The built-in model, for that reason.
+    pub fn built_in(source: ModelSource) -> Self {
+        Self {
+            model: built_in(),
+            source,
+            slot: None,
+        }
+    }
+}
+
+/// `None`, with a log line, when the file is not usable.
+fn built_in() -> Option<Model<'static>> {
     let file = if NEAR != 0 { &COPY.0[..] } else { &FILE.0 };
     match Model::parse(file) {
         Ok(model) => Some(model),
@@ -39,5 +68,118 @@ pub fn embedded() -> Option<Model<'static>> {
             defmt::error!("the built-in model: {}", defmt::Display2Format(&error));
             None
         }
+    }
+}
+
+/// The sector of the flash's second bank that keeps the model of a slot: behind those of the log.
+pub fn sector(slot: u8) -> u32 {
+    2 + u32::from(slot)
+}
+
+/// The model that is kept, read from the flash; the built-in one instead when that does not read,
+/// or is none for this sensor.
+pub fn kept(flash: &mut SecondBank, kept: &KeptModel) -> Chosen {
+    match read(flash, kept) {
+        Some(model) => Chosen {
+            model: Some(model),
+            source: ModelSource::Kept,
+            slot: Some(kept.slot),
+        },
+        None => {
+            defmt::error!("the kept model cannot be used");
+            Chosen::built_in(ModelSource::Fallback)
+        }
+    }
+}
+
+fn read(flash: &mut SecondBank, kept: &KeptModel) -> Option<Model<'static>> {
+    let read = model_slots::fill(kept.slot, |file| {
+        let file = file.get_mut(..kept.bytes as usize)?;
+        blob::read(flash, sector(kept.slot), file).ok()
+    });
+    read??;
+    let file = model_slots::lend(kept.slot, kept.bytes)?;
+    let model = check(file).ok().filter(|model| model.crc() == kept.crc);
+    if model.is_none() {
+        model_slots::give_back(kept.slot);
+    }
+    model
+}
+
+/// Why a model is refused.
+pub enum Refusal {
+    /// It is no model file, or none that is sound.
+    Unusable(ModelError),
+    /// It was made for another camera: lens, frame, pixels.
+    Frames,
+    /// It was calibrated on the sensor with another microcontroller.
+    Unit,
+    /// Frames cannot be read as it wants.
+    Settings,
+}
+
+impl Refusal {
+    /// The reply.
+    pub fn outcome(&self) -> Outcome {
+        match self {
+            Refusal::Unusable(_) | Refusal::Settings => Outcome::ModelUnusable,
+            Refusal::Frames | Refusal::Unit => Outcome::AnotherSensor,
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Refusal::Unusable(error) => error.fmt(f),
+            Refusal::Frames => write!(
+                f,
+                "the model is for another camera than {} at {}x{}",
+                camera::PRESET.name(),
+                camera::WIDTH,
+                camera::HEIGHT
+            ),
+            Refusal::Unit => f.write_str("the model was calibrated on another unit"),
+            Refusal::Settings => f.write_str("the model asks for frames that cannot be read"),
+        }
+    }
+}
+
+/// Reads a model file, and proves it sound and one for this sensor.
+///
+/// # Errors
+/// Why it is refused.
+pub fn check(file: &'static [u8]) -> Result<Model<'static>, Refusal> {
+    let model = Model::parse(file).map_err(Refusal::Unusable)?;
+    let conditions = &model.conditions;
+    let is_sent = Format::of(conditions.threshold.format()).is_some();
+    if conditions.geometry != camera::GEOMETRY || !is_sent {
+        return Err(Refusal::Frames);
+    }
+    if matches!(conditions.origin, Origin::Unit(unit) if unit != embassy_stm32::uid::uid()) {
+        return Err(Refusal::Unit);
+    }
+    match settings(Some(&model)).check() {
+        Ok(()) => Ok(model),
+        Err(_) => Err(Refusal::Settings),
+    }
+}
+
+/// The camera's frames and the threshold that the model was made for, or the usual one of its
+/// pixels. A built-in model for pixels that the camera does not send gives no force then, and every
+/// sample says so.
+pub fn settings(model: Option<&Model<'static>>) -> Settings {
+    let order = ByteOrder::Swapped;
+    let geometry = camera::GEOMETRY;
+    let sent = |model: &&Model| Format::of(model.conditions.threshold.format()).is_some();
+    match model.filter(sent) {
+        Some(model) => Settings {
+            geometry,
+            ..model.conditions.settings(order)
+        },
+        None => Settings {
+            threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
+            ..Settings::usual(geometry, order)
+        },
     }
 }

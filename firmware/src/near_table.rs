@@ -40,17 +40,23 @@ impl Pixels for NearTable {
         usize::from(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
         match &self.0 {
             Some(table) => table.mask_row(row, mask),
-            None => mask.fill(0),
+            None => {
+                mask.fill(0);
+                false
+            }
         }
     }
 
-    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         match &self.0 {
             Some(table) => table.mask_rows(rows, width, mask),
-            None => mask.fill(0),
+            None => {
+                mask.fill(0);
+                false
+            }
         }
     }
 

@@ -38,9 +38,23 @@ impl NextThreshold {
             let _ = sensor.set_threshold(threshold);
             return Ok(true);
         }
-        self.0 = Some((Asked::by(id), threshold));
-        REQUESTED_FORMAT.signal(format);
+        self.begin(Asked::by(id), threshold, format);
         Ok(false)
+    }
+
+    /// Has a threshold of other pixels come into use with the first frame of them, for a command;
+    /// false when another one waits, or the camera does not send such pixels.
+    pub fn wait_for(&mut self, asked: Asked, threshold: Threshold) -> bool {
+        let format = Format::of(threshold.format()).filter(|_| self.0.is_none());
+        if let Some(format) = format {
+            self.begin(asked, threshold, format);
+        }
+        format.is_some()
+    }
+
+    fn begin(&mut self, asked: Asked, threshold: Threshold, format: Format) {
+        self.0 = Some((asked, threshold));
+        REQUESTED_FORMAT.signal(format);
     }
 
     /// Brings the threshold that waited into use: the camera sends its pixels now. Tells who asked

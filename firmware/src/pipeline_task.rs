@@ -6,9 +6,10 @@ use crate::camera;
 use crate::capture::{self, CaptureEvent};
 use crate::health::{self, Condition};
 use crate::near_table::NearTable;
+use crate::next_model::{self, InUse};
 use crate::next_threshold::NextThreshold;
 use crate::session::Asked;
-use crate::shared::{CAPTURE_EVENTS, ORDERS};
+use crate::shared::{CAPTURE_EVENTS, NEXT_MODEL, ORDERS};
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
 use crate::{outbox, session, settings, stats, vsync};
@@ -16,9 +17,12 @@ use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::pipeline::{self, Measurement};
+use hivtac_sensing::rest::Rest;
+use hivtac_sensing::temporal::{Followed, Moment, Temporal};
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{Outcome, Sample};
+use hivtac_wire::message::{DeviceMessage, Outcome, Sample};
 use hivtac_wire::settings::RestPosition;
 
 /// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
@@ -36,6 +40,8 @@ pub enum Order {
         id: u16,
         /// How many; unchecked.
         frames: u16,
+        /// Also when something moves or touches the film.
+        insists: bool,
     },
     /// Take this as the rest position, or none.
     SetTare {
@@ -44,18 +50,40 @@ pub enum Order {
         /// As it came, unchecked.
         position: Option<RestPosition>,
     },
+    /// Follow forces so from the next frame on.
+    SetTemporal {
+        /// Of the command.
+        id: u16,
+        /// As they came, unchecked.
+        settings: TemporalSettings,
+    },
     /// Keep the next whole frame and send it.
     Snapshot(Asked),
+    /// Use the model of [`NEXT_MODEL`].
+    UseModel {
+        /// Of the command.
+        asked: Asked,
+        /// With its threshold and no tare, whatever is in use.
+        afresh: bool,
+    },
 }
 
 /// The pipeline, its table in DTCM.
 pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
-/// Runs for ever in thread mode. `sensor` is configured.
+/// Runs for ever in thread mode. `sensor`, with `model`, and `temporal` are configured.
 #[embassy_executor::task]
-pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: SnapshotCopy) {
+pub async fn run(
+    sensor: &'static mut Sensor,
+    temporal: &'static mut Temporal,
+    model: InUse,
+    bands: BandCopy,
+    snapshots: SnapshotCopy,
+) {
     let mut task = PipelineTask {
         sensor,
+        temporal,
+        model,
         next_threshold: NextThreshold::NONE,
         bands,
         last_band: 0,
@@ -88,6 +116,8 @@ pub async fn run(sensor: &'static mut Sensor, bands: BandCopy, snapshots: Snapsh
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
+    temporal: &'static mut Temporal,
+    model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
     /// Sequence number of the band that was scanned last.
@@ -206,14 +236,50 @@ impl PipelineTask {
                 }
             }
             Order::Tare { id, .. } if self.taring.is_some() => outbox::reply(id, Outcome::Busy),
-            Order::Tare { id, frames } => match Taring::begin(id, frames) {
+            Order::Tare {
+                id,
+                frames,
+                insists,
+            } => match Taring::begin(id, frames, insists) {
                 Some(taring) => self.taring = Some(taring),
                 None => outbox::reply(id, Outcome::InvalidArgument),
             },
             Order::SetTare { id, position } => {
                 outbox::reply(id, self.set_tare(position));
             }
+            Order::SetTemporal { id, settings } => {
+                let outcome = match self.temporal.set(settings) {
+                    Ok(()) => Outcome::Done,
+                    Err(_) => Outcome::InvalidArgument,
+                };
+                self.follow();
+                outbox::reply(id, outcome);
+            }
             Order::Snapshot(asked) => self.snapshots.begin(asked),
+            Order::UseModel { asked, afresh } => self.use_model(asked, afresh),
+        }
+    }
+
+    /// Between two frames, so that none is of two models.
+    fn use_model(&mut self, asked: Asked, afresh: bool) {
+        let Some(next) = NEXT_MODEL.try_take() else {
+            return;
+        };
+        self.give_up_tare();
+        let before = self.sensor.threshold();
+        let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
+        if afresh {
+            *self.temporal = Temporal::new();
+        }
+        self.temporal.set_tare(self.sensor.tare().copied());
+        if self.sensor.threshold() == before {
+            self.follow();
+        } else {
+            self.threshold_changed();
+        }
+        let waits = wanted.is_some_and(|threshold| self.next_threshold.wait_for(asked, threshold));
+        if let Some(id) = asked.id().filter(|_| !waits) {
+            outbox::reply(id, Outcome::Done);
         }
     }
 
@@ -222,19 +288,30 @@ impl PipelineTask {
         match rest.transpose() {
             Ok(rest) => {
                 self.give_up_tare();
-                self.sensor.set_tare(rest);
-                settings::follow(self.sensor);
+                self.use_tare(rest);
                 Outcome::Done
             }
             Err(outcome) => outcome,
         }
     }
 
+    /// Tells what it measures with from now on.
+    fn follow(&self) {
+        settings::follow(self.sensor, self.temporal, self.model.source);
+    }
+
+    /// Measures against this rest position from the next frame on, or against the model's own.
+    fn use_tare(&mut self, rest: Option<Rest>) {
+        self.sensor.set_tare(rest);
+        self.temporal.set_tare(self.sensor.tare().copied());
+        self.follow();
+    }
+
     /// Frames of other pixels come from now on: those of the threshold that waits. Markers have
     /// other areas in them, so that no rest position holds.
     fn change_format(&mut self) {
         let asked = self.next_threshold.come_into_use(self.sensor);
-        self.sensor.set_tare(None);
+        self.use_tare(None);
         self.give_up_tare();
         self.threshold_changed();
         if let Some(id) = asked.and_then(Asked::id) {
@@ -245,8 +322,9 @@ impl PipelineTask {
     /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
     /// which frames pass.
     fn threshold_changed(&mut self) {
-        settings::follow(self.sensor);
+        self.follow();
         self.sensor.forget_motion();
+        self.temporal.begin_anew();
         let mut missed = false;
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
             missed = true;
@@ -269,12 +347,17 @@ impl PipelineTask {
             self.look_again(&mut measurement, delivery);
         }
         self.newest = delivery.edge.number;
-        let sample = self.sample(delivery, &measurement);
+        let followed = self.temporal.follow(moment(delivery), &measurement);
+        let sample = self.sample(delivery, &measurement, &followed);
         let (frame, time_us) = (sample.frame, sample.time_us);
         self.busy_us += begun.elapsed().as_micros() as u32;
         stats::PROCESSING_US.set(self.busy_us);
         let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
         stats::LATENCY_US.set(latency_us as u32);
+        if let Some(rest) = followed.rest {
+            self.sensor.set_tare(Some(rest));
+            self.follow();
+        }
         self.tare_with(&measurement);
         health::set(match measurement.force {
             Some(_) => Condition::Good,
@@ -289,32 +372,35 @@ impl PipelineTask {
         self.snapshots.frame(frame, time_us, threshold);
     }
 
-    /// Looks at the frame again, while the pipeline asks for it and all its bands are still in the
-    /// ring: until the next frame's first band is finished, a millisecond at the usual rate, and
-    /// then band by band, ten times as slowly as it is read. What is overwritten leaves the
-    /// measurement as it is.
+    /// Looks at the frame again when the pipeline asks for it and all its bands are still in the
+    /// ring. What is overwritten meanwhile leaves the measurement as it is.
     fn look_again(&mut self, measurement: &mut Measurement, delivery: &Delivery) {
-        while self.sensor.look_again() {
-            self.bands.rewind();
-            let first = self.last_band.wrapping_sub(u32::from(SHAPE.bands()) - 1);
-            for index in 0..SHAPE.bands() {
-                let band = Band {
-                    sequence: first.wrapping_add(u32::from(index)),
-                    index,
-                    edge: delivery.edge,
-                };
-                let Some(fetched) = self.bands.fetch(&band, capture::finished) else {
-                    self.bands.rewind();
-                    return;
-                };
-                self.sensor.push_rows_below(fetched.above, fetched.rows);
-            }
-            *measurement = self.sensor.finish_frame();
+        if !self.sensor.look_again() {
+            return;
         }
+        self.bands.rewind();
+        let first = self.last_band.wrapping_sub(u32::from(SHAPE.bands()) - 1);
+        for index in 0..SHAPE.bands() {
+            let band = Band {
+                sequence: first.wrapping_add(u32::from(index)),
+                index,
+                edge: delivery.edge,
+            };
+            let Some(fetched) = self.bands.fetch(&band, capture::finished) else {
+                return;
+            };
+            self.sensor.push_rows_below(fetched.above, fetched.rows);
+        }
+        *measurement = self.sensor.finish_frame();
     }
 
-    fn sample(&mut self, delivery: &Delivery, measurement: &Measurement) -> Sample {
-        let mut status = measurement.status;
+    fn sample(
+        &mut self,
+        delivery: &Delivery,
+        measurement: &Measurement,
+        followed: &Followed,
+    ) -> Sample {
+        let mut status = followed.status;
         let first = core::mem::replace(&mut self.first, false);
         for (set, bit) in [
             (delivery.after_loss && !first, Status::FRAME_DROPPED),
@@ -325,13 +411,13 @@ impl PipelineTask {
                 status |= bit;
             }
         }
+        let Moment { frame, time_us } = moment(delivery);
         Sample {
             sequence: self.sequence,
-            frame: delivery.edge.number,
-            time_us: (delivery.edge.time_us)
-                .saturating_add_signed(camera::exposure_middle_us().into()),
+            frame,
+            time_us,
             status,
-            force: measurement.force,
+            force: followed.force,
             markers: measurement.markers.filter(|_| session::wants_markers()),
         }
     }
@@ -341,12 +427,16 @@ impl PipelineTask {
             return;
         };
         if let Some(outcome) = taring.add(self.sensor, measurement) {
+            let id = taring.id();
             if let Ok(rest) = outcome {
-                self.sensor.set_tare(Some(rest));
-                settings::follow(self.sensor);
+                let report = settings::tared(&rest, self.sensor, taring.spread());
+                outbox::offer(DeviceMessage::Tared(report));
             }
-            outbox::reply(taring.id(), outcome.err().unwrap_or(Outcome::Done));
             self.taring = None;
+            if let Ok(rest) = outcome {
+                self.use_tare(Some(rest));
+            }
+            outbox::reply(id, outcome.err().unwrap_or(Outcome::Done));
         }
     }
 
@@ -354,5 +444,14 @@ impl PipelineTask {
         if let Some(taring) = self.taring.take() {
             outbox::reply(taring.id(), taring.given_up());
         }
+    }
+}
+
+/// When the frame was exposed that was delivered.
+fn moment(delivery: &Delivery) -> Moment {
+    let edge = delivery.edge;
+    Moment {
+        frame: edge.number,
+        time_us: (edge.time_us).saturating_add_signed(camera::exposure_middle_us().into()),
     }
 }

@@ -7,32 +7,44 @@ use core::cell::Cell;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
+use hivtac_sensing::temporal::Temporal;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::root::root;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{ModelIdentity, Outcome};
-use hivtac_wire::settings::{Name, RestPosition};
+use hivtac_terms::units::Px;
+use hivtac_wire::message::{ModelIdentity, ModelSource, Outcome};
+use hivtac_wire::settings::{Name, RestPosition, TareReport};
 
 /// What the pipeline measures with.
 #[derive(Clone)]
 pub struct OfPipeline {
     /// Its settings.
     pub settings: Settings,
-    /// Its rest position, when one was taken.
+    /// Its rest position as it was taken, when one was.
     pub tare: Option<Rest>,
+    /// How far re-zeroing moved it.
+    pub rezeroed: Px,
+    /// How it follows forces from frame to frame.
+    pub temporal: TemporalSettings,
     /// Its model, when it has one.
     pub model: Option<ModelIdentity>,
 }
 
-/// Tells what the pipeline measures with from now on.
-pub fn follow(sensor: &Sensor) {
+/// Tells what the pipeline measures with from now on, its model from this source.
+pub fn follow(sensor: &Sensor, temporal: &Temporal, source: ModelSource) {
     let model = sensor.model().map(|model| ModelIdentity {
         crc: model.crc(),
         name: model.name(),
         simulated: model.is_simulated(),
         threshold: model.conditions.threshold,
+        source,
     });
     let told = OfPipeline {
         settings: *sensor.settings(),
-        tare: sensor.tare().copied(),
+        tare: temporal.tare().copied(),
+        rezeroed: temporal.rezeroed(),
+        temporal: *temporal.settings(),
         model,
     };
     PIPELINE.lock(|cell| cell.set(Some(told)));
@@ -65,8 +77,12 @@ pub struct InUse {
     pub name: Name,
     /// The threshold.
     pub threshold: Threshold,
-    /// The rest position, when one was taken.
+    /// The rest position as it was taken, when one was.
     pub tare: Option<RestPosition>,
+    /// How far re-zeroing moved it.
+    pub rezeroed: Px,
+    /// How forces are followed from frame to frame.
+    pub temporal: TemporalSettings,
     /// The threshold of the model.
     of_model: Option<Threshold>,
 }
@@ -83,18 +99,22 @@ pub fn in_use() -> Option<InUse> {
     let OfPipeline {
         settings,
         tare,
+        rezeroed,
+        temporal,
         model,
     } = of_pipeline()?;
     Some(InUse {
         name: name(),
         threshold: settings.threshold,
         tare: tare.map(|rest| position(&rest, &settings)),
+        rezeroed,
+        temporal,
         of_model: model.map(|model| model.threshold),
     })
 }
 
 /// A rest position and by which settings its markers were seen.
-fn position(rest: &Rest, settings: &Settings) -> RestPosition {
+pub fn position(rest: &Rest, settings: &Settings) -> RestPosition {
     RestPosition {
         format: settings.threshold.format(),
         dilations: settings.dilations,
@@ -103,6 +123,34 @@ fn position(rest: &Rest, settings: &Settings) -> RestPosition {
         rect_center: rest.features.rect_center,
         rect_area: rest.features.rect_area,
     }
+}
+
+/// What a tare gave that is to be `rest`; the sensor still has the rest position before.
+pub fn tared(rest: &Rest, sensor: &Sensor, spread: Px) -> TareReport {
+    let before = sensor.tare().map(Rest::markers);
+    TareReport {
+        rest: position(rest, sensor.settings()),
+        spread,
+        moved: before.map(|before| farthest(&before, &rest.markers())),
+    }
+}
+
+/// How far two rest positions are from each other; `None` when they are of other frames.
+pub fn drift(one: &RestPosition, other: &RestPosition) -> Option<Px> {
+    let seen = |rest: &RestPosition| (rest.format, rest.dilations, rest.centroid);
+    (seen(one) == seen(other)).then(|| farthest(&one.markers, &other.markers))
+}
+
+/// The distance of the markers that are farthest from each other.
+fn farthest(one: &[Marker; 4], other: &[Marker; 4]) -> Px {
+    let distance = |(one, other): (&Marker, &Marker)| {
+        let [x, y] = [one.x.0.abs_diff(other.x.0), one.y.0.abs_diff(other.y.0)];
+        // Inside a picture: below 2²⁶ each.
+        let squares = [x, y].map(|side| u64::from(side) * u64::from(side));
+        root(squares[0].saturating_add(squares[1]))
+    };
+    let largest = one.iter().zip(other).map(distance).max().unwrap_or(0);
+    Px(largest.min(i32::MAX as u32) as i32)
 }
 
 /// The rest position for frames that are seen by these settings.

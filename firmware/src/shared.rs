@@ -14,6 +14,7 @@
 //! | `RING` | `bands`, in AXI SRAM | DMA of the camera; the core clears it at boot | MDMA |
 //! | `BUFFERS` | `band_copy`, in DTCM | MDMA | pipeline, which owns it from boot on |
 //! | `FRAME` | `snapshot`, in AXI SRAM | MDMA | USB tasks, once the pipeline says that it is whole |
+//! | `FILES` | `model_slots`, in SRAM | USB tasks, boot | whom a slot is lent to: memory task, pipeline |
 //! | `CAPTURE_EXECUTOR`, `USB_EXECUTOR` | `main` | embassy | embassy: boot and one handler each |
 //!
 //! Not shared: memory with one owner, which takes it once (`main::SENSOR`, `near_table::TABLE`),
@@ -24,6 +25,9 @@ use crate::capture::{CaptureEvent, Running};
 use crate::capture_task::CameraOrder;
 use crate::health::Condition;
 use crate::memory::MemoryOrder;
+use crate::model::Chosen;
+use crate::model_slots;
+use crate::model_upload::Upload;
 use crate::pipeline_task::Order;
 use crate::settings::OfPipeline;
 use crate::snapshot::Taken;
@@ -35,6 +39,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use hivtac_capture::Edge;
+use hivtac_wire::health::ResetReason;
 use hivtac_wire::message::{DeviceMessage, Sample};
 use hivtac_wire::settings::Name;
 
@@ -106,6 +111,9 @@ pub static ORDERS: Queue<Order, 4> = Queue::new();
 pub static PIPELINE: CriticalSectionMutex<Cell<Option<OfPipeline>>> =
     CriticalSectionMutex::new(Cell::new(None));
 
+/// The model that is to be used next. From the memory task to the pipeline, with an order.
+pub static NEXT_MODEL: Request<Chosen> = Request::new();
+
 /// How the sensor is doing, a [`Condition`]. Written by the pipeline and the capture task; read by
 /// the LED task (`health`).
 pub static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
@@ -116,6 +124,10 @@ pub static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
 
 /// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
 pub static SNAPSHOT_TAKEN: Request<Taken> = Request::new();
+
+/// Why the microcontroller started, a `ResetReason`. Written at boot; read by the memory task
+/// (`faults`).
+pub static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
 
 // What is kept.
 
@@ -129,6 +141,14 @@ pub static MEMORY_ORDER: Request<MemoryOrder> = Request::new();
 
 /// Such an order is under way. Set by the USB tasks, cleared by the memory task (`memory`).
 pub static MEMORY_ORDERED: AtomicBool = AtomicBool::new(false);
+
+/// Slots for models that may not be written. Set at boot and by the memory task; cleared by them
+/// and the pipeline (`model_slots`).
+pub static LENT: [AtomicBool; model_slots::COUNT] = [const { AtomicBool::new(false) }; _];
+
+/// A model on its way. Used by the USB tasks and the memory task (`model_upload`).
+pub static UPLOAD: CriticalSectionMutex<Cell<Option<Upload>>> =
+    CriticalSectionMutex::new(Cell::new(None));
 
 // The conversation with the host.
 

@@ -1,13 +1,37 @@
-// Runs right after a reset, before any memory is initialized, and so uses registers only: switches
-// on the clocks of SRAM1 to 3, loads .itcm and .sram (memory.x) from flash in double words, as
-// ITCM's error correction has them, and clears .sram_zero.
+// Runs right after a reset, before any memory is initialized, and so uses registers only: starts
+// the part's own loader if the program asked for it (loader.rs), switches on the clocks of SRAM1 to
+// 3, loads .itcm and .sram (memory.x) from flash in double words, as ITCM's error correction has
+// them, and clears .sram_zero.
 
     .syntax unified
     .section .text.__pre_init, "ax", %progbits
     .global __pre_init
+    .weak   LOADER_WANTED           // a program that never asks has none
     .type __pre_init, %function
     .thumb_func
 __pre_init:
+    ldr     r0, =0x580244D0         // RCC_RSR
+    ldr     r1, [r0]
+    tst     r1, #0x01000000         // SFTRSTF: after a reset by software memory holds what it held
+    beq     7f
+    ldr     r0, =LOADER_WANTED
+    cbz     r0, 7f
+    ldr     r1, [r0]
+    ldr     r2, =0x21554644         // "DFU!"
+    cmp     r1, r2
+    bne     7f
+    movs    r1, #0                  // once
+    str     r1, [r0]
+    ldr     r0, =0x1FF09800         // the loader's vectors (AN2606, STM32H743)
+    ldr     r1, =0xE000ED08         // VTOR
+    str     r0, [r1]
+    dsb
+    ldr     r1, [r0]
+    msr     msp, r1
+    ldr     r1, [r0, #4]
+    bx      r1
+
+7:
     ldr     r0, =0x580244DC         // RCC_AHB2ENR
     ldr     r1, [r0]
     orr     r1, r1, #0xE0000000     // SRAM3EN, SRAM2EN, SRAM1EN

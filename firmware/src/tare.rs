@@ -7,6 +7,7 @@ use embassy_time::{Duration, Instant};
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::tare::{Refusal, TareBuilder};
+use hivtac_terms::units::Px;
 use hivtac_wire::message::Outcome;
 
 /// Every second frame may be bad, and a camera may need some time to come back.
@@ -22,13 +23,19 @@ pub struct Taring {
 }
 
 impl Taring {
-    /// For command `id`, over `frames` good frames; `None` when that number is out of its range.
-    pub fn begin(id: u16, frames: u16) -> Option<Self> {
+    /// For command `id`, over `frames` good frames; when the host `insists`, also while something
+    /// moves or touches the film. `None` when that number is out of its range.
+    pub fn begin(id: u16, frames: u16, insists: bool) -> Option<Self> {
         let patience = FRAME_TIME * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
+        let builder = TareBuilder::new(frames)?;
         Some(Self {
             id,
             conversation: session::number(),
-            builder: TareBuilder::new(frames)?,
+            builder: if insists {
+                builder.insisting()
+            } else {
+                builder
+            },
             deadline: Instant::now() + patience,
         })
     }
@@ -60,13 +67,21 @@ impl Taring {
             Refusal::MarkersImplausible => Outcome::MarkersImplausible,
             Refusal::Unsteady => Outcome::Unsteady,
             Refusal::NotAtRest => Outcome::NotAtRest,
+            Refusal::Touched => Outcome::Touched,
         }))
+    }
+
+    /// The largest standard deviation of a marker's coordinate.
+    pub fn spread(&self) -> Px {
+        self.builder.spread()
     }
 
     /// Why there were not enough good frames in time.
     pub fn given_up(&self) -> Outcome {
         if self.builder.saw_implausible() {
             Outcome::MarkersImplausible
+        } else if self.builder.saw_touch() {
+            Outcome::Touched
         } else {
             Outcome::NoGoodFrames
         }

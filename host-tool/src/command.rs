@@ -1,14 +1,17 @@
 //! `hivtac tare`, `hivtac threshold` and `hivtac expose`: one command each.
 
-use crate::output::{note, print};
+use crate::output::{self, note};
 use crate::settings;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
-use hivtac_host::threshold::text;
+use hivtac_host::threshold::{text, to_json};
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
-use hivtac_wire::settings::Selection;
+use hivtac_wire::settings::{Selection, TareReport};
+use serde::Serialize;
+use serde_json::json;
 use std::time::Duration;
 
 /// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
@@ -16,12 +19,42 @@ const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 /// Time a tare may need besides.
 pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
 
-/// Takes the mean of the next `frames` good frames (1–256) as the rest position, until the device
-/// restarts or for good.
-pub fn tare(address: &Address, patience: Duration, frames: u16, keep: bool) -> Result<(), Failure> {
+/// How to take a tare.
+pub struct Tare {
+    /// Good frames to average, 1–256.
+    pub frames: u16,
+    /// Though something moves or touches the film.
+    pub force: bool,
+    /// Through restarts.
+    pub keep: bool,
+    /// One JSON object instead of a line.
+    pub json: bool,
+}
+
+/// What a tare gave: pixels.
+#[derive(Serialize)]
+struct Tared {
+    frames: u16,
+    kept: bool,
+    markers: [[f64; 2]; 4],
+    spread_px: f64,
+    moved_px: Option<f64>,
+}
+
+/// Takes the mean of the next good frames as the rest position, and tells it.
+pub fn tare(address: &Address, patience: Duration, tare: &Tare) -> Result<(), Failure> {
+    let Tare { frames, keep, .. } = *tare;
     let wait = TARE_PATIENCE + SLOWEST_FRAME * frames.into();
     let (mut link, _) = Link::connect(address, patience)?;
-    send(&mut link, Request::Tare { frames }, wait)?;
+    let request = match tare.force {
+        true => Request::TareAnyway { frames },
+        false => Request::Tare { frames },
+    };
+    let mut report = None;
+    link.request(request, wait, |message| match message {
+        DeviceMessage::Tared(newest) => report = Some(newest),
+        other => tell(other),
+    })?;
     if keep {
         let selection = Selection {
             tare: true,
@@ -29,15 +62,55 @@ pub fn tare(address: &Address, patience: Duration, frames: u16, keep: bool) -> R
         };
         settings::keep(&mut link, selection)?;
     }
-    let kept = if keep { " and kept" } else { "" };
-    print(&format!("tare taken over {frames} frames{kept}")).map(|_| ())
+    let report = report.map(|report| Tared::of(tare, &report));
+    let line = match &report {
+        Some(report) => report.line(),
+        None => format!("tare taken over {frames} frames"),
+    };
+    output::tell(tare.json, &line, &json!(report))
+}
+
+impl Tared {
+    fn of(tare: &Tare, report: &TareReport) -> Tared {
+        Tared {
+            frames: tare.frames,
+            kept: tare.keep,
+            markers: (report.rest.markers).map(|marker| [px(marker.x), px(marker.y)]),
+            spread_px: px(report.spread),
+            moved_px: report.moved.map(px),
+        }
+    }
+
+    fn line(&self) -> String {
+        let kept = if self.kept { " and kept" } else { "" };
+        let markers = self.markers.map(|[x, y]| format!("({x:.2}, {y:.2})"));
+        let moved = match self.moved_px {
+            Some(moved) => format!("{moved:.3} px from the rest before"),
+            None => "the first one".to_owned(),
+        };
+        format!(
+            "tare taken over {} frames{kept}: markers at {} px, spread {:.3} px, {moved}",
+            self.frames,
+            markers.join(", "),
+            self.spread_px
+        )
+    }
+}
+
+/// Pixels, exactly.
+pub fn px(px: Px) -> f64 {
+    f64::from(px.0) / f64::from(Px::ONE.0)
 }
 
 /// Has exposure and gain found anew for the light that there is.
-pub fn expose(address: &Address, patience: Duration) -> Result<(), Failure> {
+pub fn expose(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
     let (mut link, _) = Link::connect(address, patience)?;
     send(&mut link, Request::Expose, patience)?;
-    print("exposure and gain found; take a new tare").map(|_| ())
+    output::tell(
+        json,
+        "exposure and gain found; take a new tare",
+        &json!({ "exposed": true }),
+    )
 }
 
 /// Sets the threshold, until the device restarts or for good: this one, or when none is given that
@@ -47,20 +120,37 @@ pub fn threshold(
     patience: Duration,
     wanted: Option<Threshold>,
     keep: bool,
+    json: bool,
 ) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let wanted = wanted.map_or_else(|| of_model(&hello), Ok)?;
-    send(&mut link, Request::SetThreshold(wanted), patience)?;
+    set_threshold(&mut link, &hello, wanted, patience, keep)?;
+    let kept = if keep { " and kept" } else { "" };
+    output::tell(
+        json,
+        &format!("threshold set{kept}: {}", text(&wanted)),
+        &json!({ "threshold": to_json(&wanted), "kept": keep }),
+    )
+}
+
+/// Sets a threshold, until the device restarts or for good, and says when there will be no forces
+/// with it.
+pub fn set_threshold(
+    link: &mut Link,
+    device: &DeviceHello,
+    wanted: Threshold,
+    patience: Duration,
+    keep: bool,
+) -> Result<(), Failure> {
+    send(link, Request::SetThreshold(wanted), patience)?;
     if keep {
         let selection = Selection {
             threshold: true,
             ..Selection::NONE
         };
-        settings::keep(&mut link, selection)?;
+        settings::keep(link, selection)?;
     }
-    let kept = if keep { " and kept" } else { "" };
-    print(&format!("threshold set{kept}: {}", text(&wanted)))?;
-    let made_for = hello.model.map(|model| model.threshold);
+    let made_for = device.model.as_ref().map(|model| model.threshold);
     if let Some(made_for) = made_for.filter(|made_for| *made_for != wanted) {
         note(&format!(
             "hivtac: samples have markers but no force (model_mismatch): the device's model was \

@@ -27,6 +27,36 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// All kinds, in the order of their exit codes.
+    pub const ALL: [Kind; 9] = [
+        Kind::Input,
+        Kind::NoDevice,
+        Kind::Version,
+        Kind::Lost,
+        Kind::Refused,
+        Kind::Rate,
+        Kind::Loss,
+        Kind::NotRight,
+        Kind::Interrupted,
+    ];
+
+    /// What its exit code means.
+    pub fn meaning(self) -> &'static str {
+        match self {
+            Kind::Input => "a file, a picture or the output cannot be used",
+            Kind::NoDevice => "no device: none found, the port cannot be opened, or nobody answers",
+            Kind::Version => "the device speaks another version of the protocol",
+            Kind::Lost => "the connection was lost",
+            Kind::Refused => "the device refused a command or did not answer it",
+            Kind::Rate => "`check`: fewer samples a second than --min-rate",
+            Kind::Loss => "`check`: more frames lost than --max-loss",
+            Kind::NotRight => "`bring-up`, `threshold auto`: something is not right",
+            Kind::Interrupted => {
+                "interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same"
+            }
+        }
+    }
+
     /// The exit code; part of the tool's interface.
     pub fn exit_code(self) -> u8 {
         match self {
@@ -73,3 +103,24 @@ impl fmt::Display for Failure {
 }
 
 impl std::error::Error for Failure {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many as the enumeration has, each with another code.
+    #[test]
+    fn all_kinds_are_listed() {
+        let source = include_str!("failure.rs");
+        let (_, rest) = source.split_once("pub enum Kind {").unwrap();
+        let (body, _) = rest.split_once('}').unwrap();
+        let names = body.lines().filter(|line| line.trim_end().ends_with(','));
+        assert_eq!(names.count(), Kind::ALL.len());
+        let mut codes = Kind::ALL.map(Kind::exit_code).to_vec();
+        codes.dedup();
+        assert!(
+            codes.is_sorted() && codes.len() == Kind::ALL.len(),
+            "{codes:?}"
+        );
+    }
+}

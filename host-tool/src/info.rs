@@ -1,7 +1,11 @@
 //! `hivtac info`: what the device is and how it fares.
 
+use crate::command::px;
+use crate::health::{self, Told};
 use crate::lines::to_json;
 use crate::output::{note, print};
+use crate::settings;
+use crate::settings::temporal::FilterJson;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
@@ -9,7 +13,10 @@ use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, Request, Stats};
+use hivtac_wire::message::{
+    DeviceHello, DeviceMessage, ModelIdentity, ModelSource, Request, Stats,
+};
+use hivtac_wire::settings::SettingsReport;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
@@ -17,7 +24,13 @@ use std::time::Duration;
 pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
     let (mut link, hello) = Link::connect(address, patience)?;
     let (hello, stats) = ask(&mut link, patience, hello)?;
-    let info = Info::new(&link.name, &hello, stats);
+    let settings = settings::ask(&mut link, patience)?;
+    let health = health::ask(&mut link, patience)?;
+    let info = Info {
+        tare: Some(Tare::of(&settings)),
+        health: Some(Told::of(&health)),
+        ..Info::new(&link.name, &hello, stats)
+    };
     print(&if json {
         to_json(&info)
     } else {
@@ -60,16 +73,86 @@ pub struct Info<'a> {
     preset: &'a str,
     dilations: u8,
     centroid: &'static str,
+    filter: FilterJson,
     stats: Option<Stats>,
+    /// `None` in what does not ask for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tare: Option<Tare>,
+    /// Likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    health: Option<Told>,
 }
 
+/// The rest position in use.
 #[derive(Serialize)]
-struct Model<'a> {
+struct Tare {
+    taken: bool,
+    kept: bool,
+    /// How far it is from the kept one, px.
+    drift_px: Option<f64>,
+}
+
+impl Tare {
+    fn of(settings: &SettingsReport) -> Tare {
+        let taken = settings.tare.is_some();
+        Tare {
+            taken,
+            kept: taken && settings.kept.tare,
+            drift_px: settings.drift.map(px),
+        }
+    }
+
+    fn text(&self) -> String {
+        let state = match self {
+            Tare { taken: false, .. } => "none; take one of the untouched film with `hivtac tare`",
+            Tare { kept: true, .. } => "kept",
+            _ => "taken, until restart",
+        };
+        match self.drift_px.filter(|_| !self.kept) {
+            Some(drift) => format!("{state}; {drift:.3} px from the kept one"),
+            None => state.to_owned(),
+        }
+    }
+}
+
+/// The model in use.
+#[derive(Serialize)]
+pub struct Model<'a> {
     crc: String,
     name: &'a str,
     simulated: bool,
+    source: &'static str,
     #[serde(serialize_with = "as_json")]
     threshold: Threshold,
+}
+
+impl<'a> Model<'a> {
+    /// As a device names it.
+    pub fn of(model: &'a ModelIdentity) -> Model<'a> {
+        Model {
+            crc: format!("{:08x}", model.crc),
+            name: &model.name,
+            simulated: model.simulated,
+            source: match model.source {
+                ModelSource::BuiltIn => "built-in",
+                ModelSource::Kept => "kept",
+                ModelSource::Fallback => "fallback",
+            },
+            threshold: model.threshold,
+        }
+    }
+
+    fn text(&self) -> String {
+        let origin = match self.simulated {
+            true => "simulated sensor",
+            false => "this unit",
+        };
+        let name = shown(self.name);
+        format!(
+            "{name}, CRC {}, trained on: {origin}; {}",
+            self.crc, self.source
+        )
+    }
 }
 
 fn as_json<S: Serializer>(threshold: &Threshold, serializer: S) -> Result<S::Ok, S::Error> {
@@ -87,12 +170,7 @@ impl<'a> Info<'a> {
             name: &hello.name,
             board: &hello.board,
             firmware: &hello.firmware,
-            model: hello.model.as_ref().map(|model| Model {
-                crc: format!("{:08x}", model.crc),
-                name: &model.name,
-                simulated: model.simulated,
-                threshold: model.threshold,
-            }),
+            model: hello.model.as_ref().map(Model::of),
             width: hello.width,
             height: hello.height,
             threshold: hello.threshold,
@@ -102,7 +180,10 @@ impl<'a> Info<'a> {
                 CentroidEstimator::BinaryMask => "binary-mask",
                 CentroidEstimator::RednessWeighted => "redness-weighted",
             },
+            filter: FilterJson::new(hello.filter),
             stats,
+            tare: None,
+            health: None,
         }
     }
 
@@ -130,32 +211,33 @@ impl<'a> Info<'a> {
                 text(made_for)
             ));
         }
+        lines.push(format!("filter     {}", self.filter.text()));
+        if self
+            .model
+            .as_ref()
+            .is_some_and(|model| model.source == "fallback")
+        {
+            lines.push(
+                "           the kept model cannot be used; send it again with `hivtac update model`"
+                    .to_owned(),
+            );
+        }
+        let tare = self.tare.iter();
+        lines.extend(tare.map(|tare| format!("tare       {}", tare.text())));
         lines.extend(self.stats.iter().flat_map(stats_lines));
+        lines.extend(self.health.iter().flat_map(Told::lines));
         lines
+    }
+
+    fn model_text(&self) -> String {
+        let text = self.model.as_ref().map(Model::text);
+        text.unwrap_or_else(|| "none".to_owned())
     }
 
     fn called(&self) -> String {
         match self.name {
             "" => String::new(),
             name => format!(", called {}", shown(name)),
-        }
-    }
-
-    fn model_text(&self) -> String {
-        match &self.model {
-            Some(model) => {
-                let origin = if model.simulated {
-                    "simulated sensor"
-                } else {
-                    "this unit"
-                };
-                format!(
-                    "{}, CRC {}, trained on: {origin}",
-                    shown(model.name),
-                    model.crc
-                )
-            }
-            None => "none".to_owned(),
         }
     }
 }

@@ -53,10 +53,10 @@ fn names(status: Status) -> Vec<&'static str> {
     status.names().collect()
 }
 
-/// Whether something touches the film; unknown without a force.
-fn contact(sample: &Sample) -> Option<bool> {
-    let touched = sample.status.contains(Status::CONTACT);
-    sample.force.is_some().then_some(touched)
+/// Whether a bit that tells of a contact is set; unknown without a force.
+fn told(sample: &Sample, bit: Status) -> Option<bool> {
+    let is_set = sample.status.contains(bit);
+    sample.force.is_some().then_some(is_set)
 }
 
 fn human_header(truth: bool) -> String {
@@ -91,7 +91,12 @@ fn human_row(row: &Row) -> String {
     let time = Millionths::from_u64(*time_us);
     let mut line = format!("{sequence:>8}{frame:>8}{time:>13}");
     line += &human_force(force.as_ref());
-    line += &format!("{:>9}", contact_text(contact(row.sample)));
+    let contact = contact_text(told(row.sample, Status::CONTACT));
+    let contact = match status.contains(Status::SLIP) {
+        true => "slips",
+        false => contact,
+    };
+    line += &format!("{contact:>9}");
     if let Some(truth) = row.truth {
         line += &human_truth(truth);
     }
@@ -99,9 +104,9 @@ fn human_row(row: &Row) -> String {
     format!("{line}  {status}")
 }
 
-/// Names of status bits for a person, who is told of a contact elsewhere.
+/// Names of status bits for a person, who is told of contact and slip elsewhere.
 pub fn status_text(names: &[&str], has_force: bool) -> String {
-    let other = |name: &&str| *name != "contact";
+    let other = |name: &&str| !["contact", "slip"].contains(name);
     let names: Vec<_> = names.iter().copied().filter(other).collect();
     if names.is_empty() {
         return if has_force { "ok" } else { "no force" }.to_owned();
@@ -166,6 +171,7 @@ struct SampleJson {
     time_us: u64,
     force: Option<ForceJson>,
     contact: Option<bool>,
+    slip: Option<bool>,
     status: Vec<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     truth: Option<Option<Truth>>,
@@ -178,7 +184,8 @@ fn json_row(row: &Row) -> String {
         frame: sample.frame,
         time_us: sample.time_us,
         force: sample.force.as_ref().map(ForceJson::from),
-        contact: contact(sample),
+        contact: told(sample, Status::CONTACT),
+        slip: told(sample, Status::SLIP),
         status: names(sample.status),
         truth: row.truth,
     };
@@ -195,7 +202,7 @@ pub fn to_json(value: &impl Serialize) -> String {
 fn csv_header(truth: bool) -> String {
     let mut header = "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,\
                       direction_sigma_deg,magnitude_sigma_n,\
-                      place_x_mm,place_y_mm,place_sigma_mm,contact,status"
+                      place_x_mm,place_y_mm,place_sigma_mm,contact,slip,status"
         .to_owned();
     if truth {
         header += ",true_alpha_deg,true_beta_deg,true_magnitude_n,true_x_n,true_y_n,true_z_n,\
@@ -213,7 +220,9 @@ fn csv_row(row: &Row) -> String {
         sample.time_us.to_string(),
     ];
     fields.extend(csv_force(sample.force.as_ref()));
-    fields.push(field(contact(sample)));
+    for bit in [Status::CONTACT, Status::SLIP] {
+        fields.push(field(told(sample, bit)));
+    }
     fields.push(names(sample.status).join("|"));
     if let Some(truth) = row.truth {
         fields.extend(csv_truth(truth));
@@ -354,6 +363,9 @@ mod tests {
         let pressed = sample(Some(force(None)), Status::CONTACT);
         let line = row(Format::Human, &pressed, None);
         assert!(line.ends_with("      yes  ok"), "{line}");
+        let slipping = sample(Some(force(None)), Status::CONTACT | Status::SLIP);
+        let line = row(Format::Human, &slipping, None);
+        assert!(line.ends_with("    slips  ok"), "{line}");
     }
 
     #[test]
@@ -365,7 +377,7 @@ mod tests {
                 r#""beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"#,
                 r#""z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"#,
                 r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085},"#,
-                r#""contact":true,"status":["not_calibrated","contact"]}"#
+                r#""contact":true,"slip":false,"status":["not_calibrated","contact"]}"#
             )
         );
         let without = sample(None, Status::IMAGE_DARK);
@@ -373,7 +385,7 @@ mod tests {
             row(Format::Json, &without, Some(None)),
             concat!(
                 r#"{"seq":41,"frame":42,"time_us":1400000,"force":null,"contact":null,"#,
-                r#""status":["image_dark"],"truth":null}"#
+                r#""slip":null,"status":["image_dark"],"truth":null}"#
             )
         );
     }
@@ -384,7 +396,7 @@ mod tests {
         let line = row(Format::Json, &sample, Some(Some(truth())));
         let end = concat!(
             r#""place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null},"contact":false,"#,
-            r#""status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"#,
+            r#""slip":false,"status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"#,
             r#""x_n":-0.01,"y_n":0.004,"z_n":-0.1,"place_x_mm":null,"place_y_mm":null}}"#
         );
         assert!(line.ends_with(end), "{line}");
@@ -414,19 +426,19 @@ mod tests {
         assert_eq!(
             row(Format::Csv, &with_place(), Some(Some(truth_with_place()))),
             format!(
-                "{force_of_all},1.250,-0.007,0.085,true,not_calibrated|contact,\
+                "{force_of_all},1.250,-0.007,0.085,true,false,not_calibrated|contact,\
                  -5.25,2.5,0.1015,-0.01,0.004,-0.1,1.2504,-0.5"
             )
         );
         let without_place = sample(Some(force(None)), Status::default());
         assert_eq!(
             row(Format::Csv, &without_place, None),
-            format!("{force_of_all},,,,false,")
+            format!("{force_of_all},,,,false,false,")
         );
         let without = sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED);
         assert_eq!(
             row(Format::Csv, &without, Some(Some(truth()))),
-            "41,42,1400000,,,,,,,,,,,,,markers_missing|frame_dropped,\
+            "41,42,1400000,,,,,,,,,,,,,,markers_missing|frame_dropped,\
              -5.25,2.5,0.1015,-0.01,0.004,-0.1,,"
         );
     }

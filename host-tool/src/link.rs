@@ -238,8 +238,17 @@ fn name_of(request: &Request) -> &'static str {
         Request::Inspect => "inspect",
         Request::GetSettings => "get settings",
         Request::SetName(_) => "set name",
+        Request::SetTemporal(_) => "set limits of contact, slip, filter and re-zeroing",
         Request::SetTare(_) => "set tare",
         Request::Keep(_) => "keep settings",
+        Request::BeginModel { .. } => "begin model",
+        Request::ModelPart(_) => "model part",
+        Request::UseModel => "use model",
+        Request::UseBuiltInModel => "use built-in model",
+        Request::Reset => "reset",
+        Request::TareAnyway { .. } => "tare",
+        Request::GetHealth => "get health",
+        Request::StartLoader => "start loader",
     }
 }
 
@@ -265,6 +274,14 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
             "its flash is worn and keeps nothing new; it works on, with what it kept before at \
              each start"
         }
+        Outcome::ModelUnusable => {
+            "it cannot use this model file; the one in use goes on, and the device's line above \
+             says why"
+        }
+        Outcome::AnotherSensor => {
+            "the model was made for another sensor, camera or frame; the one in use goes on, and \
+             the device's line above says which"
+        }
         Outcome::NotAtRest => {
             "the markers are not where a film at rest has them; take away what touches it, and \
              check the film's distance"
@@ -272,6 +289,10 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::MarkersImplausible => {
             "the images at rest are not those of four whole, equal markers: one may be covered, \
              cut, stained or glare; look at the film and its light, and clean it"
+        }
+        Outcome::Touched => {
+            "something touches the film, as the rest position from before tells; take it away, or \
+             say --force when nothing does"
         }
         Outcome::Unsteady => {
             "the markers moved meanwhile; take away what touches or shakes the film"

@@ -1,16 +1,21 @@
 //! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
 
+mod auto_threshold;
 mod bring_up;
 mod check;
 mod command;
 mod decimal;
 mod files;
 mod finding;
+mod firmware;
 mod focus;
 mod force_json;
+mod health;
+mod help;
 mod hsv;
 mod info;
 mod lines;
+mod list;
 mod look;
 mod monitor;
 mod output;
@@ -24,38 +29,29 @@ mod snapshot;
 mod tally;
 mod template;
 mod truth;
+mod update;
 mod view;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, FromArgMatches, Parser, Subcommand};
+use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use hivtac_terms::geometry::Preset;
+use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
+use hivtac_terms::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
 use hivtac_wire::settings::Name;
 use lines::Format;
+use settings::temporal::{Change, RezeroChange, small_thousandths, thousandths};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-const EXIT_CODES: &str = "\
-Exit codes:
-  0    done; also when the reader of the output went away (broken pipe)
-  1    a file, a picture or the output cannot be used
-  2    wrong usage
-  3    no device: none found, the port cannot be opened, or nobody answers
-  4    the device speaks another version of the protocol
-  5    the connection was lost
-  6    the device refused a command or did not answer it
-  7    `check`: fewer samples a second than --min-rate
-  8    `check`: more frames lost than --max-loss
-  9    `bring-up`: something is not right
-  130  interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same";
-
 /// Shows the forces of a HiVTac sensor.
 #[derive(Parser)]
-#[command(version, after_help = EXIT_CODES)]
+#[command(version)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -64,6 +60,8 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     /// Show forces as they come, and a summary at the end
+    ///
+    /// Example: hivtac monitor --seconds 10
     Monitor(MonitorArguments),
     /// Measure rate, jitter, losses and latency for a while, and hold them against limits
     ///
@@ -84,14 +82,17 @@ enum Command {
         /// End after so many seconds
         #[arg(long, value_name = "S", value_parser = seconds)]
         seconds: Option<Duration>,
+        /// At the end, what became of it as one JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Play a recording as if it were a device, for any other command, on a TCP port of this
     /// computer
     ///
-    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording.
+    /// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording:
+    /// `hivtac monitor --port tcp:127.0.0.1:7000` shows the forces of the example.
     ///
-    /// Example: hivtac replay press.mcap --tcp 7000, and elsewhere hivtac monitor --port
-    /// tcp:127.0.0.1:7000
+    /// Example: hivtac replay press.mcap --tcp 7000
     Replay {
         /// What `record` made; also one that was cut
         file: PathBuf,
@@ -101,8 +102,26 @@ enum Command {
         /// As fast as the other program reads, not as it was recorded
         #[arg(long)]
         fast: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the sensors that are plugged in: serial number, port, name, board and firmware
+    ///
+    /// One that another program uses is listed with what is wrong.
+    ///
+    /// Example: hivtac list
+    List {
+        /// One JSON object a line
+        #[arg(long)]
+        json: bool,
+        /// Longest wait for each one's hello, s
+        #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+        timeout: Duration,
     },
     /// Show what the device is and how it fares
+    ///
+    /// Example: hivtac info
     Info {
         #[command(flatten)]
         device: Device,
@@ -110,7 +129,22 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Have the device look at itself, and show what it finds, each with its code
+    ///
+    /// Codes are those of docs/wire.md, "Health". Exit code 9 when something is not right.
+    ///
+    /// Example: hivtac self-test
+    SelfTest {
+        #[command(flatten)]
+        device: Device,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
     /// Take the present position of the film as its rest position, until the device restarts
+    ///
+    /// Refused while something moves, or touches the film as the tare from before tells. Says where
+    /// the markers are, how much they scatter, and how far they are from where they were.
     ///
     /// Example: hivtac tare --keep
     Tare {
@@ -127,6 +161,12 @@ enum Command {
         /// Keep it through restarts
         #[arg(long)]
         keep: bool,
+        /// Though something moves or touches the film
+        #[arg(long)]
+        force: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set which pixels a marker may have, and with that the camera's pixel format, until the
     /// device restarts
@@ -136,29 +176,32 @@ enum Command {
     /// tare.
     ///
     /// Example: hivtac threshold --hsv 170,10,100,255,45,255
-    Threshold {
-        #[command(flatten)]
-        device: Device,
-        #[command(flatten)]
-        wanted: WantedThreshold,
-        /// Keep it through restarts
-        #[arg(long)]
-        keep: bool,
-    },
+    #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+    Threshold(ThresholdArguments),
     /// Show, save, give back or forget what the device keeps through restarts
     #[command(subcommand)]
     Settings(SettingsCommand),
+    /// Give the device a model of its own, or new firmware
+    #[command(subcommand)]
+    Update(UpdateCommand),
     /// Let the camera find exposure and gain for the light that there is, and keep them
     ///
     /// It does so by itself when it starts.
+    ///
+    /// Example: hivtac expose
     Expose {
         #[command(flatten)]
         device: Device,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Save a frame as the sensing saw it, while forces go on
     ///
     /// It says what the device itself found in it, too. `hivtac sense` on the picture or the raw
     /// frame finds the same; on that of YUV422 only on the raw frame, with the device's model.
+    ///
+    /// Example: hivtac snapshot frame.png --mask mask.png
     Snapshot {
         #[command(flatten)]
         device: Device,
@@ -173,6 +216,8 @@ enum Command {
     /// Picture after picture: the width of each marker's rim and of the marker, its colour and
     /// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
     /// everything is right.
+    ///
+    /// Example: hivtac focus
     Focus {
         #[command(flatten)]
         device: Device,
@@ -218,8 +263,13 @@ enum Command {
         /// Where the page's recordings go, as hivtac-UNIT-NUMBER.mcap
         #[arg(long, value_name = "FOLDER", default_value = ".")]
         recordings: PathBuf,
+        /// The page's address in a JSON object
+        #[arg(long)]
+        json: bool,
     },
     /// Write a template to print: where the film is punched and the dots are stuck, as SVG
+    ///
+    /// Example: hivtac template film.svg
     Template {
         /// File to write
         #[arg(value_name = "FILE.svg")]
@@ -227,6 +277,9 @@ enum Command {
         /// Whose markers
         #[arg(long, value_name = "paper|ov7725", default_value = "ov7725", value_parser = preset)]
         preset: Preset,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Look for markers and force in pictures, with the sensor's own code
     ///
@@ -234,12 +287,28 @@ enum Command {
     /// channel are rounded to RGB565, which is what the sensor's camera delivers. There is a force
     /// only when size, preset and threshold are those of the model; the status says so otherwise,
     /// and blobs, markers and features are there all the same.
+    ///
+    /// Example: hivtac sense photo.jpg
     Sense(SenseArguments),
+    /// Print what a shell completes this tool's commands by
+    ///
+    /// Example: hivtac completion bash
+    Completion {
+        /// Which shell's
+        shell: Shell,
+    },
+    /// Write a man page of each command into a folder
+    ///
+    /// Example: hivtac man ~/.local/share/man/man1
+    Man {
+        /// The folder, made when it is missing
+        folder: PathBuf,
+    },
 }
 
 #[derive(Subcommand)]
 enum SettingsCommand {
-    /// Show name, threshold and tare in use, and which of them are kept
+    /// Show name, threshold, tare and limits in use, and which of them are kept
     ///
     /// Example: hivtac settings get
     Get {
@@ -261,6 +330,9 @@ enum SettingsCommand {
         /// The file to make, JSON
         #[arg(value_name = "FILE.json")]
         file: String,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
     /// Set and keep the settings of a file
     ///
@@ -273,14 +345,101 @@ enum SettingsCommand {
         /// What `export` made
         #[arg(value_name = "FILE.json")]
         file: String,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
-    /// Forget everything that was kept: no name, the model's threshold, no tare
+    /// Forget everything that was kept: no name, the built-in model and its threshold, no tare, the
+    /// usual limits
     ///
     /// Example: hivtac settings reset
     Reset {
         #[command(flatten)]
         device: Device,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
     },
+}
+
+/// A device, and how is told what was done with it.
+#[derive(Args)]
+struct Told {
+    #[command(flatten)]
+    device: Device,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum UpdateCommand {
+    /// Send a model file, which the device checks, keeps through restarts and uses from then on
+    ///
+    /// Forces go on with the model before until then. What is damaged, not sound, or made for
+    /// another camera or unit is refused, and nothing changes.
+    ///
+    /// Example: hivtac update model thumb.hvtm
+    Model {
+        #[command(flatten)]
+        device: Device,
+        /// What `hivtac-calibrate` made
+        #[arg(value_name = "FILE.hvtm", required_unless_present = "built_in")]
+        file: Option<String>,
+        /// The model that is built into the firmware instead of a file; the kept one is forgotten
+        #[arg(long, conflicts_with = "file")]
+        built_in: bool,
+        /// One JSON object instead of a line
+        #[arg(long)]
+        json: bool,
+    },
+    /// Restart the device into its own loader (USB DFU), say how to send it firmware, and wait for
+    /// it to come back
+    ///
+    /// Prints the `dfu-util` command to run meanwhile in another terminal, then the version before
+    /// and after. What the device keeps stays. When the loader was started by mistake, take the
+    /// device off its supply for a moment.
+    ///
+    /// Example: hivtac update firmware hivtac-firmware.bin
+    Firmware {
+        #[command(flatten)]
+        device: Device,
+        /// The program as it lies in flash: `arm-none-eabi-objcopy -O binary ELF FILE.bin`
+        #[arg(value_name = "FILE.bin")]
+        file: String,
+        /// Longest wait for the device to come back, s
+        #[arg(long, value_name = "S", default_value = "300", value_parser = seconds)]
+        wait: Duration,
+        /// JSON objects instead of lines: the command to run, then the version before and after
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl UpdateCommand {
+    fn run(self) -> Result<(), Failure> {
+        match self {
+            UpdateCommand::Model {
+                device, file, json, ..
+            } => {
+                let options = update::Options {
+                    address: device.address()?,
+                    patience: device.timeout,
+                    json,
+                };
+                match file {
+                    Some(path) => update::model(&options, &path),
+                    None => update::built_in_model(&options),
+                }
+            }
+            UpdateCommand::Firmware {
+                device,
+                file,
+                wait,
+                json,
+            } => firmware::update(&device.address()?, device.timeout, &file, wait, json),
+        }
+    }
 }
 
 #[derive(Subcommand)]
@@ -290,28 +449,200 @@ enum SetCommand {
     /// Example: hivtac settings set name thumb
     Name {
         #[command(flatten)]
-        device: Device,
+        device: Told,
         /// At most 24 bytes of UTF-8
         #[arg(value_name = "NAME", value_parser = settings::name)]
         name: Name,
     },
+    /// From what force on something touches the film, and until what
+    ///
+    /// A contact also begins only with three times the force's standard uncertainty, and ends below
+    /// half of that.
+    ///
+    /// Example: hivtac settings set contact --begins 5 --ends 3
+    #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
+    Contact {
+        #[command(flatten)]
+        device: Told,
+        /// |F| with which it begins, mN; 2 by default
+        #[arg(long, value_name = "MN", value_parser = thousandths, group = "limit")]
+        begins: Option<u32>,
+        /// |F| below which it ends, mN; 1 by default
+        #[arg(long, value_name = "MN", value_parser = thousandths, group = "limit")]
+        ends: Option<u32>,
+    },
+    /// How far a contact moves over the film when it slips
+    ///
+    /// Example: hivtac settings set slip --distance 100
+    #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
+    Slip {
+        #[command(flatten)]
+        device: Told,
+        /// Distance, µm, 1 to 5000; 60 by default
+        #[arg(long, value_name = "UM", group = "limit")]
+        distance: Option<u32>,
+        /// In what time at most, ms, 10 to 100; 50 by default
+        #[arg(long, value_name = "MS", group = "limit")]
+        within: Option<u32>,
+        /// Least force along the film over that into it, 0 to 2; 0.1 by default
+        #[arg(long, value_name = "RATIO", value_parser = small_thousandths, group = "limit")]
+        ratio: Option<u16>,
+    },
+    /// What is sent in place of each frame's own force
+    ///
+    /// Contact and slip are told of each frame's own force all the same.
+    #[command(subcommand)]
+    Filter(FilterCommand),
+    /// Whether the rest position follows what drifts while nothing touches the film
+    ///
+    /// A force below the contact's that grows no faster than the rate is taken for drift, and
+    /// missing in every force from then on: by the total at most. With the usual limits it grows by
+    /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
+    #[command(subcommand)]
+    Rezero(RezeroCommand),
+}
+
+#[derive(Subcommand)]
+enum FilterCommand {
+    /// Each frame's own force
+    ///
+    /// Example: hivtac settings set filter none
+    None {
+        #[command(flatten)]
+        device: Told,
+    },
+    /// A first-order low-pass; a steady change comes its time constant later
+    ///
+    /// Example: hivtac settings set filter low-pass --ms 20
+    LowPass {
+        #[command(flatten)]
+        device: Told,
+        /// Its time constant, ms, 1 to 10000
+        #[arg(long, value_name = "MS")]
+        ms: u32,
+    },
+    /// The median of each component in three frames; a steady change comes a frame later
+    ///
+    /// Example: hivtac settings set filter median-of-three
+    MedianOfThree {
+        #[command(flatten)]
+        device: Told,
+    },
+}
+
+impl FilterCommand {
+    fn change(self) -> (Told, Change) {
+        let (device, filter) = match self {
+            FilterCommand::None { device } => (device, Filter::None),
+            FilterCommand::LowPass { device, ms } => {
+                let time_constant = Milliseconds(ms);
+                (device, Filter::LowPass { time_constant })
+            }
+            FilterCommand::MedianOfThree { device } => (device, Filter::MedianOfThree),
+        };
+        (device, Change::Filter(filter))
+    }
+}
+
+#[derive(Subcommand)]
+enum RezeroCommand {
+    /// It stays where it was taken
+    ///
+    /// Example: hivtac settings set rezero off
+    Off {
+        #[command(flatten)]
+        device: Told,
+    },
+    /// It follows, within limits
+    ///
+    /// Example: hivtac settings set rezero on
+    On {
+        #[command(flatten)]
+        device: Told,
+        /// How long nothing touches before, s, 1 to 3600; 10 by default
+        #[arg(long, value_name = "S", value_parser = thousandths)]
+        after: Option<u32>,
+        /// How far in a second, px, 0.001 to 0.1; 0.005 by default
+        #[arg(long, value_name = "PX", value_parser = small_thousandths)]
+        rate: Option<u16>,
+        /// How far in all, px, 0.001 to 0.25; 0.1 by default
+        #[arg(long, value_name = "PX", value_parser = small_thousandths)]
+        total: Option<u16>,
+    },
+}
+
+impl RezeroCommand {
+    fn change(self) -> (Told, Change) {
+        match self {
+            RezeroCommand::Off { device } => (device, Change::Rezero(None)),
+            RezeroCommand::On {
+                device,
+                after,
+                rate,
+                total,
+            } => {
+                let change = RezeroChange {
+                    after: after.map(Milliseconds),
+                    rate: rate.map(MilliPx),
+                    total: total.map(MilliPx),
+                };
+                (device, Change::Rezero(Some(change)))
+            }
+        }
+    }
+}
+
+impl SetCommand {
+    fn action(self) -> (Told, settings::Action) {
+        let (device, change) = match self {
+            SetCommand::Name { device, name } => {
+                return (device, settings::Action::SetName(name));
+            }
+            SetCommand::Contact {
+                device,
+                begins,
+                ends,
+            } => {
+                let [begins, ends] = [begins, ends].map(|limit| limit.map(UnsignedMicroNewtons));
+                (device, Change::Contact { begins, ends })
+            }
+            SetCommand::Slip {
+                device,
+                distance,
+                within,
+                ratio,
+            } => {
+                let change = Change::Slip {
+                    distance: distance.map(Micrometres),
+                    within: within.map(Milliseconds),
+                    ratio: ratio.map(Permille),
+                };
+                (device, change)
+            }
+            SetCommand::Filter(filter) => filter.change(),
+            SetCommand::Rezero(rezero) => rezero.change(),
+        };
+        (device, settings::Action::SetTemporal(change))
+    }
 }
 
 impl SettingsCommand {
     fn run(self) -> Result<(), Failure> {
         use settings::Action;
-        let (device, action) = match self {
-            SettingsCommand::Get { device, json } => (device, Action::Get { json }),
-            SettingsCommand::Set(SetCommand::Name { device, name }) => {
-                (device, Action::SetName(name))
+        let (device, json, action) = match self {
+            SettingsCommand::Get { device, json } => (device, json, Action::Get),
+            SettingsCommand::Set(command) => {
+                let (Told { device, json }, action) = command.action();
+                (device, json, action)
             }
-            SettingsCommand::Export { device, file } => (device, Action::Export(file)),
-            SettingsCommand::Import { device, file } => (device, Action::Import(file)),
-            SettingsCommand::Reset { device } => (device, Action::Reset),
+            SettingsCommand::Export { device, file, json } => (device, json, Action::Export(file)),
+            SettingsCommand::Import { device, file, json } => (device, json, Action::Import(file)),
+            SettingsCommand::Reset { device, json } => (device, json, Action::Reset),
         };
         let options = settings::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
+            json,
         };
         settings::run(&options, &action)
     }
@@ -320,16 +651,23 @@ impl SettingsCommand {
 #[derive(Args)]
 struct Device {
     /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
-    #[arg(long, value_name = "PORT")]
+    #[arg(long, value_name = "PORT", conflicts_with = "device")]
     port: Option<String>,
+    /// The sensor with this name or serial number, as `list` shows them
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
     /// Longest wait for the device's hello and replies, s
     #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
     timeout: Duration,
 }
 
 impl Device {
-    fn address(&self) -> Address {
-        self.port.as_deref().map_or(Address::Find, Address::parse)
+    fn address(&self) -> Result<Address, Failure> {
+        match (&self.port, &self.device) {
+            (Some(port), _) => Ok(Address::parse(port)),
+            (None, Some(device)) => list::find(device, self.timeout),
+            (None, None) => Ok(Address::Find),
+        }
     }
 }
 
@@ -349,6 +687,72 @@ struct CheckArguments {
     /// One JSON object instead of lines
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Args)]
+struct ThresholdArguments {
+    #[command(subcommand)]
+    auto: Option<ThresholdCommand>,
+    #[command(flatten)]
+    device: Device,
+    #[command(flatten)]
+    wanted: Option<WantedThreshold>,
+    /// Keep it through restarts
+    #[arg(long)]
+    keep: bool,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum ThresholdCommand {
+    /// Find the threshold that separates the dots from the film in the device's own pictures, show
+    /// why, and set it
+    ///
+    /// It is half way between film and dots; or the model's, when that separates them, too, since
+    /// there are forces only with that. The pixel format stays. Nothing should touch the film.
+    ///
+    /// Example: hivtac threshold auto --dry-run
+    Auto {
+        #[command(flatten)]
+        device: Device,
+        /// Keep it through restarts
+        #[arg(long)]
+        keep: bool,
+        /// Set nothing
+        #[arg(long, conflicts_with = "keep")]
+        dry_run: bool,
+        /// One JSON object instead of lines
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+impl ThresholdArguments {
+    fn run(self) -> Result<(), Failure> {
+        match self.auto {
+            Some(ThresholdCommand::Auto {
+                device,
+                keep,
+                dry_run,
+                json,
+            }) => auto_threshold::run(&auto_threshold::Options {
+                address: device.address()?,
+                patience: device.timeout,
+                keep,
+                dry_run,
+                json,
+            }),
+            None => command::threshold(
+                &self.device.address()?,
+                self.device.timeout,
+                self.wanted.and_then(|wanted| wanted.threshold()),
+                self.keep,
+                self.json,
+            ),
+        }
+    }
 }
 
 #[derive(Args)]
@@ -471,21 +875,21 @@ fn preset(name: &str) -> Result<Preset, String> {
 }
 
 impl MonitorArguments {
-    fn options(self) -> monitor::Options {
+    fn options(self) -> Result<monitor::Options, Failure> {
         let format = match (self.json, self.csv) {
             (true, _) => Format::Json,
             (_, true) => Format::Csv,
             _ => Format::Human,
         };
-        monitor::Options {
-            address: self.device.address(),
+        Ok(monitor::Options {
+            address: self.device.address()?,
             patience: self.device.timeout,
             frames: self.frames,
             duration: self.seconds,
             format,
             reconnect: self.reconnect,
             truth: self.truth,
-        }
+        })
     }
 }
 
@@ -503,9 +907,9 @@ fn run(command: Command) -> Result<(), Failure> {
     stop::install()?;
     match command {
         Command::Sense(arguments) => sense::run(&arguments.options()),
-        Command::Monitor(arguments) => monitor::run(&arguments.options()),
+        Command::Monitor(arguments) => monitor::run(&arguments.options()?),
         Command::Check(arguments) => check::run(&check::Options {
-            address: arguments.device.address(),
+            address: arguments.device.address()?,
             patience: arguments.device.timeout,
             duration: arguments.seconds,
             min_rate_hz: arguments.min_rate,
@@ -516,23 +920,31 @@ fn run(command: Command) -> Result<(), Failure> {
             device,
             file,
             seconds,
+            json,
         } => record::run(&record::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             duration: seconds,
             file,
+            json,
         }),
-        Command::Replay { file, tcp, fast } => replay::run(&file, tcp, fast),
+        Command::Replay {
+            file,
+            tcp,
+            fast,
+            json,
+        } => replay::run(&file, tcp, fast, json),
         Command::Snapshot {
             device,
             files,
             json,
-        } => snapshot::run(&device.address(), device.timeout, &files.files(), json),
+        } => snapshot::run(&device.address()?, device.timeout, &files.files(), json),
         Command::View {
             port,
             timeout,
             listen,
             recordings,
+            json,
         } => view::run(&view::Options {
             addresses: match port.as_slice() {
                 [] => vec![Address::Find],
@@ -541,37 +953,53 @@ fn run(command: Command) -> Result<(), Failure> {
             patience: timeout,
             port: listen,
             folder: recordings,
+            json,
         }),
-        Command::Template { file, preset } => template::run(&file, preset),
+        Command::Template { file, preset, json } => template::run(&file, preset, json),
         Command::BringUp {
             device,
             report,
             json,
         } => bring_up::run(&bring_up::Options {
-            address: device.address(),
+            address: device.address()?,
             patience: device.timeout,
             report,
             json,
         }),
-        Command::Focus { device, json } => focus::run(&device.address(), device.timeout, json),
-        Command::Info { device, json } => info::run(&device.address(), device.timeout, json),
+        Command::List { json, timeout } => list::run(timeout, json),
+        Command::Focus { device, json } => focus::run(&device.address()?, device.timeout, json),
+        Command::SelfTest { device, json } => health::run(&device.address()?, device.timeout, json),
+        Command::Info { device, json } => info::run(&device.address()?, device.timeout, json),
         Command::Tare {
             device,
             frames,
             keep,
-        } => command::tare(&device.address(), device.timeout, frames, keep),
-        Command::Expose { device } => command::expose(&device.address(), device.timeout),
-        Command::Threshold {
-            device,
-            wanted,
-            keep,
-        } => command::threshold(&device.address(), device.timeout, wanted.threshold(), keep),
+            force,
+            json,
+        } => {
+            let tare = command::Tare {
+                frames,
+                force,
+                keep,
+                json,
+            };
+            command::tare(&device.address()?, device.timeout, &tare)
+        }
+        Command::Expose { device, json } => {
+            command::expose(&device.address()?, device.timeout, json)
+        }
+        Command::Threshold(arguments) => arguments.run(),
         Command::Settings(command) => command.run(),
+        Command::Update(command) => command.run(),
+        Command::Completion { shell } => help::completion(shell),
+        Command::Man { folder } => help::man(&folder),
     }
 }
 
 fn main() -> ExitCode {
-    match run(Arguments::parse().command) {
+    let matches = help::command().get_matches();
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    match run(arguments.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if failure.kind != Kind::Interrupted {

@@ -6,6 +6,7 @@
 
 use hivtac_host::failure::Failure;
 use hivtac_host::stop;
+use serde_json::Value;
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -46,6 +47,15 @@ pub fn print(line: &str) -> Result<Reader, Failure> {
         let message = format!("cannot write to standard output: {error}");
         Err(Failure::input(message))
     })
+}
+
+/// Tells what was done: a line for a person, or one JSON object.
+pub fn tell(json: bool, line: &str, object: &Value) -> Result<(), Failure> {
+    match json {
+        true => print(&object.to_string()),
+        false => print(line),
+    }
+    .map(|_| ())
 }
 
 /// Writes a line for a person to standard error; there is nothing to do when that fails.

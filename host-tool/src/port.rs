@@ -22,6 +22,8 @@ impl<T: Read + Write + Send> Port for T {}
 pub enum Address {
     /// The one serial port with the sensor's USB id.
     Find,
+    /// The serial port with the sensor's USB id and this serial number, lower case.
+    Serial(String),
     /// A serial port or pseudo-terminal.
     Tty(String),
     /// `host:port`.
@@ -44,10 +46,28 @@ impl Address {
     pub fn open(&self) -> Result<(Box<dyn Port>, String), Failure> {
         match self {
             Address::Find => open_tty(&find(&ports()?)?),
+            Address::Serial(number) => open_tty(&find_serial(&ports()?, number)?),
             Address::Tty(name) => open_tty(name),
             Address::Tcp(address) => open_tcp(address),
         }
     }
+}
+
+/// A sensor on a serial port.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Attached {
+    /// The port's name.
+    pub port: String,
+    /// The serial number, lower case: that of the microcontroller, as in its hello.
+    pub serial: String,
+}
+
+/// All sensors on this machine's serial ports.
+///
+/// # Errors
+/// [`Kind::NoDevice`] when the ports cannot be listed.
+pub fn attached() -> Result<Vec<Attached>, Failure> {
+    Ok(ports()?.iter().filter_map(sensor).collect())
 }
 
 fn failure(message: String) -> Failure {
@@ -83,16 +103,38 @@ fn find(ports: &[SerialPortInfo]) -> Result<String, Failure> {
             seen(ports.iter())
         ))),
         _ => Err(failure(format!(
-            "more than one sensor found; {}; choose one with --port",
+            "more than one sensor found; {}; choose one with --device (`hivtac list`)",
             seen(sensors.into_iter())
         ))),
     }
 }
 
+/// The name of the port of the sensor with this serial number.
+fn find_serial(ports: &[SerialPortInfo], number: &str) -> Result<String, Failure> {
+    let mut sensors = ports.iter().filter_map(sensor);
+    let found = sensors.find(|sensor| sensor.serial == number);
+    found.map(|sensor| sensor.port).ok_or_else(|| {
+        failure(format!(
+            "no sensor with serial number {number}; {}; `hivtac list` shows those that there are",
+            seen(ports.iter())
+        ))
+    })
+}
+
 fn is_sensor(port: &SerialPortInfo) -> bool {
+    sensor(port).is_some()
+}
+
+fn sensor(port: &SerialPortInfo) -> Option<Attached> {
     match &port.port_type {
-        SerialPortType::UsbPort(usb) => (usb.vid, usb.pid) == (VENDOR_ID, PRODUCT_ID),
-        _ => false,
+        SerialPortType::UsbPort(usb) if (usb.vid, usb.pid) == (VENDOR_ID, PRODUCT_ID) => {
+            let serial = usb.serial_number.as_deref().unwrap_or_default();
+            Some(Attached {
+                port: port.port_name.clone(),
+                serial: serial.to_lowercase(),
+            })
+        }
+        _ => None,
     }
 }
 
@@ -226,6 +268,21 @@ mod tests {
     }
 
     #[test]
+    fn a_sensor_is_found_by_its_serial_number() {
+        let ports = [
+            usb("A", 0x1209, 1, "0A1B"),
+            usb("B", 0x1209, 1, "0A1C"),
+            usb("C", 1, 2, "0a1d"),
+        ];
+        assert_eq!(find_serial(&ports, "0a1c").unwrap(), "B");
+        let other = find_serial(&ports, "0a1d").unwrap_err().to_string();
+        assert!(
+            other.contains("0a1d") && other.contains("hivtac list"),
+            "{other}"
+        );
+    }
+
+    #[test]
     fn without_a_sensor_the_ports_are_listed() {
         let ports = [plain("ttyS0"), usb("ttyACM0", 1, 2, "a")];
         assert_eq!(
@@ -251,7 +308,7 @@ mod tests {
         assert_eq!(
             find(&ports).unwrap_err().to_string(),
             "more than one sensor found; ports seen: A (USB 1209:0001, a), B (USB 1209:0001, b); \
-             choose one with --port"
+             choose one with --device (`hivtac list`)"
         );
     }
 }

@@ -11,6 +11,7 @@ use hivtac_wire::message::{
 };
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use serde_json::json;
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
@@ -24,7 +25,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 const LONGEST_RECORD: usize = 1 << 24;
 
 /// Waits for a program at a port of this computer, 0 for any, and plays the recording to it.
-pub fn run(file: &Path, port: u16, fast: bool) -> Result<(), Failure> {
+pub fn run(file: &Path, port: u16, fast: bool, json: bool) -> Result<(), Failure> {
     let mut recording = Recording::open(file)?;
     let hello = recording.hello()?;
     let listener = TcpListener::bind(("127.0.0.1", port))
@@ -32,7 +33,11 @@ pub fn run(file: &Path, port: u16, fast: bool) -> Result<(), Failure> {
     let failed = |error| Failure::input(format!("cannot listen: {error}"));
     let address = listener.local_addr().map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
-    if print(&format!("ready tcp={address}"))? == Reader::Gone {
+    let ready = match json {
+        true => json!({ "tcp": address.to_string() }).to_string(),
+        false => format!("ready tcp={address}"),
+    };
+    if print(&ready)? == Reader::Gone {
         return Ok(());
     }
     let stream = loop {
@@ -262,8 +267,17 @@ impl Player {
             | Request::Inspect
             | Request::GetSettings
             | Request::SetName(_)
+            | Request::SetTemporal(_)
             | Request::SetTare(_)
-            | Request::Keep(_) => Outcome::Unsupported,
+            | Request::Keep(_)
+            | Request::BeginModel { .. }
+            | Request::ModelPart(_)
+            | Request::UseModel
+            | Request::UseBuiltInModel
+            | Request::Reset
+            | Request::TareAnyway { .. }
+            | Request::GetHealth
+            | Request::StartLoader => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

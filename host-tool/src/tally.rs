@@ -115,17 +115,15 @@ impl Tally {
     }
 
     /// What a recording says of itself.
-    pub fn counts(&self) -> BTreeMap<String, String> {
-        let counts = [
+    pub fn counts(&self) -> [(&'static str, u64); 6] {
+        [
             ("samples", self.received),
             ("samples_lost_on_the_way", self.gaps.samples),
             ("frames_not_processed", self.gaps.frames),
             ("samples_without_force", self.without_force),
             ("messages_rejected", self.rejected.frames().into()),
             ("device_restarts", self.gaps.restarts),
-        ];
-        let text = counts.map(|(name, count)| (name.to_owned(), count.to_string()));
-        text.into()
+        ]
     }
 
     fn summary_of_received(&self, truth: bool) -> String {

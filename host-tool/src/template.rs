@@ -1,8 +1,9 @@
 //! `hivtac template`: where to punch the film and to stick the dots, to print at its true size.
 
-use crate::output::print;
+use crate::output::tell;
 use hivtac_host::failure::Failure;
 use hivtac_terms::geometry::{Geometry, Preset};
+use serde_json::json;
 
 /// From the film's middle to each post, along x and y, mm: that of the simulated sensor.
 const POST_MM: f64 = 14.0;
@@ -18,7 +19,7 @@ const PAGE_MM: [f64; 2] = [70.0, 76.0];
 const MIDDLE_MM: [f64; 2] = [35.0, 26.0];
 
 /// Writes the template for a preset's markers.
-pub fn run(path: &str, preset: Preset) -> Result<(), Failure> {
+pub fn run(path: &str, preset: Preset, json: bool) -> Result<(), Failure> {
     // Sizes on the film do not depend on the frame's.
     let svg = svg(&Geometry::preset(preset, 320, 240));
     std::fs::write(path, svg).map_err(|error| {
@@ -26,7 +27,7 @@ pub fn run(path: &str, preset: Preset) -> Result<(), Failure> {
         Failure::input(message)
     })?;
     let told = format!("{path}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
-    print(&told).map(|_| ())
+    tell(json, &told, &json!({ "file": path, "ruler_mm": RULER_MM }))
 }
 
 /// All lengths in millimetres, and so is the page's size.

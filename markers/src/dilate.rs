@@ -6,7 +6,6 @@
 //! Most rows of a frame are empty, and most words of the others: rows come several at a time, and
 //! what is looked at again are the words near one that is set in any of them.
 
-use crate::kernels::any_set;
 #[cfg(armv7em)]
 use crate::kernels::dilate_edges;
 use crate::mask::{MAX_WORDS, Near, last_word_bits, words_of};
@@ -75,20 +74,18 @@ impl Dilation {
         incoming.get_mut(..rows * self.words).unwrap_or_default()
     }
 
-    /// Looks at the rows that were written.
+    /// Looks at the rows that were written, and that have a set bit somewhere: those of others
+    /// need not be looked at.
     pub fn look(&mut self, rows: usize) {
         let row_words = self.words.max(1);
-        let incoming = self.incoming(rows);
-        if !any_set(incoming) {
-            // As most are.
-            return;
-        }
         let (mut occupied, mut set_rows) = (0, 0);
-        for (y, row) in incoming.chunks_exact(row_words).enumerate() {
-            let mut in_row = 0;
-            for (i, _) in row.iter().enumerate().filter(|(_, word)| **word != 0) {
-                in_row |= 1 << i;
-            }
+        for (y, row) in self.incoming(rows).chunks_exact(row_words).enumerate() {
+            // Leading zeros are 32 of an empty word only: there is no branch in this loop.
+            let words = row.iter().rev();
+            let empty = words.fold(u32::MAX, |empty, word| {
+                empty << 1 | word.leading_zeros() >> 5
+            });
+            let in_row = !empty;
             occupied |= in_row;
             set_rows |= u32::from(in_row != 0) << y;
         }

@@ -70,7 +70,7 @@ impl<T: Table> Pixels for Formats<T> {
         self.threshold.format().row_length(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
         match &self.threshold {
             Threshold::Rgb565(_) => self.table.mask_row(row, mask),
             Threshold::Yuv422(yuv422) => yuv422.mask_row(row, mask),
@@ -78,7 +78,7 @@ impl<T: Table> Pixels for Formats<T> {
         }
     }
 
-    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         match &self.threshold {
             Threshold::Rgb565(_) => self.table.mask_rows(rows, width, mask),
             Threshold::Yuv422(yuv422) => yuv422.mask_rows(rows, width, mask),
@@ -89,9 +89,8 @@ impl<T: Table> Pixels for Formats<T> {
     fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
         match &self.threshold {
             Threshold::Rgb565(_) => self.table.mask_covered_rows(rows, width, mask),
-            // Their weights are half of the largest at the threshold.
-            Threshold::Yuv422(yuv422) => yuv422.mask_rows(rows, width, mask),
-            Threshold::Mono(mono) => mono.mask_rows(rows, width, mask),
+            Threshold::Yuv422(yuv422) => yuv422.mask_covered_rows(rows, width, mask),
+            Threshold::Mono(mono) => mono.mask_covered_rows(rows, width, mask),
         }
     }
 
@@ -124,8 +123,8 @@ impl Pixels for Yuv422 {
         PixelFormat::Yuv422.row_length(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        threshold_cr(self.cr_low, row, mask);
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
+        threshold_cr(self.cr_low, row, mask)
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {
@@ -172,11 +171,12 @@ impl Pixels for Mono {
         PixelFormat::Mono.row_length(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        match self.high.checked_sub(self.low) {
-            Some(span) => threshold_luma(self.low, span, row, mask),
-            None => mask.fill(0),
-        }
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
+        let Some(span) = self.high.checked_sub(self.low) else {
+            mask.fill(0);
+            return false;
+        };
+        threshold_luma(self.low, span, row, mask)
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {

@@ -40,8 +40,7 @@ impl History {
         kept.then_some(&self.rows[place][..])
     }
 
-    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] + 1 rows before row `end` that are in memory;
-    /// rows
+    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] + 1 rows before row `end` that are in memory; rows
     /// have at most 800 pixels.
     pub fn keep(&mut self, band: &Band<'_>, end: u16, count: u8) {
         for y in end.saturating_sub(u16::from(count))..end {

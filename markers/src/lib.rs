@@ -11,7 +11,6 @@
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
 //! | `scanner` | from rows to blobs, as they come |
 //! | `majority` | specks and holes taken out of rows of bits |
-//! | `closeup`, `outline` | a marker's edge fitted where its centroid is not to be trusted |
 //! | `rules` | which four blobs are the markers, and whether to trust them |
 //! | `settings` | what must be told before the first frame |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
@@ -23,7 +22,6 @@
 extern crate std;
 
 pub mod blob;
-pub mod closeup;
 pub mod formats;
 pub mod rules;
 pub mod scanner;
@@ -40,5 +38,4 @@ mod mask;
 mod moments;
 #[cfg(test)]
 mod numerics;
-pub mod outline;
 mod runs;

@@ -4,7 +4,7 @@
 //! An opening would take away specks, too, but not those that touch a flat part of a marker's edge,
 //! and it would widen holes. What lies outside the frame counts as unset.
 
-use crate::mask::{MAX_WORDS, any_set};
+use crate::mask::{MAX_WORDS, any_set, last_word_bits, words_of};
 
 /// The two rows before the next one.
 #[derive(Clone, Debug)]
@@ -25,11 +25,12 @@ impl Majority {
         self.rows = [[0; MAX_WORDS]; 2];
     }
 
-    /// Replaces rows of `words` words each, as they come in, by the majority around the pixels of
-    /// the row above each of them. `last` are those bits of the last word that lie in a row.
+    /// Replaces rows of `width` pixels, as they come in, by the majority around the pixels of the
+    /// row above each of them. Says whether any is set.
     #[inline(never)]
-    pub fn filter(&mut self, rows: &mut [u32], words: usize, last: u32) {
-        for row in rows.chunks_exact_mut(words.clamp(1, MAX_WORDS)) {
+    pub fn filter(&mut self, rows: &mut [u32], width: u16) -> bool {
+        let mut any = false;
+        for row in rows.chunks_exact_mut(words_of(width).clamp(1, MAX_WORDS)) {
             let mut raw = [0; MAX_WORDS];
             let filled = raw.iter_mut().zip(row.iter());
             filled.for_each(|(raw, word)| *raw = *word);
@@ -37,13 +38,15 @@ impl Majority {
             if any_set(above) || any_set(middle) || any_set(&raw) {
                 majority_row(above, middle, &raw, row);
                 if let Some(word) = row.last_mut() {
-                    *word &= last;
+                    *word &= last_word_bits(width);
                 }
+                any |= any_set(row);
             }
             let [above, middle] = &mut self.rows;
             *above = *middle;
             *middle = raw;
         }
+        any
     }
 }
 
@@ -147,7 +150,8 @@ mod tests {
             let mut majority = Majority::new();
             majority.begin();
             for band in filtered.chunks_mut(at_a_time * WORDS) {
-                majority.filter(band, WORDS, LAST);
+                let any = majority.filter(band, WIDTH as u16);
+                prop_assert_eq!(any, band.iter().any(|word| *word != 0));
             }
             // A row comes out with the one below it; nothing lies above the first.
             prop_assert_eq!(&filtered[..WORDS], &[0; WORDS]);

@@ -7,7 +7,7 @@ use crate::dilate::{Dilation, MAX_ROWS};
 use crate::history::{Band, History};
 use crate::label::Labeller;
 use crate::majority::Majority;
-use crate::mask::{last_word_bits, words_of};
+use crate::mask::{any_set, last_word_bits, words_of};
 use crate::tables::Pixels;
 use hivtac_terms::status::Status;
 
@@ -33,9 +33,8 @@ pub struct ScanSettings {
     /// time that noise takes.
     pub max_runs: u32,
     /// Whether the mask is of the pixels that a marker covers at least half, whatever the light
-    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: a frame
-    /// with
-    /// specks, noise or little light.
+    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: of a frame
+    /// with specks or little light.
     pub cleaned: bool,
 }
 
@@ -201,10 +200,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
 
     /// The same without copying: the rows that came last are still in memory when the next ones
     /// come, and are then `above`: all of the frame, or at least as many as there are dilations,
-    /// one after the other; one more in a frame that is
-    /// [cleaned](ScanSettings::cleaned). With fewer, a frame whose pixels are weighed becomes
-    /// incomplete where
-    /// one of them would have been needed.
+    /// one after the other; one more in a frame that is [cleaned](ScanSettings::cleaned). With
+    /// fewer, a frame whose pixels are weighed becomes incomplete where one of them would have been
+    /// needed.
     pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
         self.push_whole(pixels, above, rows, Stay::Here);
     }
@@ -241,17 +239,18 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         let mut left = count.min(room);
         while left > 0 {
             let rows = left.min(MAX_ROWS);
+            let mut any = false;
             if !self.labels.is_exhausted() {
                 let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
                 let incoming = self.dilation.incoming(rows);
-                if self.settings.cleaned {
+                any = if self.settings.cleaned {
                     pixels.mask_covered_rows(part, width, incoming);
-                    (self.majority).filter(incoming, words_of(width), last_word_bits(width));
+                    self.majority.filter(incoming, width)
                 } else {
-                    pixels.mask_rows(part, width, incoming);
-                }
+                    pixels.mask_rows(part, width, incoming)
+                };
             }
-            self.take(pixels, band, rows);
+            self.take(pixels, band, rows, any);
             left -= rows;
         }
         // What ends a frame is weighed when it is finished.
@@ -275,11 +274,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
         }
-        if self.settings.cleaned {
-            let width = self.settings.width;
-            (self.majority).filter(incoming, words_of(width), last_word_bits(width));
-        }
-        self.take(&(), &Band::WITHOUT_PIXELS, 1);
+        let any = if self.settings.cleaned {
+            self.majority.filter(incoming, self.settings.width)
+        } else {
+            any_set(incoming)
+        };
+        self.take(&(), &Band::WITHOUT_PIXELS, 1, any);
     }
 
     /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no
@@ -320,10 +320,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if self.active { usize::from(missing) } else { 0 }
     }
 
-    /// Takes the rows that were written to the dilation.
-    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
+    /// Takes the rows that were written to the dilation; `any` says whether a bit of them is set.
+    fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize, any: bool) {
         if !self.labels.is_exhausted() {
-            self.dilation.look(rows);
+            if any {
+                self.dilation.look(rows);
+            }
             if !self.is_quiet() {
                 self.label(pixels, band, rows);
             }
@@ -371,9 +373,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if !self.labels.is_exhausted() {
             let incoming = self.dilation.incoming(late);
             incoming.fill(0);
-            if self.settings.cleaned {
-                let width = self.settings.width;
-                (self.majority).filter(incoming, words_of(width), last_word_bits(width));
+            if self.settings.cleaned && self.majority.filter(incoming, self.settings.width) {
                 self.dilation.look(late);
             }
             let band = match pixels.row_length(self.settings.width) {

@@ -1,6 +1,7 @@
 //! A table for processors with wide registers: most words of a mask are found empty without looking
 //! a pixel up.
 
+use crate::mask::any_set;
 use crate::tables::{ByteTable, Pixels, Table};
 use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 
@@ -43,12 +44,13 @@ impl Pixels for ScreenedTable {
         self.table.row_length(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
         match self.screen.channel {
             Channel::Red => self.mask_by(row, mask, |raw| self.screen.red(raw)),
             Channel::Green => self.mask_by(row, mask, |raw| self.screen.green(raw)),
             Channel::Blue => self.mask_by(row, mask, |raw| self.screen.blue(raw)),
         }
+        any_set(mask)
     }
 
     fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {

@@ -15,35 +15,28 @@ pub trait Pixels {
     fn row_length(&self, width: u16) -> usize;
 
     /// Thresholds a row: bit i of word w is pixel 32·w + i. `mask` has ⌈pixels / 32⌉ words; bits
-    /// beyond the row become unset.
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]);
+    /// beyond the row become unset. Says whether any is set.
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool;
 
     /// Thresholds several rows of `width` pixels, which lie one after the other. `mask` has
-    /// ⌈width / 32⌉ words for each.
-    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+    /// ⌈width / 32⌉ words for each. Says whether any bit is set.
+    fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         if width.is_multiple_of(32) {
             // One long row.
             return self.mask_row(rows, mask);
         }
         let rows = rows.chunks(self.row_length(width).max(1));
+        let mut any = false;
         for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
-            self.mask_row(row, mask);
+            any |= self.mask_row(row, mask);
         }
+        any
     }
 
     /// Masks several rows, as [`mask_rows`](Self::mask_rows) does, by the pixels that a marker
-    /// covers to [`HALF_WEIGHT`] at least, whatever the light.
-    #[inline(never)]
+    /// covers at least half, whatever the light; where that is not to be told, by the threshold.
     fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
-        let rows = rows.chunks(self.row_length(width).max(1));
-        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width).max(1))) {
-            for (word, first) in mask.iter_mut().zip((0..width).step_by(32)) {
-                let columns = first..(first + 32).min(width);
-                *word = columns.rev().fold(0, |bits, column| {
-                    bits << 1 | u32::from(self.weight(row, column) >= HALF_WEIGHT)
-                });
-            }
-        }
+        self.mask_rows(rows, width, mask);
     }
 
     /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the
@@ -64,8 +57,9 @@ impl Pixels for () {
         0
     }
 
-    fn mask_row(&self, _: &[u16], mask: &mut [u32]) {
+    fn mask_row(&self, _: &[u16], mask: &mut [u32]) -> bool {
         mask.fill(0);
+        false
     }
 
     fn weight(&self, _: &[u16], _: u16) -> u8 {
@@ -91,10 +85,6 @@ pub trait Table: Pixels {
 
 /// The largest weight. A pixel that a marker covers wholly has about 95.
 pub const FULL_WEIGHT: u8 = 127;
-
-/// Of a pixel that a marker covers half: one that a threshold just takes in YUV422 and mono; in
-/// RGB565 one of two thirds.
-pub const HALF_WEIGHT: u8 = 64;
 
 /// Sums of weights over the pixels of one run.
 ///
@@ -207,11 +197,11 @@ impl Pixels for ByteTable {
         usize::from(width)
     }
 
-    fn mask_row(&self, row: &[u16], mask: &mut [u32]) {
-        threshold_bytes(&self.bytes, row, mask);
+    fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
+        threshold_bytes(&self.bytes, row, mask)
     }
 
-    /// A weight of [`HALF_WEIGHT`] and more has bit 7 of a byte set.
+    /// By bit 7 of a byte: weights of 64 and more, two thirds of what a marker has inside.
     #[inline(never)]
     fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
         let rows = rows.chunks(usize::from(width).max(1));
@@ -322,6 +312,12 @@ mod tests {
                 let sums = table.weigh(&row, run);
                 let columns = usize::from(run.x0)..(usize::from(run.x1) + 1).min(row.len());
                 let weights = columns.map(|x| (x as u32, u32::from(redness(row[x].swap_bytes()))));
+                let width = row.len() as u16;
+                table.mask_covered_rows(&row, width, &mut mask);
+                for (x, &raw) in row.iter().enumerate() {
+                    let bit = mask[x / 32] >> (x % 32) & 1 == 1;
+                    prop_assert_eq!(bit, redness(raw.swap_bytes()) >= 64);
+                }
                 let (sum, sum_x) = weights.fold((0, 0), |(s, sx), (x, w)| (s + w, sx + w * x));
                 prop_assert_eq!((sums.sum, sums.sum_x), (sum, sum_x));
                 Ok(())

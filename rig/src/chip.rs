@@ -126,7 +126,7 @@ impl Chip {
         let i2c_slot = part.bus().slot("I2C1")?;
         let mut chip = Self {
             dormant: Dormant::new(part.bus()),
-            dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone()),
+            dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone(), seed),
             control_bus: ControlBus::new(faults.clone(), slots.vsync_port(), i2c_slot),
             held_bus: HeldBus,
             mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), seed),

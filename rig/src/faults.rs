@@ -30,7 +30,8 @@ pub enum Kind {
     FrameLong,
     /// The DMA gets no access to the bus, so that the camera interface overruns.
     DcmiOverrun,
-    /// Others hold the bus: blocks that the MDMA moves take up to 16 times as long, by seed.
+    /// Others hold the bus, by seed: blocks that the MDMA moves take up to 16 times as long, the
+    /// DMA waits for words of the camera interface, and both their interrupt lines fall late.
     BusBusy,
     /// The host has the port open but does not ask for data.
     HostNotReading,

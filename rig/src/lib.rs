@@ -21,6 +21,7 @@
 
 pub mod arrivals;
 pub mod board;
+mod busy_bus;
 pub mod camera;
 pub mod chip;
 mod control_bus;

@@ -76,7 +76,12 @@ impl Board for Sensor {
         };
         config.vector_table = Some(vectors);
         let mut core = config.spec();
-        core.factory_images = vec![rom::unique_id(), rom::loader()];
+        core.factory_images = vec![
+            rom::unique_id(),
+            rom::temperature_calibration(),
+            rom::loader(),
+            rom::firmware_loader(),
+        ];
         vec![Target::new("stm32h743", &mut self.chip, core)]
     }
 }

@@ -39,7 +39,7 @@ pub struct Report {
     pub flash_operations: u64,
     /// Whether the power was cut in one of them.
     pub power_was_cut: bool,
-    /// Bytes that the MDMA moved.
+    /// Bytes that the MDMA moved out of memories.
     pub mdma_bytes: u64,
     /// The USB port at the end.
     pub port: Port,
@@ -88,7 +88,7 @@ impl Report {
             dcmi: chip.dcmi.counters(),
             flash_operations: bank.operations(),
             power_was_cut: bank.was_cut(),
-            mdma_bytes: chip.mdma.bytes(),
+            mdma_bytes: chip.mdma.memory_bytes(),
             port: host.port(),
             usb: host.counters(),
             usb_log: host.log().to_vec(),
@@ -123,6 +123,7 @@ impl Report {
                 "empty_frames": self.dcmi.empty_frames,
                 "words": self.dcmi.words,
                 "overruns": self.dcmi.overruns,
+                "waits": self.dcmi.waits,
             },
             "flash": {
                 "operations": self.flash_operations,

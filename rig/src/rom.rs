@@ -1,4 +1,5 @@
-//! The part's ROM: its unique number, and the loader's jump to the program in flash.
+//! The part's ROM: its unique number, how its temperature sensor was calibrated, and the loader
+//! with its jump to the program in flash.
 //!
 //! After `dfu-util …:leave` the loader sets the stack pointer and jumps, with its own vector table
 //! still in use: the program has to set its own (AN3156). Every vector of the table here but the
@@ -24,6 +25,27 @@ const TRAP: u16 = 0xE7FE;
 /// 61).
 pub fn unique_id() -> Image {
     image("unique-id", b"hivtac-rig-1".to_vec(), 0x1FF1_E800)
+}
+
+/// What the temperature sensor reads at 30 °C and 110 °C, at 3.3 V in 16 bits (TS_CAL1, TS_CAL2):
+/// by DS12110's typical 0.62 V at 30 °C and 2 mV a degree (table 180), as the emulator's sensor.
+pub fn temperature_calibration() -> Image {
+    let word = |millivolts: u32| (millivolts * 65_535 / 3_300) as u16;
+    let mut bytes = vec![0xFF; 0x22];
+    for (at, millivolts) in [(0, 620), (0x20, 780)] {
+        bytes[at..at + 2].copy_from_slice(&word(millivolts).to_le_bytes());
+    }
+    image("temperature-calibration", bytes, 0x1FF1_E820)
+}
+
+/// Where the loader's vectors are for a program that starts it (AN2606, STM32H743). What takes new
+/// firmware over USB is not here: it stands still, and the part is gone from USB.
+pub fn firmware_loader() -> Image {
+    const VECTORS: u32 = 0x1FF0_9800;
+    let words = [STACK, VECTORS + 9];
+    let mut bytes: Vec<u8> = words.into_iter().flat_map(u32::to_le_bytes).collect();
+    bytes.extend(TRAP.to_le_bytes());
+    image("firmware-loader", bytes, VECTORS)
 }
 
 /// The loader.

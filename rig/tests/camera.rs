@@ -1,9 +1,7 @@
 //! What a real OV7725 does and a table of registers does not tell: the firmware must not rest on
 //! it.
 
-mod common;
-
-use common::{Run, Setup, command, firmware};
+use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::{Outcome, Request};

@@ -1,13 +1,11 @@
 //! The command: ready line, clients, hang-up, signals, limits and errors.
 
-mod common;
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use common::{firmware, hello};
+use crate::common::{firmware, hello};
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
 use hivtac_wire::message::DeviceMessage;

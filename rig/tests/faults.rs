@@ -1,8 +1,6 @@
 //! Each fault ends in the status or counter that the firmware's documents name, and is survived.
 
-mod common;
-
-use common::{HELLO_MS, Setup, command, firmware, hello};
+use crate::common::{HELLO_MS, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
 use hivtac_terms::status::Status;
@@ -108,14 +106,17 @@ fn an_overrun_costs_a_frame_and_is_told() {
     assert_eq!(run.frames_after_a_loss(), [missing[0] + 1]);
 }
 
-/// Copies of bands wait for the bus, at random: they catch up, and no frame is lost.
+/// Copies of bands and words of the camera wait for the bus, at random, and interrupts come back
+/// after they were cleared: no frame is lost.
 #[test]
 fn a_busy_bus_costs_nothing() {
     let run = Setup::new(firmware(), 280).fault("bus-busy").run();
     assert!(run.samples().len() >= 4, "{}", run.log());
     assert_eq!(run.missing_frames(), Vec::<u32>::new());
     assert_eq!(run.frames_after_a_loss(), Vec::<u32>::new());
-    assert_eq!(run.report.dcmi.overruns, 0);
+    let dcmi = run.report.dcmi;
+    assert_eq!(dcmi.overruns, 0);
+    assert!(dcmi.waits * 5 > dcmi.words, "{dcmi:?}");
 }
 
 /// The camera sends half a frame: it is dropped and counted, and the next one is captured.
@@ -190,7 +191,8 @@ fn a_pulled_cable_is_survived() {
     );
     assert!(run.hellos().len() >= 2);
     let samples = run.samples();
-    assert!(samples.iter().any(|sample| sample.time_us < 240_000));
+    // The device's clock is 65 ms ahead.
+    assert!(samples.iter().any(|sample| sample.time_us < 290_000));
     let after = samples
         .iter()
         .filter(|sample| sample.time_us > 560_000)

@@ -1,8 +1,6 @@
 //! The firmware as it is flashed: what it sends is what the camera saw.
 
-mod common;
-
-use common::{Setup, firmware};
+use crate::common::{Setup, firmware};
 use hivtac_rig::run::INSTRUCTIONS_PER_SECOND;
 use hivtac_terms::status::Status;
 
@@ -17,7 +15,7 @@ const PICTURE: Status = Status(
         | Status::FRAME_INCOMPLETE.0,
 );
 
-fn undisturbed(setup: Setup) -> common::Run {
+fn undisturbed(setup: Setup) -> crate::common::Run {
     let run = setup.run();
     assert_eq!(run.rejected.frames(), 0, "{:?}", run.rejected);
     assert_eq!((run.report.dcmi.overruns, run.report.resets), (0, 0));
@@ -69,9 +67,9 @@ fn frames_back_to_back_are_all_measured() {
     // All words of every frame that has ended, and some of the one under way, or all.
     let under_way = dcmi.words - dcmi.frames * 38_400;
     assert!((0..=38_400).contains(&under_way), "{dcmi:?}");
-    // Each band reached the core once.
+    // Each band reached the core once; on a busy bus the last ones are under way.
     let words = run.report.mdma_bytes / 4;
-    assert!(dcmi.words.abs_diff(words) <= 2 * 640, "{words} of {dcmi:?}");
+    assert!(dcmi.words.abs_diff(words) <= 4 * 640, "{words} of {dcmi:?}");
 }
 
 #[test]

@@ -2,9 +2,7 @@
 //! that pass meanwhile are counted, and the way back leads to the very forces that there would have
 //! been.
 
-mod common;
-
-use common::{Run, Setup, command, firmware, set_threshold};
+use crate::common::{Run, Setup, command, firmware, set_threshold};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Mono;

@@ -1,9 +1,7 @@
 //! Firmware with a seeded bug must fail, each in its own way: that is what shows that the rig would
 //! notice.
 
-mod common;
-
-use common::{Setup, bug};
+use crate::common::{Setup, bug};
 use hivtac_rig::usb_host::Port;
 use hivtac_terms::status::Status;
 

@@ -1,11 +1,9 @@
 //! What the flashed firmware keeps in its flash, through restarts and power cuts.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use common::{Run, Setup, command, firmware};
+use crate::common::{Setup, command, firmware};
 use hivtac_rig::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
@@ -225,7 +223,7 @@ fn of_another_version(flash: &Path) {
         record.extend(&word[1..]);
     }
     record.truncate(length);
-    assert_eq!(record[0], 1, "the version");
+    assert_eq!(record[0], 2, "the version");
     sector[10] = 200;
     record[0] = 200;
     let mut checked = sector[2..6].to_vec();

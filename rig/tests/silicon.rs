@@ -1,8 +1,6 @@
 //! The chip as it may be met: an old revision, and a program that the ROM's loader starts.
 
-mod common;
-
-use common::{Setup, firmware};
+use crate::common::{Setup, firmware};
 use hivtac_rig::chip::Revision;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::usb_host::Port;

@@ -1,8 +1,6 @@
 //! A frame is sent as the camera showed it, while forces go on; and what cuts that short.
 
-mod common;
-
-use common::{HELLO_MS, Run, Setup, command, firmware, hello};
+use crate::common::{HELLO_MS, Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
 use hivtac_scene::{Preset, Scene, Shutter};
 use hivtac_terms::status::Status;

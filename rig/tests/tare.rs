@@ -1,11 +1,10 @@
 //! A tare of the flashed firmware: taken of a film at rest, refused with the reason otherwise.
 
-mod common;
-
-use common::{Run, Setup, command, firmware};
+use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
-use hivtac_wire::message::{Outcome, Request};
+use hivtac_wire::message::{DeviceMessage, Outcome, Request};
+use hivtac_wire::settings::TareReport;
 
 const ASKED: u16 = 40;
 
@@ -21,6 +20,15 @@ fn outcome(run: &Run) -> Outcome {
     answers[0].0
 }
 
+/// What a tare gave.
+fn report(run: &Run) -> TareReport {
+    let mut reports = run.messages.iter().filter_map(|message| match message {
+        DeviceMessage::Tared(report) => Some(*report),
+        _ => None,
+    });
+    reports.next().expect("it was taken")
+}
+
 #[test]
 fn a_film_at_rest_is_tared() {
     let run = tared("rest", 200);
@@ -29,6 +37,9 @@ fn a_film_at_rest_is_tared() {
     let last = samples.last().unwrap();
     assert!(last.force.is_some(), "{last:?}");
     assert!(!last.status.contains(Status::TARE_MISSING), "{last:?}");
+    let report = report(&run);
+    assert_eq!(report.moved, None, "the first one");
+    assert!((0..6_554).contains(&report.spread.0), "0.1 px: {report:?}");
 }
 
 #[test]
@@ -38,4 +49,50 @@ fn markers_that_are_covered_from_one_side_are_refused_and_nothing_changes() {
     for sample in run.samples() {
         assert!(sample.status.contains(Status::TARE_MISSING), "{sample:?}");
     }
+}
+
+/// The answers to these commands, each sent at its time.
+fn answered(scene: &'static str, asked: &[(u64, Request, Outcome)]) -> Run {
+    let mut setup = Setup {
+        scene,
+        ..Setup::new(firmware(), 300)
+    };
+    for (nth, (at, request, _)) in (0..).zip(asked) {
+        let command = command(ASKED + nth, request.clone());
+        setup = setup.at(*at, Action::Send(command));
+    }
+    let run = setup.run();
+    for (nth, (_, request, expected)) in (0..).zip(asked) {
+        assert_eq!(run.outcome(ASKED + nth), *expected, "{request:?}");
+    }
+    run
+}
+
+/// The rest position is given to a sensor over whose film a tip moves; a press that far is refused
+/// to who insists, too. Then one that is a pixel off, to a sensor at rest.
+#[test]
+fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_before() {
+    let rest = report(&tared("rest", 200)).rest;
+    let frames = 4;
+    let anyway = Request::TareAnyway { frames };
+    answered(
+        "demo",
+        &[
+            (190, Request::SetTare(Some(rest)), Outcome::Done),
+            (200, Request::Tare { frames }, Outcome::Touched),
+            (250, anyway.clone(), Outcome::NotAtRest),
+        ],
+    );
+    let mut before = rest;
+    let (x, y) = rest.rect_center;
+    for marker in &mut before.markers {
+        marker.x.0 -= (marker.x.0 - x.0) / 64;
+        marker.y.0 -= (marker.y.0 - y.0) / 64;
+    }
+    let set = Request::SetTare(Some(before));
+    let asked = [(190, set, Outcome::Done), (200, anyway, Outcome::Done)];
+    let run = answered("rest", &asked);
+    let moved = report(&run).moved.expect("there was one before");
+    let one = 1 << 16;
+    assert!((one / 2..2 * one).contains(&moved.0), "{moved:?}");
 }

@@ -1,9 +1,7 @@
 //! A new threshold while frames are streamed: its table is made in place, the frames that pass
 //! meanwhile are counted, and none is of two thresholds.
 
-mod common;
-
-use common::{Setup, firmware, set_threshold};
+use crate::common::{Setup, firmware, set_threshold};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Threshold};

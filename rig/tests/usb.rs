@@ -1,8 +1,6 @@
 //! Control transfers of any kind: the device answers, stalls what it does not know, and goes on.
 
-mod common;
-
-use common::{Run, Setup, firmware};
+use crate::common::{Run, Setup, firmware};
 use hivtac_rig::script::Action;
 
 /// What became of a control transfer, by the host's log.

@@ -161,6 +161,22 @@ impl Scene {
         Ok(self.expose(&exposure, number))
     }
 
+    /// The frame of a camera with a shutter under a load in time that is no [`Motion`]: what
+    /// presses so many seconds after the middle of the exposure. The number selects its noise.
+    ///
+    /// # Errors
+    /// When the film cannot take the load in that middle. Loads around it are those of the film's
+    /// limits.
+    pub fn frame_under(
+        &self,
+        shutter: &Shutter,
+        number: u64,
+        load: impl Fn(f64) -> Load,
+    ) -> Result<Frame, SceneError> {
+        self.options.film.check(&self.film, &load(0.0))?;
+        Ok(self.expose(&self.exposure(shutter, load), number))
+    }
+
     fn exposure<'a, L: Fn(f64) -> Load>(
         &'a self,
         shutter: &'a Shutter,

@@ -14,11 +14,12 @@
 extern crate std;
 
 pub use hivtac_force::{features, force, forward, layer, model, network, packing, rest};
-pub use hivtac_markers::{blob, formats, outline, rules, scanner, screen, settings, tables};
+pub use hivtac_markers::{blob, formats, rules, scanner, screen, settings, tables};
 
 pub mod motion;
 pub mod pipeline;
 pub mod tare;
+pub mod temporal;
 
 #[cfg(test)]
 mod picture;

@@ -6,12 +6,17 @@
 //! 1. the images are those of whole markers ([`Sensor::tare_with`](crate::pipeline::Sensor)): a
 //!    film at rest is flat, so that optics says what four equal discs look like;
 //! 2. nothing moves: the frames scatter no more than noise does;
-//! 3. the markers are as far from their centre as a film at rest shows them ([`Rest::fits`]).
+//! 3. nothing touches the film, as the rest position from before tells, where there is one;
+//! 4. the markers are as far from their centre as a film at rest shows them ([`Rest::fits`]).
+//!
+//! Who [insists](TareBuilder::insisting) does without 2 and 3.
 
 use hivtac_force::features::{FEATURES, Features};
 use hivtac_force::rest::Rest;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
+use hivtac_terms::root::rounded_root;
+use hivtac_terms::units::Px;
 
 /// Most frames in a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
@@ -32,6 +37,8 @@ pub enum Refusal {
     Unsteady,
     /// The markers are nearer to or farther from their centre than a film at rest shows them.
     NotAtRest,
+    /// Something touches the film.
+    Touched,
 }
 
 /// Sums up good frames until there are enough. All sums are exact; each mean is rounded once, half
@@ -39,8 +46,10 @@ pub enum Refusal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TareBuilder {
     wanted: u16,
+    insists: bool,
     taken: u16,
     implausible: u16,
+    touched: u16,
     features: [i64; FEATURES],
     areas: [u64; 4],
     /// Coordinates of the first frame, px with 8 fractional bits; sums of what the others differ
@@ -56,8 +65,10 @@ impl TareBuilder {
         let wanted = frames;
         let empty = TareBuilder {
             wanted,
+            insists: false,
             taken: 0,
             implausible: 0,
+            touched: 0,
             features: [0; FEATURES],
             areas: [0; 4],
             first: [0; 8],
@@ -65,6 +76,15 @@ impl TareBuilder {
             squares: [0; 8],
         };
         (1..=MAX_FRAMES).contains(&frames).then_some(empty)
+    }
+
+    /// Takes frames as they come, though something moves or touches the film.
+    #[must_use]
+    pub fn insisting(self) -> TareBuilder {
+        TareBuilder {
+            insists: true,
+            ..self
+        }
     }
 
     /// Takes the markers and features of a good frame. Gives the rest position of frames of this
@@ -86,6 +106,35 @@ impl TareBuilder {
     pub fn add_implausible(&mut self) -> Option<Refusal> {
         self.implausible = self.implausible.saturating_add(1);
         (self.implausible >= self.wanted).then_some(Refusal::MarkersImplausible)
+    }
+
+    /// Takes notice of a frame in which something touches the film. Says so once there were as many
+    /// as good ones are wanted.
+    pub fn add_touched(&mut self) -> Option<Refusal> {
+        self.touched = self.touched.saturating_add(1);
+        (self.touched >= self.wanted).then_some(Refusal::Touched)
+    }
+
+    /// Whether frames are taken in which something touches the film.
+    pub fn insists(&self) -> bool {
+        self.insists
+    }
+
+    /// Whether something touched the film in a frame.
+    pub fn saw_touch(&self) -> bool {
+        self.touched > 0
+    }
+
+    /// The largest standard deviation of a marker's coordinate over the frames that were taken, to
+    /// 1/256 px.
+    pub fn spread(&self) -> Px {
+        let frames = i64::from(self.taken.max(1));
+        let variance = |(sum, square): (&i64, &i64)| square * frames - sum * sum;
+        let sums = self.differences.iter().zip(&self.squares);
+        let largest = sums.map(variance).max().unwrap_or(0);
+        // Below 2⁴² · 2¹⁶; a frame's fractional bits are half of the sixteen.
+        let scaled = rounded_root((largest.max(0) as u64) << 16) as i64;
+        Px((scaled / frames) as i32)
     }
 
     /// How many good frames are still wanted.
@@ -121,7 +170,7 @@ impl TareBuilder {
 
     fn judge(&self, geometry: &Geometry) -> Result<Rest, Refusal> {
         let rest = self.mean();
-        if !self.is_steady() {
+        if !self.insists && !self.is_steady() {
             Err(Refusal::Unsteady)
         } else if !rest.fits(geometry) {
             Err(Refusal::NotAtRest)
@@ -156,7 +205,6 @@ impl TareBuilder {
 mod tests {
     use super::*;
     use hivtac_terms::geometry::Preset;
-    use hivtac_terms::units::Px;
 
     const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
 
@@ -242,6 +290,40 @@ mod tests {
         assert_eq!(tare_of(jumping(400.0)), Err(Refusal::Unsteady));
         let drifting = (0..256).map(|i| i * 260);
         assert_eq!(tare_of(drifting), Err(Refusal::Unsteady), "1 px in all");
+    }
+
+    /// Of a square wave of 0.2 px, and of one that jumps by more than is steady.
+    #[test]
+    fn the_spread_is_the_standard_deviation_and_who_insists_has_it_taken() {
+        let spread = |jump: f64, insists: bool| {
+            let mut builder = TareBuilder::new(64).unwrap();
+            if insists {
+                builder = builder.insisting();
+            }
+            let mut outcome = None;
+            for nth in 0..64 {
+                let (markers, features) = frame((jump * 65_536.0) as i32 * (nth % 2), 100);
+                outcome = builder.add(&markers, &features, &GEOMETRY);
+            }
+            (
+                builder.spread().0,
+                outcome.unwrap().map(|rest| left_of(&rest)),
+            )
+        };
+        let (small, taken) = spread(0.2, false);
+        assert!((small - 6_554).abs() <= 256, "{small}: 0.1 px");
+        assert!(taken.is_ok());
+        let (large, refused) = spread(4.0, false);
+        assert_eq!((large, refused), (2 << 16, Err(Refusal::Unsteady)));
+        assert_eq!(spread(4.0, true), (2 << 16, Ok(2 << 16)));
+    }
+
+    #[test]
+    fn as_many_touched_frames_as_good_ones_are_wanted_end_it() {
+        let mut builder = TareBuilder::new(2).unwrap();
+        assert_eq!(builder.add_touched(), None);
+        assert!(builder.saw_touch());
+        assert_eq!(builder.add_touched(), Some(Refusal::Touched));
     }
 
     #[test]

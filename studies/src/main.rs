@@ -15,6 +15,7 @@ mod peers;
 mod press;
 mod refused;
 mod scene;
+mod slip;
 mod tangential;
 mod tips;
 mod touches;
@@ -61,6 +62,9 @@ enum Command {
     /// Look at the simulated sensor: frames, its film, what each of its effects does.
     #[command(subcommand)]
     Scene(scene::SceneCommand),
+    /// Press, drag, release, grasp and catch, and count what contact and slip miss, invent, and how
+    /// late they come.
+    Slip(slip::Slip),
     /// Press with a tangential force to 0.8 of the normal one.
     Tangential(tangential::Tangential),
     /// Press with tips of other sizes than the model believes in.
@@ -90,6 +94,7 @@ fn main() -> Result<()> {
         Command::Peers(study) => study.run(),
         Command::Refused(study) => study.run(),
         Command::Scene(command) => command.run(),
+        Command::Slip(study) => study.run(),
         Command::Tangential(study) => study.run(),
         Command::Tips(study) => study.run(),
         Command::Touches(study) => study.run(),

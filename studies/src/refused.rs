@@ -66,8 +66,8 @@ struct Row {
     frames: u32,
     /// With a force.
     kept: u32,
-    /// Of these, with reconstructed markers.
-    reconstructed: u32,
+    /// Of these, by the second look.
+    second_look: u32,
     /// With a marker more than 0.3 px off.
     wrong_px: u32,
     /// With a force off by more than three stated standard uncertainties.
@@ -222,7 +222,7 @@ impl Refused {
             return page::print_rows(&rows);
         }
         let mut text = String::from(
-            "| frames with | kept | of these reconstructed | marker, rms | worst | farther than \
+            "| frames with | kept | of these by the second look | marker, rms | worst | farther than \
              0.3 px | beyond 3 σ: direction, \\|F\\| or place | wrong force | refused by \
              |\n|---|--:|--:|--:|--:|--:|--:|--:|---|\n",
         );
@@ -272,8 +272,8 @@ impl Row {
             return Ok(());
         };
         self.kept += 1;
-        let reconstructed = answer.status.contains(Status::MARKERS_RECONSTRUCTED);
-        self.reconstructed += u32::from(reconstructed);
+        let second_look = answer.status.contains(Status::FRAME_DISTURBED);
+        self.second_look += u32::from(second_look);
         let off_px = answer.off_px.unwrap_or([[f64::INFINITY; 2]; 4]);
         let far_px = off_px
             .iter()
@@ -297,7 +297,7 @@ impl Row {
     fn and(mut self, other: Row) -> Row {
         self.frames += other.frames;
         self.kept += other.kept;
-        self.reconstructed += other.reconstructed;
+        self.second_look += other.second_look;
         self.wrong_px += other.wrong_px;
         self.beyond_three_sigmas += other.beyond_three_sigmas;
         self.wrong_force += other.wrong_force;
@@ -330,7 +330,7 @@ impl Row {
             self.case,
             percent(self.kept),
             self.frames,
-            percent(self.reconstructed),
+            percent(self.second_look),
             self.wrong_px,
             self.beyond_three_sigmas,
             self.wrong_force,

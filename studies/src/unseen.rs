@@ -141,20 +141,19 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
 impl Cell {
     fn take(&mut self, forward: &Forward<'_>, truth: &Contact<'_>, off_px: f64, found: &Estimate) {
         let errors = errors(forward, &found.pose, truth.pose());
-        let refused = !found.is_explained() || found.pose.size >= forward.limits.size;
-        let matters = found
-            .sigma(&forward.stiffness, forward.own.stiffness)
-            .is_none_or(|sigma| {
-                let stated = [
-                    f64::from(sigma.direction).to_degrees(),
-                    1e3 * f64::from(sigma.magnitude_n),
-                    f64::from(sigma.place_mm),
-                ];
-                errors
-                    .iter()
-                    .zip(stated)
-                    .any(|(error, sigma)| *error > SIGMAS * sigma)
-            });
+        let unit = forward.own.at(&found.pose, &forward.limits);
+        let refused = !found.is_explained(&unit) || found.pose.size >= forward.limits.size;
+        let matters = found.sigma(&forward.stiffness, &unit).is_none_or(|sigma| {
+            let stated = [
+                f64::from(sigma.direction).to_degrees(),
+                1e3 * f64::from(sigma.magnitude_n),
+                f64::from(sigma.place_mm),
+            ];
+            errors
+                .iter()
+                .zip(stated)
+                .any(|(error, sigma)| *error > SIGMAS * sigma)
+        });
         self.matter += u32::from(matters);
         self.refused += u32::from(matters && refused);
         if !refused {

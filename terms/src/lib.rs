@@ -14,6 +14,7 @@ pub mod geometry;
 pub mod hsv;
 pub mod marker;
 pub mod status;
+pub mod temporal;
 pub mod threshold;
 pub mod units;
 

@@ -54,9 +54,9 @@ bits! {
     /// The model was made for another frame size, format, threshold or centroid estimator: no
     /// force.
     MODEL_MISMATCH = 15, "model_mismatch";
-    /// Something touches the film: |F| is at least 2 mN and three times its standard uncertainty.
+    /// Something touches the film ([`ContactLimits`](crate::temporal::ContactLimits)).
     CONTACT = 16, "contact";
-    /// The contact slips. Reserved: not set by protocol version 2.
+    /// What touches the film slips ([`SlipLimits`](crate::temporal::SlipLimits)).
     SLIP = 17, "slip";
     /// The direction lies outside the range that the model was calibrated for: too much force along
     /// the film for the force into it.
@@ -65,9 +65,11 @@ bits! {
     PLACE_OUT_OF_RANGE = 19, "place_out_of_range";
     /// No single contact fits the positions of the four markers: no force.
     UNEXPLAINED = 20, "unexplained";
-    /// The frame is disturbed: the markers' places were reconstructed from what is left of their
-    /// edges, and the standard uncertainties are larger.
-    MARKERS_RECONSTRUCTED = 21, "markers_reconstructed";
+    /// Re-zeroing moved the rest position from where it was taken.
+    REZEROED = 21, "rezeroed";
+    /// The frame has specks or little light: its markers were found by a second look, and the
+    /// standard uncertainties are larger.
+    FRAME_DISTURBED = 22, "frame_disturbed";
 }
 
 impl Status {

@@ -94,3 +94,27 @@ pub struct UnsignedMicroNewtons(pub u32);
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct UnsignedMilliDegrees(pub u32);
+
+/// A time, in thousandths of a second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Milliseconds(pub u32);
+
+/// A ratio, in thousandths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Permille(pub u16);
+
+/// A distance in a picture, in thousandths of a pixel: of settings, which people write.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct MilliPx(pub u16);

@@ -154,7 +154,8 @@ pub struct ToolOutput {
     pub err: String,
 }
 
-/// Runs the host tool (`HIVTAC_TOOL`) on a rig's port until it ends. It waits up to 40 s for an
+/// Runs a command of the host tool (`HIVTAC_TOOL`), such as `threshold auto`, on a rig's port until
+/// it ends. It waits up to 40 s for an
 /// answer: the emulated board boots slower than a real one.
 ///
 /// # Errors
@@ -164,7 +165,8 @@ pub fn tool(rig: &Rig, command: &str, options: &[&str]) -> Result<ToolOutput> {
     let output = Command::new("timeout")
         .arg(std::format!("{seconds}"))
         .arg(artifact::named_by("HIVTAC_TOOL"))
-        .args([command, "--port", rig.port(), "--timeout", "40"])
+        .args(command.split(' '))
+        .args(["--port", rig.port(), "--timeout", "40"])
         .args(options)
         .stdin(Stdio::null())
         .output()

@@ -268,7 +268,7 @@ impl TaredSensor {
         };
         sensor.begin_frame();
         let mut measurement = push(sensor);
-        while sensor.look_again() {
+        if sensor.look_again() {
             measurement = push(sensor);
         }
         measurement

@@ -102,7 +102,7 @@ fn another_camera_is_named() {
 fn a_register_that_the_camera_forgot_is_named() {
     let words = ["register 03 holds 00, 40 was written"];
     ends_wrong(
-        &["--scene", "rest", "--fault", "camera-forgets@100"],
+        &["--scene", "rest", "--fault", "camera-forgets@150"],
         "camera",
         &words,
     );

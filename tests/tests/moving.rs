@@ -1,6 +1,6 @@
 //! Forces that change under a rolling shutter: what moving the markers to one common time is worth.
 //!
-//! `cargo test --release -p hivtac-tests --test moving -- --nocapture` prints the table of
+//! `cargo test --release -p hivtac-tests moving:: -- --nocapture` prints the table of
 //! `docs/firmware.md`.
 
 use std::fs;

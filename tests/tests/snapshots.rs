@@ -73,6 +73,48 @@ fn focus_finds_the_nominal_sensor_right() {
     assert_eq!(checks.len(), 23, "{checks:?}");
 }
 
+/// A threshold with which no marker is seen: `threshold auto` finds one with which the device has
+/// forces again.
+#[test]
+fn a_wrong_threshold_is_mended() {
+    let rig = Rig::start(&["--scene", "static", "--seed", "5"]).unwrap();
+    let run = |command, options: &[&str]| {
+        let output = tool(&rig, command, options).unwrap();
+        assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+        output.out
+    };
+    let forces = || {
+        let lines = run("monitor", &["--json", "--frames", "8"]);
+        let lines = json_lines(&lines).unwrap();
+        lines
+            .iter()
+            .filter(|line| line["force"].is_object())
+            .count()
+    };
+    run("threshold", &["--hsv", "80,100,100,255,45,255"]);
+    assert_eq!(forces(), 0, "with a threshold for cyan dots");
+    let told = json_lines(&run("threshold auto", &["--json"]))
+        .unwrap()
+        .remove(0);
+    assert_eq!(
+        (&told["is_of_model"], &told["set"]),
+        (&true.into(), &true.into()),
+        "{told}"
+    );
+    let level = |name: &str, which: &str| told[name][which].as_u64().unwrap();
+    let half_way = told["half_way"]["saturation_low"].as_u64().unwrap();
+    assert!(
+        level("film", "high") < half_way && half_way < level("dots", "low"),
+        "{told}"
+    );
+    assert!(
+        (0.005..0.015).contains(&told["passed"].as_f64().unwrap()),
+        "{told}"
+    );
+    assert!(forces() >= 6, "forces are back");
+    rig.finish().unwrap();
+}
+
 /// A camera that sends nothing: the tool says so, and nothing is written.
 #[test]
 fn without_a_camera_it_says_why() {

@@ -43,7 +43,7 @@ fn answer(model: &Model<'_>, markers: &[Marker; 4], guess: [i32; 5]) -> (Force, 
     };
     let resting = Resting::of_model(model, &model.rest).unwrap();
     let forward = model.forward.as_ref().unwrap();
-    resting.force(forward, &model.range, markers, &output)
+    resting.force(forward, &model.range, (markers, Px(0)), &output)
 }
 
 /// From guesses that are a millimetre and a fifth of the force off, and from the middle of the
@@ -138,7 +138,7 @@ fn a_bad_guess_takes_more_steps() {
                 place,
                 input_saturated: false,
             };
-            resting.estimate(forward, markers, &output).looks
+            resting.estimate(forward, (markers, Px(0)), &output).looks
         };
         assert_eq!(looks(&markers, [1_500, -2_000]), 1 + steps);
         assert!((3..=7).contains(&looks(&markers, [0, 0])));
@@ -224,9 +224,10 @@ fn damaged_sections_do_no_harm() {
     let mut read = 0;
     for _ in 0..4_000 {
         let mut damaged = section.to_vec();
-        // Half of the damage in what is not a table's steps.
-        let at = match random.next() % 2 {
-            0 => random.next() as usize % 700,
+        // Half of the damage in what is neither a table's steps nor the systematic uncertainty's.
+        let at = match random.next() % 4 {
+            0 => random.next() as usize % 148,
+            1 => 3_388 + random.next() as usize % 560,
             _ => random.next() as usize % damaged.len(),
         };
         damaged[at] ^= 1 << (random.next() % 8);
@@ -241,10 +242,44 @@ fn damaged_sections_do_no_harm() {
                 let beside = [[0.2, -0.1]; 4];
                 let moved = forward.tables.predict(&pose, &forward.limits, &beside);
                 assert!(moved.moved.iter().all(|part| part.is_finite()));
+                let unit = forward.own.at(&pose, &forward.limits);
+                let parts = [unit.across_n, unit.size, unit.place_mm, unit.residual];
+                assert!(parts.iter().all(|part| (0.0..=65_536.0).contains(part)));
             }
             Err(ModelError::Field { .. } | ModelError::TooShort { .. }) => {}
             Err(error) => panic!("{error}"),
         }
     }
     assert!(read > 1_000);
+}
+
+/// What is not known of the unit has an end and steps that are numbers.
+#[test]
+fn a_systematic_uncertainty_of_no_size_is_refused() {
+    let file = models::anywhere(1);
+    let section = &file[FORWARD_OFFSET..file.len() - 4];
+    let field = |at: usize, value: f32| {
+        let mut changed = section.to_vec();
+        changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        Forward::parse(&changed).err()
+    };
+    // The end of its places, and the four steps.
+    assert_eq!(field(128, 5.0), None);
+    assert_eq!(field(144, 1.0), None);
+    for (at, value) in [
+        (128, 0.0),
+        (128, f32::NAN),
+        (128, 1e3),
+        (132, -1e-3),
+        (136, f32::INFINITY),
+        (140, 1.5),
+        (144, f32::NAN),
+    ] {
+        let refused = field(at, value);
+        let name = "systematic uncertainty";
+        assert!(
+            matches!(refused, Some(ModelError::Field { name: of, offset: 128, .. }) if of == name),
+            "{at} {value}: {refused:?}"
+        );
+    }
 }

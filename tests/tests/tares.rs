@@ -217,13 +217,13 @@ fn a_film_that_moves_or_is_pressed_is_refused() {
     let clean = scene(&Options::default(), 7);
     let pressed = |newton: fn(u64) -> f64| {
         let load = move |number| Load::from_angles(newton(number), 0.0, 0.0).unwrap();
-        (0..u64::from(FRAMES)).map(move |number| (load(number), number))
+        (0..2 * u64::from(FRAMES)).map(move |number| (load(number), number))
     };
     let mut tare = |newton: fn(u64) -> f64| {
         let frames = pressed(newton).map(|(load, number)| clean.render_load(&load, number));
         sensor.tare(FRAMES, frames.map(Result::unwrap)).unwrap()
     };
-    assert_eq!(tare(|n| 0.002 * (n % 4) as f64), Err(Refusal::Unsteady));
+    assert_eq!(tare(|n| 0.002 * (n % 4) as f64), Err(Refusal::Touched));
     assert_eq!(tare(|_| 0.2), Err(Refusal::NotAtRest));
     assert!(tare(|_| 0.0).is_ok());
 }

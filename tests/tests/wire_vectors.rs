@@ -6,13 +6,15 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, MilliDegrees, MilliPx, Milliseconds, Px, SignedMicrometres,
+    UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
+use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
@@ -51,9 +53,26 @@ fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
 }
 
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
+/// Usual limits with a low-pass and re-zeroing.
+const OWN: TemporalSettings = TemporalSettings {
+    filter: Filter::LowPass {
+        time_constant: Milliseconds(20),
+    },
+    rezero: Some(Rezero {
+        after: Milliseconds(10_000),
+        rate: MilliPx(5),
+        total: MilliPx(100),
+    }),
+    ..TemporalSettings::USUAL
+};
 const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });
 
-fn hello(model: Option<ModelIdentity>, threshold: Threshold, name: &str) -> DeviceMessage {
+fn hello(
+    model: Option<ModelIdentity>,
+    threshold: Threshold,
+    name: &str,
+    filter: Filter,
+) -> DeviceMessage {
     DeviceMessage::Hello(DeviceHello {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
@@ -68,6 +87,7 @@ fn hello(model: Option<ModelIdentity>, threshold: Threshold, name: &str) -> Devi
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: name.try_into().unwrap(),
+        filter,
     })
 }
 
@@ -77,6 +97,7 @@ fn model(threshold: Threshold) -> ModelIdentity {
         name: "11-64-64-3 ov7725".try_into().unwrap(),
         simulated: true,
         threshold,
+        source: ModelSource::Kept,
     }
 }
 
@@ -230,6 +251,7 @@ const NAME_AND_TARE: Selection = Selection {
     name: true,
     threshold: false,
     tare: true,
+    temporal: true,
 };
 
 fn settings() -> DeviceMessage {
@@ -241,21 +263,59 @@ fn settings() -> DeviceMessage {
         found: Found::Settings,
         erases: 3,
         failures: 0,
+        temporal: OWN,
+        rezeroed: Px(1_311),
+        drift: Some(Px(20_316)),
+    })
+}
+
+fn health() -> DeviceMessage {
+    DeviceMessage::Health(Health {
+        reset: ResetReason::Watchdog,
+        temperature_centidegrees: Some(4_150),
+        stack_used: 6_120,
+        stack_bytes: 24_576,
+        problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit(),
+    })
+}
+
+fn tared() -> DeviceMessage {
+    DeviceMessage::Tared(TareReport {
+        rest: rest(),
+        spread: Px(789),
+        moved: Some(Px(20_316)),
     })
 }
 
 fn device_messages() -> BTreeMap<String, DeviceMessage> {
     let out_of_range = Status::MAGNITUDE_OUT_OF_RANGE | Status::DIRECTION_OUT_OF_RANGE;
     [
-        ("device-hello", hello(Some(model(RED)), RED, "thumb")),
+        (
+            "device-hello",
+            hello(Some(model(RED)), RED, "thumb", OWN.filter),
+        ),
         (
             "device-hello-yuv422",
-            hello(Some(model(RED_CR)), RED_CR, "thumb"),
+            hello(Some(model(RED_CR)), RED_CR, "thumb", Filter::None),
         ),
-        ("device-hello-without-model", hello(None, RED, "")),
+        (
+            "device-hello-without-model",
+            hello(None, RED, "", Filter::None),
+        ),
         (
             "sample-force",
             sample(Status::NOT_CALIBRATED | Status::CONTACT, Some(PLACE)),
+        ),
+        (
+            "sample-slip",
+            sample(
+                Status::NOT_CALIBRATED | Status::CONTACT | Status::SLIP,
+                Some(PLACE),
+            ),
+        ),
+        (
+            "sample-rezeroed",
+            sample(Status::CONTACT | Status::REZEROED, Some(PLACE)),
         ),
         (
             "sample-without-place",
@@ -289,13 +349,29 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("reply-no-camera", reply(10, Outcome::NoCamera)),
         ("inspection", inspection()),
         ("settings", settings()),
+        ("tared", tared()),
+        ("health", health()),
+        ("reply-touched", reply(7, Outcome::Touched)),
         ("reply-worn", reply(14, Outcome::Worn)),
+        ("reply-model-unusable", reply(18, Outcome::ModelUnusable)),
+        ("reply-another-sensor", reply(18, Outcome::AnotherSensor)),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
 }
 
+fn model_part() -> ModelPart {
+    ModelPart {
+        offset: 57_972,
+        bytes: [0x0D, 0xF0, 0xFE, 0xCA].as_slice().try_into().unwrap(),
+    }
+}
+
 fn host_messages() -> BTreeMap<String, HostMessage> {
+    let median = TemporalSettings {
+        filter: Filter::MedianOfThree,
+        ..TemporalSettings::USUAL
+    };
     let command = |id, request| HostMessage::Command(Command { id, request });
     [
         ("host-hello", HostMessage::Hello(HelloPrefix::OURS.into())),
@@ -326,7 +402,30 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
         ),
         ("set-tare", command(13, Request::SetTare(Some(rest())))),
         ("forget-tare", command(13, Request::SetTare(None))),
+        ("set-temporal", command(15, Request::SetTemporal(OWN))),
+        (
+            "set-temporal-usual",
+            command(15, Request::SetTemporal(TemporalSettings::USUAL)),
+        ),
+        (
+            "set-temporal-median",
+            command(15, Request::SetTemporal(median)),
+        ),
         ("keep", command(14, Request::Keep(NAME_AND_TARE))),
+        (
+            "begin-model",
+            command(16, Request::BeginModel { bytes: 57_976 }),
+        ),
+        ("model-part", command(17, Request::ModelPart(model_part()))),
+        ("use-model", command(18, Request::UseModel)),
+        ("use-built-in-model", command(19, Request::UseBuiltInModel)),
+        ("reset", command(20, Request::Reset)),
+        ("get-health", command(21, Request::GetHealth)),
+        ("start-loader", command(22, Request::StartLoader)),
+        (
+            "tare-anyway",
+            command(7, Request::TareAnyway { frames: 128 }),
+        ),
     ]
     .map(|(name, message)| (name.to_owned(), message))
     .into()
@@ -378,7 +477,7 @@ fn every_kind_of_message_has_a_vector() {
     let devices = device_messages();
     let kinds: Vec<_> = devices.values().map(std::mem::discriminant).collect();
     let distinct: std::collections::HashSet<_> = kinds.into_iter().collect();
-    assert_eq!(distinct.len(), 9);
+    assert_eq!(distinct.len(), 11);
     let hosts = host_messages();
     let requests: std::collections::HashSet<_> = hosts
         .values()
@@ -387,7 +486,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 13);
+    assert_eq!(requests.len(), 22);
 }
 
 /// Of an earlier version and of a later one: both sides read who speaks, and nothing else.

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x1CF97246EA8E3AD1
+SCHEMA = 0xBE1B83752B1982C6
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -115,12 +115,33 @@ REST = [
 ]
 
 
+NO_FILTER = [raw("filter: None", [0])]
+LOW_PASS = [raw("filter: LowPass", [1]), unsigned("time_constant_ms", 20)]
+LIMITS = [
+    unsigned("contact: begins_un", 2_000),
+    unsigned("ends_un", 1_000),
+    unsigned("slip: distance_um", 60),
+    unsigned("within_ms", 50),
+    unsigned("ratio_permille", 100),
+]
+REZERO = [
+    raw("rezero: Some", [1]),
+    unsigned("after_ms", 10_000),
+    unsigned("rate_mpx_per_s", 5),
+    unsigned("total_mpx", 100),
+]
+NO_REZERO = [raw("rezero: None", [0])]
+USUAL = LIMITS + NO_FILTER + NO_REZERO
+OWN = LIMITS + LOW_PASS + REZERO
+
+
 MODEL = [
     raw("model: Some", [1]),
     (varint(0xCAFEF00D), "model.crc 0xcafef00d"),
     string("model.name", "11-64-64-3 ov7725"),
     raw("model.simulated: true", [1]),
 ]
+KEPT_MODEL = [raw("model.source: Kept", [1])]
 
 
 def sample(sequence, frame_number, time_us, status, names):
@@ -184,12 +205,18 @@ STATS = [
 ]
 
 DEVICE = {
-    "device-hello": HELLO + MODEL + RED + hello_end(RED) + [string("name", "thumb")],
-    "device-hello-yuv422": HELLO + MODEL + RED_CR + hello_end(RED_CR) + [string("name", "thumb")],
+    "device-hello": HELLO + MODEL + RED + KEPT_MODEL + hello_end(RED)
+    + [string("name", "thumb")] + LOW_PASS,
+    "device-hello-yuv422": HELLO + MODEL + RED_CR + KEPT_MODEL + hello_end(RED_CR)
+    + [string("name", "thumb")] + NO_FILTER,
     "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED)
-    + [string("name", "")],
+    + [string("name", "")] + NO_FILTER,
     "sample-force": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact") + ANGLES
     + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
+    "sample-slip": sample(41, 42, 1_400_000, 0x32000, "not_calibrated, contact, slip")
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
+    "sample-rezeroed": sample(41, 42, 1_400_000, 0x210000, "contact, rezeroed")
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
     "sample-without-place": sample(41, 42, 1_400_000, 0x50010,
                                    "magnitude_out_of_range, contact, direction_out_of_range")
     + ANGLES + CARTESIAN + SIGMAS + NO_PLACE + NO_MARKERS,
@@ -254,12 +281,39 @@ DEVICE = {
         string("name", "thumb"),
         *RED,
         *REST,
-        raw("kept: name, not threshold, tare", [1, 0, 1]),
+        raw("kept: name, not threshold, tare, temporal", [1, 0, 1, 1]),
         raw("found: Settings", [1]),
         unsigned("erases", 3),
         unsigned("failures", 0),
+        *OWN,
+        signed("rezeroed_q16", 1_311),
+        raw("drift: Some", [1]),
+        signed("drift_q16", 20_316),
+    ],
+    "health": [
+        raw("Health", [10]),
+        raw("reset: Watchdog", [4]),
+        raw("temperature_centidegrees: Some", [1]),
+        signed("temperature_centidegrees", 4_150),
+        unsigned("stack_used", 6_120),
+        unsigned("stack_bytes", 24_576),
+        (varint(0x44), "problems 0x44: model_fallback, watchdog_reset"),
+    ],
+    "tared": [
+        raw("Tared", [9]),
+        *REST[1:],
+        signed("spread_q16", 789),
+        raw("moved: Some", [1]),
+        signed("moved_q16", 20_316),
     ],
     "reply-worn": [raw("Reply", [4]), unsigned("id", 14), raw("outcome: Worn", [10])],
+    "reply-model-unusable": [
+        raw("Reply", [4]), unsigned("id", 18), raw("outcome: ModelUnusable", [11]),
+    ],
+    "reply-touched": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Touched", [13])],
+    "reply-another-sensor": [
+        raw("Reply", [4]), unsigned("id", 18), raw("outcome: AnotherSensor", [12]),
+    ],
 }
 
 HOST = {
@@ -279,8 +333,23 @@ HOST = {
     "set-name": COMMAND + [unsigned("id", 12), raw("SetName", [10]), string("name", "thumb")],
     "set-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), *REST],
     "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
-    "keep": COMMAND
-    + [unsigned("id", 14), raw("Keep", [12]), raw("name, not threshold, tare", [1, 0, 1])],
+    "keep": COMMAND + [unsigned("id", 14), raw("Keep", [12])]
+    + [raw("name, not threshold, tare, temporal", [1, 0, 1, 1])],
+    "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
+    "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
+    "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
+    + [raw("filter: MedianOfThree", [2])] + NO_REZERO,
+    "begin-model": COMMAND
+    + [unsigned("id", 16), raw("BeginModel", [14]), unsigned("bytes", 57_976)],
+    "model-part": COMMAND
+    + [unsigned("id", 17), raw("ModelPart", [15]), unsigned("offset", 57_972),
+       raw("bytes: 4", [4]), raw("the file's CRC-32 0xcafef00d", [0x0D, 0xF0, 0xFE, 0xCA])],
+    "use-model": COMMAND + [unsigned("id", 18), raw("UseModel", [16])],
+    "use-built-in-model": COMMAND + [unsigned("id", 19), raw("UseBuiltInModel", [17])],
+    "tare-anyway": COMMAND + [unsigned("id", 7), raw("TareAnyway", [19]), unsigned("frames", 128)],
+    "get-health": COMMAND + [unsigned("id", 21), raw("GetHealth", [20])],
+    "start-loader": COMMAND + [unsigned("id", 22), raw("StartLoader", [21])],
+    "reset": COMMAND + [unsigned("id", 20), raw("Reset", [18])],
 }
 
 FOREIGN = {

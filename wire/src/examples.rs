@@ -1,5 +1,6 @@
 //! Messages for tests: the longest of each kind, and arbitrary ones.
 
+use crate::health::*;
 use crate::message::*;
 use crate::settings::*;
 use crate::version::SCHEMA_HASH;
@@ -8,10 +9,11 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{ContactLimits, Filter, Rezero, SlipLimits, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
+    SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
@@ -40,6 +42,7 @@ pub fn device_hello() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: String::new(),
+        filter: Filter::None,
     }
 }
 
@@ -56,11 +59,13 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
                 name: full(),
                 simulated: true,
                 threshold: RED,
+                source: ModelSource::Fallback,
             }),
             width: u16::MAX,
             height: u16::MAX,
             preset: full(),
             name: full(),
+            filter: longest_temporal().filter,
             ..device_hello()
         }),
         DeviceMessage::Sample(longest_sample()),
@@ -95,6 +100,21 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             found: Found::AnotherVersion,
             erases: u32::MAX,
             failures: u32::MAX,
+            temporal: longest_temporal(),
+            rezeroed: Px(i32::MIN),
+            drift: Some(Px(i32::MIN)),
+        }),
+        DeviceMessage::Health(Health {
+            reset: ResetReason::Other,
+            temperature_centidegrees: Some(i16::MIN),
+            stack_used: u32::MAX,
+            stack_bytes: u32::MAX,
+            problems: u32::MAX,
+        }),
+        DeviceMessage::Tared(TareReport {
+            rest: longest_rest(),
+            spread: Px(i32::MIN),
+            moved: Some(Px(i32::MIN)),
         }),
     ]
 }
@@ -138,6 +158,29 @@ pub fn longest_rest() -> RestPosition {
         markers: longest_sample().markers.unwrap(),
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
         rect_area: i64::MIN,
+    }
+}
+
+/// Temporal settings, each number as long as it can be.
+pub fn longest_temporal() -> TemporalSettings {
+    TemporalSettings {
+        contact: ContactLimits {
+            begins: UnsignedMicroNewtons(u32::MAX),
+            ends: UnsignedMicroNewtons(u32::MAX),
+        },
+        slip: SlipLimits {
+            distance: Micrometres(u32::MAX),
+            within: Milliseconds(u32::MAX),
+            ratio: Permille(u16::MAX),
+        },
+        filter: Filter::LowPass {
+            time_constant: Milliseconds(u32::MAX),
+        },
+        rezero: Some(Rezero {
+            after: Milliseconds(u32::MAX),
+            rate: MilliPx(u16::MAX),
+            total: MilliPx(u16::MAX),
+        }),
     }
 }
 
@@ -194,6 +237,18 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::SetName(full()),
         Request::SetTare(Some(longest_rest())),
         Request::Keep(Selection::ALL),
+        Request::SetTemporal(longest_temporal()),
+        Request::BeginModel { bytes: u32::MAX },
+        Request::ModelPart(ModelPart {
+            offset: u32::MAX,
+            bytes: Bytes::from_array([u8::MAX; MODEL_PART_BYTES]),
+        }),
+        Request::UseModel,
+        Request::UseBuiltInModel,
+        Request::Reset,
+        Request::TareAnyway { frames: u16::MAX },
+        Request::GetHealth,
+        Request::StartLoader,
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -220,6 +275,8 @@ pub fn any_device_message() -> impl Strategy<Value = DeviceMessage> {
         any_part().prop_map(DeviceMessage::SnapshotPart),
         any_inspection().prop_map(DeviceMessage::Inspection),
         any_report().prop_map(DeviceMessage::Settings),
+        any_tared().prop_map(DeviceMessage::Tared),
+        any_health().prop_map(DeviceMessage::Health),
     ]
 }
 
@@ -239,6 +296,15 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         any_string().prop_map(Request::SetName),
         proptest::option::of(any_rest()).prop_map(Request::SetTare),
         any_selection().prop_map(Request::Keep),
+        any_temporal().prop_map(Request::SetTemporal),
+        any::<u32>().prop_map(|bytes| Request::BeginModel { bytes }),
+        any_model_part().prop_map(Request::ModelPart),
+        Just(Request::UseModel),
+        Just(Request::UseBuiltInModel),
+        Just(Request::Reset),
+        any::<u16>().prop_map(|frames| Request::TareAnyway { frames }),
+        Just(Request::GetHealth),
+        Just(Request::StartLoader),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -257,10 +323,22 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     ];
     let seen = (any_threshold(), any::<u8>(), centroid);
     let size = any::<(u16, u16)>();
-    let model = proptest::option::of((any::<u32>(), any_string(), any::<bool>(), any_threshold()));
-    let identity = (any::<[u8; 12]>(), any_string());
+    let source = prop_oneof![
+        Just(ModelSource::BuiltIn),
+        Just(ModelSource::Kept),
+        Just(ModelSource::Fallback)
+    ];
+    let model = (
+        any::<u32>(),
+        any_string(),
+        any::<bool>(),
+        any_threshold(),
+        source,
+    );
+    let model = proptest::option::of(model);
+    let identity = (any::<[u8; 12]>(), any_string(), any_temporal());
     (identity, names, size, model, seen).prop_map(
-        |((device_id, name), (board, firmware, preset), (width, height), model, seen)| {
+        |((device_id, name, temporal), (board, firmware, preset), (width, height), model, seen)| {
             DeviceHello {
                 device_id,
                 name,
@@ -268,16 +346,18 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
                 firmware,
                 width,
                 height,
-                model: model.map(|(crc, name, simulated, threshold)| ModelIdentity {
+                model: model.map(|(crc, name, simulated, threshold, source)| ModelIdentity {
                     crc,
                     name,
                     simulated,
                     threshold,
+                    source,
                 }),
                 threshold: seen.0,
                 preset,
                 dilations: seen.1,
                 centroid: seen.2,
+                filter: temporal.filter,
                 ..device_hello()
             }
         },
@@ -375,6 +455,9 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::NotRead),
         Just(Outcome::NoCamera),
         Just(Outcome::Worn),
+        Just(Outcome::ModelUnusable),
+        Just(Outcome::AnotherSensor),
+        Just(Outcome::Touched),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -395,6 +478,14 @@ fn any_snapshot() -> impl Strategy<Value = Snapshot> {
 fn any_part() -> impl Strategy<Value = SnapshotPart> {
     let bytes = proptest::collection::vec(any::<u8>(), 0..=SNAPSHOT_PART_BYTES);
     (any::<u32>(), bytes).prop_map(|(offset, bytes)| SnapshotPart {
+        offset,
+        bytes: Bytes::from_slice(&bytes).unwrap(),
+    })
+}
+
+fn any_model_part() -> impl Strategy<Value = ModelPart> {
+    let bytes = proptest::collection::vec(any::<u8>(), 0..=MODEL_PART_BYTES);
+    (any::<u32>(), bytes).prop_map(|(offset, bytes)| ModelPart {
         offset,
         bytes: Bytes::from_slice(&bytes).unwrap(),
     })
@@ -433,26 +524,98 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         any_string(),
         any_threshold(),
         proptest::option::of(any_rest()),
+        any_temporal(),
     );
-    (used, any_selection(), found, any::<[u32; 2]>()).prop_map(
-        |((name, threshold, tare), kept, found, [erases, failures])| SettingsReport {
-            name,
-            threshold,
-            tare,
+    let numbers = any::<([u32; 2], i32, Option<i32>)>();
+    (used, any_selection(), found, numbers).prop_map(
+        |(
+            (name, threshold, tare, temporal),
             kept,
             found,
-            erases,
-            failures,
+            ([erases, failures], rezeroed, drift),
+        )| {
+            SettingsReport {
+                name,
+                threshold,
+                tare,
+                kept,
+                found,
+                erases,
+                failures,
+                temporal,
+                rezeroed: Px(rezeroed),
+                drift: drift.map(Px),
+            }
         },
     )
 }
 
+fn any_health() -> impl Strategy<Value = Health> {
+    let reset = prop_oneof![
+        Just(ResetReason::PowerOn),
+        Just(ResetReason::BrownOut),
+        Just(ResetReason::Pin),
+        Just(ResetReason::Software),
+        Just(ResetReason::Watchdog),
+        Just(ResetReason::Other)
+    ];
+    (reset, any::<(Option<i16>, u32, u32, u32)>()).prop_map(
+        |(reset, (temperature_centidegrees, stack_used, stack_bytes, problems))| Health {
+            reset,
+            temperature_centidegrees,
+            stack_used,
+            stack_bytes,
+            problems,
+        },
+    )
+}
+
+fn any_tared() -> impl Strategy<Value = TareReport> {
+    (any_rest(), any::<(i32, Option<i32>)>()).prop_map(|(rest, (spread, moved))| TareReport {
+        rest,
+        spread: Px(spread),
+        moved: moved.map(Px),
+    })
+}
+
 fn any_selection() -> impl Strategy<Value = Selection> {
-    any::<[bool; 3]>().prop_map(|[name, threshold, tare]| Selection {
+    any::<[bool; 4]>().prop_map(|[name, threshold, tare, temporal]| Selection {
         name,
         threshold,
         tare,
+        temporal,
     })
+}
+
+/// Any temporal settings.
+pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
+    let filter = prop_oneof![
+        Just(Filter::None),
+        Just(Filter::MedianOfThree),
+        any::<u32>().prop_map(|ms| Filter::LowPass {
+            time_constant: Milliseconds(ms)
+        }),
+    ];
+    let rezero = proptest::option::of(any::<(u32, u16, u16)>());
+    (any::<[u32; 4]>(), any::<u16>(), filter, rezero).prop_map(
+        |([begins, ends, distance, within], ratio, filter, rezero)| TemporalSettings {
+            contact: ContactLimits {
+                begins: UnsignedMicroNewtons(begins),
+                ends: UnsignedMicroNewtons(ends),
+            },
+            slip: SlipLimits {
+                distance: Micrometres(distance),
+                within: Milliseconds(within),
+                ratio: Permille(ratio),
+            },
+            filter,
+            rezero: rezero.map(|(after, rate, total)| Rezero {
+                after: Milliseconds(after),
+                rate: MilliPx(rate),
+                total: MilliPx(total),
+            }),
+        },
+    )
 }
 
 /// Any rest position.

@@ -18,8 +18,8 @@ pub const MAX_DEVICE_BODY: usize = 248;
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 144;
 
-/// Longest body a host sends in this protocol version: a rest position.
-pub const MAX_HOST_BODY: usize = 89;
+/// Longest body a host sends in this protocol version: a full part of a model file.
+pub const MAX_HOST_BODY: usize = 236;
 
 /// Longest frame from the device in this protocol version, closing zero included.
 pub const MAX_DEVICE_FRAME: usize = frame_length(MAX_DEVICE_BODY);

@@ -2,14 +2,15 @@
 //! a whole or not at all.
 
 use crate::settings::{Name, RestPosition};
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
 use serde::{Deserialize, Serialize};
 
 /// First byte of a record. Raised on every change of what follows.
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// Longest record.
-pub const MAX_BYTES: usize = 130;
+pub const MAX_BYTES: usize = 171;
 
 /// All that a device keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,6 +23,8 @@ pub struct Record {
     pub tare: Option<RestPosition>,
     /// The model that was sent to it; `None` for the built-in one.
     pub model: Option<KeptModel>,
+    /// How forces are followed from frame to frame.
+    pub temporal: TemporalSettings,
 }
 
 /// A model file that lies in flash.
@@ -61,7 +64,7 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::examples::{any_rest, any_threshold, longest_rest};
+    use crate::examples::{any_rest, any_temporal, any_threshold, longest_rest, longest_temporal};
     use hivtac_terms::threshold::HsvBox;
     use proptest::prelude::*;
     use std::vec::Vec;
@@ -76,6 +79,7 @@ mod tests {
                 bytes: u32::MAX,
                 crc: u32::MAX,
             }),
+            temporal: longest_temporal(),
         }
     }
 
@@ -89,7 +93,7 @@ mod tests {
 
     /// The record of a device in use must be read by every firmware with this version's number.
     #[test]
-    fn the_bytes_of_version_1() {
+    fn the_bytes_of_version_2() {
         let record = Record {
             name: Name::try_from("thumb").unwrap(),
             threshold: Some(Threshold::Rgb565(HsvBox::of_limits([
@@ -101,10 +105,11 @@ mod tests {
                 bytes: 9_216,
                 crc: 0xcafe_f00d,
             }),
+            temporal: TemporalSettings::default(),
         };
         let bytes = [
-            1, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
-            0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c,
+            2, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
+            0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c, 0xd0, 0x0f, 0xe8, 0x07, 60, 50, 100, 0, 0,
         ];
         let mut buffer = [0; MAX_BYTES];
         assert_eq!(record.to_bytes(&mut buffer), bytes);
@@ -131,12 +136,14 @@ mod tests {
             threshold in proptest::option::of(any_threshold()),
             tare in proptest::option::of(any_rest()),
             model in proptest::option::of(any::<(u8, u32, u32)>()),
+            temporal in any_temporal(),
         ) {
             let record = Record {
                 name: Name::try_from(name.as_str()).unwrap(),
                 threshold,
                 tare,
                 model: model.map(|(slot, bytes, crc)| KeptModel { slot, bytes, crc }),
+                temporal,
             };
             let mut buffer = [0; MAX_BYTES];
             prop_assert_eq!(Record::of_bytes(record.to_bytes(&mut buffer)), Ok(record));

@@ -10,6 +10,7 @@ extern crate std;
 
 pub mod decoder;
 pub mod frame;
+pub mod health;
 pub mod kept;
 pub mod message;
 pub mod settings;

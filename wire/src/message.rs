@@ -1,11 +1,13 @@
 //! Every message, both ways.
 
-use crate::settings::{Name, RestPosition, Selection, SettingsReport};
+use crate::health::Health;
+use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport};
 use heapless::{String, Vec};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::Threshold;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -35,9 +37,17 @@ pub enum DeviceMessage {
     Inspection(Inspection),
     /// Answer to [`Request::GetSettings`].
     Settings(SettingsReport),
+    /// A tare was taken; before the reply to it.
+    Tared(TareReport),
+    /// Answer to [`Request::GetHealth`].
+    Health(Health),
 }
 
 /// What the host sends.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "the device has no heap, and one message at a time"
+)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum HostMessage {
     /// First message of a host; the device answers with its own hello and does not stream before.
@@ -84,6 +94,8 @@ pub struct DeviceHello {
     pub centroid: CentroidEstimator,
     /// What its user calls it.
     pub name: Name,
+    /// What is sent in place of each frame's own force.
+    pub filter: Filter,
 }
 
 /// Which model makes the forces.
@@ -97,6 +109,20 @@ pub struct ModelIdentity {
     pub simulated: bool,
     /// The threshold that it was made for: with another one there is no force.
     pub threshold: Threshold,
+    /// Where it came from.
+    pub source: ModelSource,
+}
+
+/// Where a model in use came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum ModelSource {
+    /// It is built into the firmware.
+    BuiltIn,
+    /// A host sent it, and the device keeps it.
+    Kept,
+    /// It is built into the firmware, which uses it instead of the kept one: that one does not
+    /// read, or is none for this sensor.
+    Fallback,
 }
 
 /// One frame's result.
@@ -279,6 +305,48 @@ pub enum Request {
     SetTare(Option<RestPosition>),
     /// Keep these settings as they are in use, through restarts. Answered when they are kept.
     Keep(Selection),
+    /// Set how forces are followed from frame to frame. Answered when it holds.
+    SetTemporal(TemporalSettings),
+    /// A model file of so many bytes follows, 1 to [`MODEL_BYTES`], in [`ModelPart`]s. What was
+    /// sent of another one is forgotten.
+    BeginModel {
+        /// Bytes of the file.
+        bytes: u32,
+    },
+    /// The next bytes of the model file.
+    ModelPart(ModelPart),
+    /// Check the model that was sent, keep it, and use it from a frame on. Answered when it is in
+    /// use.
+    UseModel,
+    /// Use the built-in model from a frame on, and forget the kept one. Answered when it is in use.
+    UseBuiltInModel,
+    /// Forget all that is kept, and go on as a new device does. Answered when it is in use.
+    Reset,
+    /// As [`Request::Tare`], though something moves or touches the film.
+    TareAnyway {
+        /// How many frames to average.
+        frames: u16,
+    },
+    /// Look at everything, and send a [`Health`]. Answered behind it.
+    GetHealth,
+    /// Restart into the microcontroller's own loader, which takes new firmware. Answered before
+    /// that.
+    StartLoader,
+}
+
+/// Most bytes of a model file that is sent.
+pub const MODEL_BYTES: usize = 96 << 10;
+
+/// Most bytes of a model file in one [`ModelPart`].
+pub const MODEL_PART_BYTES: usize = 224;
+
+/// The next bytes of a model file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub struct ModelPart {
+    /// Bytes of the file before these.
+    pub offset: u32,
+    /// The bytes.
+    pub bytes: Vec<u8, MODEL_PART_BYTES>,
 }
 
 /// The answer to a command.
@@ -317,4 +385,12 @@ pub enum Outcome {
     NoCamera,
     /// The flash is worn: nothing can be kept any more. What was kept before still is.
     Worn,
+    /// Refused: what was sent is no model file that this firmware can use. A [`LogLine`] before
+    /// this says what is wrong.
+    ModelUnusable,
+    /// Refused: the model was made for another sensor, camera or frame. A [`LogLine`] before this
+    /// says which.
+    AnotherSensor,
+    /// Refused: something touches the film, as the rest position from before tells.
+    Touched,
 }

@@ -3,6 +3,7 @@
 use heapless::String;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::marker::Marker;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_terms::units::Px;
 use postcard_schema::Schema;
@@ -39,7 +40,7 @@ pub struct SettingsReport {
     pub name: Name,
     /// The threshold in use.
     pub threshold: Threshold,
-    /// The rest position in use, when one was taken.
+    /// The rest position as it was taken, when one was; re-zeroing may have moved the one in use.
     pub tare: Option<RestPosition>,
     /// Which of them will be the same after a restart.
     pub kept: Selection,
@@ -49,6 +50,26 @@ pub struct SettingsReport {
     pub erases: u32,
     /// Attempts to write that failed since the start.
     pub failures: u32,
+    /// How forces are followed from frame to frame.
+    pub temporal: TemporalSettings,
+    /// How far re-zeroing moved the rest position that is in use from `tare`: the coordinate of a
+    /// marker that it moved farthest.
+    pub rezeroed: Px,
+    /// How far the rest position in use is from the kept one, by the marker that moved most: the
+    /// drift since then. `None` unless there are both, for the same frames.
+    pub drift: Option<Px>,
+}
+
+/// What a tare gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct TareReport {
+    /// The rest position, in use from now on.
+    pub rest: RestPosition,
+    /// Largest standard deviation of a marker's coordinate over the frames.
+    pub spread: Px,
+    /// How far it is from the rest position before, by the marker that moved most; `None` when
+    /// there was none.
+    pub moved: Option<Px>,
 }
 
 /// Some of the settings.
@@ -60,6 +81,8 @@ pub struct Selection {
     pub threshold: bool,
     /// The rest position.
     pub tare: bool,
+    /// How forces are followed from frame to frame.
+    pub temporal: bool,
 }
 
 impl Selection {
@@ -68,12 +91,14 @@ impl Selection {
         name: false,
         threshold: false,
         tare: false,
+        temporal: false,
     };
     /// All of them.
     pub const ALL: Selection = Selection {
         name: true,
         threshold: true,
         tare: true,
+        temporal: true,
     };
 }
 

@@ -65,7 +65,7 @@ impl Folder {
         let gauge = append(&path.join(GAUGE), GAUGE_COLUMNS)?;
         let takes = append(&path.join(TAKES), TAKE_COLUMNS)?;
         let before = Recording::read(path)?;
-        let done = takes_done(&path.join(TAKES))?;
+        let done = done(path)?;
         Ok(Self {
             samples,
             takes,
@@ -149,10 +149,10 @@ fn pair(numbers: Option<[f64; 2]>) -> String {
 const OF_THE_MODEL: Status =
     Status(Status::MODEL_MISSING.0 | Status::MODEL_MISMATCH.0 | Status::UNEXPLAINED.0);
 
-/// The names of the bits that say that a frame is none to learn from: without markers, or with
-/// markers that are implausible or reconstructed.
+/// The names of the bits that say that a frame is none to learn from: without markers, with
+/// implausible ones, or disturbed.
 fn reasons(sample: &Sample) -> String {
-    let bad = Status::NO_FORCE.0 & !OF_THE_MODEL.0 | Status::MARKERS_RECONSTRUCTED.0;
+    let bad = Status::NO_FORCE.0 & !OF_THE_MODEL.0 | Status::FRAME_DISTURBED.0;
     let frame = Status(bad & sample.status.0);
     let names: Vec<_> = frame.names().collect();
     if names.is_empty() && sample.markers.is_none() {
@@ -389,9 +389,19 @@ fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Optio
     poses::parse(&texts.join(",")).map(Some)
 }
 
-fn takes_done(path: &Path) -> Result<Vec<Pose>> {
-    let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+/// The poses whose takes were finished in a folder; none where nothing was recorded yet.
+///
+/// # Errors
+/// When their list cannot be read, or is damaged.
+pub fn done(folder: &Path) -> Result<Vec<Pose>> {
+    let path = folder.join(TAKES);
+    let text = match fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => {
+            return Err(error).with_context(|| format!("cannot read {}", path.display()));
+        }
+    };
     let poses = rows([TAKES, &text], |record| pose(record, [1, 5]), TAKE_COLUMNS)?;
     Ok(poses.into_iter().flatten().collect())
 }
@@ -509,6 +519,7 @@ mod tests {
             dilations: 1,
             centroid: CentroidEstimator::RednessWeighted,
             name: Default::default(),
+            filter: Default::default(),
         };
         let yuv422 = conditions_of(&hello).unwrap();
         assert_eq!(yuv422.pixel_format, PixelFormat::Yuv422);

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -40,6 +40,8 @@ pub struct GaugePort {
     thread: Option<JoinHandle<Result<()>>>,
     end: Arc<AtomicBool>,
     readings: Arc<AtomicUsize>,
+    /// The newest, the bits of an `f64` in N.
+    newest: Arc<AtomicU64>,
 }
 
 impl GaugePort {
@@ -66,6 +68,7 @@ impl GaugePort {
                 )
             })?;
         let (end, readings) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
+        let newest = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
         let listener = Listener {
             port,
             name: name.clone(),
@@ -75,12 +78,14 @@ impl GaugePort {
             begun,
             end: end.clone(),
             readings: readings.clone(),
+            newest: newest.clone(),
         };
         let thread = std::thread::spawn(move || listener.run());
         Ok(Some(Self {
             thread: Some(thread),
             end,
             readings,
+            newest,
         }))
     }
 
@@ -93,6 +98,12 @@ impl GaugePort {
             self.finish()?;
         }
         Ok(self.readings.load(Ordering::Relaxed))
+    }
+
+    /// What it shows, N, where it names no unit in N; nothing before its first reading.
+    pub fn newest_n(&self) -> Option<f64> {
+        let newest = f64::from_bits(self.newest.load(Ordering::Relaxed));
+        (!newest.is_nan()).then_some(newest)
     }
 
     /// Stops listening.
@@ -118,6 +129,7 @@ struct Listener {
     begun: Instant,
     end: Arc<AtomicBool>,
     readings: Arc<AtomicUsize>,
+    newest: Arc<AtomicU64>,
 }
 
 impl Listener {
@@ -163,8 +175,9 @@ impl Listener {
             let text = String::from_utf8_lossy(line).into_owned();
             line.clear();
             keep_gauge_line(&mut self.file, self.run, host_s, &text)?;
-            if reading(&text, Unit::NEWTON).is_ok() {
+            if let Ok(force_n) = reading(&text, Unit::NEWTON) {
                 self.readings.fetch_add(1, Ordering::Relaxed);
+                self.newest.store(force_n.to_bits(), Ordering::Relaxed);
             }
         }
         Ok(())

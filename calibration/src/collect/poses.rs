@@ -84,14 +84,42 @@ pub fn parse(text: &str) -> Result<Pose> {
     })
 }
 
-/// The poses of a list that are left after some were done; one that is listed twice is done twice.
-pub fn left(list: &[Pose], done: &[Pose]) -> Vec<Pose> {
+/// What a person is asked for: a pose, and a force in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Task {
+    /// The pose.
+    pub pose: Pose,
+    /// How to set it, and that Enter goes on.
+    pub set: String,
+    /// How to press, while it is recorded.
+    pub press: String,
+    /// Length of the take, s of the sensor's clock.
+    pub seconds: f64,
+    /// A take in which the sensor feels nothing is taken again.
+    pub must_be_felt: bool,
+}
+
+impl Task {
+    /// A pose in which forces go up and down for so many seconds.
+    pub fn any_force(pose: Pose, seconds: f64) -> Task {
+        Task {
+            pose,
+            set: format!("Set {pose}, and press Enter (`done` to end)."),
+            press: "press and release, in no even rhythm".to_owned(),
+            seconds,
+            must_be_felt: false,
+        }
+    }
+}
+
+/// What is left of a list after some poses were done; a pose that is listed twice is done twice.
+pub fn left<T: Clone>(list: &[T], done: &[Pose], pose: impl Fn(&T) -> Pose) -> Vec<T> {
     let mut done = done.to_vec();
     let mut left = Vec::new();
-    for pose in list {
-        match done.iter().position(|d| d == pose) {
+    for it in list {
+        match done.iter().position(|d| *d == pose(it)) {
             Some(place) => drop(done.swap_remove(place)),
-            None => left.push(*pose),
+            None => left.push(it.clone()),
         }
     }
     left
@@ -183,9 +211,10 @@ mod tests {
     fn what_was_done_is_left_out_once() {
         let [rest, other] = [Pose::default(), pose([1.0, 0.0, 0.0, 0.0])];
         let list = [rest, other, rest];
-        assert_eq!(left(&list, &[]), list);
-        assert_eq!(left(&list, &[rest]), [other, rest]);
-        assert_eq!(left(&list, &[rest, rest]), [other]);
-        assert_eq!(left(&list, &[pose([0.0, 0.0, 1.0, 0.0])]), list);
+        let left = |done: &[Pose]| left(&list, done, |pose| *pose);
+        assert_eq!(left(&[]), list);
+        assert_eq!(left(&[rest]), [other, rest]);
+        assert_eq!(left(&[rest, rest]), [other]);
+        assert_eq!(left(&[pose([0.0, 0.0, 1.0, 0.0])]), list);
     }
 }

@@ -1,5 +1,6 @@
 //! Recording: the sensor's samples, the gauge's lines and the poses, into a folder.
 
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use hivtac_wire::message::{DeviceMessage, Request, Sample};
 
 use super::folder::{Folder, conditions_of};
 use super::gauge_port::{GaugeArgs, GaugePort};
-use super::poses::{self, Person, Pose};
+use super::poses::{self, Person, Pose, Task};
 
 /// Options of `collect record`.
 #[derive(Debug, clap::Args)]
@@ -37,11 +38,16 @@ pub struct RecordArgs {
     /// Length of the take of the untouched film that begins every run, s.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub rest_seconds: f64,
+    /// The gauge at a serial port.
     #[command(flatten)]
     pub gauge: GaugeArgs,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+/// A number of seconds of a command line.
+///
+/// # Errors
+/// When it is none, or beyond what makes sense.
+pub fn seconds(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(seconds) if seconds > 0.0 && seconds <= 36_000.0 => Ok(seconds),
         _ => Err("a number of seconds above 0 is needed, up to 36000".to_owned()),
@@ -50,6 +56,12 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 /// Fewer frames of the untouched film are no rest position.
 const FEWEST_AT_REST: usize = 8;
+
+/// A load of which the sensor feels less was none, N: with a model of another unit it feels half to
+/// twice of what there is.
+const LEAST_FELT_N: f64 = 0.005;
+/// Time between two lines of live numbers.
+const SHOW_EVERY: Duration = Duration::from_millis(200);
 
 /// Frames of the sensor's own rest position, and what they may take beyond its usual patience.
 const TARE_FRAMES: u16 = 64;
@@ -60,8 +72,23 @@ const TARE_PATIENCE: Duration = Duration::from_secs(30);
 /// # Errors
 /// When sensor, gauge or folder fail. What was recorded until then stays.
 pub fn record(args: &RecordArgs) -> Result<()> {
-    stop::install()?;
     let list = args.poses.as_deref().map(poses::load).transpose()?;
+    let tasks = list.map(|list| {
+        let tasks = list.into_iter();
+        tasks
+            .map(|pose| Task::any_force(pose, args.seconds))
+            .collect()
+    });
+    record_tasks(args, tasks)
+}
+
+/// Records these tasks but those that were done; without any, poses that are typed. `args.poses`
+/// is not looked at.
+///
+/// # Errors
+/// When sensor, gauge or folder fail. What was recorded until then stays.
+pub fn record_tasks(args: &RecordArgs, tasks: Option<Vec<Task>>) -> Result<()> {
+    stop::install()?;
     let patience = Duration::from_secs_f64(args.timeout);
     let address = args.port.as_deref().map_or(Address::Find, Address::parse);
     let (link, hello) = Link::connect(&address, patience)?;
@@ -75,8 +102,9 @@ pub fn record(args: &RecordArgs) -> Result<()> {
         gauge,
         begun,
         person: Person::at_the_terminal(),
+        shown: begun,
     };
-    let result = recorder.run(args, list.as_deref());
+    let result = recorder.run(args, tasks.as_deref());
     let gauge = recorder.gauge.as_mut().map_or(Ok(()), GaugePort::finish);
     if let Err(error) = result {
         return Err(error.context(format!(
@@ -94,6 +122,8 @@ struct Recorder {
     gauge: Option<GaugePort>,
     begun: Instant,
     person: Person,
+    /// When live numbers were last shown.
+    shown: Instant,
 }
 
 /// What a take gave.
@@ -105,16 +135,19 @@ struct Take {
     first_us: Option<u64>,
     last_us: u64,
     last_sequence: Option<u32>,
+    /// The largest |F| that the sensor felt, N; nothing without a force.
+    felt_n: Option<f64>,
 }
 
 impl Recorder {
-    fn run(&mut self, args: &RecordArgs, list: Option<&[Pose]>) -> Result<()> {
+    fn run(&mut self, args: &RecordArgs, list: Option<&[Task]>) -> Result<()> {
         let question = "Nothing may touch the film, and the gauge shows zero: press Enter.";
         if self.person.ask(question)?.is_none() {
             bail!("standard input has ended: nothing was recorded");
         }
         self.tare()?;
         let rest = self.take(None, args.rest_seconds)?;
+        self.folder.take_done(None, rest.samples, rest.lost)?;
         ensure!(
             rest.good >= FEWEST_AT_REST,
             "{} of {} frames of the untouched film show the four markers: at least \
@@ -122,12 +155,20 @@ impl Recorder {
             rest.good,
             rest.samples
         );
-        let mut left = list.map(|list| poses::left(list, &self.folder.done));
+        let mut left = list.map(|list| poses::left(list, &self.folder.done, |task| task.pose));
         if let (Some(list), Some(left)) = (list, &left) {
             eprintln!("{} of {} poses are left.", left.len(), list.len());
         }
-        while let Some(pose) = self.next_pose(left.as_mut())? {
-            self.take(Some(pose), args.seconds)?;
+        while let Some(task) = self.next_task(left.as_mut(), args.seconds)? {
+            let take = self.take(Some(&task), task.seconds)?;
+            let is_felt = take.felt_n.is_none_or(|force_n| force_n >= LEAST_FELT_N);
+            if task.must_be_felt && !is_felt {
+                eprintln!("Nothing pressed the film: once more.");
+                left.get_or_insert_default().insert(0, task);
+                continue;
+            }
+            self.folder
+                .take_done(Some(task.pose), take.samples, take.lost)?;
         }
         Ok(())
     }
@@ -143,21 +184,20 @@ impl Recorder {
         Ok(())
     }
 
-    /// The next pose, once it is set; nothing at the end.
-    fn next_pose(&self, list: Option<&mut Vec<Pose>>) -> Result<Option<Pose>> {
+    /// The next task, once its pose is set; nothing at the end.
+    fn next_task(&self, list: Option<&mut Vec<Task>>, seconds: f64) -> Result<Option<Task>> {
         let Some(list) = list else {
-            return self.typed_pose();
+            return self.typed_task(seconds);
         };
         if list.is_empty() {
             return Ok(None);
         }
-        let pose = list.remove(0);
-        let question = format!("Set {pose}, and press Enter (`done` to end).");
-        let answer = self.person.ask(&question)?;
-        Ok(answer.filter(|text| text != "done").map(|_| pose))
+        let task = list.remove(0);
+        let answer = self.person.ask(&task.set)?;
+        Ok(answer.filter(|text| text != "done").map(|_| task))
     }
 
-    fn typed_pose(&self) -> Result<Option<Pose>> {
+    fn typed_task(&self, seconds: f64) -> Result<Option<Task>> {
         loop {
             let question = "Set a pose and type α and β in degrees, such as `4, -3`, and where the \
                             tip is not in the middle its x and y in mm, such as `4, -3, 2.5, 0` \
@@ -165,7 +205,7 @@ impl Recorder {
             match self.person.ask(question)?.as_deref() {
                 None | Some("done") => return Ok(None),
                 Some(text) => match poses::parse(text) {
-                    Ok(pose) => return Ok(Some(pose)),
+                    Ok(pose) => return Ok(Some(Task::any_force(pose, seconds))),
                     Err(error) => eprintln!("{error}"),
                 },
             }
@@ -173,11 +213,10 @@ impl Recorder {
     }
 
     /// Records for so long on the sensor's clock.
-    fn take(&mut self, pose: Option<Pose>, seconds: f64) -> Result<Take> {
-        match pose {
-            Some(_) => {
-                eprintln!("Recording for {seconds} s: press and release, in no even rhythm.")
-            }
+    fn take(&mut self, task: Option<&Task>, seconds: f64) -> Result<Take> {
+        let pose = task.map(|task| task.pose);
+        match task {
+            Some(task) => eprintln!("Recording for {seconds} s: {}.", task.press),
             None => eprintln!("Recording the untouched film for {seconds} s."),
         }
         let heard = self.gauge_readings()?;
@@ -211,7 +250,6 @@ impl Recorder {
         for message in late {
             self.keep(message, pose, &mut take)?;
         }
-        self.folder.take_done(pose, take.samples, take.lost)?;
         let heard = match (heard, self.gauge_readings()?) {
             (Some(before), Some(after)) => format!(", {} gauge readings", after - before),
             _ => String::new(),
@@ -235,12 +273,35 @@ impl Recorder {
                     .sample(host_s, pose, &sample)
                     .context("the recording")?;
                 take.count(&sample);
+                self.show(&sample);
             }
             DeviceMessage::Log(line) => eprintln!("{}", log_text(&line)),
             _ => {}
         }
         Ok(())
     }
+
+    /// Live numbers on one line of a terminal, a few times a second.
+    fn show(&mut self, sample: &Sample) {
+        let mut terminal = std::io::stderr();
+        if self.shown.elapsed() < SHOW_EVERY || !terminal.is_terminal() {
+            return;
+        }
+        self.shown = Instant::now();
+        let gauge_n = self.gauge.as_ref().and_then(GaugePort::newest_n);
+        let _ = write!(terminal, "\r{}\r", live(gauge_n, sample));
+    }
+}
+
+/// What gauge and sensor show now, each as wide as the last.
+fn live(gauge_n: Option<f64>, sample: &Sample) -> String {
+    let gauge = gauge_n.map_or(String::new(), |n| format!("gauge {:7.1} mN, ", 1e3 * n));
+    let sensor = match &sample.force {
+        Some(force) => format!("sensor about {:5.0} mN", f64::from(force.magnitude.0) / 1e3),
+        None if sample.markers.is_some() => "sensor sees four markers".to_owned(),
+        None => "sensor sees NO four markers".to_owned(),
+    };
+    format!("{:<60}", gauge + &sensor)
 }
 
 impl Take {
@@ -250,6 +311,10 @@ impl Take {
         self.good += usize::from(sample.markers.is_some() && !sample.status.contains(implausible));
         self.first_us.get_or_insert(sample.time_us);
         self.last_us = sample.time_us;
+        if let Some(force) = &sample.force {
+            let force_n = f64::from(force.magnitude.0) / 1e6;
+            self.felt_n = Some(self.felt_n.map_or(force_n, |most| most.max(force_n)));
+        }
         if let Some(last) = self.last_sequence.replace(sample.sequence) {
             self.lost += sample.sequence.wrapping_sub(last).wrapping_sub(1);
         }

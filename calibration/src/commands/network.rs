@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use hivtac_calibration::dataset::Dataset;
 use hivtac_calibration::errors::{Errors, WEAK_N};
@@ -10,6 +10,7 @@ use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::progress::bar;
 use hivtac_calibration::train::Options;
+use hivtac_calibration::unit::{GuideArgs, Known};
 use hivtac_calibration::weights::Weights;
 
 /// Options of `train`.
@@ -102,30 +103,49 @@ impl FilmArgs {
 /// Options of `unit`.
 #[derive(Args)]
 pub struct UnitArgs {
-    /// A weights file with a film (`calibration/models/default.weights`).
-    #[arg(long)]
-    weights: PathBuf,
-    /// The unit's data set: frames without force, and frames of each load, with its place
-    /// (`x_mm`, `y_mm`); without places, all in the film's middle.
-    #[arg(long)]
-    data: PathBuf,
+    #[command(flatten)]
+    guide: GuideArgs,
+    /// A weights file with a film (`calibration/models/default.weights`, which `--into` begins with
+    /// when none is named).
+    #[arg(long, required_unless_present = "into")]
+    weights: Option<PathBuf>,
+    /// Fit to this data set of the unit: frames without force, and frames of each load, with its
+    /// place (`x_mm`, `y_mm`); without places, all in the film's middle.
+    #[arg(
+        long,
+        required_unless_present = "into",
+        conflicts_with = "into",
+        requires = "out"
+    )]
+    data: Option<PathBuf>,
     /// Standard uncertainty of a load's |F|, N.
     #[arg(long, default_value_t = 0.001)]
     gauge_n: f64,
     /// Standard uncertainty of where the stage's zero is on the film, mm.
     #[arg(long, default_value_t = 0.1)]
     stage_mm: f64,
-    /// The weights file to write.
-    #[arg(long)]
-    out: PathBuf,
+    /// The weights file to write; with `--into` it is `unit.weights` there, beside the model,
+    /// `unit.hvtm`.
+    #[arg(long, requires = "data")]
+    out: Option<PathBuf>,
 }
 
 impl UnitArgs {
     pub fn run(&self) -> Result<()> {
-        let weights = Weights::load(&self.weights)?;
-        let dataset = Dataset::load(&self.data)?;
-        let (weights, fit) = weights.for_unit(&dataset, self.gauge_n, self.stage_mm)?;
+        let known = Known {
+            gauge_n: self.gauge_n,
+            stage_mm: self.stage_mm,
+        };
+        let (weights, data, out) = match (self.guide.folder(), &self.weights, &self.data, &self.out)
+        {
+            (Some(into), weights, ..) => return self.guide.lead(into, weights.as_deref(), known),
+            (None, Some(weights), Some(data), Some(out)) => (weights, data, out),
+            _ => bail!("--weights, --data and --out are needed, or --into"),
+        };
+        let dataset = Dataset::load(data)?;
+        let (weights, fit) =
+            Weights::load(weights)?.for_unit(&dataset, known.gauge_n, known.stage_mm)?;
         print!("{fit}");
-        weights.save(&self.out)
+        weights.save(out)
     }
 }

@@ -3,6 +3,8 @@
 
 pub mod building;
 mod honest;
+mod left_open;
+mod left_out;
 mod nearest;
 mod noise;
 mod tables;
@@ -14,10 +16,14 @@ use std::sync::Mutex;
 use anyhow::{Result, anyhow, ensure};
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_scene::{Camera, FILM_DISTANCE_MM, MARKER_REST_MM, MARKERS, Preset};
-use hivtac_sensing::forward::{self, Limits, Mounting, RestImage, Stiffness, Tolerance};
-use hivtac_sensing::model::{ForwardSpec, TableSpec};
+use hivtac_sensing::forward::{
+    self, KNOTS, Limits, Mounting, PARTS, PLACES, RestImage, SIZES, Stiffness, Tolerance,
+};
+use hivtac_sensing::model::{ForwardSpec, SystematicSpec, TableSpec};
 use serde::{Deserialize, Serialize};
 
+pub use left_open::Open;
+use left_open::left_open;
 pub use noise::Noise;
 pub use tables::UnitSetup;
 pub use ten_loads::{Bench, Fit, KnownLoad, fit};
@@ -38,41 +44,30 @@ pub struct FilmModel {
     pub noise_px: [f64; 2],
     /// How many times that it is when the marker is four times as large.
     pub noise_at_four_areas: [f64; 2],
-    /// How far the unit that it was made on may differ from what the file says of it.
+    /// What the errors on the unit that it was made on are beside what the markers' noise makes, at
+    /// even sizes from nothing to the largest: standard uncertainties of the force across itself,
+    /// N, of |F|, as sizes, and of the place, mm.
     #[serde(default)]
-    pub own: ToleranceOf,
+    pub beside_noise: [[f64; 3]; SIZES],
     /// The unit; without it the film is the nominal one, and the rest picture tells the markers'
     /// places.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<OwnUnit>,
+    /// What its calibration leaves open of it: the unit moved along each column of its numbers'
+    /// factor, by a quarter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub open: Vec<Open>,
 }
 
-/// Standard uncertainties of what a unit differs in from what a file says of it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ToleranceOf {
-    /// Of each coordinate of a marker's displacement, in parts of the displacement.
-    pub shape: f64,
-    /// Of the film's stiffness, in parts of it.
-    pub stiffness: f64,
-}
-
-/// Those of units that somebody built and did not calibrate, for dots 0.15 mm off, a camera rolled
-/// by 2° and 2 % longer, a film 20 % stiffer and 10 % thicker, posts 0.3 mm off and a tip of 0.25
-/// to 1 mm: `hivtac-studies units` finds that 95 of 100 errors lie within their bounds then.
-const OTHER_UNITS: ToleranceOf = ToleranceOf {
+/// A calibration leaves fewer directions open than this.
+const MOST_OPEN: usize = 64;
+/// What units that somebody built and did not calibrate differ in, for dots 0.15 mm off, a camera
+/// rolled by 2° and 2 % longer, a film 20 % stiffer and 10 % thicker, posts 0.3 mm off and a tip of
+/// 0.25 to 1 mm: `hivtac-studies units` finds that 95 of 100 errors lie within their bounds then.
+const OTHER_UNITS: Tolerance = Tolerance {
     shape: 0.03,
     stiffness: 0.2,
 };
-
-impl ToleranceOf {
-    fn to_chip(self) -> Tolerance {
-        Tolerance {
-            shape: self.shape as f32,
-            stiffness: self.stiffness as f32,
-        }
-    }
-}
 
 /// A unit as its calibration found it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,6 +90,17 @@ pub struct OwnUnit {
 }
 
 impl OwnUnit {
+    fn check(&self) -> Result<()> {
+        self.film().check()?;
+        ensure!(
+            (10.0..=10_000.0).contains(&self.focal_px) && self.roll_deg.abs() <= 45.0,
+            "film.unit: a focal length of {} px and a roll of {}° are no camera's",
+            self.focal_px,
+            self.roll_deg
+        );
+        Ok(())
+    }
+
     fn film(&self) -> Unit {
         Unit {
             stiffness: self.stiffness,
@@ -136,8 +142,9 @@ impl FilmModel {
             rest_px: noise.rest_px,
             noise_px: noise.at_rest_px,
             noise_at_four_areas: noise.at_four_areas,
-            own: ToleranceOf::default(),
+            beside_noise: Default::default(),
             unit: None,
+            open: Vec::new(),
         }
     }
 
@@ -165,24 +172,25 @@ impl FilmModel {
                 self.noise_at_four_areas[1],
                 [0.1, 10.0],
             ),
-            ("own.shape", self.own.shape, [0.0, 1.0]),
-            ("own.stiffness", self.own.stiffness, [0.0, 1.0]),
         ] {
             ensure!(
                 (low..=high).contains(&value),
                 "film.{name} is {value}: use {low} to {high}"
             );
         }
-        if let Some(unit) = &self.unit {
-            unit.film().check()?;
+        for part in self.beside_noise.as_flattened() {
             ensure!(
-                (10.0..=10_000.0).contains(&unit.focal_px) && unit.roll_deg.abs() <= 45.0,
-                "film.unit: a focal length of {} px and a roll of {}° are no camera's",
-                unit.focal_px,
-                unit.roll_deg
+                (0.0..=1.0).contains(part),
+                "film.beside_noise has {part}: use 0 to 1"
             );
         }
-        Ok(())
+        ensure!(
+            self.open.len() <= MOST_OPEN,
+            "film.open has {} units: use at most {MOST_OPEN}",
+            self.open.len()
+        );
+        let open = self.open.iter().map(|open| &open.unit);
+        self.unit.iter().chain(open).try_for_each(OwnUnit::check)
     }
 
     /// What a model file holds of it.
@@ -220,19 +228,37 @@ impl FilmModel {
                 at_rest_px: self.noise_px.map(|part| part as f32),
                 at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
             },
-            own: self.own.to_chip(),
-            other: OTHER_UNITS.to_chip(),
+            own: self.systematic(&[]),
+            other: OTHER_UNITS,
             moved,
             beside,
             own_table: None,
         };
-        if self.unit.is_some() {
+        if let Some(unit) = &self.unit {
             let bytes = spec.to_bytes();
-            let forward = forward::Forward::parse(&bytes)
-                .map_err(|error| anyhow!("a film's tables cannot be kept: {error}"))?;
-            spec.own_table = Some(setup.own_table(|pose| told(&forward, pose))?);
+            let even = parsed(&bytes)?;
+            spec.own_table = Some(setup.own_table(|pose| told(&even, pose))?);
+            let bytes = spec.to_bytes();
+            spec.own = self.systematic(&left_open(self, unit, &parsed(&bytes)?)?);
         }
         Ok(spec)
+    }
+
+    /// What is not known of the unit, and of the film that is run forwards.
+    fn systematic(&self, left_open: &[[f32; PARTS]]) -> SystematicSpec {
+        let mut knots = left_open.to_vec();
+        knots.resize(KNOTS, [0.0; PARTS]);
+        for (of_size, beside) in knots.chunks_mut(PLACES * PLACES).zip(self.beside_noise) {
+            for knot in of_size {
+                for (part, beside) in knot.iter_mut().zip(beside) {
+                    *part = libm::hypotf(*part, beside as f32);
+                }
+            }
+        }
+        SystematicSpec {
+            end_mm: left_open::END_MM as f32,
+            knots,
+        }
     }
 }
 
@@ -254,7 +280,13 @@ fn nominal_tables(camera: &Camera) -> Result<[TableSpec; 2]> {
     Ok(tables)
 }
 
-/// What the first two tables say of a pose, as the chip reads them.
+/// A film as the chip reads it.
+fn parsed(bytes: &[u8]) -> Result<forward::Forward<'_>> {
+    forward::Forward::parse(bytes)
+        .map_err(|error| anyhow!("a film's tables cannot be kept: {error}"))
+}
+
+/// What a film's tables say of a pose, as the chip reads them.
 fn told(forward: &forward::Forward<'_>, pose: &Pose) -> [f64; 8] {
     let beside_mm = (forward.mounting).map_or([[0.0; 2]; 4], |mounting| mounting.beside_mm);
     let pose = forward::Pose {

@@ -5,12 +5,12 @@ use std::fmt;
 
 use anyhow::{Result, ensure};
 use hivtac_film::Film;
-use hivtac_film::reduced::{NOMINAL_RADIUS_MM, Pose};
+use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_scene::{Camera, Disc, Load, Preset};
-use hivtac_sensing::forward::{Column, Stiffness, solve};
 
 use super::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
-use super::{OwnUnit, ToleranceOf, UnitSetup};
+use super::left_open::{Open, STEP as OPEN_STEP};
+use super::{OwnUnit, UnitSetup};
 
 /// A load that was put on, and what was seen of it.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ pub struct Fit {
     /// χ² over the degrees of freedom.
     pub chi_square: f64,
     /// What is still not known of the unit.
-    pub tolerance: ToleranceOf,
+    pub open: Vec<Open>,
 }
 
 impl fmt::Display for Fit {
@@ -375,169 +375,45 @@ impl Problem<'_> {
             rest_px: made.rest_px,
             numbers: numbers.collect(),
             chi_square,
-            tolerance: self.tolerance(parts, &covariance)?,
-        })
-    }
-}
-
-/// Loads at which it is seen what is not known of a unit: their |F|, N, and places, mm.
-const TRIED_N: [f64; 3] = [0.05, 0.1, 0.2];
-const TRIED_MM: [[f64; 2]; 5] = [
-    [0.0, 0.0],
-    [3.0, 1.0],
-    [-1.0, 3.0],
-    [-3.0, -2.0],
-    [2.0, -3.0],
-];
-
-/// Sums of squares of what loads would be off by: their direction, rad, |F|, in parts of it, and
-/// place, mm.
-#[derive(Default)]
-struct Off {
-    direction: f64,
-    force: f64,
-    place: f64,
-}
-
-impl Off {
-    /// Of unknowns of a solved load: size, tilt, place.
-    fn add(&mut self, off: impl Fn(usize) -> f64, at: &Tried) {
-        self.direction += off(1).powi(2) + off(2).powi(2);
-        self.force += (at.per_size * off(0)).powi(2);
-        self.place += off(3).powi(2) + off(4).powi(2);
-    }
-}
-
-impl Problem<'_> {
-    /// How far loads would be off by what the fit leaves open, beside how far they would be by a
-    /// displacement of the markers that is wrong by a part of itself.
-    fn tolerance(&self, parts: &[f64], covariance: &[Vec<f64>]) -> Result<ToleranceOf> {
-        let spread = cholesky(covariance.to_vec())?;
-        let tried = self.tried(parts)?;
-        let (mut left_open, mut by_shape) = (Off::default(), Off::default());
-        for k in 0..parts.len() {
-            let there = parts.iter().zip(&spread);
-            let there: Vec<f64> = there.map(|(part, row)| part + row[k]).collect();
-            let film = Moving::new(self, &there)?;
-            for at in &tried {
-                let moved = film.moved(&film.pose(at.force_n, at.place_mm))?;
-                let off: Column = std::array::from_fn(|i| (moved[i] - at.moved[i]) as f32);
-                if let Some(solved) = solve(at.slopes, off) {
-                    left_open.add(|k| solved.unknowns[k].into(), at);
-                }
-            }
-        }
-        for at in &tried {
-            let sigma: Column = std::array::from_fn(|i| {
-                let [x, y] = [at.moved[i & !1], at.moved[i | 1]];
-                x.hypot(y) as f32
-            });
-            let weigh = |column: Column| std::array::from_fn(|i| column[i] / sigma[i]);
-            if let Some(solved) = solve(at.slopes.map(weigh), [0.0; 8]) {
-                by_shape.add(|k| f64::from(solved.covariance(k, k)).sqrt(), at);
-            }
-        }
-        let shape =
-            (left_open.direction / by_shape.direction).max(left_open.place / by_shape.place);
-        Ok(ToleranceOf {
-            shape: shape.sqrt(),
-            stiffness: (left_open.force / tried.len() as f64).sqrt(),
+            open: self.open(parts, &covariance)?,
         })
     }
 
-    /// The loads that are tried on a unit.
-    fn tried(&self, parts: &[f64]) -> Result<Vec<Tried>> {
-        let film = Moving::new(self, parts)?;
-        let mut all = Vec::new();
-        for force_n in TRIED_N {
-            for place_mm in TRIED_MM {
-                all.push(film.tried(force_n, place_mm)?);
+    /// The unit moved along each column of its numbers' factor: what is not known of it, without
+    /// what a model file does not hold.
+    fn open(&self, parts: &[f64], covariance: &[Vec<f64>]) -> Result<Vec<Open>> {
+        let mut held: Vec<usize> = (0..parts.len())
+            .filter(|k| self.numbers[*k].0.is_held())
+            .collect();
+        // Columns of those that come last leave the film as it is.
+        held.sort_by_key(|k| matches!(self.numbers[*k].0, Number::Rest(..)));
+        let row = |i: &usize| held.iter().map(|j| covariance[*i][*j]).collect();
+        let spread = cholesky(held.iter().map(row).collect())?;
+        let moved = |column: usize| {
+            let mut there = parts.to_vec();
+            for (row, k) in spread.iter().zip(&held) {
+                there[*k] += OPEN_STEP * row[column];
             }
-        }
-        Ok(all)
-    }
-}
-
-/// A load that is tried: how the unit's markers move under it, px, and what that changes by.
-struct Tried {
-    force_n: f64,
-    place_mm: [f64; 2],
-    moved: [f64; 8],
-    /// By the unknowns of a solved load: size, tilt, place.
-    slopes: [Column; 5],
-    /// How much of |F| a change of the size by one is.
-    per_size: f64,
-}
-
-/// How the markers of a unit move.
-struct Moving<'a> {
-    unit: OwnUnit,
-    setup: UnitSetup<'a>,
-    film: Film,
-}
-
-impl<'a> Moving<'a> {
-    fn new(problem: &'a Problem, parts: &[f64]) -> Result<Self> {
-        let made = problem.made(parts);
-        let setup = problem.setup(&made);
-        Ok(Self {
-            film: Film::of(setup.unit)?,
-            setup,
-            unit: made.unit,
-        })
-    }
-
-    /// The pose of a force straight into the film.
-    fn pose(&self, force_n: f64, place_mm: [f64; 2]) -> Pose {
-        Pose::of_force([0.0, 0.0, -force_n], place_mm, self.setup.stiffness_n())
-    }
-
-    /// x and y of markers 0–3, px.
-    fn moved(&self, pose: &Pose) -> Result<[f64; 8]> {
-        let to_px = self.unit.to_px();
-        let mut moved = [0.0; 8];
-        for (marker, place) in moved.chunks_exact_mut(2).enumerate() {
-            place.copy_from_slice(&to_px(self.setup.moved(&self.film, pose, marker)?));
-        }
-        Ok(moved)
-    }
-
-    fn tried(&self, force_n: f64, place_mm: [f64; 2]) -> Result<Tried> {
-        let pose = self.pose(force_n, place_mm);
-        let [linear_n, cubic_n] = self.setup.stiffness_n().map(|part| part as f32);
-        let stiffness = Stiffness { linear_n, cubic_n };
-        let size = pose.size as f32;
-        Ok(Tried {
-            force_n,
-            place_mm,
-            moved: self.moved(&pose)?,
-            slopes: slopes(&pose, |pose| self.moved(pose))?,
-            per_size: (stiffness.per_size_n(size) / stiffness.magnitude_n(size)).into(),
-        })
-    }
-}
-
-/// By central differences.
-fn slopes(pose: &Pose, moved: impl Fn(&Pose) -> Result<[f64; 8]>) -> Result<[Column; 5]> {
-    const STEP: f64 = 1e-3;
-    let mut slopes = [[0.0; 8]; 5];
-    for (k, column) in slopes.iter_mut().enumerate() {
-        let beside = |step: f64| {
-            let mut pose = *pose;
-            match k {
-                0 => pose.size += step,
-                1 | 2 => pose.tilt[k - 1] += step,
-                _ => pose.place_mm[k - 3] += step,
+            let made = self.made(&there);
+            Open {
+                unit: made.unit,
+                tip_radius_mm: made.tip_radius_mm,
+                rest_px: made.rest_px,
             }
-            moved(&pose)
         };
-        let (less, more) = (beside(-STEP)?, beside(STEP)?);
-        *column = std::array::from_fn(|i| ((more[i] - less[i]) / (2.0 * STEP)) as f32);
+        Ok((0..held.len()).map(moved).collect())
     }
-    Ok(slopes)
 }
 
 impl Number {
+    /// Whether a model file holds it: the others are the bench's.
+    fn is_held(self) -> bool {
+        !matches!(
+            self,
+            Number::Middle(_) | Number::Stage(_) | Number::Gauge(_)
+        )
+    }
+
     fn name(self) -> String {
         let along = |axis: usize| ["x", "y"][axis];
         match self {

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result, ensure};
 
 use super::{Bench, FilmModel, Fit, KnownLoad, fit};
+use crate::conditions::Conditions;
 use crate::dataset::{Dataset, Observation};
 use crate::weights::{Rest, Weights};
 
@@ -34,15 +35,28 @@ impl Weights {
             "the weights are for other frames than the data set's"
         );
         ensure!(
+            own.pixel_format == other.pixel_format,
+            "the weights are for {}, and the unit sends {}: take those for it \
+             (calibration/models), or `hivtac threshold --model`",
+            own.pixel_format.name(),
+            other.pixel_format.name()
+        );
+        ensure!(
             own.contact == other.contact,
             "the weights are for the contact reading `{}`, and the data set's is `{}`",
             own.contact,
             other.contact
         );
-        let origin = other.origin.clone();
+        let (origin, threshold, dilations) =
+            (other.origin.clone(), other.threshold, other.dilations);
         let (mut weights, found) =
             self.fitted(dataset.rest()?, &loads(dataset)?, gauge_n, stage_mm)?;
-        weights.conditions.origin = origin;
+        weights.conditions = Conditions {
+            origin,
+            threshold,
+            dilations,
+            ..weights.conditions
+        };
         weights.check()?;
         Ok((weights, found))
     }
@@ -73,8 +87,8 @@ impl Weights {
         self.film = Some(FilmModel {
             tip_radius_mm: found.tip_radius_mm,
             rest_px: found.rest_px,
-            own: found.tolerance,
             unit: Some(found.unit.clone()),
+            open: found.open.clone(),
             ..film
         });
         self.rest = rest;
@@ -139,10 +153,38 @@ mod tests {
     use std::path::Path;
 
     use hivtac_scene::Contact;
+    use hivtac_terms::threshold::PixelFormat;
 
     use super::*;
     use crate::dataset::{Loads, Recipe, generate};
     use crate::range::Range;
+
+    /// The unit's own threshold is the model's: with another one it would give no force.
+    #[test]
+    fn a_model_has_the_threshold_of_its_unit() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/default.weights");
+        let recipe = Recipe {
+            loads: Loads::Random(8),
+            rest: 4,
+            ..Recipe::default()
+        };
+        let mut dataset = generate(&recipe, || ()).unwrap();
+        let threshold = [165, 12, 90, 255, 40, 255];
+        dataset.about.conditions.threshold = threshold;
+        let (own, _) = Weights::load(&file)
+            .unwrap()
+            .for_unit(&dataset, 1e-3, 0.1)
+            .unwrap();
+        assert_eq!(own.conditions.threshold, threshold);
+        dataset.about.conditions.pixel_format = PixelFormat::Yuv422;
+        dataset.about.conditions.threshold = [162, 0, 0, 0, 0, 0];
+        let refused = Weights::load(&file).unwrap().for_unit(&dataset, 1e-3, 0.1);
+        let error = refused.unwrap_err().to_string();
+        assert!(
+            error.contains("rgb565") && error.contains("yuv422"),
+            "{error}"
+        );
+    }
 
     /// A pressing direction is no direction of the force that the film model explains.
     #[test]

@@ -67,11 +67,16 @@ pub fn hello() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: Default::default(),
+        filter: Default::default(),
     }
 }
 
 /// What the sensor's clock says, and how it goes on from frame to frame.
 pub type Clock = Box<dyn FnMut() -> f64 + Send>;
+
+/// What a sensor measures: of the frame of this number, since the start of samples of this number.
+/// Both count from 1.
+pub type Film = Box<dyn FnMut(u32, u32) -> Sample + Send>;
 
 /// A sensor on a TCP port, whose film is pressed in the pose that the test sets.
 pub struct FakeSensor {
@@ -85,29 +90,41 @@ impl FakeSensor {
     /// Every seventh frame misses a marker, and in every eleventh one is half covered. `after`
     /// frames of a conversation it is gone.
     pub fn start(mut clock: Clock, after: usize) -> Self {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let port = format!("tcp:{}", listener.local_addr().unwrap());
         let pose = Arc::new(Mutex::new([0.0; 2]));
         let set = pose.clone();
+        let film = Box::new(move |frame, _| sample(frame, clock(), *set.lock().unwrap()));
+        Self {
+            pose,
+            ..Self::of_film(film, after)
+        }
+    }
+
+    /// One that measures what is said; `after` frames of a conversation it is gone.
+    pub fn of_film(mut film: Film, after: usize) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp:{}", listener.local_addr().unwrap());
         let tare = Arc::new(Mutex::new(Outcome::Done));
         let answered = tare.clone();
         std::thread::spawn(move || {
-            let mut frame = 0;
+            let mut counts = [0, 0];
             while let Ok((stream, _)) = listener.accept() {
                 let outcome = *answered.lock().unwrap();
-                talk(stream, &mut clock, &set, outcome, &mut frame, after);
+                talk(stream, &mut film, outcome, &mut counts, after);
             }
         });
-        Self { port, pose, tare }
+        Self {
+            port,
+            pose: Arc::default(),
+            tare,
+        }
     }
 }
 
 fn talk(
     mut stream: TcpStream,
-    clock: &mut Clock,
-    pose: &Mutex<[f64; 2]>,
+    film: &mut Film,
     tare: Outcome,
-    frame: &mut u32,
+    [frame, start]: &mut [u32; 2],
     after: usize,
 ) {
     stream
@@ -125,7 +142,9 @@ fn talk(
                     let Received::Message(message) = message else {
                         return;
                     };
+                    let was = streaming;
                     answer(&mut stream, message, tare, &mut streaming);
+                    *start += u32::from(streaming && !was);
                 }
             }
             Err(_) if !streaming => continue,
@@ -137,10 +156,7 @@ fn talk(
                 return;
             }
             *frame += 1;
-            send(
-                &mut stream,
-                &DeviceMessage::Sample(sample(*frame, clock(), *pose.lock().unwrap())),
-            );
+            send(&mut stream, &DeviceMessage::Sample(film(*frame, *start)));
         }
     }
 }

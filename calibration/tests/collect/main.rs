@@ -3,4 +3,5 @@
 
 mod fake;
 mod from_file;
+mod guided;
 mod over_serial;

@@ -21,6 +21,7 @@ use crate::capture::Capture;
 use crate::flash::SecondBank;
 use crate::priorities;
 use crate::snapshot_copy::SnapshotCopy;
+use crate::thermometer::Thermometer;
 use embassy_stm32::gpio::{Level, Output, OutputType, Speed};
 use embassy_stm32::i2c::I2c;
 use embassy_stm32::rcc::*;
@@ -76,6 +77,7 @@ pub fn start() -> Board {
         bands: BandCopy::new(p.MDMA_CH0),
         flash: SecondBank::new(p.FLASH, p.MDMA_CH2),
         snapshots: SnapshotCopy::new(p.MDMA_CH1),
+        thermometer: Thermometer(p.ADC3),
         usb: UsbPort {
             core: p.USB_OTG_FS,
             plus: p.PA12,

@@ -8,6 +8,7 @@ use crate::capture::Capture;
 use crate::flash::SecondBank;
 use crate::seeded_bugs;
 use crate::snapshot_copy::SnapshotCopy;
+use crate::thermometer::Thermometer;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull};
 use embassy_stm32::i2c;
 use embassy_stm32::rcc::*;
@@ -38,6 +39,8 @@ pub struct Board {
     pub flash: SecondBank,
     /// What keeps a frame for the host.
     pub snapshots: SnapshotCopy,
+    /// The microcontroller's temperature.
+    pub thermometer: Thermometer,
     /// What the USB task needs to make its driver.
     pub usb: UsbPort,
     /// The status LED, off.

@@ -2,7 +2,8 @@
 
 use super::{Force, Place, Polar, trust};
 use crate::forward::{
-    Column, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Tolerance,
+    Column, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Systematic,
+    Tolerance,
 };
 use crate::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::network::Output;
@@ -17,10 +18,9 @@ use hivtac_terms::units::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resting {
     mounting: Mounting,
-    /// Whether they are on the unit that the model was made on.
-    is_own: bool,
-    /// How far the unit may differ from what the model says of it.
-    tolerance: Tolerance,
+    /// How far the unit may differ from the one that the model was made on; `None` when it is that
+    /// one.
+    other: Option<Tolerance>,
     px: Markers,
     areas: [f32; 4],
 }
@@ -53,9 +53,9 @@ impl Resting {
             (false, _) => told,
         };
         let centroids = rest.features.centroids;
-        let (off, tolerance) = match is_own {
-            true => (forward.noise.rest_px, forward.own),
-            false => (Markers::default(), forward.other),
+        let off = match is_own {
+            true => forward.noise.rest_px,
+            false => Markers::default(),
         };
         let at = |k: usize| {
             [
@@ -65,25 +65,18 @@ impl Resting {
         };
         Resting {
             mounting,
-            is_own,
-            tolerance,
+            other: (!is_own).then_some(forward.other),
             px: core::array::from_fn(at),
             areas: rest.areas.map(|area| area as f32),
         }
     }
 
     /// How markers moved from there.
-    fn observed(
-        &self,
-        forward: &Forward<'_>,
-        markers: &[Marker; 4],
-        blur: Option<&[Px; 4]>,
-    ) -> Observed {
+    fn observed(&self, forward: &Forward<'_>, markers: &[Marker; 4], blur: Px) -> Observed {
         let mut moved: Column = [0.0; 8];
         let mut sigma = [0.0; 8];
         let scale = self.mounting.scale();
-        let shape = self.tolerance.shape * self.tolerance.shape;
-        let mut wider = 1.0_f32;
+        let blur = scale * blur.to_f32();
         for (k, marker) in markers.iter().enumerate() {
             let [x, y] = self.px[k];
             let [x, y] = self
@@ -99,69 +92,35 @@ impl Resting {
             for i in [0, 1] {
                 let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
-                let usual = scale * at_rest_px[i] * growth.max(0.1);
-                let seen = match blur {
-                    None => usual,
-                    Some(blur) => {
-                        let blur = scale * blur[k].to_f32();
-                        libm::sqrtf(usual * usual + blur * blur)
+                let mut seen = scale * at_rest_px[i] * growth.max(0.1);
+                if blur > 0.0 {
+                    seen = libm::sqrtf(seen * seen + blur * blur);
+                }
+                // What is wrong with another unit is more than noise, and no two markers share it.
+                sigma[2 * k + i] = match self.other {
+                    None => seen,
+                    Some(Tolerance { shape, .. }) => {
+                        libm::sqrtf(seen * seen + shape * shape * (x * x + y * y))
                     }
                 };
-                let unknown = shape * (x * x + y * y);
-                // What is wrong with another unit is more than noise, and no two markers share it.
-                sigma[2 * k + i] = match self.is_own {
-                    true => seen,
-                    false => libm::sqrtf(seen * seen + unknown),
-                };
-                wider += unknown / (seen * seen) / 8.0;
             }
         }
-        Observed {
-            moved,
-            sigma,
-            wider: if self.is_own { wider } else { 1.0 },
-        }
+        Observed { moved, sigma }
     }
 
-    /// The load that explains the markers best, from the network's answer on.
+    /// The load that explains the markers best, from the network's answer on. `blur` is a standard
+    /// uncertainty of each coordinate beside that of noise, 0 or more.
     pub fn estimate(
         &self,
         forward: &Forward<'_>,
-        markers: &[Marker; 4],
+        (markers, blur): (&[Marker; 4], Px),
         output: &Output,
     ) -> Estimate {
-        let observed = self.observed(forward, markers, None);
-        forward.estimate(&observed, &self.mounting, guess_of(forward, output))
-    }
-
-    /// The force of [`Self::force`] of markers that are known less well than usual: each by a
-    /// standard uncertainty beside that of noise.
-    pub fn force_of_blurred(
-        &self,
-        forward: &Forward<'_>,
-        range: &CalibratedRange,
-        (markers, blur): (&[Marker; 4], &[Px; 4]),
-        output: &Output,
-    ) -> (Force, Status) {
-        self.force_of(forward, range, (markers, Some(blur)), output)
-    }
-
-    /// One function for all frames: it is large, and lies in the memory nearest to the core.
-    #[inline(never)]
-    fn force_of(
-        &self,
-        forward: &Forward<'_>,
-        range: &CalibratedRange,
-        (markers, blur): (&[Marker; 4], Option<&[Px; 4]>),
-        output: &Output,
-    ) -> (Force, Status) {
+        let newtons = output.values.map(|part| part as f32 * 1e-6);
+        let place_mm = output.place.map(|part| part as f32 * 1e-3);
+        let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
         let observed = self.observed(forward, markers, blur);
-        let guess = guess_of(forward, output);
-        self.told(
-            forward,
-            range,
-            &forward.estimate(&observed, &self.mounting, guess),
-        )
+        forward.estimate(&observed, &self.mounting, guess)
     }
 
     /// The force of [`Self::estimate`]; [`Status::UNEXPLAINED`] when it explains the markers badly,
@@ -170,10 +129,10 @@ impl Resting {
         &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
-        markers: &[Marker; 4],
+        markers: (&[Marker; 4], Px),
         output: &Output,
     ) -> (Force, Status) {
-        self.force_of(forward, range, (markers, None), output)
+        self.told(forward, range, &self.estimate(forward, markers, output))
     }
 
     /// What a sample says of a load that was found.
@@ -183,9 +142,10 @@ impl Resting {
         range: &CalibratedRange,
         estimate: &Estimate,
     ) -> (Force, Status) {
-        let force = force(forward, estimate, self.tolerance.stiffness);
+        let unit = self.systematic(forward, &estimate.pose);
+        let force = force(forward, estimate, &unit);
         let mut status = trust(&force, range);
-        if !estimate.is_explained() {
+        if !estimate.is_explained(&unit) {
             status |= Status::UNEXPLAINED;
         }
         // Where the tables end, a larger force may explain the markers better.
@@ -194,13 +154,18 @@ impl Resting {
         }
         (force, status)
     }
-}
 
-/// Where steps begin: the network's answer.
-fn guess_of(forward: &Forward<'_>, output: &Output) -> Pose {
-    let newtons = output.values.map(|part| part as f32 * 1e-6);
-    let place_mm = output.place.map(|part| part as f32 * 1e-3);
-    Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits)
+    /// How well a load is known at best, by what is known of the unit.
+    fn systematic(&self, forward: &Forward<'_>, pose: &Pose) -> Systematic {
+        let Some(Tolerance { stiffness, .. }) = self.other else {
+            return forward.own.at(pose, &forward.limits);
+        };
+        let film = &forward.stiffness;
+        Systematic {
+            size: stiffness * film.magnitude_n(pose.size) / film.per_size_n(pose.size),
+            ..Systematic::default()
+        }
+    }
 }
 
 /// Whether a rest position is that of the unit that a model was made on, as it may have drifted
@@ -212,8 +177,7 @@ fn is_near(rest: &Rest, own: &Rest) -> bool {
     })
 }
 
-/// `softer` is the standard uncertainty of the film's stiffness, in parts of it.
-fn force(forward: &Forward<'_>, estimate: &Estimate, softer: f32) -> Force {
+fn force(forward: &Forward<'_>, estimate: &Estimate, unit: &Systematic) -> Force {
     let pose = &estimate.pose;
     let micronewtons = 1e6 * forward.stiffness.magnitude_n(pose.size);
     let cartesian = pose
@@ -224,7 +188,7 @@ fn force(forward: &Forward<'_>, estimate: &Estimate, softer: f32) -> Force {
         beta,
         magnitude,
     } = Polar::of_vector(cartesian);
-    let sigma = estimate.sigma(&forward.stiffness, softer);
+    let sigma = estimate.sigma(&forward.stiffness, unit);
     let [direction, magnitude_sigma, place] = stated(sigma);
     let [x, y] = pose
         .place_mm

@@ -4,17 +4,26 @@
 pub const SPAN: usize = 4;
 /// The least and the most nodes of an axis.
 pub const NODES: core::ops::RangeInclusive<usize> = 6..=16;
-/// Parts of one that weights are kept in: Q15.
-const ONE: f32 = 32_768.0;
+/// What weights are parts of: the largest i16.
+pub const ONE: f32 = 32_767.0;
+/// 3·2²²: what is added to it is rounded to whole numbers, as f32 has no smaller steps there, and
+/// those of 16 bits are then the low half of its bits.
+const WHOLE: f32 = 12_582_912.0;
+/// Most knots of an axis.
+const MOST_KNOTS: usize = *NODES.end() + SPAN;
 
 /// The nodes of cubic splines, which are sums of B-splines: one for each node, smooth over the
 /// second node and the last but one (not-a-knot).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
-    nodes_mm: [f32; *NODES.end()],
+    /// Four times the first node, the nodes but the outer two at each end, four times the last
+    /// node.
+    knots_mm: [f32; MOST_KNOTS],
     count: usize,
     /// What slopes' weights are in parts of, 1/mm.
     slope_unit: f32,
+    /// Parts of one, for each 1/mm of a slope's weight.
+    per_slope: f32,
 }
 
 /// What the value and the slope at a point are made of: so much of each coefficient from the first
@@ -23,9 +32,9 @@ pub struct Axis {
 pub struct Weights {
     /// The first coefficient.
     pub first: usize,
-    /// Parts of the value, Q15; their sizes add up to at most one and four roundings.
+    /// Parts of the value, [`ONE`] in all; their sizes add up to at most that and four roundings.
     pub values: [i16; SPAN],
-    /// Parts of the slope in units of [`Axis::slope_unit`], Q15; likewise.
+    /// Parts of the slope in units of [`Axis::slope_unit`], likewise.
     pub slopes: [i16; SPAN],
 }
 
@@ -39,17 +48,24 @@ impl Axis {
         if !NODES.contains(&count) || !grow || !near {
             return None;
         }
-        let mut axis = Axis {
-            nodes_mm: [0.0; *NODES.end()],
-            count,
-            slope_unit: 0.0,
+        let node = |k: usize| nodes_mm.get(k).copied().unwrap_or_default();
+        let knot = |k: usize| {
+            node(match k {
+                0..SPAN => 0,
+                _ if k >= count => count - 1,
+                _ => k - 2,
+            })
         };
-        axis.nodes_mm[..count].copy_from_slice(nodes_mm);
         // Parts of B-splines of the second degree add up to one, over at least the narrowest span:
         // the slopes' parts, differences of three times these, add up to at most six over it.
-        let spans = (SPAN - 1..count).map(|span| axis.knot(span + 1) - axis.knot(span));
-        axis.slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
-        Some(axis)
+        let spans = (SPAN - 1..count).map(|span| knot(span + 1) - knot(span));
+        let slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
+        Some(Axis {
+            knots_mm: core::array::from_fn(knot),
+            count,
+            slope_unit,
+            per_slope: ONE / slope_unit,
+        })
     }
 
     /// How many nodes it has.
@@ -59,7 +75,7 @@ impl Axis {
 
     /// Its first and last node, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
-        [self.node(0), self.node(self.count - 1)]
+        [self.knots_mm[0], self.knots_mm[MOST_KNOTS - 1]]
     }
 
     /// What slopes' weights are in parts of, 1/mm.
@@ -72,54 +88,48 @@ impl Axis {
         let [from, to] = self.ends_mm();
         // A value that is no number is at the first node.
         let x = if x_mm > from { x_mm.min(to) } else { from };
-        let inner = SPAN..self.count;
-        let first = inner.filter(|&k| self.knot(k) <= x).count();
-        let span = first + SPAN - 1;
-        let mut values = [1.0, 0.0, 0.0, 0.0];
-        let mut slopes = [0.0; SPAN];
-        // Cox and de Boor's recurrence; the slopes are made of the splines of one degree less.
-        for degree in 1..SPAN {
-            let mut saved = 0.0;
-            for r in 0..degree {
-                let right = self.knot(span + r + 1);
-                let left = self.knot(span + 1 + r - degree);
-                let part = values[r] / (right - left);
-                values[r] = saved + (right - x) * part;
-                saved = (x - left) * part;
-                if degree == SPAN - 1 {
-                    slopes[r] -= 3.0 * part;
-                    slopes[r + 1] += 3.0 * part;
-                }
-            }
-            values[degree] = saved;
-        }
+        let inner = self.knots_mm.get(SPAN..self.count).unwrap_or_default();
+        let first = inner.iter().take_while(|knot| **knot <= x).count();
+        let around = self.knots_mm.get(first + 1..).unwrap_or_default();
+        let [a, b, c, d, e, f] = around.first_chunk().copied().unwrap_or_default();
+        // Cox and de Boor's recurrence, for the span from c to d; the slopes are made of the
+        // splines of one degree less.
+        let [c_x, d_x] = [x - c, d - x];
+        let part = 1.0 / (d - c);
+        let [linear_c, linear_d] = [d_x * part, c_x * part];
+        let [b_x, e_x] = [x - b, e - x];
+        let [part_b, part_c] = [linear_c / (d - b), linear_d / (e - c)];
+        let squares = [d_x * part_b, b_x * part_b + e_x * part_c, c_x * part_c];
+        let parts = [
+            squares[0] / (d - a),
+            squares[1] / (e - b),
+            squares[2] / (f - c),
+        ];
+        let [a_x, f_x] = [x - a, f - x];
+        let values = [
+            d_x * parts[0],
+            a_x * parts[0] + e_x * parts[1],
+            b_x * parts[1] + f_x * parts[2],
+            c_x * parts[2],
+        ];
+        let three = 3.0 * self.per_slope;
+        let slopes = [
+            -parts[0],
+            parts[0] - parts[1],
+            parts[1] - parts[2],
+            parts[2],
+        ];
         Weights {
             first,
-            values: values.map(q15),
-            slopes: slopes.map(|part| q15(part / self.slope_unit)),
+            values: values.map(|part| rounded(ONE * part)),
+            slopes: slopes.map(|part| rounded(three * part)),
         }
-    }
-
-    /// Four times the first node, the nodes but the outer two at each end, four times the last
-    /// node.
-    fn knot(&self, k: usize) -> f32 {
-        let last = self.count - 1;
-        self.node(match k {
-            0..SPAN => 0,
-            _ if k > last => last,
-            _ => k - 2,
-        })
-    }
-
-    /// There are as many as the axis counts.
-    fn node(&self, k: usize) -> f32 {
-        self.nodes_mm.get(k).copied().unwrap_or_default()
     }
 }
 
-/// Rounded to nearest; what is one becomes a step less.
-fn q15(part: f32) -> i16 {
-    (ONE * part + 0.5f32.copysign(part)) as i16
+/// To nearest, of at most 2¹⁵.
+fn rounded(value: f32) -> i16 {
+    (value + WHOLE).to_bits() as i16
 }
 
 #[cfg(test)]
@@ -139,8 +149,8 @@ mod tests {
     #[test]
     fn a_line_is_a_spline() {
         let axis = Axis::new(&NODES_MM).unwrap();
-        let greville =
-            |j: usize| f64::from(axis.knot(j + 1) + axis.knot(j + 2) + axis.knot(j + 3)) / 3.0;
+        let knot = |k: usize| f64::from(axis.knots_mm[k]);
+        let greville = |j: usize| (knot(j + 1) + knot(j + 2) + knot(j + 3)) / 3.0;
         let own: Vec<f64> = (0..8).map(greville).collect();
         for step in 0..=200 {
             let x = -5.0 + 0.05 * step as f32;
@@ -187,7 +197,7 @@ mod tests {
             prop_assert!(weights.first + SPAN <= axis.count());
             for parts in [weights.values, weights.slopes] {
                 let sum: i32 = parts.iter().map(|part| i32::from(*part).abs()).sum();
-                prop_assert!(sum <= 32_768 + 4, "{parts:?}");
+                prop_assert!(sum <= 32_767 + 4, "{parts:?}");
             }
         }
     }

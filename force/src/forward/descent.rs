@@ -6,6 +6,7 @@ use super::mounting::Mounting;
 use super::pose::{Pose, limited};
 use super::predict::{CORNERS, Prediction};
 use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
+use crate::kernels::sqrt;
 
 /// A step that would explain no more than this of the residual, in parts of the noise's variance,
 /// is not needed: it would move no unknown by more than a half of its standard uncertainty.
@@ -24,13 +25,20 @@ const SHORTER: f32 = 0.25;
 /// A way from a first guess to the load that explains the markers best.
 pub struct Descent<'a> {
     forward: &'a Forward<'a>,
-    observed: &'a Observed,
-    mounting: &'a Mounting,
+    markers: Markers<'a>,
     here: Linearization,
     /// How much of the next step is tried.
     part: f32,
     /// How often the film was run forwards.
     looks: u8,
+}
+
+/// What the markers of a frame show.
+struct Markers<'a> {
+    observed: &'a Observed,
+    mounting: &'a Mounting,
+    /// What each coordinate weighs, away from the pattern's middle and across that.
+    weights: Column,
 }
 
 /// A load, and what the markers say there.
@@ -52,11 +60,16 @@ impl<'a> Descent<'a> {
         mounting: &'a Mounting,
         guess: Pose,
     ) -> Self {
-        let here = Linearization::at(forward, observed, mounting, within(forward, guess));
-        Self {
-            forward,
+        let half = core::f32::consts::FRAC_1_SQRT_2;
+        let markers = Markers {
             observed,
             mounting,
+            weights: observed.sigma.map(|sigma| half / sigma),
+        };
+        let here = Linearization::at(forward, &markers, within(forward, guess));
+        Self {
+            forward,
+            markers,
             here,
             part: 1.0,
             looks: 1,
@@ -70,7 +83,7 @@ impl<'a> Descent<'a> {
             return false;
         };
         let pose = after(self.forward, &self.here.pose, solved, self.part);
-        let there = Linearization::at(self.forward, self.observed, self.mounting, pose);
+        let there = Linearization::at(self.forward, &self.markers, pose);
         self.looks += 1;
         if there.square < self.here.square {
             (self.here, self.part) = (there, 1.0);
@@ -89,8 +102,7 @@ impl<'a> Descent<'a> {
     pub fn estimate(self) -> Estimate {
         Estimate {
             pose: self.here.pose,
-            unexplained: self.here.unexplained / self.observed.wider,
-            wider: self.observed.wider,
+            unexplained: self.here.unexplained,
             solved: self.here.solved,
             looks: self.looks,
         }
@@ -127,21 +139,19 @@ fn square(parts: &[f32]) -> f32 {
 }
 
 impl Linearization {
-    fn at(
-        forward: &Forward<'_>,
-        observed: &Observed,
-        mounting: &Mounting,
-        pose: Pose,
-    ) -> Linearization {
+    fn at(forward: &Forward<'_>, markers: &Markers<'_>, pose: Pose) -> Linearization {
+        let Markers {
+            observed,
+            mounting,
+            weights,
+        } = markers;
         let tables = &forward.tables;
         let Prediction { moved, slopes } =
             tables.predict(&pose, &forward.limits, &mounting.beside_mm);
-        let weigh = |column: &Column| {
-            let turned = from_middle(column);
-            core::array::from_fn(|i| turned[i] / observed.sigma[i])
-        };
-        let left: Column = weigh(&core::array::from_fn(|i| observed.moved[i] - moved[i]));
-        let equations = Equations::new(&slopes.each_ref().map(weigh), &left, &pose);
+        let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
+        let left = from_middle(&left, weights);
+        let slopes = slopes.each_ref().map(|slope| from_middle(slope, weights));
+        let equations = Equations::new(&slopes, &left, &pose);
         Linearization {
             pose,
             unexplained: square(&left),
@@ -163,7 +173,7 @@ fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32) -> Pose
     let most = forward.limits.tilt;
     let mut step = solved.unknowns.map(|unknown| part * unknown);
     let tilt = [pose.tilt[0] + step[TILT], pose.tilt[1] + step[TILT + 1]];
-    let steep = libm::sqrtf(tilt[0] * tilt[0] + tilt[1] * tilt[1]);
+    let steep = sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1]);
     if steep > most {
         let along = tilt.map(|part| part / steep);
         step = solved.held_back(step, TILT, along, steep - most);
@@ -190,13 +200,14 @@ fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
     }
 }
 
-/// x and y of markers 0–3, as seen from the pattern's middle: away from it, and across that.
-fn from_middle(column: &Column) -> Column {
-    let half = core::f32::consts::FRAC_1_SQRT_2;
-    let mut turned = [0.0; EQUATIONS];
+/// x and y of markers 0–3, as seen from the pattern's middle: away from it, and across that, as
+/// often as each weighs.
+fn from_middle(column: &Column, weights: &Column) -> Column {
+    let mut turned = *weights;
     let markers = column.as_chunks::<2>().0.iter().zip(CORNERS);
     for (([x, y], [cx, cy]), turned) in markers.zip(turned.as_chunks_mut::<2>().0) {
-        *turned = [half * (x * cx + y * cy), half * (y * cx - x * cy)];
+        turned[0] *= x * cx + y * cy;
+        turned[1] *= y * cx - x * cy;
     }
     turned
 }

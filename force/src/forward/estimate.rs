@@ -5,10 +5,13 @@ use super::descent::Descent;
 use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
 use super::solve::{Column, Solved};
+use super::systematic::Systematic;
 
 /// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
 /// of three degrees of freedom is more than 17.7 then.
 pub const UNEXPLAINED: f32 = 17.7;
+/// No less force has a direction, N.
+const LEAST_N: f32 = 1e-9;
 /// Steps that a frame takes at most: more than the model asks for while what they led to does not
 /// explain the markers. Units of which little is known begin far from where they end.
 pub const STEPS_AT_MOST: u8 = 6;
@@ -21,9 +24,6 @@ pub struct Observed {
     /// Standard uncertainty of each marker, away from the pattern's middle and across that, focal
     /// lengths, > 0: what markers weigh by.
     pub sigma: Column,
-    /// How many times that their variance is on the mean with what is not known of the unit and
-    /// weighs nothing, ≥ 1.
-    pub wider: f32,
 }
 
 /// A load and how well it is known.
@@ -35,8 +35,6 @@ pub struct Estimate {
     pub unexplained: f32,
     /// What the markers say at this load; `None` where they do not tell its parts.
     pub solved: Option<Solved>,
-    /// [`Observed::wider`].
-    pub wider: f32,
     /// How often the film was run forwards: once where the steps begin, and once for each step.
     pub looks: u8,
 }
@@ -47,7 +45,7 @@ impl Forward<'_> {
     pub fn estimate(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
         let found = self.descend(observed, mounting, guess);
         // What noise explains.
-        if found.unexplained * found.wider <= UNEXPLAINED {
+        if found.unexplained <= UNEXPLAINED {
             return found;
         }
         let middle = Pose {
@@ -91,27 +89,38 @@ pub struct Sigma {
 }
 
 impl Estimate {
-    /// Whether a load explains the markers; what is no number explains nothing.
-    pub fn is_explained(&self) -> bool {
-        (0.0..=UNEXPLAINED).contains(&self.unexplained)
+    /// Whether a load explains the markers, by their noise and what is not known of the unit; what
+    /// is no number explains nothing.
+    pub fn is_explained(&self, unit: &Systematic) -> bool {
+        let wider = 1.0 + unit.residual * unit.residual;
+        (0.0..=UNEXPLAINED * wider).contains(&self.unexplained)
     }
 
-    /// How well the load is known; `None` where the markers do not tell its parts.
-    /// `softer` is the standard uncertainty of the film's stiffness, in parts of it.
-    pub fn sigma(&self, stiffness: &Stiffness, softer: f32) -> Option<Sigma> {
+    /// How well the load is known, by the markers' noise and what is not known of the unit; `None`
+    /// where the markers do not tell its parts.
+    pub fn sigma(&self, stiffness: &Stiffness, unit: &Systematic) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;
-        let covariance = |(a, b): (usize, usize)| self.wider * solved.covariance(a, b);
+        let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);
         let tilt = [(1, 1), (1, 2), (2, 2)].map(covariance);
         let place = [(3, 3), (3, 4), (4, 4)].map(covariance);
+        let place_mm = stated(place) * core::f32::consts::FRAC_1_SQRT_2;
+        let size = libm::sqrtf(covariance((0, 0)));
         let per_size_n = stiffness.per_size_n(self.pose.size);
-        let magnitude_n = per_size_n * libm::sqrtf(covariance((0, 0)));
-        let softer = softer * stiffness.magnitude_n(self.pose.size);
+        let magnitude_n = stiffness.magnitude_n(self.pose.size).max(LEAST_N);
         Some(Sigma {
-            direction: stated(across(&self.pose, tilt)),
-            magnitude_n: libm::sqrtf(magnitude_n * magnitude_n + softer * softer),
-            place_mm: stated(place) * core::f32::consts::FRAC_1_SQRT_2,
+            direction: both(
+                stated(across(&self.pose, tilt)),
+                unit.across_n / magnitude_n,
+            ),
+            magnitude_n: per_size_n * both(size, unit.size),
+            place_mm: both(place_mm, unit.place_mm),
         })
     }
+}
+
+/// The standard uncertainty that two independent ones add up to.
+fn both(a: f32, b: f32) -> f32 {
+    libm::sqrtf(a * a + b * b)
 }
 
 /// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across
@@ -132,7 +141,7 @@ fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
 /// What a covariance (xx, xy, yy) states as its σ: 95 of 100 errors are within 1.731 times it
 /// (√(−ln 0.05)), however long and narrow their ellipse is. A round one's is the root of its trace;
 /// of a narrow one's 95 of 100 are within 1.960 times that.
-fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
+pub fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
     let trace = xx + yy;
     let apart = (xx - yy) * (xx - yy) + 4.0 * xy * xy;
     // Fits the quantiles of all ellipses to 0.7 %.

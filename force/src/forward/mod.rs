@@ -18,6 +18,7 @@
 //! | `mounting` | where this unit's markers are glued, and how its camera sees them |
 //! | `solve` | eight equations, five unknowns |
 //! | `descent` | steps downhill from a guess |
+//! | `systematic` | what is not known of the unit beside the noise |
 //! | `estimate` | from guesses to a load, what is left over, standard uncertainties |
 
 mod axis;
@@ -27,18 +28,20 @@ mod mounting;
 mod pose;
 mod predict;
 mod solve;
+mod systematic;
 mod table;
 mod terms;
 
 pub use axis::{Axis, NODES};
 pub use descent::Descent;
-pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED};
+pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED, stated};
 pub use mounting::{Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
 pub use predict::{Markers, Prediction, Tables};
 pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
-pub use table::{Answer, Place, Table};
-pub use terms::{Limits, MOST_TILTS, Sizes, Terms, Tilts};
+pub use systematic::{KNOTS, PARTS, PLACES, SIZES, Systematic, SystematicGrid};
+pub use table::{Answer, Place, Steps, Table};
+pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
 
 /// Most steps that a model may ask for.
 pub const MOST_STEPS: u8 = 3;
@@ -60,9 +63,9 @@ pub struct Forward<'a> {
     pub mounting: Option<Mounting>,
     /// How well markers are seen.
     pub noise: Noise,
-    /// How far the unit that it was made on may differ from what the model says of it.
-    pub own: Tolerance,
-    /// How far another unit may.
+    /// What is not known of the unit that it was made on.
+    pub own: SystematicGrid<'a>,
+    /// How far another unit may differ from what the model says of its own.
     pub other: Tolerance,
     /// The film's tables.
     pub tables: Tables<'a>,
@@ -81,7 +84,7 @@ pub struct Noise {
     pub at_four_areas: [f32; 2],
 }
 
-/// Standard uncertainties of what a unit differs in from what a model says of it.
+/// Standard uncertainties of what another unit differs in from what a model says of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tolerance {
     /// Of each coordinate of a marker's displacement, in parts of the displacement.

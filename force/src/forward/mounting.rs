@@ -1,6 +1,7 @@
 //! Where this unit's markers are on its film, and how its camera sees them.
 
 use super::predict::{CORNERS, Markers};
+use crate::kernels::sqrt;
 use crate::rest::Rest;
 
 /// How a unit's camera sees its film, and where its markers are glued.
@@ -79,7 +80,7 @@ impl Mounting {
     /// Focal lengths per px.
     pub fn scale(&self) -> f32 {
         let [a, b] = self.per_px;
-        libm::sqrtf(a * a + b * b)
+        sqrt(a * a + b * b)
     }
 }
 

@@ -1,6 +1,7 @@
 //! A load in the variables in which the film's answer is nearly a polynomial.
 
 use super::terms::Limits;
+use crate::kernels::sqrt;
 
 /// Which force presses where.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,7 +73,7 @@ impl Pose {
                 ..Pose::default()
             };
         }
-        let magnitude_n = libm::sqrtf(x * x + y * y + z * z);
+        let magnitude_n = sqrt(x * x + y * y + z * z);
         let tangents = [x, y].map(|part| (part / -z).clamp(-2.0, 2.0));
         let part = angle_over_tangent(tangents);
         Pose {
@@ -92,7 +93,7 @@ impl Pose {
     /// How large the tilt is, rad.
     pub fn angle(&self) -> f32 {
         let [x, y] = self.tilt;
-        libm::sqrtf(x * x + y * y)
+        sqrt(x * x + y * y)
     }
 }
 
@@ -122,7 +123,7 @@ pub fn sine_over_angle_and_cosine(t: f32) -> (f32, f32) {
 /// θ / tan θ, of a tangent up to 2 to 0.005: good for a first guess.
 fn angle_over_tangent([x, y]: [f32; 2]) -> f32 {
     // arctan t / t ≈ 3 / (1 + 2 √(1 + t²)), Shafer's.
-    3.0 / (1.0 + 2.0 * libm::sqrtf(1.0 + x * x + y * y))
+    3.0 / (1.0 + 2.0 * sqrt(1.0 + x * x + y * y))
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@
 
 use super::pose::Pose;
 use super::solve::{Column, EQUATIONS, UNKNOWNS};
-use super::table::{Answer, Load, Place, Sums, Table};
-use super::terms::{Limits, Sizes, Tilts};
+use super::table::{Answer, Place, Steps, Table};
+use super::terms::{Limits, Powers, Sizes, Tilts};
 
 /// Signs of x and y of markers 0–3.
 pub const CORNERS: [[f32; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
@@ -37,59 +37,87 @@ pub struct Prediction {
     pub slopes: [Column; UNKNOWNS],
 }
 
+/// An output of a table.
+#[derive(Clone, Copy)]
+struct Output<'t>(&'t Table<'t>, usize);
+
 impl Tables<'_> {
     /// Where the images of markers go that are glued `beside_mm` of their places.
     pub fn predict(&self, pose: &Pose, limits: &Limits, beside_mm: &Markers) -> Prediction {
         let sizes = Sizes::at(pose.size, limits);
-        let [x, y] = pose.tilt;
-        let tilts = [[x, y], [y, x]].map(|tilt| Tilts::at(tilt, limits));
+        let [x, y] = pose.tilt.map(|part| Powers::at(part, limits));
+        let tilts = [Tilts::of(&x, &y), Tilts::of(&y, &x)];
+        let outputs = [(&self.moved, 0), (&self.beside, 0), (&self.beside, 1)];
+        let outputs = outputs.map(|(table, output)| Output(table, output));
+        let outputs = match *beside_mm == Markers::default() {
+            true => outputs.get(..1).unwrap_or_default(),
+            false => &outputs,
+        };
         let mut prediction = Prediction::default();
-        let mut sums = Sums::new();
-        for (marker, corner) in CORNERS.into_iter().enumerate() {
-            let beside_mm = beside_mm[marker];
-            // The place beside which a marker in its place would be as far from the tip.
-            let place_mm = [0, 1].map(|i| corner[i] * (pose.place_mm[i] - beside_mm[i]));
-            let is_beside = beside_mm != [0.0; 2];
-            let at = place(&self.moved, place_mm);
-            let beside_at = is_beside.then(|| place(&self.beside, place_mm));
-            for axis in [0, 1] {
-                let reflection = Reflection { corner, axis };
-                let load = Load {
-                    sizes: &sizes,
-                    tilts: &tilts[axis].mirrored(reflection.signs()),
-                };
-                let mut answer = self
-                    .moved
-                    .answer(0, &reflection.swapped(at), &load, &mut sums);
-                if let Some(at) = beside_at {
-                    let at = reflection.swapped(at);
-                    for (output, part) in reflection.vector(beside_mm).into_iter().enumerate() {
-                        answer.value += part * self.beside.value(output, &at, &load, &mut sums);
+        // Under the load as marker 2 has it, for what moves along x and for what moves along y.
+        let mut steps: [Steps; 2] = Default::default();
+        for (nth, &Output(table, output)) in outputs.iter().enumerate() {
+            for (steps, tilts) in steps.iter_mut().zip(&tilts) {
+                table.set(steps, output, &sizes, tilts);
+            }
+            let mut seen = [1.0; 2];
+            for (marker, (corner, beside_mm)) in CORNERS.into_iter().zip(beside_mm).enumerate() {
+                for (along, (seen, corner)) in seen.iter_mut().zip(corner).enumerate() {
+                    if *seen != corner {
+                        turn(table, &mut steps, along);
+                        *seen = corner;
                     }
                 }
-                prediction.set(2 * marker + axis, &reflection.back(&answer));
+                // The place beside which a marker in its place would be as far from the tip.
+                let place_mm = [0, 1].map(|i| corner[i] * (pose.place_mm[i] - beside_mm[i]));
+                let at = place(table, place_mm);
+                for (axis, steps) in steps.iter().enumerate() {
+                    let reflection = Reflection { corner, axis };
+                    let answer = table.answer(output, &reflection.swapped(at), steps);
+                    let equation = 2 * marker + axis;
+                    let [x, y] = reflection.vector(*beside_mm);
+                    // What gluing changes of the slopes is far less than they are.
+                    let more = |part: f32| reflection.sign() * part * answer.value;
+                    match nth {
+                        0 => prediction.set(equation, &reflection.back(&answer)),
+                        1 => prediction.add(equation, more(x)),
+                        _ => prediction.add(equation, more(y)),
+                    }
+                }
             }
         }
         if let Some(own) = &self.own {
+            let [steps, _] = &mut steps;
             let at = place(own, pose.place_mm);
-            let load = Load {
-                sizes: &sizes,
-                tilts: &tilts[0],
-            };
             for (k, moved) in prediction.moved.iter_mut().enumerate() {
-                *moved += own.value(k, &at, &load, &mut sums);
+                own.set(steps, k, &sizes, &tilts[0]);
+                *moved += own.answer(k, &at, steps).value;
             }
         }
         prediction
     }
 }
 
+/// Sees the load in a mirror: its part along x (0) or y (1) turned around.
+fn turn(table: &Table<'_>, [of_x, of_y]: &mut [Steps; 2], along: usize) {
+    table.turn(of_x, along);
+    table.turn(of_y, 1 - along);
+}
+
 impl Prediction {
     fn set(&mut self, equation: usize, answer: &Answer) {
         debug_assert!(equation < EQUATIONS);
-        self.moved[equation] = answer.value;
-        for (column, slope) in self.slopes.iter_mut().zip(answer.slopes) {
-            column[equation] = slope;
+        let columns = self.slopes.iter_mut().zip(answer.slopes);
+        for (column, part) in columns.chain([(&mut self.moved, answer.value)]) {
+            if let Some(place) = column.get_mut(equation) {
+                *place = part;
+            }
+        }
+    }
+
+    fn add(&mut self, equation: usize, moved: f32) {
+        if let Some(place) = self.moved.get_mut(equation) {
+            *place += moved;
         }
     }
 }
@@ -102,21 +130,18 @@ struct Reflection {
 }
 
 impl Reflection {
+    /// Of what moves, reflected.
+    fn sign(&self) -> f32 {
+        let [sx, sy] = self.corner;
+        if self.axis == 0 { sx } else { sy }
+    }
+
     /// A vector along the film, reflected; and a reflected one, as it is.
     fn vector(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sx, sy] = self.corner;
         match self.axis {
             0 => [sx * x, sy * y],
             _ => [sy * y, sx * x],
-        }
-    }
-
-    /// The signs of what is reflected.
-    fn signs(&self) -> [f32; 2] {
-        let [sx, sy] = self.corner;
-        match self.axis {
-            0 => [sx, sy],
-            _ => [sy, sx],
         }
     }
 
@@ -131,21 +156,24 @@ impl Reflection {
         }
     }
 
-    /// What was reflected, as it is.
+    /// What was reflected, as it is: its slopes by tilt are those by the tilt as it is, but for
+    /// which comes first.
     fn back(&self, reflected: &Answer) -> Answer {
-        let sign = self.corner[self.axis];
+        let ([sx, sy], sign) = (self.corner, self.sign());
         let [size, a, b, x, y] = reflected.slopes;
-        let along = |[a, b]: [f32; 2]| {
-            let [sx, sy] = self.corner;
-            match self.axis {
-                0 => [sign * sx * a, sign * sy * b],
-                _ => [sign * sx * b, sign * sy * a],
-            }
+        let ([a, b], [x, y]) = match self.axis {
+            0 => ([a, b], [x, y]),
+            _ => ([b, a], [y, x]),
         };
-        let ([a, b], [x, y]) = (along([a, b]), along([x, y]));
         Answer {
             value: sign * reflected.value,
-            slopes: [sign * size, a, b, x, y],
+            slopes: [
+                sign * size,
+                sign * a,
+                sign * b,
+                sign * sx * x,
+                sign * sy * y,
+            ],
         }
     }
 }

@@ -1,7 +1,9 @@
 //! Linear equations for five unknowns, by least squares.
 //!
-//! Modified Gram–Schmidt on columns scaled to one, the right side as a sixth column: as stable as
-//! Householder's reflections for least squares (Björck 1967), and nothing is squared.
+//! Modified Gram–Schmidt, the right side as a sixth column: as stable as Householder's reflections
+//! for least squares (Björck 1967), and nothing is squared.
+
+use crate::kernels::sqrt;
 
 /// Unknowns: size, tilt along x and y, place along x and y.
 pub const UNKNOWNS: usize = 5;
@@ -66,25 +68,18 @@ pub fn solve<const N: usize>(
     mut columns: [[f32; N]; UNKNOWNS],
     mut side: [f32; N],
 ) -> Option<Solved> {
-    let mut scales = [0.0; UNKNOWNS];
-    for (column, scale) in columns.iter_mut().zip(&mut scales) {
-        *scale = norm(column);
-        // What is no number is not among them.
-        if !(f32::MIN_POSITIVE..f32::INFINITY).contains(scale) {
-            return None;
-        }
-        *column = column.map(|part| part / *scale);
-    }
+    let whole = columns.each_ref().map(norm);
     let mut upper = [[0.0; UNKNOWNS]; UNKNOWNS];
     let mut along = [0.0; UNKNOWNS];
     for k in 0..UNKNOWNS {
         let own = norm(&columns[k]);
-        // Of one, up to rounding; what is no number is not among them.
-        if !(LEAST_OWN..2.0).contains(&own) {
+        // Not more than the whole, up to rounding; what is no number is not among them.
+        if !(f32::MIN_POSITIVE.max(LEAST_OWN * whole[k])..2.0 * whole[k]).contains(&own) {
             return None;
         }
         upper[k][k] = own;
-        let unit = columns[k].map(|part| part / own);
+        let per_own = 1.0 / own;
+        let unit = columns[k].map(|part| part * per_own);
         for j in k + 1..UNKNOWNS {
             upper[k][j] = dot(&unit, &columns[j]);
             take(&mut columns[j], &unit, upper[k][j]);
@@ -98,13 +93,11 @@ pub fn solve<const N: usize>(
         unknowns: [0.0; UNKNOWNS],
         left_over,
         explained: along.iter().fold(0.0, |sum, part| sum + part * part),
-        spread: [[0.0; UNKNOWNS]; UNKNOWNS],
+        spread: inverse,
     };
-    for (row, scale) in scales.into_iter().enumerate() {
+    for (row, unknown) in solved.unknowns.iter_mut().enumerate() {
         for k in row..UNKNOWNS {
-            let part = inverse[row][k] / scale;
-            solved.unknowns[row] += part * along[k];
-            solved.spread[row][k] = part;
+            *unknown += inverse[row][k] * along[k];
         }
     }
     let sound = left_over.is_finite() && solved.unknowns.iter().all(|part| part.is_finite());
@@ -119,21 +112,26 @@ fn inverse(upper: &[[f32; UNKNOWNS]; UNKNOWNS]) -> [[f32; UNKNOWNS]; UNKNOWNS] {
         for row in (0..column).rev() {
             let sum =
                 (row + 1..=column).fold(0.0, |sum, k| sum + upper[row][k] * inverse[k][column]);
-            inverse[row][column] = -sum / upper[row][row];
+            inverse[row][column] = -sum * inverse[row][row];
         }
     }
     inverse
 }
 
-fn norm(column: &[f32]) -> f32 {
-    libm::sqrtf(dot(column, column))
+fn norm<const N: usize>(column: &[f32; N]) -> f32 {
+    sqrt(dot(column, column))
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+/// In four sums, none of which waits for another.
+fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
+    let mut sums = [0.0; 4];
+    for (k, (a, b)) in a.iter().zip(b).enumerate() {
+        sums[k % 4] += a * b;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
-fn take(from: &mut [f32], unit: &[f32], part: f32) {
+fn take<const N: usize>(from: &mut [f32; N], unit: &[f32; N], part: f32) {
     for (from, unit) in from.iter_mut().zip(unit) {
         *from -= part * unit;
     }

@@ -4,12 +4,13 @@
 //! summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what is
 //! left is single precision.
 
-use super::axis::{Axis, Weights};
+use super::axis::{Axis, ONE, Weights};
 use super::terms::{MOST_TERMS, Sizes, Terms, Tilts};
-use crate::kernels::{Parts, spline};
+use crate::kernels::{Factors, Parts, spline};
+use heapless::Vec;
 
-/// Steps that a sum over both axes is in parts of: Q15 · Q15 / 2¹⁶.
-const SUM: f32 = 1.0 / 16_384.0;
+/// Steps that a sum over both axes is in parts of: what weights are parts of, squared, / 2¹⁶.
+const SUM: f32 = 65_536.0 / (ONE * ONE);
 
 /// Outputs, each a sum of terms whose coefficients are splines over the place. Borrowed from a
 /// file.
@@ -33,18 +34,10 @@ pub struct Place {
     pub y: Weights,
 }
 
-/// What presses, as terms see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Load<'l> {
-    /// How strongly.
-    pub sizes: &'l Sizes,
-    /// In which direction.
-    pub tilts: &'l Tilts,
-}
-
-/// Room for the sums of an output's coefficients.
-#[derive(Clone, Debug)]
-pub struct Sums([[i32; 3]; MOST_TERMS]);
+/// What a step of each of an output's terms is under a load, with its slopes by size and by tilt
+/// along x and y.
+#[derive(Clone, Debug, Default)]
+pub struct Steps(Vec<Factors, MOST_TERMS>);
 
 /// An output with its slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -92,51 +85,56 @@ impl<'a> Table<'a> {
         &self.axis
     }
 
-    /// An output at a place.
-    pub fn value(&self, output: usize, place: &Place, load: &Load<'_>, sums: &mut Sums) -> f32 {
-        self.answer(output, place, load, sums).value
-    }
-
-    /// An output with its slopes.
-    pub fn answer(&self, output: usize, place: &Place, load: &Load<'_>, sums: &mut Sums) -> Answer {
-        let (mut sums, mut steps) = self.sums(output, place, sums);
-        let mut sum = Answer::default();
-        let mut tilts = load.tilts.values.iter().zip(&load.tilts.slopes);
+    /// Writes down what steps of an output's terms are under a load.
+    pub fn set(&self, steps: &mut Steps, output: usize, sizes: &Sizes, tilts: &Tilts) {
+        steps.0.clear();
+        let of_output = self.sizes.get(output * self.terms.count()..);
+        let mut terms = of_output.unwrap_or_default().iter();
+        let mut tilts = tilts.0.iter();
         for (count, groups) in self.terms.sizes_of_degrees() {
-            for (whole, by_tilt) in tilts.by_ref().take(groups) {
-                let (here, step);
-                (here, sums) = sums.split_at(count.min(sums.len()));
-                (step, steps) = steps.split_at(count.min(steps.len()));
-                let group = load.sizes.group(here, step);
-                sum.value += group.value * whole;
-                sum.slopes[0] += group.by_size * whole;
-                sum.slopes[1] += group.value * by_tilt[0];
-                sum.slopes[2] += group.value * by_tilt[1];
-                sum.slopes[3] += group.by_x * whole;
-                sum.slopes[4] += group.by_y * whole;
+            for [whole, by_a, by_b] in tilts.by_ref().take(groups) {
+                let sizes = sizes.values.iter().zip(&sizes.slopes).take(count);
+                for ((value, slope), step) in sizes.zip(&mut terms) {
+                    let step = SUM * f32::from_le_bytes(*step);
+                    let (value, slope) = (step * value, step * slope);
+                    let factors = [value * whole, slope * whole, value * by_a, value * by_b];
+                    // There is room for all terms.
+                    let _ = steps.0.push(factors);
+                }
             }
         }
-        let along = SUM * self.axis.slope_unit();
-        let [by_size, by_a, by_b, by_x, by_y] = sum.slopes;
-        Answer {
-            value: SUM * sum.value,
-            slopes: [
-                SUM * by_size,
-                SUM * by_a,
-                SUM * by_b,
-                along * by_x,
-                along * by_y,
-            ],
+    }
+
+    /// Turns the tilt's part along x (0) or y (1) around. Slopes stay those by the part as it was.
+    pub fn turn(&self, steps: &mut Steps, along: usize) {
+        let mut terms = &mut steps.0[..];
+        for (degree, (count, groups)) in self.terms.sizes_of_degrees().enumerate() {
+            for k in 0..groups {
+                let group;
+                (group, terms) = terms.split_at_mut(count.min(terms.len()));
+                let power = if along == 0 { degree - k } else { k };
+                if power % 2 == 1 {
+                    for factor in group.as_flattened_mut() {
+                        // By its sign bit: cheaper than in the floating-point unit.
+                        *factor = f32::from_bits(factor.to_bits() ^ 1 << 31);
+                    }
+                }
+            }
         }
     }
 
-    /// The sums of an output's coefficients around a place, and the size of a step of each.
-    fn sums<'s>(
-        &self,
-        output: usize,
-        place: &Place,
-        sums: &'s mut Sums,
-    ) -> (&'s [[i32; 3]], &'a [[u8; 4]]) {
+    /// An output with its slopes, by what its terms' steps are.
+    pub fn answer(&self, output: usize, place: &Place, steps: &Steps) -> Answer {
+        let [value, by_size, by_a, by_b, by_x, by_y] = self.spline(output, place, &steps.0);
+        let along = self.axis.slope_unit();
+        Answer {
+            value,
+            slopes: [by_size, by_a, by_b, along * by_x, along * by_y],
+        }
+    }
+
+    /// The sums of an output's coefficients around a place, times factors.
+    fn spline(&self, output: usize, place: &Place, factors: &[Factors]) -> [f32; 6] {
         let count = self.terms.count();
         let node = 2 * self.axis.count();
         let before = (place.y.first * self.outputs + output) * count * node + 2 * place.x.first;
@@ -144,81 +142,16 @@ impl<'a> Table<'a> {
             y: core::array::from_fn(|j| [place.y.values[j], place.y.slopes[j]]),
             x: [place.x.values, place.x.slopes],
         };
-        let sums = sums.0.get_mut(..count).unwrap_or_default();
         let line = self.outputs * count * node;
         let steps = self.steps.get(before..).unwrap_or_default();
-        spline(steps, line, node, &parts, sums);
-        let sizes = self.sizes.get(output * count..(output + 1) * count);
-        (sums, sizes.unwrap_or_default())
-    }
-}
-
-impl Sums {
-    /// Of nothing yet.
-    pub const fn new() -> Sums {
-        Sums([[0; 3]; MOST_TERMS])
-    }
-}
-
-/// What the terms of a group add up to, before the tilt.
-#[derive(Default)]
-struct Group {
-    value: f32,
-    by_size: f32,
-    by_x: f32,
-    by_y: f32,
-}
-
-impl Sizes {
-    /// Of as many terms as there are sums: loops whose length the compiler knows take half the
-    /// time.
-    fn group(&self, sums: &[[i32; 3]], steps: &[[u8; 4]]) -> Group {
-        match sums.len() {
-            1 => self.group_of::<1>(sums, steps),
-            2 => self.group_of::<2>(sums, steps),
-            3 => self.group_of::<3>(sums, steps),
-            4 => self.group_of::<4>(sums, steps),
-            5 => self.group_of::<5>(sums, steps),
-            6 => self.group_of::<6>(sums, steps),
-            7 => self.group_of::<7>(sums, steps),
-            8 => self.group_of::<8>(sums, steps),
-            _ => Group::default(),
-        }
-    }
-
-    #[inline(always)]
-    fn group_of<const N: usize>(&self, sums: &[[i32; 3]], steps: &[[u8; 4]]) -> Group {
-        let mut group = Group::default();
-        let powers = self
-            .values
-            .first_chunk::<N>()
-            .zip(self.slopes.first_chunk::<N>());
-        let Some(((sums, steps), (values, slopes))) = sums
-            .first_chunk::<N>()
-            .zip(steps.first_chunk::<N>())
-            .zip(powers)
-        else {
-            return group;
-        };
-        let powers = values.iter().zip(slopes);
-        for (([here, along_x, along_y], step), (power, slope)) in sums.iter().zip(steps).zip(powers)
-        {
-            let step = f32::from_le_bytes(*step);
-            let here = *here as f32 * step;
-            group.value += here * power;
-            group.by_size += here * slope;
-            let power = step * power;
-            group.by_x += *along_x as f32 * power;
-            group.by_y += *along_y as f32 * power;
-        }
-        group
+        spline(steps, line, node, &parts, factors)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward::terms::Limits;
+    use crate::forward::terms::{Limits, Powers};
     use std::vec::Vec;
 
     const LIMITS: Limits = Limits {
@@ -238,7 +171,16 @@ mod tests {
     }
 
     fn load([size, a, b]: [f32; 3]) -> (Sizes, Tilts) {
-        (Sizes::at(size, &LIMITS), Tilts::at([a, b], &LIMITS))
+        let [a, b] = [a, b].map(|part| Powers::at(part, &LIMITS));
+        let tilts = Tilts::of(&a, &b);
+        (Sizes::at(size, &LIMITS), tilts)
+    }
+
+    fn answer(table: &Table, output: usize, place: &Place, load: [f32; 3]) -> Answer {
+        let (sizes, tilts) = self::load(load);
+        let mut steps = Steps::default();
+        table.set(&mut steps, output, &sizes, &tilts);
+        table.answer(output, place, &steps)
     }
 
     /// Of two outputs, the steps from a function of their index.
@@ -254,18 +196,7 @@ mod tests {
     fn slopes_are_the_values_differences() {
         let wild = |k: usize| (20_000.0 * (k as f64).sin()) as i16;
         with(wild, |table| {
-            let answer = |[s, a, b, x, y]: [f32; 5]| {
-                let ((sizes, tilts), place) = (load([s, a, b]), at(x, y));
-                let load = Load {
-                    sizes: &sizes,
-                    tilts: &tilts,
-                };
-                let mut sums = Sums::new();
-                let answer = table.answer(1, &place, &load, &mut sums);
-                let value = table.value(1, &place, &load, &mut sums);
-                assert!((value - answer.value).abs() < 1e-5);
-                answer
-            };
+            let answer = |[s, a, b, x, y]: [f32; 5]| answer(table, 1, &at(x, y), [s, a, b]);
             let here = [0.4, 0.3, -0.2, 0.7, 1.3];
             let told = answer(here).slopes;
             for axis in 0..5 {
@@ -282,6 +213,26 @@ mod tests {
         });
     }
 
+    #[test]
+    fn turned_steps_are_those_of_the_mirrored_load() {
+        let wild = |k: usize| (20_000.0 * (k as f64).sin()) as i16;
+        with(wild, |table| {
+            for (along, signs) in [(0, [-1.0, 1.0]), (1, [1.0, -1.0])] {
+                let (sizes, tilts) = load([0.4, 0.3, -0.2]);
+                let mut steps = Steps::default();
+                table.set(&mut steps, 0, &sizes, &tilts);
+                table.turn(&mut steps, along);
+                let turned = table.answer(0, &at(0.7, 1.3), &steps);
+                let [sa, sb] = signs;
+                let mut seen = answer(table, 0, &at(0.7, 1.3), [0.4, 0.3 * sa, -0.2 * sb]);
+                // By the part of the tilt as it was.
+                seen.slopes[1] *= sa;
+                seen.slopes[2] *= sb;
+                assert_eq!(turned, seen);
+            }
+        });
+    }
+
     /// The largest steps everywhere, of either sign: nothing overflows (tests check it), and the
     /// sum is what it should be.
     #[test]
@@ -292,17 +243,13 @@ mod tests {
                 |table| {
                     for (x, y) in [(-2.0, -2.0), (0.4, 2.9), (3.0, 3.0)] {
                         let (sizes, tilts) = load([0.6, 0.6, 0.6]);
-                        let mut groups = tilts.values.iter();
+                        let mut groups = tilts.0.iter().map(|[value, ..]| value);
                         let mut of_degree = |(count, groups_of): (usize, usize)| {
                             let tilts: f32 = groups.by_ref().take(groups_of).sum();
                             tilts * sizes.values[..count].iter().sum::<f32>()
                         };
                         let sum: f32 = table.terms.sizes_of_degrees().map(&mut of_degree).sum();
-                        let load = Load {
-                            sizes: &sizes,
-                            tilts: &tilts,
-                        };
-                        let value = table.answer(0, &at(x, y), &load, &mut Sums::new()).value;
+                        let value = answer(table, 0, &at(x, y), [0.6, 0.6, 0.6]).value;
                         let expected = 1e-4 * f32::from(step) * sum;
                         assert!(
                             (value - expected).abs() < 2e-3 * expected.abs(),
@@ -328,12 +275,7 @@ mod tests {
             if negative { i16::MIN } else { i16::MAX }
         };
         with(sign, |table| {
-            let (sizes, tilts) = load([0.6, 0.6, 0.6]);
-            let load = Load {
-                sizes: &sizes,
-                tilts: &tilts,
-            };
-            let answer = table.answer(0, &place, &load, &mut Sums::new());
+            let answer = answer(table, 0, &place, [0.6, 0.6, 0.6]);
             assert!(answer.slopes.iter().all(|part| part.is_finite()));
         });
     }

@@ -39,14 +39,18 @@ pub struct Sizes {
     pub slopes: [f32; MOST_SIZES],
 }
 
-/// What terms with a tilt are, by group, and their slopes by the tilt along x and y, 1/rad.
+/// The powers of one part of a tilt, in parts of the largest.
 #[derive(Clone, Copy, Debug)]
-pub struct Tilts {
-    /// a^j·b^k.
-    pub values: [f32; MOST_GROUPS],
-    /// Their slopes.
-    pub slopes: [[f32; 2]; MOST_GROUPS],
+pub struct Powers {
+    /// a^j.
+    values: [f32; MOST_TILTS],
+    /// Their slopes, 1/rad.
+    slopes: [f32; MOST_TILTS],
 }
+
+/// What terms with a tilt are, by group: a^j·b^k, and its slopes by the tilt along x and y, 1/rad.
+#[derive(Clone, Copy, Debug)]
+pub struct Tilts(pub [[f32; 3]; MOST_GROUPS]);
 
 impl Terms {
     /// `None` when it would be none or more than [`MOST_TERMS`].
@@ -90,56 +94,40 @@ impl Sizes {
     }
 }
 
-impl Tilts {
-    /// At a tilt, rad.
-    pub fn at(tilt: [f32; 2], limits: &Limits) -> Tilts {
+impl Powers {
+    /// Of one part of a tilt, rad.
+    pub fn at(part: f32, limits: &Limits) -> Powers {
         let by_largest = 1.0 / limits.tilt;
-        let [x, y] = tilt.map(|part| powers(part * by_largest));
-        let slope = |powers: &[f32; MOST_TILTS], j: usize| match j {
-            0 => 0.0,
-            _ => j as f32 * by_largest * powers[j - 1],
+        let base = part * by_largest;
+        let mut powers = Powers {
+            values: [1.0; MOST_TILTS],
+            slopes: [0.0; MOST_TILTS],
         };
-        let mut tilts = Tilts {
-            values: [0.0; MOST_GROUPS],
-            slopes: [[0.0; 2]; MOST_GROUPS],
-        };
-        let mut groups = tilts.values.iter_mut().zip(&mut tilts.slopes);
-        for degree in 0..MOST_TILTS {
-            for (k, (value, slopes)) in (0..=degree).zip(&mut groups) {
-                let j = degree - k;
-                *value = x[j] * y[k];
-                *slopes = [slope(&x, j) * y[k], x[j] * slope(&y, k)];
-            }
+        for j in 1..MOST_TILTS {
+            powers.values[j] = powers.values[j - 1] * base;
+            powers.slopes[j] = j as f32 * by_largest * powers.values[j - 1];
         }
-        tilts
-    }
-
-    /// The same seen in a mirror: x and y by these signs.
-    pub fn mirrored(&self, [sx, sy]: [f32; 2]) -> Tilts {
-        let mut tilts = *self;
-        let mut groups = tilts.values.iter_mut().zip(&mut tilts.slopes);
-        let mut signs = [1.0; MOST_TILTS];
-        for degree in 0..MOST_TILTS {
-            for (sign, (value, slopes)) in signs[..=degree].iter().zip(&mut groups) {
-                *value *= sign;
-                *slopes = [sign * sx * slopes[0], sign * sy * slopes[1]];
-            }
-            // Those of the next degree: one more a, and for the last one more b.
-            if degree + 1 < MOST_TILTS {
-                signs[degree + 1] = sy * signs[degree];
-                signs[..=degree].iter_mut().for_each(|sign| *sign *= sx);
-            }
-        }
-        tilts
+        powers
     }
 }
 
-fn powers(base: f32) -> [f32; MOST_TILTS] {
-    let mut powers = [1.0; MOST_TILTS];
-    for j in 1..MOST_TILTS {
-        powers[j] = powers[j - 1] * base;
+impl Tilts {
+    /// Of the powers of both parts of a tilt.
+    pub fn of(x: &Powers, y: &Powers) -> Tilts {
+        let mut tilts = Tilts([[0.0; 3]; MOST_GROUPS]);
+        let mut groups = tilts.0.iter_mut();
+        for degree in 0..MOST_TILTS {
+            for (k, group) in (0..=degree).zip(&mut groups) {
+                let j = degree - k;
+                *group = [
+                    x.values[j] * y.values[k],
+                    x.slopes[j] * y.values[k],
+                    x.values[j] * y.slopes[k],
+                ];
+            }
+        }
+        tilts
     }
-    powers
 }
 
 #[cfg(test)]
@@ -151,32 +139,21 @@ mod tests {
         tilt: 0.67,
     };
 
+    fn at(tilt: [f32; 2]) -> Tilts {
+        let [x, y] = tilt.map(|part| Powers::at(part, &LIMITS));
+        Tilts::of(&x, &y)
+    }
+
     #[test]
     fn groups_follow_the_degrees() {
         let terms = Terms::new([4, 3, 1, 0, 0]).unwrap();
         assert_eq!(terms.count(), 4 + 2 * 3 + 3);
         let sizes: std::vec::Vec<_> = terms.sizes_of_degrees().collect();
         assert_eq!(sizes, [(4, 1), (3, 2), (1, 3), (0, 4), (0, 5)]);
-        let tilts = Tilts::at([0.335, 0.67], &LIMITS);
-        assert_eq!(&tilts.values[..6], &[1.0, 0.5, 1.0, 0.25, 0.5, 1.0]);
+        let values = at([0.335, 0.67]).0.map(|[value, ..]| value);
+        assert_eq!(&values[..6], &[1.0, 0.5, 1.0, 0.25, 0.5, 1.0]);
         for wrong in [[9, 0, 0, 0, 0], [0; 5], [8, 8, 8, 8, 8], [255; 5]] {
             assert_eq!(Terms::new(wrong), None, "{wrong:?}");
-        }
-    }
-
-    #[test]
-    fn mirrors_turn_signs() {
-        for signs in [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]] {
-            let [sx, sy] = signs;
-            let (seen, own) = (
-                Tilts::at([0.3 * sx, -0.5 * sy], &LIMITS),
-                Tilts::at([0.3, -0.5], &LIMITS).mirrored(signs),
-            );
-            assert_eq!(
-                (seen.values, seen.slopes),
-                (own.values, own.slopes),
-                "{signs:?}"
-            );
         }
     }
 
@@ -190,15 +167,15 @@ mod tests {
             assert!(near(slope, here.slopes[i]), "{i}: {slope} {here:?}");
         }
         for axis in [0, 1] {
-            let at = |step: f32| {
+            let beside = |step: f32| {
                 let mut tilt = [0.3, -0.5];
                 tilt[axis] += step;
-                Tilts::at(tilt, &LIMITS)
+                at(tilt).0
             };
-            let (back, here, forth) = (at(-step), at(0.0), at(step));
+            let (back, here, forth) = (beside(-step), beside(0.0), beside(step));
             for k in 0..MOST_GROUPS {
-                let slope = (forth.values[k] - back.values[k]) / (2.0 * step);
-                assert!(near(slope, here.slopes[k][axis]), "{k}: {slope} {here:?}");
+                let slope = (forth[k][0] - back[k][0]) / (2.0 * step);
+                assert!(near(slope, here[k][1 + axis]), "{k}: {slope} {here:?}");
             }
         }
     }

@@ -11,7 +11,7 @@
 
 use core::arch::global_asm;
 
-use super::{Inputs, LOADED_AHEAD, Parts, Sums};
+use super::{Factors, Inputs, LOADED_AHEAD, Parts, Sums};
 use crate::layer::{Layer, MAX_WIDTH};
 use crate::packing::{MAX_ACTIVATION8, MAX_WEIGHT8, WeightWidth};
 
@@ -20,6 +20,8 @@ global_asm!(include_str!("dot8.s"), options(raw));
 global_asm!(include_str!("dot16.s"), options(raw));
 #[cfg(target_abi = "eabihf")]
 global_asm!(include_str!("spline.s"), options(raw));
+#[cfg(target_abi = "eabihf")]
+global_asm!(include_str!("sqrt.s"), options(raw));
 
 unsafe extern "C" {
     /// Equals `portable::multiply` for a layer of int8 weights, given inputs that [`hivtac_expand`]
@@ -114,25 +116,32 @@ unsafe extern "C" {
     );
 
     /// Equals `portable::spline`. A pair of products is one SMUAD or SMLAD, a sum along y one
-    /// SMLAWB or SMLAWT.
+    /// SMLAWB or SMLAWT; while those of one term are made, the term before is multiplied with its
+    /// factors.
     ///
     /// *No overflow.* See there: whatever the coefficients are.
     ///
-    /// *Contract.* `sums`, up to `end`, which lies a positive number of terms after it; `line`:
+    /// *Contract.* `factors`, up to `end`, which lies a positive number of terms after it; `line`:
     /// bytes to the next line; `back`: bytes from a term's last line to the next term's first one,
     /// modulo 2³². `steps`: eight bytes in each line of each term are readable, and so are those of
-    /// one term more in the first line; they may lie at any address.
+    /// one term more in the first line; they may lie at any address. Writes `sums`.
     ///
-    /// *Schedule.* A term, 32 products along x and 12 along y: 53 instructions in 36 cycles.
+    /// *Schedule.* A term, 32 products along x, 12 along y and 6 with factors: 75 instructions in
+    /// 42 cycles.
     #[cfg(target_abi = "eabihf")]
     fn hivtac_spline(
-        sums: *mut [i32; 3],
+        steps: *const u8,
         line: usize,
         back: usize,
         parts: *const Parts,
-        end: *const [i32; 3],
-        steps: *const u8,
+        factors: *const Factors,
+        end: *const Factors,
+        sums: *mut [f32; 6],
     );
+
+    /// Equals `libm::sqrtf`: IEEE 754's square root, by VSQRT.
+    #[cfg(target_abi = "eabihf")]
+    fn hivtac_root(square: f32) -> f32;
 }
 
 /// The proof of [`hivtac_dot8`] for the widest layer.
@@ -206,28 +215,43 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) -> usize {
     rows
 }
 
-/// As [`portable::spline`](super::portable::spline), for coefficients that are all there; says
-/// whether it did anything.
+/// As [`portable::spline`](super::portable::spline), for coefficients that are all there.
 #[cfg(target_abi = "eabihf")]
 pub fn spline(
     steps: &[u8],
     line: usize,
     node: usize,
     parts: &Parts,
-    sums: &mut [[i32; 3]],
-) -> bool {
+    factors: &[Factors],
+) -> Option<[f32; 6]> {
     // What files may hold is far below 32 bits: `Table` has at most 88 terms and 16 nodes along
     // each axis.
-    let last = sums
-        .len()
-        .checked_sub(1)
-        .map(|last| last * node + 3 * line + 8);
-    if last.is_none_or(|last| last > steps.len()) || line < sums.len() * node {
-        return false;
+    let last = factors.len().checked_sub(1)? * node + 3 * line + 8;
+    if last > steps.len() || line < factors.len() * node {
+        return None;
     }
-    let (back, end) = (node.wrapping_sub(3 * line), sums.as_mut_ptr_range().end);
+    let (back, steps) = (node.wrapping_sub(3 * line), steps.as_ptr());
+    let (range, mut sums) = (factors.as_ptr_range(), [0.0; 6]);
     // SAFETY: there is a term, and the last one's last line ends within the coefficients; a term
     // more in the first line ends before, as a line holds all terms.
-    unsafe { hivtac_spline(sums.as_mut_ptr(), line, back, parts, end, steps.as_ptr()) };
-    true
+    unsafe {
+        hivtac_spline(
+            steps,
+            line,
+            back,
+            parts,
+            range.start,
+            range.end,
+            &raw mut sums,
+        )
+    };
+    Some(sums)
+}
+
+/// As `libm::sqrtf`, which computes it bit by bit here.
+#[cfg(target_abi = "eabihf")]
+#[inline(always)]
+pub fn sqrt(square: f32) -> f32 {
+    // SAFETY: it changes nothing but its result.
+    unsafe { hivtac_root(square) }
 }

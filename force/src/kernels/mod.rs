@@ -67,13 +67,31 @@ pub struct Parts {
     pub x: [[i16; 4]; 2],
 }
 
-/// For each term its coefficient at a place, its slope along x and its slope along y: see
+/// What a term's coefficient counts in an output, and in its slopes by size and by tilt along x and
+/// y.
+pub type Factors = [f32; 4];
+
+/// An output at a place, and its slopes by size, by tilt along x and y, and along x and y: see
 /// `portable::spline`.
-pub fn spline(steps: &[u8], line: usize, node: usize, parts: &Parts, sums: &mut [[i32; 3]]) {
-    // It keeps numbers in the floating-point unit's registers.
+pub fn spline(
+    steps: &[u8],
+    line: usize,
+    node: usize,
+    parts: &Parts,
+    factors: &[Factors],
+) -> [f32; 6] {
     #[cfg(all(armv7em, target_abi = "eabihf"))]
-    if cortex_m7::spline(steps, line, node, parts, sums) {
-        return;
+    if let Some(sums) = cortex_m7::spline(steps, line, node, parts, factors) {
+        return sums;
     }
-    portable::spline(steps, line, node, parts, sums);
+    portable::spline(steps, line, node, parts, factors)
+}
+
+/// A square root, to the nearest.
+#[inline(always)]
+pub fn sqrt(square: f32) -> f32 {
+    #[cfg(all(armv7em, target_abi = "eabihf"))]
+    return cortex_m7::sqrt(square);
+    #[cfg(not(all(armv7em, target_abi = "eabihf")))]
+    libm::sqrtf(square)
 }

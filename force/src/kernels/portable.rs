@@ -1,6 +1,6 @@
 //! The definition of every kernel, in portable Rust.
 
-use super::{Parts, Sums};
+use super::{Factors, Parts, Sums};
 use crate::layer::{Layer, MAX_WIDTH};
 use crate::packing::{ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 use crate::rescale::rescale_sum;
@@ -14,31 +14,59 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
     }
 }
 
-/// For each of `sums` the sum of a term's coefficients at four by four nodes, in parts of 2¹⁴ to a
-/// step: its value, its slope along x and its slope along y. A coefficient is an i16; those of a
-/// term that lie beside each other along x follow each other, the next term's are `node` bytes
-/// farther, and those beside each other along y `line` bytes. What lies beyond the end counts as
-/// zero.
+/// The sum of all terms times their factors, its slopes by size and tilt, by their own factors, and
+/// its slopes along x and y.
+///
+/// A term is the sum of its coefficients at four by four nodes, in parts of some 2¹⁴ to a step: its
+/// value, its slope along x and its slope along y. A coefficient is an i16; those of a term that
+/// lie beside each other along x follow each other, the next term's are `node` bytes farther, and
+/// those beside each other along y `line` bytes. What lies beyond the end counts as zero.
 ///
 /// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
 /// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
-pub fn spline(steps: &[u8], line: usize, node: usize, parts: &Parts, sums: &mut [[i32; 3]]) {
-    let times = |sum: i32, part: i16| ((i64::from(sum) * i64::from(part)) >> 16) as i32;
-    for (term, sums) in sums.iter_mut().enumerate() {
-        *sums = [0; 3];
-        for (j, [value, slope]) in parts.y.into_iter().enumerate() {
-            let row = four(steps, term * node + j * line);
-            let [here, along_x] = parts.x.map(|parts| {
-                let products = row.iter().zip(parts);
-                products.fold(0, |sum, (step, part)| {
-                    sum + i32::from(*step) * i32::from(part)
-                })
-            });
-            sums[0] += times(here, value);
-            sums[1] += times(along_x, value);
-            sums[2] += times(here, slope);
+pub fn spline(
+    steps: &[u8],
+    line: usize,
+    node: usize,
+    parts: &Parts,
+    factors: &[Factors],
+) -> [f32; 6] {
+    let mut sums = [0.0; 6];
+    for (term, [whole, by_size, by_a, by_b]) in factors.iter().enumerate() {
+        let [here, along_x, along_y] =
+            around(steps, term * node, line, parts).map(|sum| sum as f32);
+        let products = [
+            here * whole,
+            here * by_size,
+            here * by_a,
+            here * by_b,
+            along_x * whole,
+            along_y * whole,
+        ];
+        for (sum, product) in sums.iter_mut().zip(products) {
+            *sum += product;
         }
     }
+    sums
+}
+
+/// A term whose coefficients begin there: its value, its slope along x and its slope along y.
+fn around(steps: &[u8], at: usize, line: usize, parts: &Parts) -> [i32; 3] {
+    let times = |sum: i32, part: i16| ((i64::from(sum) * i64::from(part)) >> 16) as i32;
+    let mut sums = [0; 3];
+    for (j, [value, slope]) in parts.y.into_iter().enumerate() {
+        let row = four(steps, at + j * line);
+        let [here, along_x] = parts.x.map(|parts| {
+            let products = row.iter().zip(parts);
+            products.fold(0, |sum, (step, part)| {
+                sum + i32::from(*step) * i32::from(part)
+            })
+        });
+        sums[0] += times(here, value);
+        sums[1] += times(along_x, value);
+        sums[2] += times(here, slope);
+    }
+    sums
 }
 
 fn four(steps: &[u8], at: usize) -> [i16; 4] {

@@ -2,8 +2,8 @@
 
 use super::{ModelError, reader::Reader};
 use crate::forward::{
-    Axis, Forward, Limits, MOST_STEPS, Markers, Mounting, NODES, Noise, RestImage, Stiffness,
-    Table, Tables, Terms, Tolerance,
+    Axis, Forward, KNOTS, Limits, MOST_STEPS, Markers, Mounting, NODES, Noise, PARTS, RestImage,
+    Stiffness, SystematicGrid, Table, Tables, Terms, Tolerance,
 };
 #[cfg(any(test, feature = "encode"))]
 use alloc::vec::Vec;
@@ -46,8 +46,9 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         at_rest_px: pair(reader, "noise", [1e-4, 10.0], "0.0001 to 10 px")?,
         at_four_areas: pair(reader, "noise", [0.1, 10.0], "0.1 to 10")?,
     };
-    let (own, other) = (tolerance(reader)?, tolerance(reader)?);
+    let other = tolerance(reader)?;
     let mounting = mounting(reader)?;
+    let own = systematic(reader)?;
     let tables = Tables {
         moved: table(reader, MOVED)?,
         beside: table(reader, BESIDE)?,
@@ -73,6 +74,21 @@ fn tolerance(reader: &mut Reader<'_>) -> Result<Tolerance, ModelError> {
     Ok(Tolerance {
         shape: float(reader, "tolerance", [0.0, 1.0], "0 to 1")?,
         stiffness: float(reader, "tolerance", [0.0, 1.0], "0 to 1")?,
+    })
+}
+
+fn systematic<'a>(reader: &mut Reader<'a>) -> Result<SystematicGrid<'a>, ModelError> {
+    let offset = reader.offset;
+    let end_mm = f32::from_le_bytes(reader.array()?);
+    let mut steps = [0.0; PARTS];
+    for step in &mut steps {
+        *step = f32::from_le_bytes(reader.array()?);
+    }
+    let knots = reader.take(2 * PARTS * KNOTS)?;
+    SystematicGrid::new(end_mm, steps, knots).ok_or(ModelError::Field {
+        name: "systematic uncertainty",
+        offset,
+        allowed: "an end of 0.1 to 100 mm and steps of 0 to 1",
     })
 }
 
@@ -170,9 +186,9 @@ pub struct ForwardSpec {
     pub mounting: Option<Mounting>,
     /// How well markers are seen.
     pub noise: Noise,
-    /// How far the unit may differ from what the model says of it.
-    pub own: Tolerance,
-    /// How far another unit may.
+    /// What is not known of the unit.
+    pub own: SystematicSpec,
+    /// How far another unit may differ.
     pub other: Tolerance,
     /// [`Tables::moved`], one output.
     pub moved: TableSpec,
@@ -180,6 +196,17 @@ pub struct ForwardSpec {
     pub beside: TableSpec,
     /// [`Tables::own`], eight outputs.
     pub own_table: Option<TableSpec>,
+}
+
+/// What is not known of a unit, to be written.
+#[cfg(any(test, feature = "encode"))]
+#[derive(Clone, Debug, PartialEq)]
+pub struct SystematicSpec {
+    /// Places go to so many mm either way.
+    pub end_mm: f32,
+    /// Standard uncertainties by size, place along y and place along x ([`SystematicGrid`]): of the
+    /// force across itself, N, of |F|, as sizes, of the place, mm, and of the residual.
+    pub knots: Vec<[f32; PARTS]>,
 }
 
 /// A table, to be written.
@@ -227,18 +254,44 @@ impl ForwardSpec {
         let parts = parts
             .chain(&self.noise.at_rest_px)
             .chain(&self.noise.at_four_areas);
-        let tolerances = [self.own, self.other].map(|own| [own.shape, own.stiffness]);
-        let parts = parts
-            .chain(tolerances.as_flattened())
-            .chain(&mounting.per_px);
+        let other = [self.other.shape, self.other.stiffness];
+        let parts = parts.chain(&other).chain(&mounting.per_px);
         for part in parts.chain(mounting.beside_mm.as_flattened()) {
             bytes.extend(part.to_le_bytes());
         }
+        self.own.push(bytes);
         for (table, outputs) in [(&self.moved, MOVED), (&self.beside, BESIDE)] {
             table.push(outputs, bytes);
         }
         if let Some(own) = &self.own_table {
             own.push(OWN, bytes);
+        }
+    }
+}
+
+#[cfg(any(test, feature = "encode"))]
+impl SystematicSpec {
+    /// Each part's step is the largest of its numbers over 65,535; numbers are rounded up, as
+    /// nothing is known better than it is said to be.
+    fn push(&self, bytes: &mut Vec<u8>) {
+        let mut steps = [0.0_f32; PARTS];
+        for knot in &self.knots {
+            for (step, part) in steps.iter_mut().zip(knot) {
+                *step = step.max(*part / f32::from(u16::MAX));
+            }
+        }
+        for number in [self.end_mm].iter().chain(&steps) {
+            bytes.extend(number.to_le_bytes());
+        }
+        for knot in &self.knots {
+            for (part, step) in knot.iter().zip(steps) {
+                let count = if step > 0.0 {
+                    libm::ceilf(part / step)
+                } else {
+                    0.0
+                };
+                bytes.extend((count as u16).to_le_bytes());
+            }
         }
     }
 }

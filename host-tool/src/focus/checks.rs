@@ -23,7 +23,7 @@ const WIDTH_PART: f64 = 0.19;
 const COLOUR_MARGIN: f64 = 20.0;
 /// Darkest marker, in parts of the threshold's lowest value: at half of that light two thirds of
 /// its mask are lost, and with that its place, silently.
-const DARKEST_VALUES: f64 = 2.0;
+pub const DARKEST_VALUES: f64 = 2.0;
 /// Brightest level: RGB565's last but one. Beyond it light is no longer in proportion to levels, by
 /// which rims are weighed.
 const BRIGHTEST: f64 = 247.0;

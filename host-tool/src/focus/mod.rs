@@ -4,7 +4,7 @@ pub mod checks;
 mod rim;
 pub mod seen;
 #[cfg(test)]
-mod tests;
+pub mod tests;
 
 use crate::lines::to_json;
 use crate::output::{Reader, print};

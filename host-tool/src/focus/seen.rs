@@ -6,7 +6,8 @@ use hivtac_host::frame::Frame;
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::threshold::{ByteOrder, PixelFormat};
+use hivtac_terms::marker as terms;
+use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_terms::units::Px;
 use hivtac_wire::message::DeviceHello;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
@@ -85,22 +86,67 @@ fn geometry(frame: &Frame, device: &DeviceHello) -> Geometry {
 }
 
 /// A blob as a disc, px.
-#[derive(Clone, Copy)]
-struct Spot {
-    centre: [f64; 2],
-    radius: f64,
+#[derive(Clone, Copy, Debug)]
+pub struct Spot {
+    /// Its centre, (x, y).
+    pub centre: [f64; 2],
+    /// That of a disc of its area.
+    pub radius: f64,
+}
+
+impl Spot {
+    fn new(x: Px, y: Px, area: u32) -> Spot {
+        Spot {
+            centre: [x.to_f64(), y.to_f64()],
+            radius: (f64::from(area) / PI).sqrt(),
+        }
+    }
 }
 
 /// The markers as the sensing finds them, or else the four largest blobs when they lie around their
 /// own middle: those of a picture that is to be mended.
 fn spots(frame: &Frame, device: &DeviceHello, geometry: Geometry) -> Result<[Spot; 4], NotSeen> {
+    let mut sensor = Box::default();
+    let not_seen = match sensed(&mut sensor, frame, device, geometry, frame.threshold) {
+        Ok(spots) => return Ok(spots),
+        Err(not_seen) => not_seen,
+    };
+    let mut blobs: Vec<_> = sensor.blobs().iter().take(not_seen.blobs).collect();
+    blobs.sort_by_key(|blob| std::cmp::Reverse(blob.area));
+    let largest = blobs.iter().take(4).map(|blob| {
+        let (x, y) = blob.centroid();
+        Spot::new(x, y, blob.area)
+    });
+    let four: Result<[Spot; 4], _> = largest.collect::<Vec<_>>().try_into();
+    four.ok().and_then(clockwise).ok_or(not_seen)
+}
+
+/// The markers as the sensing finds them with a threshold of the frame's format.
+///
+/// # Errors
+/// It finds no four.
+pub fn found_by_sensing(
+    frame: &Frame,
+    device: &DeviceHello,
+    threshold: Threshold,
+) -> Result<[Spot; 4], NotSeen> {
+    let geometry = geometry(frame, device);
+    sensed(&mut Box::default(), frame, device, geometry, threshold)
+}
+
+fn sensed(
+    sensor: &mut Sensor<64>,
+    frame: &Frame,
+    device: &DeviceHello,
+    geometry: Geometry,
+    threshold: Threshold,
+) -> Result<[Spot; 4], NotSeen> {
     let settings = Settings {
-        threshold: frame.threshold,
+        threshold,
         dilations: device.dilations,
         centroid: device.centroid,
         ..Settings::usual(geometry, ByteOrder::Native)
     };
-    let mut sensor: Box<Sensor<64>> = Box::default();
     if sensor.configure(settings, None).is_err() {
         return Err(NotSeen {
             blobs: 0,
@@ -108,22 +154,10 @@ fn spots(frame: &Frame, device: &DeviceHello, geometry: Geometry) -> Result<[Spo
         });
     }
     let measurement = sensor.measure_frame(&frame.pixels());
-    let spot = |x: Px, y: Px, area: u32| Spot {
-        centre: [x.to_f64(), y.to_f64()],
-        radius: (f64::from(area) / PI).sqrt(),
-    };
-    if let Some(markers) = measurement.markers {
-        return Ok(markers.map(|marker| spot(marker.x, marker.y, marker.area)));
-    }
-    let mut blobs: Vec<_> = sensor.blobs().iter().collect();
-    blobs.sort_by_key(|blob| std::cmp::Reverse(blob.area));
-    let largest = blobs.iter().take(4).map(|blob| {
-        let (x, y) = blob.centroid();
-        spot(x, y, blob.area)
-    });
-    let four: Result<[Spot; 4], _> = largest.collect::<Vec<_>>().try_into();
-    four.ok().and_then(clockwise).ok_or_else(|| NotSeen {
-        blobs: blobs.len(),
+    let spot = |marker: terms::Marker| Spot::new(marker.x, marker.y, marker.area);
+    let markers = measurement.markers.map(|four| four.map(spot));
+    markers.ok_or_else(|| NotSeen {
+        blobs: sensor.blobs().len(),
         status: measurement.status.names().collect(),
     })
 }

@@ -3,11 +3,12 @@
 use super::*;
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
-use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
+use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
 
 const RED: [u8; 6] = [170, 10, 100, 255, 45, 255];
 
-fn device() -> DeviceHello {
+/// A device that makes frames such as these.
+pub fn device() -> DeviceHello {
     DeviceHello {
         protocol: 2,
         schema: 0,
@@ -22,31 +23,36 @@ fn device() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: Default::default(),
+        filter: Default::default(),
     }
 }
 
 /// The film at rest with some options changed.
-fn frame(change: impl Fn(&mut Options)) -> Frame {
+pub fn frame(change: impl Fn(&mut Options)) -> Frame {
     let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
     let mut options = scene.options().clone();
     change(&mut options);
-    let is_rgb = options.format == Format::Rgb565;
+    let format = options.format;
     let scene = scene.with_options(options).unwrap();
-    let pixels = scene.render_load(&Load::REST, 7).unwrap().pixels;
-    let in_order = |pixel: u16| match is_rgb {
-        true => pixel.to_be_bytes(),
-        false => pixel.to_le_bytes(),
+    let rendered = scene.render_load(&Load::REST, 7).unwrap();
+    let in_order = |pixel: u16| match format {
+        Format::Rgb565 => pixel.to_be_bytes(),
+        _ => pixel.to_le_bytes(),
     };
     Frame {
         number: 7,
         time_us: 0,
         width: 320,
         height: 240,
-        threshold: match is_rgb {
-            true => Threshold::Rgb565(HsvBox::of_limits(RED)),
-            false => Threshold::Yuv422(Yuv422::RED),
+        threshold: match format {
+            Format::Rgb565 => Threshold::Rgb565(HsvBox::of_limits(RED)),
+            Format::Mono => Threshold::Mono(Mono::DARK),
+            _ => Threshold::Yuv422(Yuv422::RED),
         },
-        bytes: pixels.into_iter().flat_map(in_order).collect(),
+        bytes: match format {
+            Format::Mono => rendered.mono,
+            _ => rendered.pixels.into_iter().flat_map(in_order).collect(),
+        },
     }
 }
 

@@ -28,6 +28,7 @@ enum Topic {
     Place,
     Markers,
     Contact,
+    Slip,
     Status,
     Wire,
 }
@@ -35,8 +36,8 @@ enum Topic {
 /// The file under way.
 pub struct Bag {
     writer: Writer<BufWriter<File>>,
-    channels: [u16; 6],
-    counts: [u32; 6],
+    channels: [u16; 7],
+    counts: [u32; 7],
     /// Of the first sample: host time, ns since 1970, and device time, µs.
     first: Option<(u64, u64)>,
 }
@@ -51,15 +52,16 @@ impl Bag {
             .compression(None);
         let mut writer = options.create(BufWriter::new(file))?;
         let unit = unit_number(&hello.device_id);
-        let topics: [(&str, &Definition); 6] = [
+        let topics: [(&str, &Definition); 7] = [
             ("/wrench", &ros::WRENCH),
             ("/place", &ros::POINT),
             ("/markers", &ros::POLYGON),
             ("/contact", &ros::BOOL),
+            ("/slip", &ros::BOOL),
             ("/status", &ros::STRING),
             (WIRE, &ros::BYTES),
         ];
-        let mut channels = [0; 6];
+        let mut channels = [0; 7];
         for (channel, (topic, definition)) in channels.iter_mut().zip(topics) {
             let text = definition.text.as_bytes();
             let schema = writer.add_schema(definition.name, "ros2msg", text)?;
@@ -69,7 +71,7 @@ impl Bag {
         let mut bag = Bag {
             writer,
             channels,
-            counts: [0; 6],
+            counts: [0; 7],
             first: None,
         };
         bag.message(&DeviceMessage::Hello(hello.clone()), now_ns)?;
@@ -113,8 +115,13 @@ impl Bag {
             if let Some(place) = ros::point(stamp_ns, FILM_FRAME, force) {
                 self.write(Topic::Place, &place, now_ns, stamp_ns)?;
             }
-            let contact = ros::bool(status.contains(Status::CONTACT));
-            self.write(Topic::Contact, &contact, now_ns, stamp_ns)?;
+            for (topic, bit) in [
+                (Topic::Contact, Status::CONTACT),
+                (Topic::Slip, Status::SLIP),
+            ] {
+                let is_set = ros::bool(status.contains(bit));
+                self.write(topic, &is_set, now_ns, stamp_ns)?;
+            }
         }
         if let Some(markers) = markers {
             let markers = ros::polygon(stamp_ns, IMAGE_FRAME, markers);

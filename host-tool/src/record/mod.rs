@@ -7,7 +7,7 @@ mod table;
 pub use bag::WIRE;
 pub use ros::BEFORE_BYTES;
 
-use crate::output::note;
+use crate::output::{note, print};
 use crate::tally::Tally;
 use bag::Bag;
 use hivtac_host::failure::{Failure, Kind};
@@ -15,6 +15,7 @@ use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -38,6 +39,8 @@ pub struct Options {
     pub duration: Option<Duration>,
     /// `….mcap` or `….csv`.
     pub file: PathBuf,
+    /// At the end, what became of it as one JSON object.
+    pub json: bool,
 }
 
 /// Records until the time is over, Ctrl-C, or the device is gone.
@@ -47,7 +50,36 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let mut recording = Recording::create(&options.file, &hello)?;
     let result = recording.follow(&mut link, options);
     recording.tally.rejected(link.rejected());
-    recording.end(&hello, result)
+    let counts = recording.tally.counts();
+    let ended = recording.end(&hello, result);
+    if options.json {
+        print(&summary(options, counts, &ended).to_string())?;
+    }
+    ended
+}
+
+/// What became of a recording, as one JSON object.
+fn summary(
+    options: &Options,
+    counts: impl IntoIterator<Item = (&'static str, u64)>,
+    ended: &Result<(), Failure>,
+) -> Value {
+    let is_whole = is_clean(ended);
+    let file = options.file.display();
+    let mut summary = json!({
+        "file": if is_whole { file.to_string() } else { format!("{file}.partial") },
+        "whole": is_whole,
+    });
+    for (name, count) in counts {
+        summary[name] = count.into();
+    }
+    summary
+}
+
+/// Whether nothing is missing of a recording that ended so.
+fn is_clean(ended: &Result<(), Failure>) -> bool {
+    let asked = |failure: &Failure| failure.kind == Kind::Interrupted;
+    ended.as_ref().err().is_none_or(asked)
 }
 
 /// Says whether a file can be made.
@@ -222,10 +254,7 @@ impl Recording {
             tally,
             ..
         } = self;
-        let is_clean = match &result {
-            Ok(()) => true,
-            Err(failure) => failure.kind == Kind::Interrupted,
-        };
+        let is_clean = is_clean(&result);
         if let Err(failure) = &result
             && failure.kind == Kind::Input
         {
@@ -238,7 +267,9 @@ impl Recording {
             .as_ref()
             .err()
             .map_or("as asked".to_owned(), ToString::to_string);
-        let mut summary = tally.counts();
+        let counts = tally.counts().into_iter();
+        let texts = counts.map(|(name, count)| (name.to_owned(), count.to_string()));
+        let mut summary: BTreeMap<String, String> = texts.collect();
         summary.insert("ended".to_owned(), ended);
         summary.insert(
             "seconds".to_owned(),

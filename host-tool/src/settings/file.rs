@@ -1,5 +1,6 @@
 //! Settings as JSON: what `export` writes and `import` reads.
 
+use super::temporal::TemporalJson;
 use super::{name, unusable};
 use crate::files::read_at_most;
 use crate::lines::to_json;
@@ -7,6 +8,7 @@ use hivtac_host::failure::Failure;
 use hivtac_host::shown::unit_number;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::marker::Marker;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::Px;
 use hivtac_wire::settings::{Found, RestPosition, Selection, SettingsReport};
@@ -29,6 +31,7 @@ pub struct File {
     threshold: Limits,
     /// The rest position, when one was taken.
     pub tare: Option<Rest>,
+    temporal: TemporalJson,
 }
 
 /// A threshold as everywhere in the tool's JSON.
@@ -92,10 +95,13 @@ enum Centroid {
 pub struct Kept {
     #[serde(flatten)]
     file: File,
+    /// px.
+    rezeroed_px: f64,
     kept: KeptParts,
     found: &'static str,
     erases: u32,
     failures: u32,
+    drift_q16: Option<i32>,
 }
 
 #[derive(Serialize)]
@@ -103,6 +109,7 @@ struct KeptParts {
     name: bool,
     threshold: bool,
     tare: bool,
+    temporal: bool,
 }
 
 impl Kept {
@@ -112,13 +119,16 @@ impl Kept {
             name,
             threshold,
             tare,
+            temporal,
         } = report.kept;
         Kept {
             file: File::new(device_id, report),
+            rezeroed_px: report.rezeroed.to_f64(),
             kept: KeptParts {
                 name,
                 threshold,
                 tare,
+                temporal,
             },
             found: match report.found {
                 Found::Nothing => "nothing",
@@ -127,6 +137,7 @@ impl Kept {
             },
             erases: report.erases,
             failures: report.failures,
+            drift_q16: report.drift.map(|drift| drift.0),
         }
     }
 }
@@ -140,6 +151,7 @@ impl File {
             name: report.name.as_str().to_owned(),
             threshold: limits(&report.threshold),
             tare: report.tare.as_ref().map(Rest::of),
+            temporal: TemporalJson::new(&report.temporal),
         }
     }
 
@@ -175,6 +187,11 @@ impl File {
                 high: luma_high,
             }),
         }
+    }
+
+    /// How forces are followed from frame to frame.
+    pub fn temporal(&self) -> TemporalSettings {
+        self.temporal.settings()
     }
 
     /// The rest position.
@@ -281,6 +298,9 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
     threshold
         .check()
         .map_err(|error| format!("the threshold means nothing: {error}"))?;
+    file.temporal()
+        .check()
+        .map_err(|error| format!("a limit is out of range: {error}"))?;
     Ok(file)
 }
 
@@ -318,6 +338,9 @@ mod tests {
             found: Found::Settings,
             erases: 1,
             failures: 0,
+            temporal: TemporalSettings::default(),
+            rezeroed: Px(0),
+            drift: None,
         }
     }
 
@@ -354,6 +377,7 @@ mod tests {
             ("\"thumb\"", "\"th\\u001bumb\"", "cannot be seen"),
             ("\"hue_low\":170", "\"hue_low\":200", "means nothing"),
             ("\"hue_low\"", "\"huelow\"", "huelow"),
+            ("\"within_ms\":50", "\"within_ms\":5", "10 to 100 ms"),
             ("rgb565", "rgb888", "rgb888"),
             ("{", "[", "no settings"),
         ] {

@@ -2,9 +2,11 @@
 //! forgotten.
 
 mod file;
+pub mod temporal;
 
 use crate::command::{send, tell};
 use crate::lines::to_json;
+use crate::output;
 use crate::output::{note, print};
 use file::{File, Kept};
 use hivtac_host::failure::{Failure, Kind};
@@ -12,10 +14,14 @@ use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
+use serde_json::{Value, json};
 use std::time::Duration;
+use temporal::Change;
 
 /// Longest time that keeping may take: an erased sector takes 1 to 2 s, and a worn one is tried
 /// again.
@@ -27,17 +33,18 @@ pub struct Options {
     pub address: Address,
     /// Longest wait for its hello and replies.
     pub patience: Duration,
+    /// One JSON object instead of lines.
+    pub json: bool,
 }
 
 /// What to do with its settings.
 pub enum Action {
     /// Show them.
-    Get {
-        /// As one JSON object.
-        json: bool,
-    },
+    Get,
     /// Give it a name and keep that.
     SetName(Name),
+    /// Change how forces are followed, and keep that.
+    SetTemporal(Change),
     /// Save them in a file.
     Export(String),
     /// Set and keep those of a file.
@@ -61,10 +68,12 @@ pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
         link,
         hello,
         patience: options.patience,
+        json: options.json,
     };
     match action {
-        Action::Get { json } => device.show(*json),
+        Action::Get => device.show(),
         Action::SetName(name) => device.set_name(name),
+        Action::SetTemporal(change) => device.set_temporal(*change),
         Action::Export(path) => device.export(path),
         Action::Import(path) => imported.map_or(Ok(()), |file| device.import(path, &file)),
         Action::Reset => device.reset(),
@@ -77,6 +86,19 @@ pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
 /// What the device refuses.
 pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
     send(link, Request::Keep(selection), KEEP_PATIENCE)
+}
+
+/// A device's settings.
+///
+/// # Errors
+/// What the device refuses.
+pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failure> {
+    let mut report = None;
+    link.request(Request::GetSettings, patience, |message| match message {
+        DeviceMessage::Settings(newest) => report = Some(newest),
+        other => tell(other),
+    })?;
+    report.ok_or_else(|| link.lost("its settings did not come"))
 }
 
 /// A name for a device: 1 to 24 bytes that can be read.
@@ -102,27 +124,25 @@ struct Device {
     link: Link,
     hello: DeviceHello,
     patience: Duration,
+    json: bool,
 }
 
 impl Device {
     fn settings(&mut self) -> Result<SettingsReport, Failure> {
-        let mut report = None;
-        let patience = self.patience;
-        self.link
-            .request(Request::GetSettings, patience, |message| match message {
-                DeviceMessage::Settings(newest) => report = Some(newest),
-                other => tell(other),
-            })?;
-        report.ok_or_else(|| self.link.lost("its settings did not come"))
+        ask(&mut self.link, self.patience)
     }
 
     fn send(&mut self, request: Request) -> Result<(), Failure> {
         send(&mut self.link, request, self.patience)
     }
 
-    fn show(&mut self, json: bool) -> Result<(), Failure> {
+    fn tell(&self, line: &str, object: Value) -> Result<(), Failure> {
+        output::tell(self.json, line, &object)
+    }
+
+    fn show(&mut self) -> Result<(), Failure> {
         let report = self.settings()?;
-        let lines = match json {
+        let lines = match self.json {
             true => to_json(&Kept::new(&self.hello.device_id, &report)),
             false => lines(&report).join("\n"),
         };
@@ -136,13 +156,36 @@ impl Device {
             ..Selection::NONE
         };
         keep(&mut self.link, selection)?;
-        print(&format!("this device is now called {}", shown(name))).map(|_| ())
+        let line = format!("this device is now called {}", shown(name));
+        self.tell(&line, json!({ "name": name.as_str(), "kept": true }))
+    }
+
+    fn set_temporal(&mut self, change: Change) -> Result<(), Failure> {
+        let settings = change.of(self.settings()?.temporal);
+        settings
+            .check()
+            .map_err(|error| Failure::new(Kind::Input, format!("{error}; nothing was changed")))?;
+        self.send(Request::SetTemporal(settings))?;
+        let selection = Selection {
+            temporal: true,
+            ..Selection::NONE
+        };
+        keep(&mut self.link, selection)?;
+        let named = |(name, _): &(&str, String)| *name == change.name();
+        let texts = temporal::texts(&settings).into_iter().find(named);
+        let (name, text) = texts.unwrap_or_default();
+        let line = format!("{name} set and kept: {text}");
+        self.tell(
+            &line,
+            json!({ "setting": name, "text": text, "kept": true }),
+        )
     }
 
     fn export(&mut self, path: &str) -> Result<(), Failure> {
         let report = self.settings()?;
         file::write(path, &File::new(&self.hello.device_id, &report))?;
-        print(&format!("settings in use written to {path}")).map(|_| ())
+        let line = format!("settings in use written to {path}");
+        self.tell(&line, json!({ "file": path }))
     }
 
     fn import(&mut self, path: &str, file: &File) -> Result<(), Failure> {
@@ -156,33 +199,37 @@ impl Device {
         }
         let tare = file.rest().filter(|_| is_own);
         let name = name(&file.name).unwrap_or_default();
-        self.set(name, Some(file.threshold()), tare)?;
-        print(&format!("settings of {path} are in use and kept")).map(|_| ())
+        self.set(name, file.threshold(), tare, file.temporal())?;
+        let line = format!("settings of {path} are in use and kept");
+        let parts = json!({ "file": path, "kept": true, "tare": tare.is_some() });
+        self.tell(&line, parts)
     }
 
     fn reset(&mut self) -> Result<(), Failure> {
-        let threshold = self.hello.model.as_ref().map(|model| model.threshold);
-        self.set(Name::new(), threshold, None)?;
-        print("everything that was kept is forgotten; take a tare").map(|_| ())
+        send(&mut self.link, Request::Reset, KEEP_PATIENCE)?;
+        let line = "everything that was kept is forgotten; take a tare";
+        self.tell(line, json!({ "kept": false }))
     }
 
     /// Sets and keeps all.
     fn set(
         &mut self,
         name: Name,
-        threshold: Option<Threshold>,
+        threshold: Threshold,
         tare: Option<RestPosition>,
+        temporal: TemporalSettings,
     ) -> Result<(), Failure> {
         let unkept = |failure: Failure| {
             let what = "nothing was kept: a restart brings back the settings from before";
             Failure::new(failure.kind, format!("{failure}; {what}"))
         };
         // Another pixel format forgets the rest position.
-        if let Some(threshold) = threshold.filter(|threshold| *threshold != self.hello.threshold) {
+        if threshold != self.hello.threshold {
             self.send(Request::SetThreshold(threshold))
                 .map_err(unkept)?;
         }
         self.send(Request::SetTare(tare)).map_err(unkept)?;
+        self.send(Request::SetTemporal(temporal)).map_err(unkept)?;
         self.send(Request::SetName(name)).map_err(unkept)?;
         keep(&mut self.link, Selection::ALL)
     }
@@ -197,9 +244,10 @@ fn lines(report: &SettingsReport) -> Vec<String> {
         "" => "none".to_owned(),
         name => shown(name),
     };
-    let tare = match report.tare {
-        Some(_) => "taken",
-        None => "none",
+    let tare = match (report.tare, report.rezeroed) {
+        (None, _) => "none".to_owned(),
+        (Some(_), Px(0)) => "taken".to_owned(),
+        (Some(_), moved) => format!("taken; re-zeroed by {:.3} px", moved.to_f64()),
     };
     let found = match report.found {
         Found::Nothing => "nothing was ever kept",
@@ -209,7 +257,7 @@ fn lines(report: &SettingsReport) -> Vec<String> {
              until something is kept"
         }
     };
-    vec![
+    let mut lines = vec![
         format!("name       {name} ({})", until(report.kept.name)),
         format!(
             "threshold  {} ({})",
@@ -217,12 +265,18 @@ fn lines(report: &SettingsReport) -> Vec<String> {
             until(report.kept.threshold)
         ),
         format!("tare       {tare} ({})", until(report.kept.tare)),
+    ];
+    let temporal = until(report.kept.temporal);
+    let texts = temporal::texts(&report.temporal).into_iter();
+    lines.extend(texts.map(|(name, text)| format!("{name:<11}{text} ({temporal})")));
+    lines.extend([
         format!("flash      {found}"),
         format!(
             "           {} sectors erased in its life, {} failed attempts to write since the start",
             report.erases, report.failures
         ),
-    ]
+    ]);
+    lines
 }
 
 /// A file that cannot be used.

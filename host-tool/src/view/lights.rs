@@ -111,7 +111,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "go back to the model's threshold",
         ),
         Status::CONTACT => ("something touches the film", ""),
-        Status::SLIP => ("the contact slips", ""),
+        Status::SLIP => ("what touches the film slips", ""),
         Status::DIRECTION_OUT_OF_RANGE => (
             "more force along the film than the model knows",
             "press more steeply",
@@ -120,14 +120,17 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "the contact is outside the part of the film that the model knows",
             "press nearer to the middle",
         ),
+        Status::REZEROED => (
+            "the rest position followed what drifted since the tare",
+            "take a new tare when forces matter",
+        ),
         Status::UNEXPLAINED => (
             "no single contact explains where the markers are",
             "press with one tip; at rest, take a new tare",
         ),
-        Status::MARKERS_RECONSTRUCTED => (
-            "something disturbs the picture: places of markers are those of what is left of their \
-             edges, and less certain",
-            "look at the picture for reflections, specks and dim light",
+        Status::FRAME_DISTURBED => (
+            "specks or little light disturb the picture: the force is less certain",
+            "clean film and lens; look at the light, then find the exposure anew: hivtac expose",
         ),
         _ => (
             "this tool does not know of it",

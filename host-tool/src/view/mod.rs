@@ -22,6 +22,7 @@ use hivtac_host::port::Address;
 use hivtac_host::stop;
 use owner::Owner;
 use recorder::Recorder;
+use serde_json::json;
 use server::{Sensor, Server};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -44,6 +45,8 @@ pub struct Options {
     pub port: u16,
     /// Where recordings go.
     pub folder: PathBuf,
+    /// The page's address in a JSON object.
+    pub json: bool,
 }
 
 /// Serves the page until it is interrupted. Prints `ready` and its address.
@@ -58,7 +61,11 @@ pub fn run(options: &Options) -> Result<(), Failure> {
     let opened: Vec<(Sensor, Opened)> = opened.collect::<Result<_, _>>()?;
     let (sensors, opened): (Vec<_>, Vec<_>) = opened.into_iter().unzip();
     let server = Arc::new(Server::new(options.port, sensors, options.patience)?);
-    if print(&format!("ready {}", server.address()))? == Reader::Gone {
+    let ready = match options.json {
+        true => json!({ "address": server.address() }).to_string(),
+        false => format!("ready {}", server.address()),
+    };
+    if print(&ready)? == Reader::Gone {
         return Ok(());
     }
     let owners: Vec<JoinHandle<()>> = opened

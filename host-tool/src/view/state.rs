@@ -182,6 +182,7 @@ mod tests {
             dilations: 1,
             centroid: CentroidEstimator::BinaryMask,
             name: "\u{9b}thumb".try_into().unwrap(),
+            filter: Default::default(),
         };
         State::new("a port".to_owned(), hello)
     }

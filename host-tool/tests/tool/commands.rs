@@ -32,15 +32,20 @@ fn info_for_a_person() {
              board      fake board\n\
              firmware   fake 1.0\n\
              protocol   2, schema {SCHEMA_HASH:#018x}\n\
-             model      11-64-64-3 ov7725, CRC 0000cafe, trained on: simulated sensor\n\
+             model      11-64-64-3 ov7725, CRC 0000cafe, trained on: simulated sensor; \
+             built-in\n\
              frame      320 × 240 px\n\
              threshold  rgb565, H 170–10, S 100–255, V 45–255\n\
              markers    preset ov7725, dilations 1, centroids redness-weighted\n\
+             filter     none: each frame's own force\n\
+             tare       taken, until restart; 0.310 px from the kept one\n\
              frames     1000 exposed, 990 processed; dropped: busy 7, overrun 0, size 0, set-up 0\n\
              camera     0 timeouts, 0 restarts, 0 overruns\n\
              USB        3 samples dropped, 0 frames from the host rejected\n\
              time       up 34.000 s; last frame took 5300 µs, its sample was ready 4800 µs after \
-             the middle of its exposure\n",
+             the middle of its exposure\n\
+             health     started by power-on; 41.5 °C; 6120 of 24576 bytes of stack used\n\
+             problems   none\n",
             device.port
         )
     );
@@ -58,8 +63,11 @@ fn info_as_json() {
     assert_eq!(info["model"]["simulated"], true);
     assert_eq!(info["threshold"]["hue_low"], 170);
     assert_eq!(info["threshold"]["format"], "rgb565");
+    assert_eq!(info["filter"]["kind"], "none");
     assert_eq!(info["model"]["threshold"], info["threshold"]);
     assert_eq!(info["stats"]["frames_exposed"], 0);
+    assert_eq!(info["model"]["source"], "built-in");
+    assert_eq!(info["tare"]["drift_px"], 20_316.0 / 65_536.0);
     assert_eq!(run.stdout.lines().count(), 1);
 }
 
@@ -194,12 +202,29 @@ fn a_tare_is_taken_refused_or_not_answered() {
     let done = run(&["tare", "--frames", "64", "--port", &good.port]);
     assert_eq!(
         (done.code, done.stdout.as_str()),
-        (Some(0), "tare taken over 64 frames\n")
+        (
+            Some(0),
+            "tare taken over 64 frames: markers at (100.00, 60.00), (220.00, 60.00), \
+             (220.00, 180.00), \
+             (100.00, 180.00) px, spread 0.012 px, 0.310 px from the rest before\n"
+        )
     );
     assert_eq!(
         good.commands.iter().collect::<Vec<_>>(),
         [Request::Tare { frames: 64 }]
     );
+    let insisting = device(Some(Outcome::Done));
+    let done = run(&["tare", "--force", "--json", "--port", &insisting.port]);
+    let tared: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
+    assert_eq!(tared["markers"][2], serde_json::json!([220.0, 180.0]));
+    assert_eq!(tared["moved_px"], 20_316.0 / 65_536.0);
+    assert_eq!(
+        insisting.commands.iter().collect::<Vec<_>>(),
+        [Request::TareAnyway { frames: 32 }]
+    );
+    let touched = run(&["tare", "--port", &device(Some(Outcome::Touched)).port]);
+    assert_eq!(touched.code, Some(6));
+    assert!(touched.stderr.contains("--force"), "{}", touched.stderr);
     let blind = run(&["tare", "--port", &device(Some(Outcome::NoGoodFrames)).port]);
     assert_eq!(blind.code, Some(6));
     assert_eq!(
@@ -338,4 +363,52 @@ fn the_help_lists_the_exit_codes() {
             help.stdout
         );
     }
+}
+
+#[test]
+fn shells_are_told_what_completes_a_command() {
+    for (shell, words) in [
+        ("bash", "complete -F _hivtac"),
+        ("zsh", "#compdef hivtac"),
+        ("fish", "complete -c hivtac"),
+        ("powershell", "Register-ArgumentCompleter"),
+        ("elvish", "edit:completion"),
+    ] {
+        let done = run(&["completion", shell]);
+        assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""), "{shell}");
+        assert!(done.stdout.contains(words), "{shell}: {}", done.stdout);
+        assert!(done.stdout.contains("threshold"), "{shell}");
+    }
+    assert_eq!(run(&["completion", "nonsense"]).code, Some(2));
+}
+
+/// What was done, for a program: one object, and its parts.
+#[test]
+fn commands_tell_programs_what_they_did() {
+    let told = |arguments: &[&str]| {
+        let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| device.serve())]);
+        let done = run(&[arguments, &["--json", "--port", &device.port]].concat());
+        assert_eq!(
+            (done.code, done.stderr.as_str()),
+            (Some(0), ""),
+            "{arguments:?}"
+        );
+        assert_eq!(done.stdout.lines().count(), 1, "{}", done.stdout);
+        serde_json::from_str::<serde_json::Value>(&done.stdout).unwrap()
+    };
+    let tare = told(&["tare", "--frames", "8", "--keep"]);
+    assert_eq!((&tare["frames"], &tare["kept"]), (&8.into(), &true.into()));
+    assert_eq!(tare["moved_px"], 20_316.0 / 65_536.0);
+    assert_eq!(told(&["expose"]), serde_json::json!({ "exposed": true }));
+    let threshold = told(&["threshold", "--model"]);
+    assert_eq!(threshold["threshold"]["saturation_low"], 100);
+    assert_eq!(threshold["kept"], false);
+    let name = told(&["settings", "set", "name", "index"]);
+    assert_eq!(name, serde_json::json!({ "name": "index", "kept": true }));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("thumb.json");
+    let file = file.to_str().unwrap();
+    assert_eq!(told(&["settings", "export", file])["file"], file);
+    assert_eq!(told(&["settings", "import", file])["tare"], true);
+    assert_eq!(told(&["settings", "reset"])["kept"], false);
 }

@@ -2,7 +2,7 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_wire::message::{Command, DeviceMessage, HostMessage, LogLevel, LogLine, Outcome};
+use hivtac_wire::message::{DeviceMessage, HostMessage, LogLevel, LogLine};
 use std::io::{BufRead, BufReader, Read};
 use std::time::{Duration, Instant};
 
@@ -297,14 +297,15 @@ fn nothing_that_a_device_says_acts_on_the_terminal() {
         while let Some(message) = device.next() {
             match message {
                 HostMessage::Hello(_) => device.send(DeviceMessage::Hello(hello.clone())),
-                HostMessage::Command(Command { id, .. }) => {
+                HostMessage::Command(command) => {
                     device.send(DeviceMessage::Log(LogLine {
                         level: LogLevel::Info,
                         time_us: 1,
                         text: evil.try_into().unwrap(),
                     }));
                     device.send(DeviceMessage::Hello(hello.clone()));
-                    device.reply(id, Outcome::Done);
+                    device.settings.name = "\u{9b}2J\u{202e}".try_into().unwrap();
+                    device.answer_to(HostMessage::Command(command));
                 }
             }
         }

@@ -4,6 +4,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
@@ -11,6 +12,7 @@ use hivtac_terms::units::{
 };
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
+use hivtac_wire::health::{Health, ResetReason};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use hivtac_wire::version::SCHEMA_HASH;
@@ -36,6 +38,8 @@ pub struct Conversation {
     pub tare: Option<Outcome>,
     /// Its settings.
     pub settings: SettingsReport,
+    /// How it is doing.
+    pub health: Health,
     /// How keeping ends.
     pub flash: Outcome,
     /// What is sent for each snapshot in turn before it is said to be done.
@@ -122,8 +126,15 @@ impl Conversation {
                 self.reply(id, Outcome::Unsupported);
                 return false;
             }
-            Request::Tare { .. } => {
+            Request::Tare { .. } | Request::TareAnyway { .. } => {
                 if let Some(outcome) = self.tare {
+                    if outcome == Outcome::Done {
+                        self.send(DeviceMessage::Tared(TareReport {
+                            rest: self.settings.tare.unwrap(),
+                            spread: Px(789),
+                            moved: Some(Px(20_316)),
+                        }));
+                    }
                     self.reply(id, outcome);
                 }
                 return false;
@@ -132,6 +143,7 @@ impl Conversation {
                 let settings = self.settings.clone();
                 self.send(DeviceMessage::Settings(settings));
             }
+            Request::GetHealth => self.send(DeviceMessage::Health(self.health)),
             Request::SetName(name) => self.settings.name = name.clone(),
             Request::Keep(_) => {
                 self.reply(id, self.flash);
@@ -148,6 +160,15 @@ impl Conversation {
     }
 }
 
+/// A device with no problem.
+pub const HEALTHY: Health = Health {
+    reset: ResetReason::PowerOn,
+    temperature_centidegrees: Some(4_150),
+    stack_used: 6_120,
+    stack_bytes: 24_576,
+    problems: 0,
+};
+
 /// What its model was made for.
 pub const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
 
@@ -163,6 +184,7 @@ pub fn hello() -> DeviceHello {
             name: "11-64-64-3 ov7725".try_into().unwrap(),
             simulated: true,
             threshold: RED,
+            source: ModelSource::BuiltIn,
         }),
         width: 320,
         height: 240,
@@ -171,6 +193,7 @@ pub fn hello() -> DeviceHello {
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
         name: "thumb".try_into().unwrap(),
+        filter: Filter::None,
     }
 }
 
@@ -201,10 +224,14 @@ pub fn settings() -> SettingsReport {
             name: true,
             threshold: true,
             tare: false,
+            temporal: true,
         },
         found: Found::Settings,
         erases: 3,
         failures: 0,
+        temporal: TemporalSettings::default(),
+        rezeroed: Px(0),
+        drift: Some(Px(20_316)),
     }
 }
 
@@ -246,6 +273,7 @@ fn conversation(stream: Box<dyn Stream>, commands: &mpsc::Sender<Request>) -> Co
         commands: commands.clone(),
         tare: Some(Outcome::Done),
         settings: settings(),
+        health: HEALTHY,
         flash: Outcome::Done,
         snapshots: VecDeque::new(),
         host_is_gone: false,

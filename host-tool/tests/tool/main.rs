@@ -3,12 +3,17 @@
 
 mod bring_up;
 mod commands;
+mod documents;
 mod endings;
 mod fake;
+mod firmware;
+mod health;
 mod monitor;
 mod recordings;
 mod run;
 mod sense;
 mod settings;
 mod snapshot;
+mod threshold_auto;
+mod update;
 mod view;

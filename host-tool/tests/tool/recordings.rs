@@ -84,11 +84,12 @@ impl Folder {
 
 /// What `monitor` shows of a recording, as fast as it reads.
 pub fn replayed(file: &str, frames: &str) -> Vec<u64> {
-    let mut replay = start(&["replay", "--fast", file]);
+    let mut replay = start(&["replay", "--fast", "--json", file]);
     let mut said = String::new();
     let stdout = replay.child().stdout.take().unwrap();
     BufReader::new(stdout).read_line(&mut said).unwrap();
-    let port = said.trim().replace("ready tcp=", "tcp:");
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let port = format!("tcp:{}", said["tcp"].as_str().unwrap());
     let monitor = run(&["monitor", "--json", "--frames", frames, "--port", &port]);
     let replay = replay.finish();
     assert_eq!(replay.code, Some(0), "{replay:?}");
@@ -100,8 +101,22 @@ fn what_was_recorded_is_played_as_it_came() {
     let folder = Folder::new();
     let file = folder.path("a.mcap");
     let device = FakeDevice::on_tcp([paced((3..40).collect())]);
-    let recorded = run(&["record", &file, "--seconds", "0.5", "--port", &device.port]);
+    let port = &device.port;
+    let recorded = run(&[
+        "record",
+        &file,
+        "--seconds",
+        "0.5",
+        "--json",
+        "--port",
+        port,
+    ]);
     assert_eq!(recorded.code, Some(0), "{recorded:?}");
+    let told: Value = serde_json::from_str(&recorded.stdout).unwrap();
+    assert_eq!(
+        [&told["file"], &told["whole"], &told["samples"]],
+        [&json!(file), &json!(true), &json!(37)]
+    );
     assert!(
         recorded.stderr.contains("recorded: 37 received, 0 lost"),
         "{recorded:?}"

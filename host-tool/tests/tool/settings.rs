@@ -2,7 +2,8 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_terms::threshold::{Threshold, Yuv422};
+use hivtac_terms::temporal::{Filter, Rezero, TemporalSettings};
+use hivtac_terms::units::{MilliPx, Milliseconds, Px};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use serde_json::Value;
@@ -14,6 +15,7 @@ fn only(name: bool, threshold: bool, tare: bool) -> Request {
         name,
         threshold,
         tare,
+        temporal: false,
     })
 }
 
@@ -34,6 +36,10 @@ fn settings_for_a_person() {
         "name       thumb (kept)\n\
          threshold  rgb565, H 170–10, S 100–255, V 45–255 (kept)\n\
          tare       taken (until restart)\n\
+         contact    from 2.000 mN on, until below 1.000 mN (kept)\n\
+         slip       60 µm within 50 ms, from 0.100 of the normal force on (kept)\n\
+         filter     none: each frame's own force (kept)\n\
+         rezero     off (kept)\n\
          flash      settings found at the start\n\
          \x20          3 sectors erased in its life, 0 failed attempts to write since the start\n"
     );
@@ -52,6 +58,7 @@ fn settings_as_json() {
     assert_eq!(settings["tare"]["markers"][2]["x_q16"], 220 << 16);
     assert_eq!(settings["found"], "settings");
     assert_eq!(settings["erases"], 3);
+    assert_eq!(settings["drift_q16"], 20_316);
 }
 
 #[test]
@@ -86,7 +93,8 @@ fn a_name_that_is_none_is_wrong_usage() {
 fn a_tare_and_a_threshold_are_kept_when_asked_for() {
     let one = device();
     let taken = run(&["tare", "--keep", "--port", &one.port]);
-    assert_eq!(taken.stdout, "tare taken over 32 frames and kept\n");
+    let start = "tare taken over 32 frames and kept: markers at ";
+    assert!(taken.stdout.starts_with(start), "{}", taken.stdout);
     let tare = Request::Tare { frames: 32 };
     assert_eq!(commands(&one), [tare, only(false, false, true)]);
     let other = device();
@@ -133,6 +141,7 @@ fn what_was_exported_is_set_and_kept_again() {
     let settings = settings();
     let expected = [
         Request::SetTare(settings.tare),
+        Request::SetTemporal(settings.temporal),
         Request::SetName(settings.name),
         Request::Keep(ALL),
     ];
@@ -188,28 +197,133 @@ fn an_import_that_is_refused_keeps_nothing() {
 }
 
 #[test]
-fn a_reset_forgets_everything_and_keeps_that() {
-    let script: Script = Box::new(|device| {
-        let cr = Threshold::Yuv422(Yuv422 { cr_low: 162 });
-        let hello = DeviceHello {
-            threshold: cr,
-            ..hello()
-        };
-        device.next();
-        device.send(DeviceMessage::Hello(hello));
-        device.serve();
-    });
-    let device = FakeDevice::on_tcp([script]);
+fn a_reset_is_the_devices_own() {
+    let device = device();
     let run = run(&["settings", "reset", "--port", &device.port]);
     assert_eq!(
         run.stdout,
         "everything that was kept is forgotten; take a tare\n"
     );
-    let expected = [
-        Request::SetThreshold(RED),
-        Request::SetTare(None),
-        Request::SetName(Name::new()),
-        Request::Keep(ALL),
-    ];
-    assert_eq!(commands(&device), expected);
+    assert_eq!(commands(&device), [Request::Reset]);
+}
+
+/// What a device is told, and what it says that it keeps.
+fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
+    let device = device();
+    let run = run(&[arguments, &["--port", &device.port]].concat());
+    assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
+    let commands = commands(&device);
+    let [Request::GetSettings, Request::SetTemporal(settings), keep] = &commands[..] else {
+        panic!("{commands:?}");
+    };
+    let only_temporal = Selection {
+        temporal: true,
+        ..Selection::NONE
+    };
+    assert_eq!(*keep, Request::Keep(only_temporal));
+    (*settings, run.stdout)
+}
+
+#[test]
+fn limits_are_changed_one_by_one_and_kept() {
+    let usual = TemporalSettings::default();
+    let (contact, text) = changed(&["settings", "set", "contact", "--begins", "3.5"]);
+    assert_eq!(
+        text,
+        "contact set and kept: from 3.500 mN on, until below 1.000 mN\n"
+    );
+    let mut expected = usual;
+    expected.contact.begins.0 = 3_500;
+    assert_eq!(contact, expected);
+    let (slip, _) = changed(&[
+        "settings",
+        "set",
+        "slip",
+        "--distance",
+        "90",
+        "--ratio",
+        "0.2",
+    ]);
+    let mut expected = usual;
+    (expected.slip.distance.0, expected.slip.ratio.0) = (90, 200);
+    assert_eq!(slip, expected);
+    let (filter, _) = changed(&["settings", "set", "filter", "low-pass", "--ms", "20"]);
+    let time_constant = Milliseconds(20);
+    assert_eq!(filter.filter, Filter::LowPass { time_constant });
+    let (median, _) = changed(&["settings", "set", "filter", "median-of-three"]);
+    assert_eq!(median.filter, Filter::MedianOfThree);
+    let (rezero, _) = changed(&["settings", "set", "rezero", "on", "--rate", "0.01"]);
+    let expected = Rezero {
+        rate: MilliPx(10),
+        ..Rezero::default()
+    };
+    assert_eq!(rezero.rezero, Some(expected));
+    assert_eq!(
+        changed(&["settings", "set", "rezero", "off"]).0.rezero,
+        None
+    );
+}
+
+#[test]
+fn a_limit_out_of_its_range_changes_nothing() {
+    for (arguments, word) in [
+        (["contact", "--ends", "3"], "0.001 mN to where it begins"),
+        (["slip", "--within", "5"], "10 to 100 ms"),
+        (["filter", "low-pass", "--ms=0"], "1 to 10000 ms"),
+    ] {
+        let device = device();
+        let arguments = [&["settings", "set"], &arguments[..]].concat();
+        let run = run(&[&arguments[..], &["--port", &device.port]].concat());
+        assert_eq!(run.code, Some(1), "{arguments:?}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{}", run.stderr);
+        assert_eq!(commands(&device), [Request::GetSettings]);
+    }
+    for arguments in [
+        ["contact", "--begins", "0.0001"],
+        ["filter", "low-pass", "--ms=x"],
+        ["filter", "median-of-three", "--ms=3"],
+        ["rezero", "off", "--rate=0.01"],
+    ] {
+        let run = run(&[&["settings", "set"], &arguments[..]].concat());
+        assert_eq!(run.code, Some(2), "{arguments:?}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn a_re_zeroed_rest_position_is_told() {
+    let script: Script = Box::new(|device| {
+        device.settings.rezeroed = Px(3 << 12);
+        device.serve();
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let run = run(&["settings", "get", "--port", &device.port]);
+    let line = "tare       taken; re-zeroed by 0.188 px (until restart)\n";
+    assert!(run.stdout.contains(line), "{}", run.stdout);
+}
+
+/// What `docs/using.md` says that these print.
+#[test]
+fn the_guide_shows_what_setting_prints() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap();
+    let guide = std::fs::read_to_string(root.join("docs/using.md")).unwrap();
+    let mut shown = 0;
+    let lines: Vec<&str> = guide.lines().collect();
+    for pair in lines.windows(2) {
+        let Some(rest) = pair[0].strip_prefix("$ hivtac settings set ") else {
+            continue;
+        };
+        if rest.starts_with("name ") {
+            continue;
+        }
+        let arguments: Vec<&str> = ["settings", "set"]
+            .into_iter()
+            .chain(rest.split(' '))
+            .collect();
+        let (_, printed) = changed(&arguments);
+        assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
+        shown += 1;
+    }
+    assert_eq!(shown, 7);
 }

@@ -53,27 +53,33 @@ unsafe extern "C" {
         last: u32,
     ) -> *mut u16;
 
-    /// Equals `portable::threshold_bytes` for whole words of the mask.
+    /// Equals `portable::threshold_bytes` for whole words of the mask. Gives all of them, or-ed.
     ///
     /// BFI puts bit 0 of a pixel's byte into its place in the word, whatever the other bits are.
     ///
-    /// *Contract.* `pixels`: 32 for each of `words` ≥ 1 words of the mask. `table`: 65,536 bytes.
-    /// Writes the words from `mask` on.
+    /// *Contract.* `pixels`: 32 for each of `words` words of the mask, a positive multiple of two.
+    /// `table`: 65,536 bytes. Writes the words from `mask` on.
     ///
-    /// *Schedule.* 32 pixels: 103 instructions in 53 cycles, 1.66 a pixel; 1.5 is the floor of two
-    /// loads and one operation.
-    fn hivtac_threshold_bytes(pixels: *const u16, table: *const u8, mask: *mut u32, words: usize);
+    /// *Schedule.* 64 pixels: 202 instructions in 104 cycles; 96 is the floor of two loads and
+    /// one operation for each.
+    fn hivtac_threshold_bytes(
+        pixels: *const u16,
+        table: *const u8,
+        mask: *mut u32,
+        words: usize,
+    ) -> u32;
 
-    /// Equals `portable::threshold_cr` for whole words of the mask. USUB8 compares the Cr of four
-    /// pairs with the lowest, and SEL chooses the bits of those that are not below it.
+    /// Equals `portable::threshold_cr` for whole words of the mask. Gives all of them, or-ed. USUB8
+    /// compares the Cr of four pairs with the lowest, and SEL chooses the bits of those that are
+    /// not below it.
     ///
     /// *Contract.* `row`: 32 pixels for each word of the mask; it loads nothing else. `low` is the
-    /// lowest Cr in all four bytes. Writes `mask` up to `end`, which lies a positive number of
-    /// words after it.
+    /// lowest Cr in all four bytes. Writes `mask` up to `end`, which lies a positive multiple of
+    /// two words after it.
     ///
-    /// *Schedule.* 32 pixels: 43 instructions in 23 cycles, 0.72 a pixel; a load, a comparison and
+    /// *Schedule.* 64 pixels: 87 instructions in 45 cycles, 0.70 a pixel; a load, a comparison and
     /// an addition with carry for each pair would be 0.75.
-    fn hivtac_threshold_cr(row: *const u16, low: u32, mask: *mut u32, end: *const u32);
+    fn hivtac_threshold_cr(row: *const u16, low: u32, mask: *mut u32, end: *const u32) -> u32;
 
     /// Equals `portable::threshold_luma` for whole words of the mask. USUB8 subtracts the lowest
     /// luma modulo 256, another one compares what is left with `span`.
@@ -123,27 +129,37 @@ unsafe extern "C" {
 }
 
 /// As [`portable::threshold_bytes`](super::portable::threshold_bytes) for the first words of the
-/// mask, and says for how many: all whole ones.
-pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> usize {
-    let whole = whole_words(row, mask, 32);
-    let (row, table, words) = (row.as_ptr(), table.as_ptr(), whole.len());
-    if words > 0 {
-        // SAFETY: the row has 32 pixels for each of the words, of which there is one at least.
-        unsafe { hivtac_threshold_bytes(row, table, whole.as_mut_ptr(), words) };
+/// mask: for how many, all pairs of whole ones, and what they are, or-ed.
+pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> (usize, u32) {
+    let pairs = pairs_of_words(row, mask);
+    let (row, table, words) = (row.as_ptr(), table.as_ptr(), pairs.len());
+    if words == 0 {
+        return (0, 0);
     }
-    words
+    // SAFETY: the row has 32 pixels for each of the words, of which there are two at least.
+    let all = unsafe { hivtac_threshold_bytes(row, table, pairs.as_mut_ptr(), words) };
+    (words, all)
 }
 
-/// As [`portable::threshold_cr`](super::portable::threshold_cr) for the first words of the mask,
-/// and says for how many: all whole ones.
-pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> usize {
-    let whole = whole_words(row, mask, 32);
-    let range = whole.as_mut_ptr_range();
-    if !whole.is_empty() {
-        // SAFETY: the row has 32 pixels for each of the words, of which there is one at least.
-        unsafe { hivtac_threshold_cr(row.as_ptr(), in_all_bytes(low), range.start, range.end) };
+/// As [`portable::threshold_cr`](super::portable::threshold_cr) for the first words of the mask:
+/// for how many, all pairs of whole ones, and what they are, or-ed.
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> (usize, u32) {
+    let pairs = pairs_of_words(row, mask);
+    let (range, words) = (pairs.as_mut_ptr_range(), pairs.len());
+    if words == 0 {
+        return (0, 0);
     }
-    whole.len()
+    let (row, low) = (row.as_ptr(), in_all_bytes(low));
+    // SAFETY: the row has 32 pixels for each of the words, of which there are two at least.
+    let all = unsafe { hivtac_threshold_cr(row, low, range.start, range.end) };
+    (words, all)
+}
+
+/// The words of the mask for which a row has 32 pixels each, but for one left over.
+fn pairs_of_words<'m>(row: &[u16], mask: &'m mut [u32]) -> &'m mut [u32] {
+    let whole = whole_words(row, mask, 32);
+    let pairs = whole.len() & !1;
+    whole.split_at_mut(pairs).0
 }
 
 /// As [`portable::threshold_luma`](super::portable::threshold_luma) for the first words of the

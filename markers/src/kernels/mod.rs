@@ -16,30 +16,36 @@ pub use {
     portable::{weigh_bytes, weigh_luma},
 };
 
-/// The mask of a row of pixels through a table of bytes: see `portable::threshold_bytes`.
-pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) {
+/// The mask of a row of pixels through a table of bytes, and whether anything is set: see
+/// `portable::threshold_bytes`.
+pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
-    let done = cortex_m7::threshold_bytes(table, row, mask);
+    let (done, all) = cortex_m7::threshold_bytes(table, row, mask);
     #[cfg(not(armv7em))]
-    let done = 0;
-    if done < mask.len() {
-        portable::threshold_bytes(table, row, mask, done);
+    let (done, all) = (0, 0);
+    if done == mask.len() {
+        return all != 0;
     }
+    portable::threshold_bytes(table, row, mask, done);
+    all != 0 || any_set(mask)
 }
 
-/// The mask of a row of YUV422 by its Cr: see `portable::threshold_cr`.
-pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) {
+/// The mask of a row of YUV422 by its Cr, and whether anything is set: see
+/// `portable::threshold_cr`.
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
-    let done = cortex_m7::threshold_cr(low, row, mask);
+    let (done, all) = cortex_m7::threshold_cr(low, row, mask);
     #[cfg(not(armv7em))]
-    let done = 0;
-    if done < mask.len() {
-        portable::threshold_cr(low, row, mask, done);
+    let (done, all) = (0, 0);
+    if done == mask.len() {
+        return all != 0;
     }
+    portable::threshold_cr(low, row, mask, done);
+    all != 0 || any_set(mask)
 }
 
-/// The mask of a row of mono pixels: see `portable::threshold_luma`.
-pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) {
+/// The mask of a row of mono pixels, and whether anything is set: see `portable::threshold_luma`.
+pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
     let done = cortex_m7::threshold_luma(low, span, row, mask);
     #[cfg(not(armv7em))]
@@ -47,4 +53,5 @@ pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) {
     if done < mask.len() {
         portable::threshold_luma(low, span, row, mask, done);
     }
+    any_set(mask)
 }

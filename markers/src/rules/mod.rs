@@ -45,11 +45,9 @@ pub use reading::Reading;
 pub use trust::Trust;
 
 use crate::blob::Blob;
-use crate::outline::Outline;
 use crate::settings::Settings;
 use heapless::Vec;
 use hivtac_terms::conditions::CentroidEstimator;
-use hivtac_terms::division::{Reciprocal, scaled};
 use hivtac_terms::geometry::Across;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -66,41 +64,15 @@ pub struct Found {
     images: [Image; 4],
     /// Their pattern.
     pattern: Pattern,
-    /// Whether the places are those of outlines, and the images disturbed.
-    outlined: bool,
 }
 
 impl Found {
     /// Whether these are the images of four whole markers on a film at rest, by themselves: against
     /// the rest position that they would be.
-    #[inline(never)]
     pub fn may_rest(&self, settings: &Settings) -> bool {
         let trust = Trust::new(settings, &self.markers, true, Reading::UNTOUCHED);
         let areas = self.markers.map(|marker| marker.area);
         trust.judge(self) == Status::OK && trust::are_equal(&settings.geometry, areas)
-    }
-
-    /// The variances (E x², E xy, E y², px² with 12 fractional bits) of the markers' images, about
-    /// as they are without dilation.
-    #[inline(never)]
-    pub fn variances(&self) -> [[i32; 3]; 4] {
-        self.images.map(|image| {
-            let passed = Reciprocal::of(image.area).part(image.passed as i32);
-            image.variance.map(|part| scaled(part, passed, 16))
-        })
-    }
-
-    /// The same markers where their outlines say that they are.
-    #[inline(never)]
-    pub fn outlined(&self, outlines: &[Outline; 4]) -> Found {
-        let mut markers = self.markers;
-        for (marker, outline) in markers.iter_mut().zip(outlines) {
-            (marker.x, marker.y) = (outline.x, outline.y);
-        }
-        Found {
-            outlined: true,
-            ..self.moved_to(markers)
-        }
     }
 
     /// The same images, whose markers make the pattern that they make elsewhere: little farther
@@ -131,8 +103,6 @@ struct Image {
     lopsided: i32,
     /// [`Shape::density`].
     density: i32,
-    /// Of its pixels: E x², E xy, E y², px² with 12 fractional bits.
-    variance: [i32; 3],
 }
 
 /// More candidates than this are not sorted out: 8 make 70 sets of four.
@@ -146,8 +116,6 @@ const LARGEST_MULTIPLE: u32 = 8;
 /// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any
 /// size and tilt, a half disc 0.95, two touching discs 0.88, a crescent less.
 const LEAST_FILL: i32 = 60_950;
-/// Where a part of an edge may be hidden (0.85).
-const LEAST_FILL_DISTURBED: i32 = 55_706;
 /// How far a marker may be from the optical law in width, of 256 (±37.5 %): threshold, light and
 /// blur are unknown before there is a rest position, and under a tip far off the middle the
 /// pattern's centre is not on the axis.
@@ -200,20 +168,7 @@ impl Finder {
     /// else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does, or there are too many
     /// candidates.
     pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
-        self.find_filled(blobs, LEAST_FILL)
-    }
-
-    /// About where the four markers are, of whose edges a part may be hidden.
-    ///
-    /// # Errors
-    /// As [`Self::find`].
-    pub fn find_disturbed(&self, blobs: &[Blob]) -> Result<Found, Status> {
-        self.find_filled(blobs, LEAST_FILL_DISTURBED)
-    }
-
-    #[inline(never)]
-    fn find_filled(&self, blobs: &[Blob], least_fill: i32) -> Result<Found, Status> {
-        let candidates = self.candidates(blobs, least_fill)?;
+        let candidates = self.candidates(blobs)?;
         let mut found = None;
         let mut reason = Status::MARKERS_AMBIGUOUS;
         for set in sets_of_four(candidates.len()) {
@@ -231,18 +186,14 @@ impl Finder {
         found.ok_or(reason)
     }
 
-    fn candidates(
-        &self,
-        blobs: &[Blob],
-        least_fill: i32,
-    ) -> Result<Vec<Shape, MAX_CANDIDATES>, Status> {
+    fn candidates(&self, blobs: &[Blob]) -> Result<Vec<Shape, MAX_CANDIDATES>, Status> {
         let mut candidates = Vec::new();
         for shape in blobs
             .iter()
             .filter(|blob| self.may_be_marker(blob))
             .filter_map(|blob| Shape::of_blob(blob, self.centroid))
         {
-            if shape.fill < least_fill {
+            if shape.fill < LEAST_FILL {
                 continue;
             }
             candidates
@@ -284,7 +235,6 @@ impl Finder {
             }),
             images: [image(a)?, image(b)?, image(c)?, image(d)?],
             pattern,
-            outlined: false,
         })
     }
 
@@ -309,7 +259,6 @@ impl Finder {
             hollow: shape.hollow,
             lopsided: shape.lopsided,
             density: shape.density,
-            variance: shape.variance(),
         })
     }
 }

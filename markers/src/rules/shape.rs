@@ -93,11 +93,6 @@ impl Shape {
         })
     }
 
-    /// E x², E xy, E y² about the mean, px² with 12 fractional bits.
-    pub fn variance(&self) -> [i32; 3] {
-        self.central.variance
-    }
-
     /// About a centre; `None` about its own.
     pub fn about(&self, center: (Px, Px)) -> Option<RadialShape> {
         let distance = distance((self.x, self.y), center);

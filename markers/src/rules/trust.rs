@@ -187,7 +187,7 @@ impl Trust {
         for ((image, edge), inner) in images.zip(&mut inner_densities) {
             let radial = &image.radial;
             let by_across = by(radial.across);
-            if !self.image_fits(image, &by_across, *edge, taper, found.outlined) {
+            if !self.image_fits(image, &by_across, *edge, taper) {
                 return false;
             }
             let aspect = by_across.part(radial.along);
@@ -204,9 +204,6 @@ impl Trust {
             .saturating_add(scaled(taper, ASPECT_TAPER, 0))
             .saturating_add(scaled(shift, self.reading.aspect_by_shift, 8))
             .saturating_add(self.reading.aspect_always);
-        if found.outlined {
-            return spread <= aspect;
-        }
         let even = scaled(shift, self.reading.density_by_shift, 8);
         let densities = found.images.each_ref().map(|image| image.density);
         let over_square = |area: i32| over_square(self.grid * area, &by_width);
@@ -216,15 +213,7 @@ impl Trust {
             && spread <= aspect
     }
 
-    /// Of an outlined image, only what the optics says of its size.
-    fn image_fits(
-        &self,
-        image: &Image,
-        by_across: &Reciprocal,
-        edge: i32,
-        taper: i32,
-        outlined: bool,
-    ) -> bool {
+    fn image_fits(&self, image: &Image, by_across: &Reciprocal, edge: i32, taper: i32) -> bool {
         let Image {
             radial, expected, ..
         } = image;
@@ -245,11 +234,10 @@ impl Trust {
             .saturating_add(scaled(bent, self.reading.lean_by_taper, 16));
         self.width_fits(*expected, radial, edge)
             && radial.skew.saturating_abs() <= skew
-            && (outlined
-                || image.hollow <= self.hollow
-                    && radial.lean <= scaled(lean, self.grid + 1, 1)
-                    && image.lopsided <= lopsided
-                    && is_filled(image, self.rim, self.reading.holes))
+            && image.hollow <= self.hollow
+            && radial.lean <= scaled(lean, self.grid + 1, 1)
+            && image.lopsided <= lopsided
+            && is_filled(image, self.rim, self.reading.holes)
     }
 
     /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.

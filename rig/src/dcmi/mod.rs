@@ -15,6 +15,7 @@ use rigless::soc::Width;
 use rigless::soc::stm32h743::generated::dcmi::Register;
 use rigless::time::{EventId, VirtualNanos};
 
+use crate::busy_bus::{Chance, InterruptLine};
 use crate::camera::SharedCamera;
 use crate::faults::{Faults, Kind};
 use crate::rules::Rules;
@@ -24,6 +25,9 @@ use timeline::{Epoch, Next, Step};
 
 /// Bytes per event: one FIFO's worth.
 const GROUP: u32 = 4 * receiver::FIFO_WORDS as u32;
+/// The DMA waits for a busy bus at most so long, ns: a group of bytes comes every 320 ns at 50 MHz,
+/// and the FIFO holds no more than one.
+const LONGEST_WAIT_NS: u64 = 250;
 /// GPIOB_IDR. A write has no effect on the chip; the rig uses it to make the port look at its pins.
 const VSYNC_PORT_INPUT: u64 = 0x5802_0410;
 
@@ -59,6 +63,8 @@ pub struct Counters {
     pub words: u64,
     /// Overruns.
     pub overruns: u64,
+    /// Groups of words that waited for the bus.
+    pub waits: u64,
 }
 
 /// The interface with the sensor's signals.
@@ -76,7 +82,10 @@ pub struct Dcmi {
     settings: Settings,
     raised: u32,
     enabled: u32,
-    interrupt: Level,
+    interrupt: InterruptLine,
+    chance: Chance,
+    /// The DMA waits for the bus until this event.
+    bus: Option<EventId>,
     requested: bool,
     vsync: Level,
     vsync_at: VirtualNanos,
@@ -86,9 +95,14 @@ pub struct Dcmi {
 
 impl Dcmi {
     /// An interface wired to a sensor.
-    pub fn new(camera: SharedCamera, faults: Faults, rules: Rules) -> Self {
+    ///
+    /// `seed` decides what a busy bus does ([`Kind::BusBusy`]).
+    pub fn new(camera: SharedCamera, faults: Faults, rules: Rules, seed: u64) -> Self {
         Self {
             camera,
+            interrupt: InterruptLine::new(faults.clone(), seed),
+            chance: Chance::new(seed),
+            bus: None,
             faults,
             rules,
             pins: Pins::default(),
@@ -100,7 +114,6 @@ impl Dcmi {
             settings: Settings::default(),
             raised: 0,
             enabled: 0,
-            interrupt: Level::Low,
             requested: false,
             vsync: Level::Low,
             vsync_at: VirtualNanos(0),
@@ -134,7 +147,8 @@ impl Dcmi {
         self.receiver.reset();
         self.settings = Settings::default();
         (self.raised, self.enabled) = (0, 0);
-        (self.interrupt, self.requested) = (Level::Low, false);
+        self.interrupt.reset();
+        (self.bus, self.requested) = (None, false);
         self.pins = Pins::default();
     }
 
@@ -208,6 +222,7 @@ impl Dcmi {
         if ends {
             self.raised |= flag::LINE;
         }
+        self.wait_for_the_bus(context);
         self.drive(context);
         if to < run.bytes && self.listens() {
             self.plan_group(run, to, context);
@@ -240,15 +255,22 @@ impl Dcmi {
         Ok(())
     }
 
+    /// On a busy bus the DMA gets the words of a group only after a while.
+    fn wait_for_the_bus(&mut self, context: &mut DeviceContext<'_>) {
+        let now = context.now().0;
+        if self.bus.is_none() && self.faults.on(Kind::BusBusy, now) {
+            let later = now + self.chance.below(LONGEST_WAIT_NS);
+            self.bus = Some(context.schedule(VirtualNanos(later)));
+            self.counters.waits += 1;
+        }
+    }
+
     /// Drives the interrupt and the DMA request as the state wants them.
     fn drive(&mut self, context: &mut DeviceContext<'_>) {
         let interrupt = Level::from(self.raised & self.enabled != 0);
-        if interrupt != self.interrupt {
-            self.interrupt = interrupt;
-            context.interrupt(0, interrupt);
-        }
+        self.interrupt.drive(interrupt, context);
         let stalled = self.faults.on(Kind::DcmiOverrun, context.now().0);
-        let wanted = self.receiver.waiting() > 0 && !stalled;
+        let wanted = self.receiver.waiting() > 0 && !stalled && self.bus.is_none();
         if wanted != self.requested {
             self.requested = wanted;
             context.request(0, Level::from(wanted));
@@ -302,6 +324,7 @@ impl Device for Dcmi {
         _registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
+        self.interrupt.read_back(context);
         let value = match register {
             Register::Dr => {
                 let word = self.receiver.take();
@@ -339,6 +362,12 @@ impl Device for Dcmi {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        if self.interrupt.falls_at(event, context) {
+            return;
+        }
+        if self.bus.take_if(|bus| *bus == event).is_some() {
+            return self.drive(context);
+        }
         let Some(next) = self.next.take_if(|next| next.event == event) else {
             return;
         };

@@ -21,8 +21,8 @@ use rigless::soc::stm32h743::peripherals::flash;
 use rigless::time::EventId;
 
 use crate::rules::Rules;
-use contents::{BANK, SECTOR_BYTES, WORD_BYTES};
-pub use contents::{Contents, Cut, Leaves};
+pub use contents::{BANK, Contents, Cut, Leaves};
+use contents::{SECTOR_BYTES, WORD_BYTES};
 
 /// SR bits: an operation runs, or waits.
 const BUSY: u64 = 1 << 0 | 1 << 2;

@@ -14,8 +14,9 @@ use rigless::soc::stm32h743::generated::mdma::Register;
 use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 
+use crate::busy_bus::{Chance, InterruptLine};
 use crate::faults::{Faults, Kind};
-use crate::flash::Bank;
+use crate::flash::{BANK, Bank};
 use crate::rules::Rules;
 use block::{Block, asked_for};
 
@@ -75,10 +76,10 @@ pub struct Mdma {
     faults: Faults,
     bank: Bank,
     /// Decides the next block's wait.
-    chance: u64,
+    chance: Chance,
     channels: [Channel; CHANNELS],
-    interrupt: Level,
-    bytes: u64,
+    interrupt: InterruptLine,
+    memory_bytes: u64,
 }
 
 impl Mdma {
@@ -87,18 +88,19 @@ impl Mdma {
     pub fn new(rules: Rules, faults: Faults, bank: Bank, seed: u64) -> Self {
         Self {
             rules,
+            interrupt: InterruptLine::new(faults.clone(), seed),
             faults,
             bank,
-            chance: seed,
+            chance: Chance::new(seed),
             channels: Default::default(),
-            interrupt: Level::Low,
-            bytes: 0,
+            memory_bytes: 0,
         }
     }
 
-    /// Bytes moved so far.
-    pub fn bytes(&self) -> u64 {
-        self.bytes
+    /// Bytes moved so far out of memories, which is what bands and snapshots are; not those of the
+    /// flash.
+    pub fn memory_bytes(&self) -> u64 {
+        self.memory_bytes
     }
 
     /// How often a block takes the time that it takes alone.
@@ -106,11 +108,7 @@ impl Mdma {
         if !self.faults.on(Kind::BusBusy, now_ns) {
             return 1;
         }
-        self.chance = self
-            .chance
-            .wrapping_mul(0x5851_F42D_4C95_7F2D)
-            .wrapping_add(1);
-        1 + (self.chance >> 33) % LONGEST_WAIT
+        1 + self.chance.below(LONGEST_WAIT)
     }
 
     fn control_written(
@@ -174,8 +172,9 @@ impl Mdma {
 
     fn end(&mut self, nth: usize, flags: u32, registers: &mut RegisterFile) {
         let channel = &mut self.channels[nth];
-        if let Some((block, _)) = channel.under_way.take() {
-            self.bytes += block.bytes;
+        let block = channel.under_way.take().map(|(block, _)| block);
+        if let Some(block) = block.filter(|block| !is_flash(block.source)) {
+            self.memory_bytes += block.bytes;
         }
         channel.flags |= flags;
         let control = register(nth, row::CR);
@@ -188,11 +187,12 @@ impl Mdma {
             channel.flags & enables != 0
         };
         let level = Level::from(self.channels.iter().enumerate().any(wants));
-        if level != self.interrupt {
-            self.interrupt = level;
-            context.interrupt(0, level);
-        }
+        self.interrupt.drive(level, context);
     }
+}
+
+fn is_flash(address: u64) -> bool {
+    u32::try_from(address).is_ok_and(|address| BANK.contains(&address))
 }
 
 fn register(nth: usize, row: usize) -> Register {
@@ -230,8 +230,9 @@ impl Device for Mdma {
         &mut self,
         register: Register,
         _registers: &mut RegisterFile,
-        _context: &mut DeviceContext<'_>,
+        context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
+        self.interrupt.read_back(context);
         let index = register.index().checked_sub(1)?;
         let channel = &self.channels[index / ROWS];
         let active = if channel.under_way.is_some() {
@@ -267,6 +268,9 @@ impl Device for Mdma {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        if self.interrupt.falls_at(event, context) {
+            return;
+        }
         for nth in 0..CHANNELS {
             if self.channels[nth]
                 .under_way
@@ -330,7 +334,7 @@ impl Device for Mdma {
 
     fn reset(&mut self) {
         self.channels = Default::default();
-        self.interrupt = Level::Low;
+        self.interrupt.reset();
     }
 }
 

@@ -2,9 +2,8 @@
 //!
 //! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each
 //! seeded bug, `yuv422.elf` with the model for YUV422, and `openmv-h7.elf` for that board.
-//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed.
-
-#![allow(dead_code, reason = "each test file uses a part of it")]
+//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed, `HIVTAC_BUSY_BUS` on a
+//! busy bus.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
@@ -132,7 +131,9 @@ impl Setup {
             camera: part::Kind::Ov7725,
             scene: "demo",
             seed: 1,
-            faults: Vec::new(),
+            faults: (std::env::var_os("HIVTAC_BUSY_BUS").iter())
+                .map(|_| "bus-busy")
+                .collect(),
             actions: Vec::new(),
             flash: None,
             cut: None,
@@ -157,15 +158,8 @@ impl Setup {
         let directory = tempfile::tempdir().unwrap();
         let truth = directory.path().join("truth.jsonl");
         let outcome = self.try_run(&truth).unwrap();
-        let lines = |file: &Path| -> Vec<Value> {
-            let text = std::fs::read_to_string(file).unwrap();
-            let lines = text.lines();
-            lines
-                .map(|line| serde_json::from_str(line).unwrap())
-                .collect()
-        };
-        let arrivals = lines(&truth.with_extension("arrivals"));
-        Run::new(outcome, lines(&truth), arrivals)
+        let arrivals = json_lines(&truth.with_extension("arrivals"));
+        Run::new(outcome, json_lines(&truth), arrivals)
     }
 
     fn source(&self) -> anyhow::Result<SceneSource> {

@@ -30,6 +30,8 @@ pub struct Drag {
     pub rise_s: f64,
     /// How long it slides, s.
     pub slide_s: f64,
+    /// How far its contact moves over the film meanwhile, from the middle on, 0–4 mm.
+    pub slide_mm: f64,
 }
 
 /// How long the pull takes to fall when the contact gives way, s.
@@ -37,7 +39,7 @@ const SLIP_S: f64 = 0.02;
 
 impl Default for Drag {
     /// 0.12 N, pulled to the right at 0.05 N/s, slipping at a ratio of 0.2 and sliding for 0.5 s at
-    /// 0.15.
+    /// 0.15, on the spot.
     fn default() -> Drag {
         Drag {
             force_n: 0.12,
@@ -48,6 +50,7 @@ impl Default for Drag {
             start_s: 0.1,
             rise_s: 0.3,
             slide_s: 0.5,
+            slide_mm: 0.0,
         }
     }
 }
@@ -62,7 +65,8 @@ impl Drag {
         within("friction_sliding", self.friction_sliding, sliding)?;
         within("start_s", self.start_s, LONGEST_S)?;
         within("rise_s", self.rise_s, LONGEST_S)?;
-        within("slide_s", self.slide_s, LONGEST_S)
+        within("slide_s", self.slide_s, LONGEST_S)?;
+        within("slide_mm", self.slide_mm, [0.0, 4.0])
     }
 
     /// When the contact gives way, s.
@@ -81,7 +85,19 @@ impl Drag {
         let falling = ramp(time_s - self.slip_s() - self.slide_s, self.rise_s);
         let left = rising - falling;
         // The pull goes with the press: friction lets go of what is not pressed.
-        pressed_and_pulled(self.force_n * left, lateral_n * left, self.direction_deg)
+        let load = pressed_and_pulled(self.force_n * left, lateral_n * left, self.direction_deg);
+        load.with_offset_mm(self.place_mm(time_s)).unwrap_or(load)
+    }
+
+    /// Where it touches the film.
+    fn place_mm(&self, time_s: f64) -> [f64; 2] {
+        let sliding_s = time_s - self.slip_s();
+        if sliding_s <= 0.0 || self.slide_mm == 0.0 {
+            return [0.0; 2];
+        }
+        let (sin, cos) = libm::sincos(crate::camera::radians(self.direction_deg));
+        let slid_mm = self.slide_mm * (sliding_s / self.slide_s).min(1.0);
+        [cos, sin].map(|part| slid_mm * part)
     }
 }
 
@@ -103,6 +119,20 @@ mod tests {
         assert!((at(0.88)[1] - 0.024).abs() < 1e-9);
         assert!((at(1.2)[1] - 0.018).abs() < 1e-12, "slides");
         assert_eq!(drag.load(2.0), Load::REST);
+    }
+
+    #[test]
+    fn its_contact_moves_while_it_slides() {
+        let drag = Drag {
+            direction_deg: 90.0,
+            slide_mm: 2.0,
+            ..Drag::default()
+        };
+        let down = |time_s| drag.load(time_s).offset_mm()[1];
+        assert_eq!([0.5, 0.87].map(down), [0.0; 2]);
+        assert!((down(1.13) - 1.0).abs() < 1e-9, "half of the way");
+        assert!((down(1.5) - 2.0).abs() < 1e-9);
+        assert!(drag.load(1.13).offset_mm()[0].abs() < 1e-9);
     }
 
     #[test]

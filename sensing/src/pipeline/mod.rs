@@ -9,7 +9,7 @@ mod taring;
 mod tests;
 
 use crate::motion::Motion;
-use again::Again;
+use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_force::features::Features;
 use hivtac_force::force::{self, Force, Resting};
@@ -27,6 +27,7 @@ use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
+use hivtac_terms::units::Px;
 
 /// What one frame gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,7 +48,7 @@ const SATURATED_PART: u32 = 2;
 /// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
 /// up in a `T`.
 ///
-/// It holds all its storage, about 84 KiB and the table (64 KiB), so build it where it shall stay:
+/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it shall stay:
 /// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
 /// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
 /// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
@@ -64,7 +65,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     prepared: Option<Prepared>,
     ahead: Ahead,
     motion: Motion,
-    again: Again,
+    look: Look,
 }
 
 /// What follows from settings, model and tare before there is a frame.
@@ -99,7 +100,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             prepared: None,
             ahead: Ahead::Off,
             motion: Motion::GLOBAL,
-            again: Again::new(),
+            look: Look::First,
         }
     }
 
@@ -114,9 +115,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         model: Option<Model<'m>>,
     ) -> Result<(), SettingsError> {
         settings.check()?;
-        self.pixels
-            .set(&settings.threshold, settings.byte_order)
-            .map_err(SettingsError::Threshold)?;
+        let seen = (settings.threshold, settings.byte_order);
+        let is_set = seen == (self.settings.threshold, self.settings.byte_order);
+        // A table of RGB565 takes as long as some frames.
+        if self.prepared.is_none() || !is_set {
+            let set = self.pixels.set(&settings.threshold, settings.byte_order);
+            set.map_err(SettingsError::Threshold)?;
+        }
         self.settings = settings;
         self.model = model;
         self.tare = None;
@@ -167,19 +172,17 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// once.
     pub fn set_motion(&mut self, motion: Motion) {
         self.motion = motion;
-        self.again.forget();
     }
 
     /// The next frame does not follow the one before at once: how the markers move is not known.
     pub fn forget_motion(&mut self) {
         self.motion.forget();
-        self.again.forget();
     }
 
     /// Starts a frame and forgets the one before, but for where its markers were.
     pub fn begin_frame(&mut self) {
-        let seen = self.again.begin_frame();
-        self.motion.ended(seen.as_ref());
+        self.motion.begin_frame();
+        self.look = Look::First;
         // An error cannot happen after `configure`, and makes every frame incomplete before it.
         let _ = self.scanner.begin(self.settings.scan());
         self.ahead = Ahead::Nothing;
@@ -187,9 +190,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Takes the next row of pixels, as they lie in memory: a `u16` for each, or for two of mono.
     pub fn push_row(&mut self, row: &[u16]) {
-        if self.again.takes_closeups() {
-            return self.again.push_rows(&self.pixels, row);
-        }
         self.scanner.push_row(&self.pixels, row);
         self.look_ahead();
     }
@@ -197,9 +197,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than
     /// one by one.
     pub fn push_rows(&mut self, rows: &[u16]) {
-        if self.again.takes_closeups() {
-            return self.again.push_rows(&self.pixels, rows);
-        }
         self.scanner.push_rows(&self.pixels, rows);
         self.look_ahead();
     }
@@ -208,9 +205,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// all of the frame, or at least as many as there are [`Settings::dilations`]. Nothing is
     /// copied then ([`Scanner::push_rows_below`]).
     pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
-        if self.again.takes_closeups() {
-            return self.again.push_rows(&self.pixels, rows);
-        }
         self.scanner.push_rows_below(&self.pixels, above, rows);
         self.look_ahead();
     }
@@ -224,22 +218,24 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// The same, and [looks again](Self::look_again) when that may help.
     pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
-        let mut measurement = self.measure_frame(frame);
-        while self.look_again() {
-            self.push_rows(frame);
-            measurement = self.finish_frame();
+        let measurement = self.measure_frame(frame);
+        if !self.look_again() {
+            return measurement;
         }
-        measurement
+        self.push_rows(frame);
+        self.finish_frame()
     }
 
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
-        if self.again.is_looking() {
-            return self.finish_look();
+        if let Look::Again(first) = self.look {
+            return self.finish_look(&first);
         }
         let measurement = self.measure_scanned();
-        let wanted = self.wants_again(&measurement);
-        self.again.ended(&measurement, wanted);
+        self.motion.ended(measurement.markers.as_ref());
+        if self.wants_again(&measurement) {
+            self.look = Look::Wanted(measurement);
+        }
         measurement
     }
 
@@ -301,7 +297,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Works out anew what follows from settings, model and tare.
     fn prepare(&mut self) {
         self.ahead = Ahead::Off;
-        self.again.give_up();
+        self.look = Look::First;
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self
@@ -347,7 +343,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     }
 
     /// Brings out the last blobs; says why the frame as a whole has no markers.
-    #[inline(never)]
     fn end_scan(&mut self) -> Result<(), Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
@@ -388,7 +383,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .as_ref()
             .and_then(|prepared| prepared.resting.as_ref());
         let (force, trust) = match model.forward.as_ref().zip(resting) {
-            Some((forward, resting)) => resting.force(forward, &model.range, markers, &output),
+            Some((forward, resting)) => {
+                let blur = match self.look {
+                    Look::Again(_) => BLUR,
+                    Look::First | Look::Wanted(_) => Px(0),
+                };
+                resting.force(forward, &model.range, (markers, blur), &output)
+            }
             None => force::of_outputs(model, &output),
         };
         *status |= trust;

@@ -1,28 +1,33 @@
 //! The frame that was measured, as one of those that make a rest position.
 
-use super::{Measurement, Sensor};
+use super::{Look, Measurement, Sensor};
 use crate::tare::{Refusal, TareBuilder};
 use hivtac_force::rest::Rest;
 use hivtac_markers::tables::Table;
+use hivtac_terms::status::Status;
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Gives a tare the frame that was finished last, of which `measurement` is. A frame without
     /// markers is passed over. Gives the rest position, which is not yet
     /// [set](Sensor::set_tare), once there were enough good frames, or why there is none.
-    #[inline(never)]
     pub fn tare_with(
         &self,
         tare: &mut TareBuilder,
         measurement: &Measurement,
     ) -> Option<Result<Rest, Refusal>> {
-        if self.again.is_looking() {
-            // The blobs are no longer those of the first look.
+        // The blobs of another look are no rest position's.
+        if matches!(self.look, Look::Again(_)) {
             return None;
         }
         let markers = measurement.markers.as_ref()?;
         let features = measurement.features.as_ref()?;
         let found = self.find_markers().ok()?;
         let geometry = &self.settings.geometry;
+        // Against the model's rest position every unit is touched.
+        let is_touched = self.tare.is_some() && measurement.status.contains(Status::CONTACT);
+        if is_touched && !tare.insists() {
+            return tare.add_touched().map(Err);
+        }
         // The images of a pressed film are not those of a flat one; that it is pressed matters.
         let is_pressed = !Rest::of_markers(&found.markers).fits(geometry);
         if is_pressed || found.may_rest(&self.settings) {

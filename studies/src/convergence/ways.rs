@@ -126,7 +126,6 @@ impl<'m> Film<'m> {
                 part + (away + across) / 2.0 * noise as f32
             }),
             sigma,
-            wider: 1.0,
         };
         let best = descend(forward, &observed, &self.mounting, pose).0;
         Contact {

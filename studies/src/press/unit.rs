@@ -6,6 +6,7 @@ use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_scene::{Frame, Load, Options, Scene};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::{Conditions, Model};
+use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::tare::TareBuilder;
@@ -80,6 +81,11 @@ impl TestedUnit {
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Its tip's radius, mm.
+    pub fn tip_radius_mm(&self) -> f64 {
+        self.tip_radius_mm
     }
 
     /// A press with this unit's tip.
@@ -163,6 +169,16 @@ impl Answer {
 }
 
 impl Tared<'_> {
+    /// Says when which row of its frames is exposed.
+    pub fn set_motion(&mut self, motion: Motion) {
+        self.sensor.set_motion(motion);
+    }
+
+    /// What the sensor says of a frame.
+    pub fn measure(&mut self, frame: &Frame) -> Measurement {
+        measure(&mut self.sensor, frame)
+    }
+
     /// Where it rests.
     pub fn rest(&self) -> Option<&Rest> {
         self.sensor.tare()

@@ -1,4 +1,4 @@
-//! The pictures of `docs/scene.md` and `docs/paper-model.md`.
+//! The pictures of `docs/scene.md`, `docs/paper-model.md` and `docs/building-a-sensor.md`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use hivtac_studies::paper_model::{Design, Map, PinholeDistance};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, WHITE};
 use super::cases::CasesArgs;
-use super::overlay;
+use super::{guide, overlay};
 
 /// Arguments of `scene figures`.
 #[derive(Args)]
@@ -34,6 +34,7 @@ impl FiguresArgs {
         let file = |name: &str| self.out_dir.join(name);
         frames(&file("frames.png"))?;
         CasesArgs::all(file("hard-cases.png")).run()?;
+        guide::draw(&file("guide.png"))?;
         figure8(&file("figure8.svg"))
     }
 }

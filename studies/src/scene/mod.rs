@@ -5,6 +5,7 @@ mod cases;
 mod effects;
 mod figures;
 mod film;
+mod guide;
 mod overlay;
 mod pipeline;
 mod render;

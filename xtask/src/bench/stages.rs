@@ -127,6 +127,8 @@ fn stage_of_name(name: &str) -> Option<&'static str> {
         ("weigh", "threshold"),
         ("dilate", "dilation"),
         ("dot", "network"),
+        ("spline", "steps"),
+        ("root", "steps"),
         ("expand", "network"),
         ("activate", "network"),
     ];

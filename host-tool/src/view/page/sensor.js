@@ -8,6 +8,7 @@ import { Threshold } from "./threshold.js";
 /** How long a light stays on after its last sample, so that it can be read. */
 const LIGHT_MS = 1500;
 const CONTACT = 1 << 16;
+const SLIP = 1 << 17;
 /** The direction's uncertainty is that of an angle in a plane: √2 that along one axis. */
 const ONE_AXIS = Math.SQRT1_2;
 
@@ -193,8 +194,9 @@ export class SensorView {
     show("beta", force?.beta, angle, 2);
     show("place-x", force?.place?.x, force?.place?.sigma, 3);
     show("place-y", force?.place?.y, force?.place?.sigma, 3);
-    const contact = this.newest !== null && (this.newest.status & CONTACT) !== 0;
-    this.say("contact", force ? (contact ? "yes" : "no") : "–");
+    const has = (bit) => this.newest !== null && (this.newest.status & bit) !== 0;
+    const touches = has(SLIP) ? "slips" : has(CONTACT) ? "yes" : "no";
+    this.say("contact", force ? touches : "–");
     this.part("numbers").dataset.frame = force ? this.newest.frame : "";
   }
 }

@@ -233,9 +233,11 @@ impl Board {
                 write(&pixels, &swapped.collect::<Vec<_>>())?;
                 let size = case.size;
                 self.frames += &format!(
-                    "Frame {{ size: {size:?}, special: {special:?}, pixels: \
-                     include_bytes!({pixels:?}), model: &AlignedFile(*include_bytes!({model:?})).0 \
-                     }},\n"
+                    "Frame {{ size: {size:?}, special: {special:?}, pixels: {{\n\
+                     #[unsafe(link_section = \".bank2\")]\n\
+                     static PIXELS: [u8; include_bytes!({pixels:?}).len()] = \
+                     *include_bytes!({pixels:?});\n&PIXELS }}, \
+                     model: &AlignedFile(*include_bytes!({model:?})).0 }},\n"
                 );
             }
             Work::Network(widths) => {

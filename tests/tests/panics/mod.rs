@@ -82,7 +82,7 @@ const REASONS: [(&str, usize, &str); 20] = [
     ),
     (
         "hivtac_firmware..flash",
-        3,
+        6,
         "an operation of the flash is waited for once: what has ended is not polled again",
     ),
     (
@@ -92,19 +92,19 @@ const REASONS: [(&str, usize, &str); 20] = [
     ),
     (
         "hivtac_firmware",
-        3,
+        4,
         "at the start only: tasks are spawned once, and the settings are constants that the \
          model's proof fits",
     ),
     (
         "embassy_executor",
-        16,
+        29,
         "the same of the capture, USB and memory tasks, compiled into their executor; executors \
          start once",
     ),
     (
         "embassy_sync",
-        13,
+        15,
         "cells of queues and signals, in a critical section and so never borrowed twice",
     ),
     (

@@ -1,4 +1,5 @@
 //! Documents that list what the sources hold list all of it, and nothing else.
 
 mod dependencies;
+mod readme;
 mod unsafe_code;

@@ -1,0 +1,155 @@
+//! A unit's own model, with a person at a bench: what to do next in words, live numbers, and at the
+//! end the model and how good it is.
+
+mod plan;
+mod verdict;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::collect::assemble::{Gauge, assemble};
+use crate::collect::folder::{self, Recording};
+use crate::collect::gauge::Unit;
+use crate::collect::gauge_port::GaugeArgs;
+use crate::collect::poses;
+use crate::collect::record::{self, RecordArgs, seconds};
+use crate::collect::series::Series;
+use crate::quantize::export;
+use crate::weights::Weights;
+use plan::{MOST_LOADS, Planned};
+use verdict::Verdict;
+
+/// What the model of the firmware was made of: the simulated sensor.
+const DEFAULT_WEIGHTS: &str = include_str!("../../models/default.weights");
+/// In the recording's folder: the unit's weights and its model.
+const WEIGHTS: &str = "unit.weights";
+const MODEL: &str = "unit.hvtm";
+
+/// Options of the guided `unit`.
+#[derive(Debug, clap::Args)]
+pub struct GuideArgs {
+    /// Be led through the loads: the folder for what is recorded and for the unit's model. The same
+    /// command goes on where it was interrupted.
+    #[arg(long, value_name = "FOLDER")]
+    into: Option<PathBuf>,
+    /// Port of the sensor: serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when
+    /// not given.
+    #[arg(long, value_name = "PORT", requires = "into")]
+    port: Option<String>,
+    /// Longest wait for the sensor's answers and for its next frame, s.
+    #[arg(long, value_name = "S", default_value_t = 5.0, value_parser = seconds)]
+    timeout: f64,
+    /// Other loads than the usual ten: a list of poses as `collect record` takes it, of ten at
+    /// most.
+    #[arg(long, value_name = "FILE", requires = "into")]
+    poses: Option<PathBuf>,
+    /// Length of a load, s of the sensor's clock.
+    #[arg(long, value_name = "S", default_value_t = 8.0, value_parser = seconds)]
+    seconds: f64,
+    /// Length of the untouched film before the loads, s.
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
+    rest_seconds: f64,
+    #[command(flatten)]
+    gauge_port: GaugeArgs,
+    /// What the gauge recorded by itself, once all loads are done, as `collect align` takes it.
+    #[arg(long, value_name = "FILE", requires = "into")]
+    gauge: Vec<PathBuf>,
+    /// The unit of readings that name none.
+    #[arg(long, default_value = "N")]
+    gauge_unit: Unit,
+}
+
+/// What is known of the bench, for the fit.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// Standard uncertainty of a load's |F|, N.
+    pub gauge_n: f64,
+    /// That of the stage's zero on the film along x and y, mm.
+    pub stage_mm: f64,
+}
+
+impl GuideArgs {
+    /// The folder, when a person is to be led.
+    pub fn folder(&self) -> Option<&Path> {
+        self.into.as_deref()
+    }
+
+    /// Leads through the loads that are left, and once none is, fits the unit to them.
+    ///
+    /// # Errors
+    /// When sensor, gauge or folder fail; what was recorded until then stays. When the loads cannot
+    /// be joined with the gauge, or no unit explains them.
+    pub fn lead(&self, into: &Path, weights: Option<&Path>, known: Known) -> Result<()> {
+        let planned = match &self.poses {
+            Some(file) => plan::of_poses(&poses::load(file)?),
+            None => plan::usual(),
+        };
+        ensure!(
+            planned.len() <= MOST_LOADS,
+            "{} loads are listed: {MOST_LOADS} are enough",
+            planned.len()
+        );
+        let weights = match weights {
+            Some(file) => Weights::load(file)?,
+            None => Weights::parse(DEFAULT_WEIGHTS)?,
+        };
+        let left = plan::left(&planned, &folder::done(into)?);
+        if !left.is_empty() {
+            self.record(into, &planned)?;
+        }
+        let left = plan::left(&planned, &folder::done(into)?);
+        if left.is_empty() {
+            return self.fit(into, weights, known);
+        }
+        println!(
+            "{} of {} loads are left: the same command goes on with them.",
+            left.len(),
+            planned.len()
+        );
+        Ok(())
+    }
+
+    fn record(&self, into: &Path, planned: &[Planned]) -> Result<()> {
+        let args = RecordArgs {
+            into: into.to_owned(),
+            port: self.port.clone(),
+            timeout: self.timeout,
+            poses: None,
+            seconds: self.seconds,
+            rest_seconds: self.rest_seconds,
+            gauge: self.gauge_port.clone(),
+        };
+        record::record_tasks(&args, Some(plan::tasks(planned, self.seconds)))
+    }
+
+    fn fit(&self, into: &Path, weights: Weights, known: Known) -> Result<()> {
+        let recording = Recording::read(into)?;
+        let files = self.gauge.iter();
+        let files = files.map(|path| Series::load(path, self.gauge_unit));
+        let gauge = match files.collect::<Result<Vec<_>>>()? {
+            files if files.is_empty() => Gauge::AtThePort,
+            files => Gauge::Files(files),
+        };
+        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, true)?;
+        println!("All loads are recorded.\n{report}");
+        eprintln!("Fitting the unit, and judging it on loads left out: a minute or two.");
+        let Known { gauge_n, stage_mm } = known;
+        let (own, found) = weights.clone().for_unit(&dataset, gauge_n, stage_mm)?;
+        print!("{found}");
+        own.save(&into.join(WEIGHTS))?;
+        let model = into.join(MODEL);
+        fs::write(&model, export(&own)?)
+            .with_context(|| format!("cannot write {}", model.display()))?;
+        println!("the unit's model is {}", model.display());
+        let judged = weights.judged_on_others(&dataset, gauge_n, stage_mm)?;
+        println!("{}", Verdict::of(&judged));
+        println!(
+            "Next: give the model to the sensor, `hivtac update model {}`; then `hivtac tare \
+             --keep`.",
+            model.display()
+        );
+        Ok(())
+    }
+}

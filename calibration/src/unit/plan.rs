@@ -1,0 +1,118 @@
+//! The loads that a person puts on, in words.
+
+use crate::collect::poses::{self, Pose, Task};
+
+/// More loads tell hardly more of a unit (`docs/results/units.md`).
+pub const MOST_LOADS: usize = 10;
+
+/// The usual loads: α and β in degrees, x and y in mm, and |F| in mN. One weak and one strong in
+/// the middle, then tilted to each side, then off the middle to each side.
+const USUAL: [([f64; 2], [f64; 2], u32); MOST_LOADS] = [
+    ([0.0, 0.0], [0.0, 0.0], 100),
+    ([0.0, 0.0], [0.0, 0.0], 200),
+    ([8.0, 0.0], [0.0, 0.0], 100),
+    ([-8.0, 0.0], [0.0, 0.0], 100),
+    ([0.0, 8.0], [0.0, 0.0], 100),
+    ([0.0, -8.0], [0.0, 0.0], 100),
+    ([0.0, 0.0], [3.0, 0.0], 100),
+    ([0.0, 0.0], [-3.0, 0.0], 100),
+    ([0.0, 0.0], [0.0, 3.0], 100),
+    ([0.0, 0.0], [0.0, -3.0], 100),
+];
+/// |F| that is asked for where nobody says, mN.
+const USUAL_MN: u32 = 100;
+
+/// A load to be put on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Planned {
+    pub pose: Pose,
+    /// About how much force, mN: the gauge says how much it was.
+    pub force_mn: u32,
+}
+
+/// The usual ten.
+pub fn usual() -> Vec<Planned> {
+    let planned = USUAL.map(|(angles_deg, place_mm, force_mn)| Planned {
+        pose: Pose {
+            angles_deg,
+            place_mm,
+        },
+        force_mn,
+    });
+    planned.to_vec()
+}
+
+/// Those of a list.
+pub fn of_poses(list: &[Pose]) -> Vec<Planned> {
+    let planned = list.iter().map(|&pose| Planned {
+        pose,
+        force_mn: USUAL_MN,
+    });
+    planned.collect()
+}
+
+/// Those that are left after some poses were done.
+pub fn left(planned: &[Planned], done: &[Pose]) -> Vec<Planned> {
+    poses::left(planned, done, |it| it.pose)
+}
+
+/// What a person is asked to do for each, in a take of so many seconds.
+pub fn tasks(planned: &[Planned], seconds: f64) -> Vec<Task> {
+    let all = planned.len();
+    let task = |(number, it): (usize, &Planned)| Task {
+        pose: it.pose,
+        set: format!(
+            "\nLoad {number} of {all}: {}.\nSet that, the tip just off the film, and press Enter \
+             (`done` to end for now).",
+            words(&it.pose)
+        ),
+        press: format!(
+            "press down to about {} mN, hold it still for a good second, and let go",
+            it.force_mn
+        ),
+        seconds,
+        must_be_felt: true,
+    };
+    (1..).zip(planned).map(task).collect()
+}
+
+/// A pose for somebody who has a stage before them.
+fn words(pose: &Pose) -> String {
+    let ([alpha, beta], [x, y]) = (pose.angles_deg, pose.place_mm);
+    let tilt = match pose.angles_deg {
+        [0.0, 0.0] => "the film level".to_owned(),
+        _ => format!("the film tilted by α = {alpha}°, β = {beta}°"),
+    };
+    let place = match pose.place_mm {
+        [0.0, 0.0] => "the tip over its middle".to_owned(),
+        _ => format!("the tip {x} mm along x and {y} mm along y off its middle"),
+    };
+    format!("{tilt}, {place}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn loads_are_told_in_words_and_those_done_are_left_out() {
+        let planned = usual();
+        let done = [planned[0].pose, planned[2].pose];
+        let left = left(&planned, &done);
+        assert_eq!(left.len(), 8);
+        assert_eq!(
+            left[0].force_mn, 200,
+            "the first of the two in the middle is done"
+        );
+        let tasks = tasks(&planned, 8.0);
+        assert!(
+            tasks[0]
+                .set
+                .contains("Load 1 of 10: the film level, the tip over its middle")
+        );
+        assert!(tasks[1].press.contains("200 mN"));
+        assert!(tasks[3].set.contains("α = -8°, β = 0°"), "{}", tasks[3].set);
+        assert!(tasks[9].set.contains("Load 10 of 10"), "{}", tasks[9].set);
+        assert!(tasks[9].set.contains("0 mm along x and -3 mm along y"));
+    }
+}

@@ -1,0 +1,67 @@
+//! Two places in SRAM for models that a host sends: one is in use while the other is filled.
+//!
+//! # Design
+//! A model is run from SRAM and not from the flash that keeps it: the core that reads a bank of the
+//! flash waits while that bank is erased, for a second. A slot is filled, then *lent*, as a file
+//! that does not change until it is given back: by the memory task when it is refused, by the
+//! pipeline when another model is in use.
+
+use crate::shared::LENT;
+use core::sync::atomic::Ordering;
+use hivtac_wire::message::MODEL_BYTES;
+
+/// How many there are.
+pub const COUNT: usize = 2;
+
+/// Files lie at a multiple of four, so that kernels run them, and of a line of the data cache.
+#[repr(C, align(32))]
+struct Files([[u8; MODEL_BYTES]; COUNT]);
+
+#[unsafe(link_section = ".sram_zero.models")]
+static mut FILES: Files = Files([[0; MODEL_BYTES]; COUNT]);
+
+/// One that is not lent.
+pub fn free() -> Option<u8> {
+    (0..)
+        .zip(&LENT)
+        .find_map(|(slot, lent)| (!lent.load(Ordering::Acquire)).then_some(slot))
+}
+
+/// Has `fill` write into a slot; `None` when it is lent, or there is no such slot. Only for the USB
+/// executor, and for the start before that: of these one runs at a time, to its end.
+pub fn fill<T>(slot: u8, fill: impl FnOnce(&mut [u8; MODEL_BYTES]) -> T) -> Option<T> {
+    let lent = LENT.get(usize::from(slot))?;
+    if lent.load(Ordering::Acquire) {
+        return None;
+    }
+    // SAFETY: the slot is one of `FILES`. It is not lent, so that there is no other reference to
+    // it: those of `fill` end with it, and none runs beside another.
+    let file = unsafe { &mut *file(slot) };
+    Some(fill(file))
+}
+
+/// Lends a slot's first bytes, until it is given back; `None` when it is lent, or there is no such
+/// slot.
+pub fn lend(slot: u8, bytes: u32) -> Option<&'static [u8]> {
+    let lent = LENT.get(usize::from(slot))?;
+    if lent.swap(true, Ordering::AcqRel) {
+        return None;
+    }
+    // SAFETY: the slot is one of `FILES`, and is not written while it is lent.
+    let file = unsafe { &*file(slot) };
+    file.get(..bytes as usize)
+}
+
+/// Gives a slot back: nobody uses what was lent of it any more.
+pub fn give_back(slot: u8) {
+    if let Some(lent) = LENT.get(usize::from(slot)) {
+        lent.store(false, Ordering::Release);
+    }
+}
+
+/// Where a slot lies that there is.
+fn file(slot: u8) -> *mut [u8; MODEL_BYTES] {
+    (&raw mut FILES)
+        .cast::<[u8; MODEL_BYTES]>()
+        .wrapping_add(usize::from(slot))
+}

@@ -1,0 +1,326 @@
+//! Which threshold separates dots from film.
+
+use super::levels::{Histogram, Scale};
+use crate::focus::checks::{DARKEST_VALUES, advice};
+use crate::focus::seen::{NotSeen, Spot, found_by_sensing};
+use hivtac_host::frame::Frame;
+use hivtac_terms::hsv::Hsv;
+use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
+use hivtac_wire::message::DeviceHello;
+
+/// Distance between two levels that are tried.
+const STEP: usize = 4;
+/// The largest part of a picture that dots and other things of their colour have: four dots have
+/// a hundredth.
+const LARGEST_PART: f64 = 0.03;
+/// Limits that show the same number of blobs, when these are things and no noise.
+const FEWEST: usize = 3;
+/// Levels that a threshold lies above nearly all of the film and below nearly all of the dots:
+/// five standard deviations of the simulated camera's noise, 2.5 levels. The quantiles allow for
+/// three.
+const MARGIN: u8 = 12;
+/// The part of the film's pixels that are not above its highest, and of the dots' that are not
+/// below their lowest.
+const NEARLY_ALL: [f64; 2] = [0.999, 0.99];
+/// A dot's colour is that of the pixels within this part of its radius, the film's that of those
+/// beyond this many radii of every dot.
+const CORE: f64 = 0.5;
+/// See [`CORE`].
+const BEYOND: f64 = 1.6;
+/// The film beside the dots is that within so many radii.
+const NEAR: f64 = 4.0;
+/// How far the hues of a box go beyond those of the dots, 2° each: as far as the usual box beyond
+/// red tape in white light.
+const HUE_MARGIN: i16 = 8;
+/// A picture whose median is darker, of 255, has no colours to tell apart.
+const DARK: u8 = 20;
+
+/// What to do about pale dots.
+const PALE: &str = "use dots of a stronger colour, white light, and no light from outside";
+
+/// What a threshold lies between, each a number of the scale from 0 to 255.
+#[derive(Clone, Copy, Debug)]
+pub struct Levels {
+    /// The film's median.
+    pub film: u8,
+    /// 99.9 % of the film are not above.
+    pub film_high: u8,
+    /// 99 % of the dots' cores are not below.
+    pub dots_low: u8,
+    /// Their median.
+    pub dots: u8,
+}
+
+/// The threshold that was found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    pub scale: Scale,
+    pub levels: Levels,
+    /// The sensing finds its four markers from the first to the last of these limits, at least.
+    pub span: [u8; 2],
+    pub chosen: Threshold,
+    /// The model's, when it separates dots from film, too.
+    pub model: Option<Threshold>,
+    /// Of the dots' cores in RGB565: first and last hue, and the lowest value.
+    pub colour: Option<Colour>,
+}
+
+impl Found {
+    /// The model's when it separates: there are forces only with that.
+    pub fn wanted(&self) -> Threshold {
+        self.model.unwrap_or(self.chosen)
+    }
+}
+
+/// The colour of the dots' cores: 98 % of their hues, and the value that 99 % are not below.
+#[derive(Clone, Copy, Debug)]
+pub struct Colour {
+    /// 0–179; the first above the second wraps through 0.
+    pub hues: [u8; 2],
+    pub value_low: u8,
+}
+
+/// Looks for it in pictures of one device.
+///
+/// # Errors
+/// Why the pictures do not separate, and what to do.
+pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
+    let format = frames[0].format();
+    let brightness = brightness(frames);
+    if brightness < DARK {
+        return Err(format!(
+            "the picture is dark (half of it is below {DARK} of 255): take the cap off the lens, \
+             switch the light on, then `hivtac expose`"
+        ));
+    }
+    let scale = Scale::of(format, brightness);
+    let pictures: Vec<Picture> = frames.iter().map(|it| Picture::of(it, scale)).collect();
+    let span = span(&pictures, device, scale)?;
+    let middle = span[0].midpoint(span[1]);
+    let spots = markers(&pictures, device, scale.threshold(middle)).map_err(|it| advice(&it))?;
+    let seen = levels(&pictures, &spots, f64::INFINITY);
+    let level = limit(scale, &seen).map_err(|why| {
+        let beside_dots = levels(&pictures, &spots, NEAR);
+        match limit(scale, &beside_dots) {
+            Ok(_) => "something else in the picture has the dots' colour: take it out of view, \
+                      or cover it"
+                .to_owned(),
+            Err(_) => why,
+        }
+    })?;
+    let colour = (format == PixelFormat::Rgb565).then(|| colour(&pictures, &spots));
+    let chosen = match (scale.threshold(level), colour) {
+        (Threshold::Rgb565(it), Some(colour)) => Threshold::Rgb565(narrowed(it, &colour)),
+        (threshold, _) => threshold,
+    };
+    markers(&pictures, device, chosen).map_err(|it| advice(&it))?;
+    let is_good = |it: &Threshold| {
+        separates(it, &seen, colour.as_ref()) && markers(&pictures, device, *it).is_ok()
+    };
+    let model = device.model.as_ref().map(|model| model.threshold);
+    Ok(Found {
+        scale,
+        levels: seen,
+        span,
+        chosen,
+        model: model.filter(is_good),
+        colour,
+    })
+}
+
+/// A frame with the level of each of its pixels.
+struct Picture<'f> {
+    frame: &'f Frame,
+    levels: Vec<u8>,
+}
+
+impl<'f> Picture<'f> {
+    fn of(frame: &'f Frame, scale: Scale) -> Picture<'f> {
+        let levels = scale.levels(frame);
+        Picture { frame, levels }
+    }
+
+    /// Distance of a pixel from the nearest spot, in radii of that.
+    fn off(&self, index: usize, spots: &[Spot; 4]) -> f64 {
+        let width = usize::from(self.frame.width);
+        let (x, y) = ((index % width) as f64, (index / width) as f64);
+        let off = |spot: &Spot| (x - spot.centre[0]).hypot(y - spot.centre[1]) / spot.radius;
+        spots.iter().map(off).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Median of value or luma.
+fn brightness(frames: &[Frame]) -> u8 {
+    let values = frames.iter().flat_map(|frame| match frame.format() {
+        PixelFormat::Rgb565 => {
+            let value = |pixel| Hsv::from_rgb565(pixel).value;
+            frame.pixels().into_iter().map(value).collect::<Vec<_>>()
+        }
+        PixelFormat::Yuv422 => frame.bytes.iter().copied().step_by(2).collect(),
+        PixelFormat::Mono => frame.bytes.clone(),
+    });
+    Histogram::of(values).quantile(0.5)
+}
+
+/// The markers of every picture as the sensing finds them with a threshold.
+fn markers(
+    pictures: &[Picture],
+    device: &DeviceHello,
+    threshold: Threshold,
+) -> Result<Vec<[Spot; 4]>, NotSeen> {
+    let of_one = |picture: &Picture| found_by_sensing(picture.frame, device, threshold);
+    pictures.iter().map(of_one).collect()
+}
+
+/// The longest row of limits with each of which the sensing finds four markers in every picture.
+fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8; 2], String> {
+    let mut best: Option<[u8; 2]> = None;
+    let mut row: Option<[u8; 2]> = None;
+    let mut misses = Vec::new();
+    let all = pictures.iter().flat_map(|it| it.levels.iter().copied());
+    let film = Histogram::of(all).quantile(1.0 - LARGEST_PART);
+    for level in (STEP as u8..=u8::MAX).step_by(STEP) {
+        match markers(pictures, device, scale.threshold(level)) {
+            Ok(_) => row = Some([row.map_or(level, |[from, _]| from), level]),
+            Err(not_seen) => {
+                row = None;
+                // Below, the film passes, and blobs are none of dots.
+                if level > film {
+                    misses.push(not_seen);
+                }
+            }
+        }
+        let length = |row: Option<[u8; 2]>| row.map(|[from, to]| to - from);
+        if length(row) > length(best) {
+            best = row;
+        }
+    }
+    best.ok_or_else(|| {
+        let why = match usual(&misses) {
+            Some(not_seen) if not_seen.blobs == 4 => format!(
+                "four things are seen, but with none they are whole, equal markers ({}): {PALE}",
+                not_seen.status.join(" ")
+            ),
+            Some(not_seen) => advice(not_seen),
+            None => "nothing in the picture has another colour than the film: are the dots in \
+                     view, red (dark ones for a mono camera), and without glare?"
+                .to_owned(),
+        };
+        format!(
+            "with no limit of the {} four dots are found: {why}",
+            scale.name()
+        )
+    })
+}
+
+/// Of what limits show, what most of them do that show anything.
+fn usual(misses: &[NotSeen]) -> Option<&NotSeen> {
+    let count = |blobs: usize| misses.iter().filter(|it| it.blobs == blobs).count();
+    let is_seen = |it: &&NotSeen| it.blobs > 0 && count(it.blobs) >= FEWEST;
+    let of_dots = misses.iter().filter(is_seen);
+    of_dots.max_by_key(|it| count(it.blobs))
+}
+
+/// Of the dots, and of the film within so many radii of a dot.
+fn levels(pictures: &[Picture], spots: &[[Spot; 4]], within: f64) -> Levels {
+    let of = |is_wanted: &dyn Fn(f64) -> bool| {
+        let both = pictures.iter().zip(spots);
+        Histogram::of(both.flat_map(|(picture, spots)| {
+            let pixels = picture.levels.iter().enumerate();
+            pixels
+                .filter(|(index, _)| is_wanted(picture.off(*index, spots)))
+                .map(|(_, level)| *level)
+                .collect::<Vec<_>>()
+        }))
+    };
+    let (film, dots) = (
+        of(&|off| off > BEYOND && off <= within),
+        of(&|off| off <= CORE),
+    );
+    Levels {
+        film: film.quantile(0.5),
+        film_high: film.quantile(NEARLY_ALL[0]),
+        dots_low: dots.quantile(1.0 - NEARLY_ALL[1]),
+        dots: dots.quantile(0.5),
+    }
+}
+
+/// Half way between the medians of film and dots, where a pixel lies that a dot covers by half; as
+/// near to that as the margins allow.
+pub fn limit(scale: Scale, levels: &Levels) -> Result<u8, String> {
+    let least = levels.film_high.saturating_add(MARGIN);
+    let most = levels.dots_low.saturating_sub(MARGIN);
+    if least > most {
+        return Err(format!(
+            "the {} of the film goes up to {}, that of the dots down to {}, and {} are needed \
+             between them: {PALE}",
+            scale.name(),
+            levels.film_high,
+            levels.dots_low,
+            2 * MARGIN
+        ));
+    }
+    Ok(levels.film.midpoint(levels.dots).clamp(least, most))
+}
+
+/// Whether a threshold of the same format lies between film and dots with the margins.
+fn separates(threshold: &Threshold, levels: &Levels, colour: Option<&Colour>) -> bool {
+    let limit = Scale::limit(threshold);
+    let is_between =
+        limit >= levels.film_high + MARGIN && limit.saturating_add(MARGIN) <= levels.dots_low;
+    let holds_colour = match (threshold, colour) {
+        (Threshold::Rgb565(it), Some(colour)) => {
+            let hue_is_in = |hue| {
+                it.contains(Hsv {
+                    hue,
+                    saturation: it.saturation_high,
+                    value: it.value_high,
+                })
+            };
+            f64::from(it.value_low) * DARKEST_VALUES <= f64::from(colour.value_low)
+                && colour.hues.into_iter().all(hue_is_in)
+        }
+        (Threshold::Rgb565(_), None) | (Threshold::Yuv422(_) | Threshold::Mono(_), Some(_)) => {
+            false
+        }
+        (Threshold::Yuv422(_), None) => true,
+        (Threshold::Mono(it), None) => it.low == 0,
+    };
+    is_between && holds_colour
+}
+
+fn colour(pictures: &[Picture], spots: &[[Spot; 4]]) -> Colour {
+    let both = pictures.iter().zip(spots);
+    let core: Vec<Hsv> = both
+        .flat_map(|(picture, spots)| {
+            let pixels = picture.frame.pixels().into_iter().enumerate();
+            pixels
+                .filter(|(index, _)| picture.off(*index, spots) <= CORE)
+                .map(|(_, pixel)| Hsv::from_rgb565(pixel))
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    // Counted from the hue opposite to red, so that reds lie side by side.
+    let turned = Histogram::of(core.iter().map(|it| beside(it.hue, 90)));
+    let hue = |part| beside(turned.quantile(part), 90);
+    Colour {
+        hues: [hue(1.0 - NEARLY_ALL[1]), hue(NEARLY_ALL[1])],
+        value_low: Histogram::of(core.iter().map(|it| it.value)).quantile(1.0 - NEARLY_ALL[1]),
+    }
+}
+
+/// The hue so far beside another one on their circle.
+fn beside(hue: u8, by: i16) -> u8 {
+    (i16::from(hue) + by).rem_euclid(180) as u8
+}
+
+/// A box around a colour: its hues and some more, and half of its value, so that half of the light
+/// is enough.
+fn narrowed(wide: HsvBox, colour: &Colour) -> HsvBox {
+    HsvBox {
+        hue_low: beside(colour.hues[0], -HUE_MARGIN),
+        hue_high: beside(colour.hues[1], HUE_MARGIN),
+        value_low: (f64::from(colour.value_low) / DARKEST_VALUES) as u8,
+        ..wide
+    }
+}

@@ -1,0 +1,196 @@
+//! `hivtac threshold auto`: the threshold that separates dots from film, found in the device's own
+//! pictures, and set.
+
+mod find;
+mod levels;
+#[cfg(test)]
+mod tests;
+
+use crate::command::set_threshold;
+use crate::lines::to_json;
+use crate::look::{self, PASSED};
+use crate::output::print;
+use crate::snapshot::snapshot;
+use find::{Found, find};
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::frame::Frame;
+use hivtac_host::link::Link;
+use hivtac_host::port::Address;
+use hivtac_host::threshold::{text, to_json as threshold_json};
+use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_wire::message::DeviceHello;
+use serde_json::{Value, json};
+use std::time::Duration;
+
+/// Pictures that are looked at: noise is in each another.
+const PICTURES: usize = 3;
+
+/// What to look at, and what to do with what is found.
+#[derive(Debug)]
+pub struct Options {
+    /// Where the device is.
+    pub address: Address,
+    /// Longest wait for its hello, replies and pictures.
+    pub patience: Duration,
+    /// Keep the threshold through restarts.
+    pub keep: bool,
+    /// Set nothing.
+    pub dry_run: bool,
+    /// One JSON object instead of lines.
+    pub json: bool,
+}
+
+/// Finds the threshold, shows why, and sets it.
+///
+/// # Errors
+/// [`Kind::NotRight`] when the pictures do not separate dots from film; what the device refuses.
+pub fn run(options: &Options) -> Result<(), Failure> {
+    let (mut link, hello) = Link::connect(&options.address, options.patience)?;
+    let mut frames = Vec::new();
+    for _ in 0..PICTURES {
+        frames.push(snapshot(&mut link, options.patience)?.frame);
+    }
+    let found = find(&frames, &hello).map_err(|why| {
+        let message = format!("no threshold separates the dots from the film: {why}");
+        Failure::new(Kind::NotRight, message)
+    })?;
+    let report = Report::new(&frames, &hello, found, options);
+    if !options.json {
+        print(&report.text())?;
+    }
+    if !options.dry_run {
+        let wanted = report.wanted();
+        set_threshold(&mut link, &hello, wanted, options.patience, options.keep)?;
+    }
+    if options.json {
+        print(&to_json(&report.json()))?;
+    }
+    Ok(())
+}
+
+/// What was found, with what passes of the pictures.
+struct Report<'o> {
+    found: Found,
+    frame: [u16; 2],
+    /// Pixels of all pictures, and those that pass.
+    pixels: usize,
+    passed: usize,
+    options: &'o Options,
+}
+
+impl<'o> Report<'o> {
+    fn new(
+        frames: &[Frame],
+        device: &DeviceHello,
+        found: Found,
+        options: &'o Options,
+    ) -> Report<'o> {
+        let wanted = found.wanted();
+        let masks = frames.iter().filter_map(|frame| {
+            let frame = Frame {
+                threshold: wanted,
+                ..frame.clone()
+            };
+            look::mask(&frame, device.dilations)
+        });
+        let passed = masks.flatten().filter(|&level| level == PASSED).count();
+        let [width, height] = [frames[0].width, frames[0].height];
+        Report {
+            found,
+            frame: [width, height],
+            pixels: frames.len() * usize::from(width) * usize::from(height),
+            passed,
+            options,
+        }
+    }
+
+    fn wanted(&self) -> Threshold {
+        self.found.wanted()
+    }
+
+    fn share(&self) -> f64 {
+        self.passed as f64 / self.pixels as f64
+    }
+
+    fn text(&self) -> String {
+        let (found, levels) = (&self.found, self.found.levels);
+        let [width, height] = self.frame;
+        let format = self.wanted().format().name();
+        let scale = found.scale.name();
+        let mut lines = vec![
+            format!("pictures   {PICTURES} of {width} × {height} px, {format}"),
+            format!(
+                "film       {scale} {}, 99.9 % of it up to {}",
+                levels.film, levels.film_high
+            ),
+            format!(
+                "dots       {scale} {}, 99 % of them from {} up{}",
+                levels.dots,
+                levels.dots_low,
+                self.colour_text()
+            ),
+            format!(
+                "separable  from {scale} {} to {} the sensing finds four dots",
+                found.span[0], found.span[1]
+            ),
+            format!("chosen     {}: {}", text(&self.wanted()), self.why()),
+            format!(
+                "passes     {:.2} % of the pixels ({} of {})",
+                100.0 * self.share(),
+                self.passed / PICTURES,
+                self.pixels / PICTURES
+            ),
+        ];
+        if self.options.dry_run {
+            lines.push("nothing was set (--dry-run)".to_owned());
+        }
+        lines.join("\n")
+    }
+
+    fn colour_text(&self) -> String {
+        self.found.colour.map_or(String::new(), |colour| {
+            let [first, last] = colour.hues;
+            format!("; hue {first}–{last}, value from {} up", colour.value_low)
+        })
+    }
+
+    fn why(&self) -> String {
+        let half_way = format!(
+            "the {} half way between film and dots",
+            self.found.scale.name()
+        );
+        match (self.found.model, self.wanted().format()) {
+            (Some(_), _) => format!(
+                "the model's, which separates them, and which forces need (without it {}: \
+                 {half_way})",
+                text(&self.found.chosen)
+            ),
+            (None, PixelFormat::Rgb565) => {
+                format!("{half_way}, hues as the dots', and half of their value")
+            }
+            (None, PixelFormat::Yuv422 | PixelFormat::Mono) => half_way,
+        }
+    }
+
+    fn json(&self) -> Value {
+        let (found, levels) = (&self.found, self.found.levels);
+        json!({
+            "pictures": PICTURES,
+            "scale": found.scale.name(),
+            "film": { "median": levels.film, "high": levels.film_high },
+            "dots": {
+                "median": levels.dots,
+                "low": levels.dots_low,
+                "hues": found.colour.map(|colour| colour.hues),
+                "value_low": found.colour.map(|colour| colour.value_low),
+            },
+            "separable": found.span,
+            "half_way": threshold_json(&found.chosen),
+            "chosen": threshold_json(&self.wanted()),
+            "is_of_model": found.model.is_some(),
+            "passed": self.share(),
+            "set": !self.options.dry_run,
+            "kept": self.options.keep,
+        })
+    }
+}

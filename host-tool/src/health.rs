@@ -1,0 +1,172 @@
+//! `hivtac self-test`: what the device finds when it looks at itself and its camera, each with its
+//! code.
+
+use crate::command::tell;
+use crate::lines::to_json;
+use crate::output::print;
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::link::Link;
+use hivtac_host::port::Address;
+use hivtac_host::shown::unit_number;
+use hivtac_wire::health::{Health, Problem, ResetReason};
+use hivtac_wire::message::{DeviceMessage, Request};
+use serde::Serialize;
+use std::time::Duration;
+
+/// What a device says of itself.
+#[derive(Serialize)]
+pub struct Told {
+    reset: &'static str,
+    temperature_c: Option<f64>,
+    stack_used: u32,
+    stack_bytes: u32,
+    problems: Vec<&'static str>,
+}
+
+/// What a self-test found.
+#[derive(Serialize)]
+struct Report {
+    device_id: String,
+    good: bool,
+    problems: Vec<Found>,
+    health: Told,
+}
+
+#[derive(Serialize)]
+struct Found {
+    code: u8,
+    name: &'static str,
+}
+
+impl Told {
+    /// By its message.
+    pub fn of(health: &Health) -> Told {
+        Told {
+            reset: reset_name(health.reset),
+            temperature_c: (health.temperature_centidegrees).map(|it| f64::from(it) / 100.0),
+            stack_used: health.stack_used,
+            stack_bytes: health.stack_bytes,
+            problems: problems(health).map(Problem::name).collect(),
+        }
+    }
+
+    /// For a person.
+    pub fn lines(&self) -> Vec<String> {
+        let temperature = match self.temperature_c {
+            Some(temperature) => format!("{temperature:.1} °C"),
+            None => "temperature unknown".to_owned(),
+        };
+        let problems = match self.problems.as_slice() {
+            [] => "none".to_owned(),
+            names => format!("{}; `hivtac self-test` says what to do", names.join(", ")),
+        };
+        vec![
+            format!(
+                "health     started by {}; {temperature}; {} of {} bytes of stack used",
+                self.reset, self.stack_used, self.stack_bytes
+            ),
+            format!("problems   {problems}"),
+        ]
+    }
+}
+
+/// Has the device look at itself, and prints what it finds.
+///
+/// # Errors
+/// [`Kind::NotRight`] when something is not right; those of [`Link::connect`].
+pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
+    let (mut link, hello) = Link::connect(address, patience)?;
+    let health = ask(&mut link, patience)?;
+    let found: Vec<Problem> = problems(&health).collect();
+    let report = Report {
+        device_id: unit_number(&hello.device_id),
+        good: found.is_empty(),
+        problems: found
+            .iter()
+            .map(|problem| Found {
+                code: problem.code(),
+                name: problem.name(),
+            })
+            .collect(),
+        health: Told::of(&health),
+    };
+    print(&match json {
+        true => to_json(&report),
+        false => lines(&health).join("\n"),
+    })?;
+    match found.len() {
+        0 => Ok(()),
+        count => Err(Failure::new(
+            Kind::NotRight,
+            format!(
+                "the self-test found {count} of {} problems",
+                Problem::ALL.len()
+            ),
+        )),
+    }
+}
+
+/// What the device says of itself.
+///
+/// # Errors
+/// What it refuses.
+pub fn ask(link: &mut Link, patience: Duration) -> Result<Health, Failure> {
+    let mut health = None;
+    link.request(Request::GetHealth, patience, |message| match message {
+        DeviceMessage::Health(newest) => health = Some(newest),
+        other => tell(other),
+    })?;
+    health.ok_or_else(|| link.lost("its health did not come"))
+}
+
+fn problems(health: &Health) -> impl Iterator<Item = Problem> {
+    let bits = health.problems;
+    let is_there = move |problem: &Problem| bits & problem.bit() != 0;
+    Problem::ALL.into_iter().filter(is_there)
+}
+
+fn lines(health: &Health) -> Vec<String> {
+    let line = |problem: Problem| {
+        let there = health.problems & problem.bit() != 0;
+        let (state, advice) = match there {
+            true => ("PROBLEM", format!(": {}", advice(problem))),
+            false => ("good   ", String::new()),
+        };
+        format!("{:>2}  {state}  {}{advice}", problem.code(), problem.name())
+    };
+    Problem::ALL.into_iter().map(line).collect()
+}
+
+fn advice(problem: Problem) -> &'static str {
+    match problem {
+        Problem::CameraSilent => "look at its connector; `hivtac bring-up` says more",
+        Problem::ModelMissing => "send one with `hivtac update model`",
+        Problem::ModelFallback => {
+            "the kept model is not usable, and the built-in one runs; send it again with \
+             `hivtac update model`, or forget it with `--built-in`"
+        }
+        Problem::SettingsUnread => {
+            "kept by other firmware; they stay until something is kept, or `hivtac settings reset`"
+        }
+        Problem::FlashFails => "it wears out: what is kept stays, new things may not",
+        Problem::StackLow => "report it, with what the device was doing",
+        Problem::WatchdogReset => {
+            "the program stood still; report it, with what the device was doing"
+        }
+        Problem::SoftwareReset => {
+            "a fault, unless a debug probe was at work; report it, with what the device was doing"
+        }
+        Problem::Temperature => "above 85 °C, or the sensor for it does not tell; let it cool",
+    }
+}
+
+fn reset_name(reset: ResetReason) -> &'static str {
+    match reset {
+        ResetReason::PowerOn => "power-on",
+        ResetReason::BrownOut => "brown-out",
+        ResetReason::Pin => "reset-line",
+        ResetReason::Software => "software",
+        ResetReason::Watchdog => "watchdog",
+        ResetReason::Other => "other",
+    }
+}

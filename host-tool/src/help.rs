@@ -1,0 +1,163 @@
+//! What the tool says of itself: exit codes, completions for shells, and man pages.
+
+use crate::Arguments;
+use crate::output::{note, print};
+use clap::{Command, CommandFactory};
+use clap_complete::Shell;
+use hivtac_host::failure::{Failure, Kind};
+use std::path::Path;
+
+/// The command line with the exit codes in the help of each command.
+pub fn command() -> Command {
+    let codes = exit_codes();
+    let mut command = with_exit_codes(Arguments::command(), &codes);
+    command = command.after_help(codes);
+    command
+}
+
+fn with_exit_codes(command: Command, codes: &str) -> Command {
+    let names: Vec<String> = command
+        .get_subcommands()
+        .map(|it| it.get_name().to_owned())
+        .collect();
+    let command = command.after_long_help(codes.to_owned());
+    names.into_iter().fold(command, |command, name| {
+        command.mut_subcommand(name, |it| with_exit_codes(it, codes))
+    })
+}
+
+/// Each code with what it means, lowest first.
+fn exit_codes() -> String {
+    let usage = "wrong usage".to_owned();
+    let done = "done; also when the reader of the output went away (broken pipe)".to_owned();
+    let mut codes = vec![(0, done), (2, usage)];
+    codes.extend(Kind::ALL.map(|kind| (kind.exit_code(), kind.meaning().to_owned())));
+    codes.sort_unstable();
+    let lines = codes
+        .iter()
+        .map(|(code, meaning)| format!("\n  {code:<4} {meaning}"));
+    format!("Exit codes:{}", lines.collect::<String>())
+}
+
+/// Prints what a shell completes this tool's commands by.
+pub fn completion(shell: Shell) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut command(), "hivtac", &mut script);
+    let script = String::from_utf8_lossy(&script);
+    print(script.trim_end()).map(|_| ())
+}
+
+/// Writes a man page of each command into a folder, which is made when it is missing.
+pub fn man(folder: &Path) -> Result<(), Failure> {
+    let failed = |error| {
+        let folder = folder.display();
+        Failure::input(format!("cannot write man pages into {folder}: {error}"))
+    };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    clap_mangen::generate_to(command(), folder).map_err(failed)?;
+    let folder = folder.display();
+    note(&format!(
+        "man pages written; `man {folder}/hivtac.1` shows the first"
+    ));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Commands that write files or a script, and say nothing that a program would read.
+    const SILENT: [&str; 2] = ["hivtac completion", "hivtac man"];
+
+    /// Every command that does something, with its whole name.
+    fn doing() -> Vec<(String, Command)> {
+        let mut all = Vec::new();
+        let mut left = vec![(String::from("hivtac"), command())];
+        while let Some((name, command)) = left.pop() {
+            let parts = command.get_subcommands();
+            left.extend(parts.map(|it| (format!("{name} {}", it.get_name()), it.clone())));
+            if !command.is_subcommand_required_set() {
+                all.push((name, command));
+            }
+        }
+        assert!(all.len() > 15, "{all:?}");
+        all
+    }
+
+    /// The example in its long help.
+    fn example(command: &Command) -> Option<String> {
+        let text = command.get_long_about()?.to_string();
+        let line = text.lines().find_map(|line| line.strip_prefix("Example: "));
+        line.map(str::to_owned)
+    }
+
+    #[test]
+    fn every_command_has_an_example_that_is_right_usage() {
+        for (name, command) in doing() {
+            let example = example(&command).unwrap_or_else(|| panic!("{name} has no example"));
+            let is_its = example
+                .strip_prefix(&name)
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(' '));
+            assert!(is_its, "{name}: {example}");
+            let parsed = super::command().try_get_matches_from(example.split(' '));
+            let error = parsed.err().map(|error| error.to_string());
+            assert_eq!(error, None, "{example}");
+        }
+    }
+
+    #[test]
+    fn every_command_that_says_something_can_say_it_to_a_program() {
+        for (name, command) in doing() {
+            let has_json = command
+                .get_arguments()
+                .any(|it| it.get_long() == Some("json"));
+            let is_silent = SILENT.contains(&name.as_str());
+            assert_ne!(has_json, is_silent, "{name}: --json");
+        }
+    }
+
+    /// With what it printed, in a block of its own or after another command.
+    #[test]
+    fn every_command_is_shown_in_the_guide() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let guide = std::fs::read_to_string(root.join("docs/using.md")).unwrap();
+        for (name, _) in doing() {
+            let begin = format!("$ {name}");
+            let is_it = |line: &&str| {
+                let rest = line.strip_prefix(begin.as_str());
+                rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+            };
+            let mut after = guide.lines().skip_while(|line| !is_it(line)).skip(1);
+            let output = after.next().unwrap_or_default();
+            assert!(!output.is_empty(), "docs/using.md does not show {begin}");
+        }
+    }
+
+    #[test]
+    fn every_help_has_all_exit_codes() {
+        for (name, mut command) in doing() {
+            let help = command.render_long_help().to_string();
+            for kind in Kind::ALL {
+                let line = format!("  {:<4} {}", kind.exit_code(), kind.meaning());
+                assert!(help.contains(&line), "{name} lacks {line}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_command_has_its_man_page_with_example_and_exit_codes() {
+        let folder = tempfile::tempdir().unwrap();
+        man(folder.path()).unwrap();
+        for (name, _) in doing() {
+            let file = name.replace(' ', "-") + ".1";
+            let page = std::fs::read_to_string(folder.path().join(&file));
+            let page = page.unwrap_or_else(|error| panic!("{file}: {error}"));
+            for words in ["Example: hivtac", "Exit codes:"] {
+                assert!(page.contains(words), "{file} lacks {words}");
+            }
+        }
+        let blocked = folder.path().join("hivtac.1").join("below");
+        let error = man(&blocked).unwrap_err().to_string();
+        assert!(error.starts_with("cannot write man pages into"), "{error}");
+    }
+}

@@ -1,0 +1,367 @@
+//! How forces are followed from frame to frame: contact, slip, filter and re-zeroing, as JSON, as
+//! lines, and as what `settings set` changes of them.
+
+use crate::decimal::Thousandths;
+use hivtac_terms::temporal::{ContactLimits, Filter, Rezero, SlipLimits, TemporalSettings};
+use hivtac_terms::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
+use serde::{Deserialize, Serialize};
+
+/// In whole numbers of the units that the device keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TemporalJson {
+    contact: ContactJson,
+    slip: SlipJson,
+    filter: FilterJson,
+    rezero: Option<RezeroJson>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ContactJson {
+    begins_un: u32,
+    ends_un: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SlipJson {
+    distance_um: u32,
+    within_ms: u32,
+    ratio_permille: u16,
+}
+
+/// As in the settings and in what `info` says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum FilterJson {
+    /// Each frame's own force.
+    None,
+    /// A first-order low-pass.
+    LowPass {
+        /// Its time constant.
+        time_constant_ms: u32,
+    },
+    /// The median of each component in three frames.
+    MedianOfThree,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RezeroJson {
+    after_ms: u32,
+    rate_mpx_per_s: u16,
+    total_mpx: u16,
+}
+
+impl TemporalJson {
+    /// Of a device's settings.
+    pub fn new(settings: &TemporalSettings) -> TemporalJson {
+        let TemporalSettings {
+            contact,
+            slip,
+            filter,
+            rezero,
+        } = *settings;
+        TemporalJson {
+            contact: ContactJson {
+                begins_un: contact.begins.0,
+                ends_un: contact.ends.0,
+            },
+            slip: SlipJson {
+                distance_um: slip.distance.0,
+                within_ms: slip.within.0,
+                ratio_permille: slip.ratio.0,
+            },
+            filter: FilterJson::new(filter),
+            rezero: rezero.map(|Rezero { after, rate, total }| RezeroJson {
+                after_ms: after.0,
+                rate_mpx_per_s: rate.0,
+                total_mpx: total.0,
+            }),
+        }
+    }
+
+    /// A device's settings; whether they are in their ranges is not looked at.
+    pub fn settings(&self) -> TemporalSettings {
+        TemporalSettings {
+            contact: ContactLimits {
+                begins: UnsignedMicroNewtons(self.contact.begins_un),
+                ends: UnsignedMicroNewtons(self.contact.ends_un),
+            },
+            slip: SlipLimits {
+                distance: Micrometres(self.slip.distance_um),
+                within: Milliseconds(self.slip.within_ms),
+                ratio: Permille(self.slip.ratio_permille),
+            },
+            filter: match self.filter {
+                FilterJson::None => Filter::None,
+                FilterJson::LowPass { time_constant_ms } => Filter::LowPass {
+                    time_constant: Milliseconds(time_constant_ms),
+                },
+                FilterJson::MedianOfThree => Filter::MedianOfThree,
+            },
+            rezero: self.rezero.map(|rezero| Rezero {
+                after: Milliseconds(rezero.after_ms),
+                rate: MilliPx(rezero.rate_mpx_per_s),
+                total: MilliPx(rezero.total_mpx),
+            }),
+        }
+    }
+}
+
+impl FilterJson {
+    /// Of a device's filter.
+    pub fn new(filter: Filter) -> FilterJson {
+        match filter {
+            Filter::None => FilterJson::None,
+            Filter::LowPass { time_constant } => FilterJson::LowPass {
+                time_constant_ms: time_constant.0,
+            },
+            Filter::MedianOfThree => FilterJson::MedianOfThree,
+        }
+    }
+
+    /// What it is and how late it makes forces, for a person.
+    pub fn text(self) -> String {
+        match self {
+            FilterJson::None => "none: each frame's own force".to_owned(),
+            FilterJson::LowPass {
+                time_constant_ms: ms,
+            } => format!("low-pass of {ms} ms: a steady change comes {ms} ms later"),
+            FilterJson::MedianOfThree => {
+                "median of three: a steady change comes a frame later".to_owned()
+            }
+        }
+    }
+}
+
+/// What they are, for a person: name and text of each.
+pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 4] {
+    let TemporalSettings {
+        contact,
+        slip,
+        filter,
+        rezero,
+    } = settings;
+    let rezero = match rezero {
+        None => "off".to_owned(),
+        Some(Rezero { after, rate, total }) => format!(
+            "after {} s without a contact, by {} px a second, {} px in all",
+            Thousandths::from_u64(after.0.into()),
+            Thousandths::from_u64(rate.0.into()),
+            Thousandths::from_u64(total.0.into())
+        ),
+    };
+    [
+        (
+            "contact",
+            format!(
+                "from {} mN on, until below {} mN",
+                Thousandths::from_u64(contact.begins.0.into()),
+                Thousandths::from_u64(contact.ends.0.into())
+            ),
+        ),
+        (
+            "slip",
+            format!(
+                "{} µm within {} ms, from {} of the normal force on",
+                slip.distance.0,
+                slip.within.0,
+                Thousandths::from_u64(slip.ratio.0.into())
+            ),
+        ),
+        ("filter", FilterJson::new(*filter).text()),
+        ("rezero", rezero),
+    ]
+}
+
+/// What to change; what is not given stays.
+#[derive(Clone, Copy, Debug)]
+pub enum Change {
+    /// Of [`ContactLimits`].
+    Contact {
+        /// Where it begins.
+        begins: Option<UnsignedMicroNewtons>,
+        /// Where it ends.
+        ends: Option<UnsignedMicroNewtons>,
+    },
+    /// Of [`SlipLimits`].
+    Slip {
+        /// How far the place moves.
+        distance: Option<Micrometres>,
+        /// In what time.
+        within: Option<Milliseconds>,
+        /// From what ratio on.
+        ratio: Option<Permille>,
+    },
+    /// Another filter.
+    Filter(Filter),
+    /// No re-zeroing, or this, with what is not given as it is, or as it is by default.
+    Rezero(Option<RezeroChange>),
+}
+
+/// What to change of [`Rezero`].
+#[derive(Clone, Copy, Debug)]
+pub struct RezeroChange {
+    /// How long nothing touched.
+    pub after: Option<Milliseconds>,
+    /// How far in a second.
+    pub rate: Option<MilliPx>,
+    /// How far in all.
+    pub total: Option<MilliPx>,
+}
+
+impl Change {
+    /// The settings with it.
+    pub fn of(self, mut settings: TemporalSettings) -> TemporalSettings {
+        let TemporalSettings { contact, slip, .. } = &mut settings;
+        match self {
+            Change::Contact { begins, ends } => {
+                contact.begins = begins.unwrap_or(contact.begins);
+                contact.ends = ends.unwrap_or(contact.ends);
+            }
+            Change::Slip {
+                distance,
+                within,
+                ratio,
+            } => {
+                slip.distance = distance.unwrap_or(slip.distance);
+                slip.within = within.unwrap_or(slip.within);
+                slip.ratio = ratio.unwrap_or(slip.ratio);
+            }
+            Change::Filter(filter) => settings.filter = filter,
+            Change::Rezero(change) => {
+                let before = settings.rezero.unwrap_or_default();
+                settings.rezero = change.map(|change| Rezero {
+                    after: change.after.unwrap_or(before.after),
+                    rate: change.rate.unwrap_or(before.rate),
+                    total: change.total.unwrap_or(before.total),
+                });
+            }
+        }
+        settings
+    }
+
+    /// What it is about, by [`texts`].
+    pub fn name(self) -> &'static str {
+        match self {
+            Change::Contact { .. } => "contact",
+            Change::Slip { .. } => "slip",
+            Change::Filter(_) => "filter",
+            Change::Rezero(_) => "rezero",
+        }
+    }
+}
+
+/// A number with up to three decimals, in thousandths.
+///
+/// # Errors
+/// When it is none, below 0, or too large.
+pub fn thousandths(text: &str) -> Result<u32, String> {
+    let number: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
+    let scaled = number * 1e3;
+    // The margin is that of decimals in binary numbers.
+    if (scaled - scaled.round()).abs() > 1e-6 * scaled.abs().max(1.0) {
+        return Err("it has more than three decimals".to_owned());
+    }
+    match (0.0..=f64::from(u32::MAX)).contains(&scaled) {
+        true => Ok(scaled.round() as u32),
+        false => Err("it is out of range".to_owned()),
+    }
+}
+
+/// The same of small numbers.
+///
+/// # Errors
+/// As [`thousandths`].
+pub fn small_thousandths(text: &str) -> Result<u16, String> {
+    u16::try_from(thousandths(text)?).map_err(|_| "it is out of range".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unusual() -> TemporalSettings {
+        let change = RezeroChange {
+            after: None,
+            rate: Some(MilliPx(7)),
+            total: None,
+        };
+        let changes = [
+            Change::Contact {
+                begins: Some(UnsignedMicroNewtons(3_500)),
+                ends: None,
+            },
+            Change::Slip {
+                distance: None,
+                within: Some(Milliseconds(30)),
+                ratio: None,
+            },
+            Change::Filter(Filter::LowPass {
+                time_constant: Milliseconds(20),
+            }),
+            Change::Rezero(Some(change)),
+        ];
+        let usual = TemporalSettings::default();
+        changes
+            .into_iter()
+            .fold(usual, |all, change| change.of(all))
+    }
+
+    #[test]
+    fn only_what_is_given_changes() {
+        let settings = unusual();
+        let usual = TemporalSettings::default();
+        assert_eq!(settings.contact.begins, UnsignedMicroNewtons(3_500));
+        assert_eq!(settings.contact.ends, usual.contact.ends);
+        assert_eq!(settings.slip.within, Milliseconds(30));
+        assert_eq!(settings.slip.distance, usual.slip.distance);
+        let rezero = settings.rezero.unwrap();
+        assert_eq!(
+            (rezero.rate, rezero.total),
+            (MilliPx(7), Rezero::default().total)
+        );
+        assert_eq!(Change::Rezero(None).of(settings).rezero, None);
+    }
+
+    #[test]
+    fn they_come_back_from_json() {
+        for filter in [Filter::None, Filter::MedianOfThree, unusual().filter] {
+            for settings in [unusual(), TemporalSettings::default()] {
+                let settings = TemporalSettings { filter, ..settings };
+                let text = serde_json::to_string(&TemporalJson::new(&settings)).unwrap();
+                let read: TemporalJson = serde_json::from_str(&text).unwrap();
+                assert_eq!(read.settings(), settings, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_person_reads_units() {
+        let [contact, slip, filter, rezero] = texts(&unusual()).map(|(_, text)| text);
+        assert_eq!(contact, "from 3.500 mN on, until below 1.000 mN");
+        assert_eq!(
+            slip,
+            "60 µm within 30 ms, from 0.100 of the normal force on"
+        );
+        assert_eq!(
+            filter,
+            "low-pass of 20 ms: a steady change comes 20 ms later"
+        );
+        let expected = "after 10.000 s without a contact, by 0.007 px a second, 0.100 px in all";
+        assert_eq!(rezero, expected);
+    }
+
+    #[test]
+    fn numbers_have_three_decimals() {
+        for (text, expected) in [("2", 2_000), ("0.3", 300), ("0.001", 1), ("0", 0)] {
+            assert_eq!(thousandths(text), Ok(expected));
+        }
+        for text in ["0.0001", "-1", "nan", "inf", "1e9", "", "2 mN"] {
+            assert!(thousandths(text).is_err(), "{text}");
+        }
+        assert!(small_thousandths("66").is_err());
+    }
+}

@@ -1,0 +1,133 @@
+//! Contact, slip and filter of the flashed firmware: those that the sensing on this computer makes
+//! of the same forces, bit for bit.
+
+use crate::common::{Run, Setup, command, firmware};
+use hivtac_rig::script::Action;
+use hivtac_sensing::pipeline::Measurement;
+use hivtac_sensing::temporal::{Moment, Temporal};
+use hivtac_terms::force::Force;
+use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{ContactLimits, Filter, TemporalSettings};
+use hivtac_terms::units::{Milliseconds, UnsignedMicroNewtons};
+use hivtac_wire::message::{Outcome, Request, Sample};
+use std::collections::BTreeMap;
+
+/// Numbers of commands, and when they are sent.
+const SET: u16 = 30;
+const WRONG: u16 = 31;
+const SET_MS: u64 = 360;
+/// The tip has been lifted by then.
+const END_MS: u64 = 520;
+
+fn setup() -> Setup {
+    Setup {
+        scene: "tests/drag.toml",
+        ..Setup::new(firmware(), END_MS)
+    }
+}
+
+/// A sample of another run: what its frame itself tells.
+fn measured(sample: &Sample) -> Measurement {
+    Measurement {
+        status: sample.status,
+        markers: None,
+        features: None,
+        force: sample.force,
+    }
+}
+
+/// What the sensing here makes of samples, with other settings from the one with this index on.
+fn followed(
+    samples: &[&Sample],
+    other: TemporalSettings,
+    from: usize,
+) -> Vec<(Status, Option<Force>)> {
+    let mut temporal = Temporal::new();
+    let followed = samples.iter().enumerate().map(|(nth, sample)| {
+        if nth == from {
+            temporal.set(other).unwrap();
+        }
+        let at = Moment {
+            frame: sample.frame,
+            time_us: sample.time_us,
+        };
+        let followed = temporal.follow(at, &measured(sample));
+        (followed.status, followed.force)
+    });
+    followed.collect()
+}
+
+fn told(run: &Run) -> Vec<(Status, Option<Force>)> {
+    let samples = run.samples();
+    samples.iter().map(|s| (s.status, s.force)).collect()
+}
+
+/// The truth of each frame: whether the tip presses, and how far its contact has moved, mm.
+fn truth(run: &Run) -> BTreeMap<u32, (bool, f64)> {
+    let lines = run.truth.iter().map(|line| {
+        let number = |key: &str| line[key].as_f64();
+        let presses = number("magnitude_n").unwrap_or(0.0) > 0.0;
+        let moved = number("place_x_mm").unwrap_or(0.0);
+        (line["frame"].as_u64().unwrap() as u32, (presses, moved))
+    });
+    lines.collect()
+}
+
+#[test]
+fn a_drag_is_a_contact_and_slips_and_new_settings_hold_for_whole_frames() {
+    let run = setup().run();
+    run.assert_only_setup_drops();
+    let samples = run.samples();
+    let usual = TemporalSettings::USUAL;
+    assert_eq!(told(&run), followed(&samples, usual, usize::MAX));
+    check_truth(&run);
+
+    // Another filter, and limits under which nothing touches.
+    let other = TemporalSettings {
+        contact: ContactLimits {
+            begins: UnsignedMicroNewtons(500_000),
+            ends: UnsignedMicroNewtons(400_000),
+        },
+        filter: Filter::LowPass {
+            time_constant: Milliseconds(20),
+        },
+        ..usual
+    };
+    let mut wrong = usual;
+    wrong.slip.within = Milliseconds(101);
+    let send = |id, settings| Action::Send(command(id, Request::SetTemporal(settings)));
+    let changed = setup()
+        .at(SET_MS, send(SET, other))
+        .at(SET_MS + 60, send(WRONG, wrong))
+        .run();
+    assert_eq!(changed.outcome(SET), Outcome::Done);
+    assert_eq!(changed.outcome(WRONG), Outcome::InvalidArgument);
+    assert_eq!(changed.hellos().last().unwrap().filter, other.filter);
+    // The reply passes samples that wait, by one or two.
+    let before = changed.answers(SET)[0].1;
+    let fits = |from: &usize| told(&changed) == followed(&samples, other, *from);
+    let from = (before - 1..before + 3).find(fits);
+    assert!(from.is_some(), "every frame by one of the two settings");
+}
+
+/// Contact and slip are told when they are true, and soon.
+fn check_truth(run: &Run) {
+    let truth = truth(run);
+    let first = |is: &dyn Fn(&Sample) -> bool| {
+        let samples = run.samples();
+        let first = samples.iter().find(|sample| is(sample));
+        first.map(|sample| sample.frame).expect("it happens")
+    };
+    let presses = first(&|sample| truth[&sample.frame].0);
+    let touched = first(&|sample| sample.status.contains(Status::CONTACT));
+    assert!(
+        (presses..presses + 3).contains(&touched),
+        "{presses} {touched}"
+    );
+    let moves = first(&|sample| truth[&sample.frame].1 > 1e-6);
+    let slips = first(&|sample| sample.status.contains(Status::SLIP));
+    // While the force still rises, its place may seem to move some frames earlier.
+    assert!((moves - 3..moves + 4).contains(&slips), "{moves} {slips}");
+    let last = run.samples().last().unwrap().status;
+    assert!(!last.contains(Status::CONTACT), "{last:?}");
+}

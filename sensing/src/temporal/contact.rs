@@ -1,0 +1,95 @@
+//! Whether something touches the film, with hysteresis.
+//!
+//! A contact begins with the limit's |F| when that is at least three times its standard
+//! uncertainty; it ends below the lower limit, or below half of that certainty.
+
+use super::ContactLimits;
+use hivtac_force::force::{CONTACT_SIGMAS, Force};
+
+/// What was known is forgotten when no frame had a force for so long, µs.
+const FORGOTTEN_US: u64 = 100_000;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contact {
+    is_touched: bool,
+    /// When the newest force was, µs.
+    newest_us: u64,
+}
+
+impl Contact {
+    /// Nothing touches it.
+    pub const NONE: Contact = Contact {
+        is_touched: false,
+        newest_us: 0,
+    };
+
+    /// Takes a frame; `None` when nobody knows, as it has no force.
+    pub fn follow(
+        &mut self,
+        limits: &ContactLimits,
+        time_us: u64,
+        force: Option<&Force>,
+    ) -> Option<bool> {
+        let force = force?;
+        let was_touched = self.is_touched && time_us.saturating_sub(self.newest_us) <= FORGOTTEN_US;
+        let magnitude = force.magnitude.0.unsigned_abs();
+        let sigma = u64::from(force.magnitude_sigma.0) * u64::from(CONTACT_SIGMAS);
+        self.is_touched = match was_touched {
+            true => magnitude >= limits.ends.0 && 2 * u64::from(magnitude) >= sigma,
+            false => magnitude >= limits.begins.0 && u64::from(magnitude) >= sigma,
+        };
+        self.newest_us = time_us;
+        Some(self.is_touched)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::temporal::tests::pressed;
+
+    /// Whether each of forces, µN with standard uncertainty, a frame apart, is a contact.
+    fn told(forces: &[(i32, u32)]) -> std::vec::Vec<bool> {
+        let mut contact = Contact::NONE;
+        let mut time_us = 0;
+        let frames = forces.iter().map(|&(magnitude, sigma)| {
+            time_us += 6_405;
+            let force = pressed(magnitude, sigma);
+            contact.follow(&ContactLimits::default(), time_us, Some(&force))
+        });
+        frames.map(|told| told.unwrap()).collect()
+    }
+
+    #[test]
+    fn it_begins_high_and_ends_low() {
+        let forces = [1_999, 2_000, 1_999, 1_000, 999, 1_999, 2_000].map(|f| (f, 300));
+        let expected = [false, true, true, true, false, false, true];
+        assert_eq!(told(&forces), expected);
+    }
+
+    #[test]
+    fn it_begins_with_three_uncertainties_and_ends_below_half_of_them() {
+        let forces = [
+            (8_999, 3_000),
+            (9_000, 3_000),
+            (4_500, 3_000),
+            (4_499, 3_000),
+        ];
+        assert_eq!(told(&forces), [false, true, true, false]);
+        let extremes = [(i32::MAX, u32::MAX), (i32::MIN, 1), (0, 0)];
+        assert_eq!(told(&extremes), [false, true, false]);
+    }
+
+    #[test]
+    fn without_a_force_nobody_knows_and_after_a_while_nothing_is_remembered() {
+        let limits = ContactLimits::default();
+        let (first, between) = (pressed(5_000, 1), pressed(1_500, 1));
+        for (later_us, expected) in [(100_000, true), (100_001, false)] {
+            let mut contact = Contact::NONE;
+            assert_eq!(contact.follow(&limits, 0, Some(&first)), Some(true));
+            assert_eq!(contact.follow(&limits, 50_000, None), None);
+            let told = contact.follow(&limits, later_us, Some(&between));
+            assert_eq!(told, Some(expected), "{later_us}");
+        }
+    }
+}

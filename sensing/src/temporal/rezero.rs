@@ -1,0 +1,334 @@
+//! Re-zeroing: the rest position follows what drifts while nothing touches the film.
+//!
+//! Where the markers rest wanders with temperature and with what the film remembers of its loads.
+//! While nothing has touched the film for long enough, each coordinate of the rest position goes
+//! towards where the markers are, the mean of a second, by no more than a rate; never farther from
+//! where it was taken than a total. It goes nowhere during a contact, nor in frames without a
+//! force or with [`frame_disturbed`](hivtac_terms::status::Status::FRAME_DISTURBED).
+//!
+//! A force that is too small to be a contact looks like drift. What grows no faster than the rate
+//! is followed, and so missing in every force from then on: up to the total, and no more. What
+//! grows faster becomes a contact and stays whole, but for what was followed until then. In the
+//! simulated sensor at 320×240 a straight press moves each coordinate by 2.6 px for its first mN,
+//! and by 0.1 px for each mN more at 0.1 N (`hivtac-studies scene film`). So the usual rate of
+//! 0.005 px a second is 2 µN a second at rest, and the usual total of 0.1 px takes 0.04 mN of a
+//! force of some mN, and at most 1 mN of one of 0.1 N.
+
+use hivtac_force::features::Features;
+use hivtac_force::rest::Rest;
+use hivtac_terms::temporal::Rezero;
+use hivtac_terms::units::{MilliPx, Px};
+
+/// Frames are averaged for so long, µs.
+const MEAN_US: u64 = 1_000_000;
+/// Frames farther apart than this do not follow each other: nobody knows what touched meanwhile.
+const LONGEST_GAP_US: u64 = 100_000;
+/// Most frames of a mean: 65 s of frames of a millisecond. Sums are below 2⁴⁸.
+const MOST_FRAMES: u32 = 1 << 16;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rezeroing {
+    /// As it was taken.
+    taken: Option<Rest>,
+    /// How far it is from there: x and y of markers 0–3, 1/65,536 px.
+    moved: [i32; 8],
+    quiet: Option<Quiet>,
+}
+
+/// A time without a contact.
+#[derive(Clone, Copy, Debug)]
+struct Quiet {
+    since_us: u64,
+    newest_us: u64,
+    mean: Mean,
+}
+
+/// Frames that are averaged.
+#[derive(Clone, Copy, Debug)]
+struct Mean {
+    begun_us: u64,
+    frames: u32,
+    sums: [i64; 8],
+}
+
+impl Mean {
+    fn new(begun_us: u64) -> Mean {
+        Mean {
+            begun_us,
+            frames: 0,
+            sums: [0; 8],
+        }
+    }
+}
+
+impl Rezeroing {
+    /// No rest position was taken.
+    pub const NONE: Rezeroing = Rezeroing {
+        taken: None,
+        moved: [0; 8],
+        quiet: None,
+    };
+
+    /// A rest position was taken, or none holds.
+    pub fn set(&mut self, taken: Option<Rest>) {
+        *self = Rezeroing {
+            taken,
+            ..Rezeroing::NONE
+        };
+    }
+
+    /// Waits anew; what was followed stays.
+    pub fn begin_anew(&mut self) {
+        self.quiet = None;
+    }
+
+    /// The rest position as it was taken.
+    pub fn taken(&self) -> Option<&Rest> {
+        self.taken.as_ref()
+    }
+
+    /// How far the coordinate moved that moved farthest.
+    pub fn farthest(&self) -> Px {
+        Px(self
+            .moved
+            .iter()
+            .fold(0, |most, moved| most.max(moved.abs())))
+    }
+
+    /// Takes the features of a frame that nothing touched, or none of any other frame. Gives the
+    /// rest position when it moves.
+    pub fn follow(
+        &mut self,
+        limits: &Rezero,
+        time_us: u64,
+        untouched: Option<&Features>,
+    ) -> Option<Rest> {
+        let taken = self.taken?;
+        let Some(features) = untouched else {
+            self.quiet = None;
+            return None;
+        };
+        let since = |quiet: &Quiet| time_us.saturating_sub(quiet.newest_us);
+        let follows = |quiet: &Quiet| since(quiet) <= LONGEST_GAP_US;
+        let mut quiet = self.quiet.filter(follows).unwrap_or(Quiet {
+            since_us: time_us,
+            newest_us: time_us,
+            mean: Mean::new(time_us),
+        });
+        quiet.newest_us = time_us;
+        let quiet_us = time_us.saturating_sub(quiet.since_us);
+        if quiet_us < u64::from(limits.after.0) * 1_000 {
+            quiet.mean = Mean::new(time_us);
+            self.quiet = Some(quiet);
+            return None;
+        }
+        take(&mut quiet.mean, features);
+        let mean = quiet.mean;
+        let averaged_us = time_us.saturating_sub(mean.begun_us);
+        let is_due = averaged_us >= MEAN_US || mean.frames >= MOST_FRAMES;
+        if is_due {
+            quiet.mean = Mean::new(time_us);
+        }
+        self.quiet = Some(quiet);
+        is_due
+            .then(|| self.moved_towards(limits, &taken, &mean))
+            .flatten()
+    }
+
+    /// Of a second's mean; `None` when it stays.
+    fn moved_towards(&mut self, limits: &Rezero, taken: &Rest, mean: &Mean) -> Option<Rest> {
+        let (rate, total) = (steps(limits.rate), steps(limits.total));
+        let frames = i64::from(mean.frames);
+        let before = self.moved;
+        for ((moved, sum), rest) in self.moved.iter_mut().zip(mean.sums).zip(coordinates(taken)) {
+            let there = sum.checked_div(frames).unwrap_or(0) - i64::from(rest);
+            let farther = (there - i64::from(*moved)).clamp(-rate, rate);
+            // A total that was lowered is kept, too.
+            *moved = (i64::from(*moved) + farther).clamp(-total, total) as i32;
+        }
+        (self.moved != before).then(|| displaced(taken, &self.moved))
+    }
+}
+
+/// 1/65,536 px.
+fn steps(distance: MilliPx) -> i64 {
+    i64::from(distance.0) * i64::from(Px::ONE.0) / 1_000
+}
+
+fn take(mean: &mut Mean, features: &Features) {
+    mean.frames += 1;
+    let all = features.centroids.iter().flat_map(|(x, y)| [x.0, y.0]);
+    for (sum, coordinate) in mean.sums.iter_mut().zip(all) {
+        *sum += i64::from(coordinate);
+    }
+}
+
+fn coordinates(rest: &Rest) -> impl Iterator<Item = i32> {
+    let centroids = rest.features.centroids;
+    centroids.into_iter().flat_map(|(x, y)| [x.0, y.0])
+}
+
+/// A rest position whose markers lie so much farther, 1/65,536 px. The bounding rectangle of a mean
+/// is not the mean of rectangles: what it changes by is added.
+fn displaced(rest: &Rest, moved: &[i32; 8]) -> Rest {
+    let mut markers = rest.markers();
+    let before = Features::of_markers(&markers);
+    for (marker, by) in markers.iter_mut().zip(moved.chunks_exact(2)) {
+        marker.x.0 = marker.x.0.saturating_add(by[0]);
+        marker.y.0 = marker.y.0.saturating_add(by[1]);
+    }
+    let after = Features::of_markers(&markers);
+    let (center, area) = (rest.features.rect_center, rest.features.rect_area);
+    let shifted = |of: Px, from: Px, to: Px| Px(of.0.saturating_add(to.0.saturating_sub(from.0)));
+    Rest {
+        features: Features {
+            centroids: after.centroids,
+            rect_center: (
+                shifted(center.0, before.rect_center.0, after.rect_center.0),
+                shifted(center.1, before.rect_center.1, after.rect_center.1),
+            ),
+            rect_area: area.saturating_add(after.rect_area - before.rect_area),
+        },
+        areas: rest.areas,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_terms::marker::Marker;
+    use proptest::prelude::*;
+
+    const FRAME_US: u64 = 6_405;
+    const LIMITS: Rezero = Rezero {
+        after: hivtac_terms::units::Milliseconds(2_000),
+        rate: MilliPx(10),
+        total: MilliPx(100),
+    };
+
+    /// Markers that rest, all shifted to the right, 1/65,536 px.
+    fn shifted(right: i32) -> [Marker; 4] {
+        [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
+            x: Px((x << 16) + right),
+            y: Px(y << 16),
+            area: 130,
+        })
+    }
+
+    fn features(right: i32) -> Features {
+        Features::of_markers(&shifted(right))
+    }
+
+    /// A rest position that was taken, frame by frame.
+    struct Followed {
+        state: Rezeroing,
+        time_us: u64,
+        rest: Rest,
+    }
+
+    impl Followed {
+        fn new() -> Self {
+            let rest = Rest::of_markers(&shifted(0));
+            let mut state = Rezeroing::NONE;
+            state.set(Some(rest));
+            Self {
+                state,
+                time_us: 5_000_000,
+                rest,
+            }
+        }
+
+        /// For so many ms; of no features when something touches.
+        fn for_ms(&mut self, ms: u64, features: Option<&Features>) {
+            self.with(&LIMITS, ms, features);
+        }
+
+        fn with(&mut self, limits: &Rezero, ms: u64, features: Option<&Features>) {
+            for _ in 0..ms * 1_000 / FRAME_US {
+                self.time_us += FRAME_US;
+                if let Some(rest) = self.state.follow(limits, self.time_us, features) {
+                    self.rest = rest;
+                }
+            }
+        }
+
+        /// How far to the right it is, px.
+        fn right(&self) -> f64 {
+            (self.rest.features.centroids[0].0.0 - (100 << 16)) as f64 / 65_536.0
+        }
+    }
+
+    #[test]
+    fn it_waits_goes_by_its_rate_and_stops_at_its_total() {
+        let drifted = features(1 << 16);
+        let mut film = Followed::new();
+        film.for_ms(2_900, Some(&drifted));
+        assert!(
+            film.right() == 0.0 && film.state.farthest() == Px(0),
+            "it waits"
+        );
+        film.for_ms(5_000, Some(&drifted));
+        assert!((0.039..0.061).contains(&film.right()), "{}", film.right());
+        assert!((film.state.farthest().to_f64() - film.right()).abs() < 1e-9);
+        film.for_ms(20_000, Some(&drifted));
+        assert!((film.right() - 0.1).abs() < 1e-4, "{}", film.right());
+        assert_eq!(film.rest.areas, [130; 4]);
+        let moved = film.rest.features;
+        assert_eq!(moved, Features::of_markers(&film.rest.markers()));
+        film.state.set(Some(film.rest));
+        assert_eq!(film.state.farthest(), Px(0), "taken anew");
+    }
+
+    #[test]
+    fn what_drifts_back_is_followed_back() {
+        let mut film = Followed::new();
+        film.for_ms(20_000, Some(&features(3_000)));
+        assert!((film.right() - 3_000.0 / 65_536.0).abs() < 1e-4);
+        film.for_ms(20_000, Some(&features(0)));
+        assert_eq!(film.right(), 0.0);
+    }
+
+    #[test]
+    fn nothing_is_followed_while_something_touches_nor_soon_after() {
+        let drifted = features(1 << 16);
+        let mut film = Followed::new();
+        film.for_ms(10_000, None);
+        film.for_ms(1_900, Some(&drifted));
+        film.for_ms(10, None);
+        film.for_ms(2_900, Some(&drifted));
+        assert_eq!(film.right(), 0.0);
+        // A gap, of which nobody knows what happened in it.
+        film.time_us += LONGEST_GAP_US;
+        film.for_ms(2_900, Some(&drifted));
+        assert_eq!(film.right(), 0.0);
+    }
+
+    #[test]
+    fn without_a_rest_position_that_was_taken_nothing_moves() {
+        let mut film = Followed::new();
+        film.state.set(None);
+        film.for_ms(20_000, Some(&features(1 << 16)));
+        assert_eq!(film.right(), 0.0);
+    }
+
+    proptest! {
+        /// No force, however it grows, moves it faster than the rate or farther than the total.
+        #[test]
+        fn rate_and_total_hold(
+            shifts in proptest::collection::vec((-500_000i32..500_000, 0u64..4_000), 1..12),
+            rate in 1u16..=100,
+            total in 1u16..=250,
+        ) {
+            let limits = Rezero { rate: MilliPx(rate), total: MilliPx(total), ..LIMITS };
+            let mut film = Followed::new();
+            let mut before = film.right();
+            for (shift, ms) in shifts {
+                film.with(&limits, ms, Some(&features(shift)));
+                let fastest = f64::from(rate) * 1e-3 * (ms / 1_000 + 1) as f64;
+                prop_assert!((film.right() - before).abs() <= fastest + 1e-4);
+                prop_assert!(film.right().abs() <= f64::from(total) * 1e-3 + 1e-4);
+                before = film.right();
+            }
+        }
+    }
+}

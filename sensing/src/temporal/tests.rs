@@ -1,0 +1,155 @@
+//! Forces for the tests of this folder.
+
+use hivtac_force::force::{Force, Place, Polar};
+use hivtac_terms::units::{
+    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+};
+
+/// A force by its vector, µN.
+pub fn force_of(vector: [i32; 3]) -> Force {
+    let cartesian = vector.map(MicroNewtons);
+    let Polar {
+        alpha,
+        beta,
+        magnitude,
+    } = Polar::of_vector(cartesian);
+    Force {
+        alpha,
+        beta,
+        magnitude,
+        cartesian,
+        direction_sigma: UnsignedMilliDegrees(300),
+        magnitude_sigma: UnsignedMicroNewtons(100),
+        place: Some(Place {
+            x: SignedMicrometres(0),
+            y: SignedMicrometres(0),
+            sigma: Micrometres(5),
+        }),
+    }
+}
+
+/// A force straight into the film with its standard uncertainty, µN.
+pub fn pressed(magnitude: i32, sigma: u32) -> Force {
+    Force {
+        magnitude_sigma: UnsignedMicroNewtons(sigma),
+        ..force_of([0, 0, magnitude.saturating_neg()])
+    }
+}
+
+use super::{Moment, Temporal};
+use crate::pipeline::Measurement;
+use hivtac_force::features::Features;
+use hivtac_force::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Filter, Rezero, TemporalError, TemporalSettings};
+use hivtac_terms::units::{Milliseconds, Px};
+
+/// A frame with a force, of markers that stand so far to the right, 1/65,536 px.
+fn frame(force: Option<Force>, right: i32) -> Measurement {
+    let markers = rest(right).markers();
+    Measurement {
+        status: Status::NOT_CALIBRATED | Status::CONTACT,
+        markers: Some(markers),
+        features: Some(Features::of_markers(&markers)),
+        force,
+    }
+}
+
+fn rest(right: i32) -> Rest {
+    let markers = [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
+        x: Px((x << 16) + right),
+        y: Px(y << 16),
+        area: 130,
+    });
+    Rest::of_markers(&markers)
+}
+
+/// The moment of a frame at 156 frames a second.
+fn moment(frame: u32) -> Moment {
+    Moment {
+        frame,
+        time_us: u64::from(frame) * 6_405,
+    }
+}
+
+#[test]
+fn contact_and_slip_do_not_know_of_the_filter() {
+    let low_pass = TemporalSettings {
+        filter: Filter::LowPass {
+            time_constant: Milliseconds(500),
+        },
+        ..TemporalSettings::default()
+    };
+    let (mut unfiltered, mut filtered) = (Temporal::new(), Temporal::new());
+    filtered.set(low_pass).unwrap();
+    for number in 0..60 {
+        let moved = 30 * (number as i32 - 30).max(0);
+        let mut force = force_of([20_000, 0, -3_000 * number.min(30) as i32]);
+        force.place = force.place.map(|place| Place {
+            x: SignedMicrometres(moved),
+            ..place
+        });
+        let seen = frame(Some(force), 0);
+        let [a, b] = [&mut unfiltered, &mut filtered].map(|t| t.follow(moment(number), &seen));
+        assert_eq!(a.status, b.status);
+        assert_eq!(a.force, Some(force));
+        if number == 59 {
+            assert!(a.status.contains(Status::CONTACT | Status::SLIP));
+            assert_ne!(b.force, Some(force));
+        }
+    }
+}
+
+#[test]
+fn a_frame_without_a_force_has_neither_contact_nor_slip() {
+    let mut temporal = Temporal::new();
+    let pressed = frame(Some(pressed(50_000, 100)), 0);
+    let followed = temporal.follow(moment(1), &pressed);
+    assert!(followed.status.contains(Status::CONTACT));
+    let followed = temporal.follow(moment(2), &frame(None, 0));
+    assert_eq!(followed.status, Status::NOT_CALIBRATED);
+    assert_eq!(followed.force, None);
+}
+
+#[test]
+fn settings_that_are_none_change_nothing_and_others_begin_anew() {
+    let mut temporal = Temporal::new();
+    let between = frame(Some(pressed(1_500, 100)), 0);
+    temporal.follow(moment(1), &frame(Some(pressed(50_000, 100)), 0));
+    let mut bad = TemporalSettings::default();
+    bad.contact.ends.0 = 0;
+    assert_eq!(temporal.set(bad), Err(TemporalError::ContactEnds));
+    let followed = temporal.follow(moment(2), &between);
+    assert!(followed.status.contains(Status::CONTACT), "as before");
+    temporal.set(TemporalSettings::default()).unwrap();
+    let followed = temporal.follow(moment(3), &between);
+    assert!(!followed.status.contains(Status::CONTACT), "by its own |F|");
+}
+
+#[test]
+fn re_zeroing_is_off_at_first_and_told_when_it_moved() {
+    let at_rest = frame(Some(pressed(500, 100)), 3_000);
+    let rezeroing = TemporalSettings {
+        rezero: Some(Rezero {
+            after: Milliseconds(1_000),
+            ..Rezero::default()
+        }),
+        ..TemporalSettings::default()
+    };
+    for (settings, moves) in [(TemporalSettings::default(), false), (rezeroing, true)] {
+        let mut temporal = Temporal::new();
+        temporal.set(settings).unwrap();
+        temporal.set_tare(Some(rest(0)));
+        let followed: std::vec::Vec<_> = (0..700)
+            .map(|number| temporal.follow(moment(number), &at_rest))
+            .collect();
+        assert_eq!(followed.iter().any(|f| f.rest.is_some()), moves);
+        let last = followed.last().unwrap();
+        assert_eq!(last.status.contains(Status::REZEROED), moves);
+        assert_eq!(temporal.tare(), Some(&rest(0)), "as it was taken");
+        temporal.set_tare(Some(rest(0)));
+        let followed = temporal.follow(moment(700), &at_rest);
+        assert!(!followed.status.contains(Status::REZEROED));
+    }
+}

@@ -1,0 +1,226 @@
+//! Contact and slip on scenes with truth.
+
+mod course;
+mod friction;
+mod score;
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
+use hivtac_scene::{Load, Options, Shutter};
+use hivtac_sensing::model::Model;
+use hivtac_sensing::motion::Motion;
+use hivtac_sensing::temporal::{Moment, Temporal};
+use hivtac_terms::status::Status;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use crate::anywhere::WEIGHTS;
+use crate::page;
+use crate::press::{Tared, TestedUnit, seeded};
+use crate::units::own_weights;
+use course::{Course, Kind};
+use score::{Frame, Row, Score};
+
+/// Lines of an OV7725's frame, of which 240 are rows, and its frames a second.
+const LINES: u16 = 278;
+const RATE_HZ: f64 = 156.12;
+/// How long each row is exposed, s.
+const EXPOSURE_S: f64 = 0.004;
+/// Frames that a course is drawn anew for when they do not show the markers: one in so many, s.
+const LOOKED_AT_S: f64 = 0.02;
+/// Courses that are drawn before none is found.
+const DRAWS: u32 = 1000;
+/// How the units are made ready, in the order of the tables.
+const UNITS: [&str; 3] = ["nominal", "tare alone", "ten loads"];
+
+/// Press, drag, release, grasp and catch, and count what contact and slip miss, invent, and how
+/// late they come.
+#[derive(Args)]
+pub struct Slip {
+    /// A weights file of a network that tells places, with its film.
+    #[arg(long, default_value = WEIGHTS)]
+    weights: PathBuf,
+    /// Units drawn.
+    #[arg(long, default_value_t = 10)]
+    units: u64,
+    /// Courses of each kind on each of them.
+    #[arg(long, default_value_t = 2)]
+    courses: u64,
+    /// Print one JSON object and write no page.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Contacts and slips by how the unit was made ready and by what happened.
+type Scores = BTreeMap<(usize, Kind), [Score; 2]>;
+
+impl Slip {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// When a file cannot be read or written, or no course can be shown.
+    pub fn run(&self) -> Result<()> {
+        let weights = Weights::load(&self.weights)?;
+        let bytes = export(&weights)?;
+        let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+        let units = (0..self.units).into_par_iter();
+        let scores = units.map(|number| self.test(&weights, &model, number));
+        let mut all = Scores::new();
+        for scores in scores.collect::<Result<Vec<Scores>>>()? {
+            merge(&mut all, &scores);
+        }
+        let [contacts, slips] = [0, 1].map(|which| rows(&all, which));
+        if self.json {
+            let report = BTreeMap::from([("contacts", contacts), ("slips", slips)]);
+            println!("{}", serde_json::to_string(&report)?);
+            return Ok(());
+        }
+        let text = table("Contacts", &contacts)? + &table("Slips", &slips)?;
+        print!("{text}");
+        page::write("slip.md", include_str!("page.md"), &text)
+    }
+
+    /// One unit, made ready in each way.
+    fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Scores> {
+        let conditions = &model.conditions;
+        let nominal = TestedUnit::new(conditions, Options::default(), 0.5, number)?;
+        let drawn = TestedUnit::drawn(conditions, number)?;
+        let own = own_weights(weights, &drawn, &mut drawn.tare(model)?, number)
+            .and_then(|own| export(&own))
+            .with_context(|| format!("unit {number}"))?;
+        let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
+        let ready = [(&nominal, model), (&drawn, model), (&drawn, &own)];
+        let mut scores = Scores::new();
+        for (nth, (unit, model)) in ready.into_iter().enumerate() {
+            let mut tared = unit.tare(model)?;
+            tared.set_motion(Motion::rolling(LINES));
+            // The same courses before and after the loads.
+            let mut random = seeded(80_000 + 2 * number + u64::from(nth > 0));
+            for kind in Kind::ALL
+                .into_iter()
+                .cycle()
+                .take(self.courses as usize * 5)
+            {
+                let course = shown(unit, kind, &mut random)?;
+                let frames = follow(unit, &mut tared, &course)?;
+                let [contacts, slips] = scores.entry((nth, kind)).or_default();
+                contacts.merge(&Score::of_contacts(&frames));
+                slips.merge(&Score::of_slips(&frames));
+            }
+        }
+        Ok(scores)
+    }
+}
+
+/// A course of a kind that the simulated film can hold and whose markers stay in the picture.
+fn shown(unit: &TestedUnit, kind: Kind, random: &mut ChaCha8Rng) -> Result<Course> {
+    for _ in 0..DRAWS {
+        let course = Course::drawn(kind, unit.tip_radius_mm(), random);
+        let steps = (course.duration_s() / LOOKED_AT_S) as u32;
+        let is_shown = |step: u32| {
+            let load = course.load(f64::from(step) * LOOKED_AT_S);
+            load.is_ok_and(|load| unit.shows_all(&load).unwrap_or(false))
+        };
+        if (0..=steps).all(is_shown) {
+            return Ok(course);
+        }
+    }
+    Err(anyhow!("no {} of {DRAWS} can be shown", kind.name()))
+}
+
+/// What a sensor says of a course, frame by frame.
+fn follow(unit: &TestedUnit, tared: &mut Tared<'_>, course: &Course) -> Result<Vec<Frame>> {
+    let shutter = Shutter {
+        exposure_s: EXPOSURE_S,
+        readout_s: 240.0 / f64::from(LINES) / RATE_HZ,
+    };
+    let mut temporal = Temporal::new();
+    let mut frames = Vec::new();
+    for number in 0.. {
+        let time_s = (f64::from(number) + 0.5) / RATE_HZ;
+        if time_s > course.duration_s() {
+            break;
+        }
+        // Between the times that were looked at a load may be one that the film does not hold.
+        let load = |after_s| course.load(time_s + after_s).unwrap_or(Load::REST);
+        let noise = u64::from(number);
+        let picture = unit.scene().frame_under(&shutter, noise, load)?;
+        let seen = tared.measure(&picture);
+        let at = Moment {
+            frame: number,
+            time_us: (time_s * 1e6) as u64,
+        };
+        let followed = temporal.follow(at, &seen);
+        let truth = course.meeting(time_s);
+        frames.push(Frame {
+            time_s,
+            touches: truth.normal_n > 0.0,
+            slips: truth.slips && truth.normal_n > 0.0,
+            slipped_mm: truth.slipped_mm,
+            has_force: followed.force.is_some(),
+            told_touch: followed.status.contains(Status::CONTACT),
+            told_slip: followed.status.contains(Status::SLIP),
+        });
+    }
+    Ok(frames)
+}
+
+fn merge(all: &mut Scores, scores: &Scores) {
+    for (key, [contacts, slips]) in scores {
+        let [all_contacts, all_slips] = all.entry(*key).or_default();
+        all_contacts.merge(contacts);
+        all_slips.merge(slips);
+    }
+}
+
+/// The rows of contacts (0) or slips (1): each kind, and all together.
+fn rows(all: &Scores, which: usize) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (nth, unit) in UNITS.into_iter().enumerate() {
+        let mut together = Score::default();
+        for kind in Kind::ALL {
+            if let Some(scores) = all.get(&(nth, kind)) {
+                rows.push(scores[which].row(unit, Some(kind)));
+                together.merge(&scores[which]);
+            }
+        }
+        rows.push(together.row(unit, None));
+    }
+    rows
+}
+
+fn table(name: &str, rows: &[Row]) -> Result<String> {
+    let mut text = format!(
+        "\n## {name}\n\n| unit | what happens | true | told | precision | recall | missed, of them \
+         where frames had no force | delay: median, 95 % |\n|---|---|--:|--:|--:|--:|---|---|\n"
+    );
+    let percent = |part: Option<f64>| match part {
+        Some(part) => format!("{:.0} %", 100.0 * part),
+        None => "–".to_owned(),
+    };
+    for row in rows {
+        let delay = match (row.delay_ms, row.delay_95_ms) {
+            (Some(median), Some(most)) => format!("{median:.0}, {most:.0} ms"),
+            _ => "–".to_owned(),
+        };
+        writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} | {}, {} | {delay} |",
+            row.unit,
+            row.kind.map_or("all", Kind::name),
+            row.events,
+            row.told,
+            percent(row.precision),
+            percent(row.recall),
+            row.missed,
+            row.missed_without_force,
+        )?;
+    }
+    Ok(text)
+}

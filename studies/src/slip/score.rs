@@ -1,0 +1,248 @@
+//! What contact and slip of a course miss, invent, and how late they come.
+
+use std::ops::RangeInclusive;
+
+use serde::Serialize;
+
+use super::course::Kind;
+
+/// A contact or a slip goes on across gaps of at most so many frames.
+const GAP: usize = 2;
+/// What is told up to so long after an event belongs to it, s: the limits' time.
+const LATE_S: f64 = 0.05;
+/// A slip of less than this is none to find, nor one to invent, mm.
+const LEAST_SLIP_MM: f64 = 0.1;
+
+/// A frame: what is true in the middle of its exposure, and what was told.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Frame {
+    /// s.
+    pub time_s: f64,
+    /// True contact, and true slip.
+    pub touches: bool,
+    /// See above.
+    pub slips: bool,
+    /// How far the contact has slipped, mm.
+    pub slipped_mm: f64,
+    /// Whether the sensor had a force.
+    pub has_force: bool,
+    /// Contact and slip as they were told.
+    pub told_touch: bool,
+    /// See above.
+    pub told_slip: bool,
+}
+
+/// Counts of events, and their delays.
+#[derive(Clone, Debug, Default)]
+pub struct Score {
+    /// True ones, and those of them that were told.
+    pub true_events: u32,
+    /// See above.
+    pub found: u32,
+    /// Told ones, and those of them that are none.
+    pub told: u32,
+    /// See above.
+    pub invented: u32,
+    /// Those that were not told, of which frames had no force.
+    pub missed_without_force: u32,
+    /// From the first frame in which each found one is true until it is told, s.
+    pub delays_s: Vec<f64>,
+}
+
+impl Score {
+    /// Takes another score's events.
+    pub fn merge(&mut self, other: &Score) {
+        self.true_events += other.true_events;
+        self.found += other.found;
+        self.told += other.told;
+        self.invented += other.invented;
+        self.missed_without_force += other.missed_without_force;
+        self.delays_s.extend(&other.delays_s);
+    }
+
+    /// Of the contacts of a course.
+    pub fn of_contacts(frames: &[Frame]) -> Score {
+        let truth = events(frames, |frame| frame.touches);
+        Score::of(frames, &truth, &truth, |frame| frame.told_touch)
+    }
+
+    /// Of its slips.
+    pub fn of_slips(frames: &[Frame]) -> Score {
+        let all = events(frames, |frame| frame.slips);
+        let far = |event: &&Event| {
+            let [before, after] = [event.start().saturating_sub(1), event.end() + 1];
+            let after = after.min(frames.len() - 1);
+            (frames[after].slipped_mm - frames[before].slipped_mm).abs() >= LEAST_SLIP_MM
+        };
+        let wanted: Vec<Event> = all.iter().filter(far).cloned().collect();
+        Score::of(frames, &wanted, &all, |frame| frame.told_slip)
+    }
+
+    /// Of events that shall be told; of others none is invented by what is told of it.
+    fn of(
+        frames: &[Frame],
+        wanted: &[Event],
+        others: &[Event],
+        is_told: impl Fn(&Frame) -> bool,
+    ) -> Score {
+        let mut score = Score::default();
+        for event in wanted {
+            score.true_events += 1;
+            let first_s = frames[*event.start()].time_s;
+            let first_told = belonging(frames, event).find(|frame| is_told(frame));
+            match first_told {
+                Some(frame) => {
+                    score.found += 1;
+                    score.delays_s.push(frame.time_s - first_s);
+                }
+                None => {
+                    let blind = frames[event.clone()].iter().any(|frame| !frame.has_force);
+                    score.missed_without_force += u32::from(blind);
+                }
+            }
+        }
+        for told in events(frames, &is_told) {
+            score.told += 1;
+            let first_s = frames[*told.start()].time_s;
+            let is_of = |event: &Event| {
+                let last_s = frames[*event.end()].time_s + LATE_S;
+                event.start() <= told.end() && first_s <= last_s
+            };
+            score.invented += u32::from(!others.iter().any(is_of));
+        }
+        score
+    }
+
+    /// The delay that so many of a hundred found ones stay within, ms; `None` when there are none.
+    pub fn delay_ms(&self, percent: usize) -> Option<f64> {
+        let mut sorted = self.delays_s.clone();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        Some(1e3 * sorted[(sorted.len() * percent / 100).min(last)])
+    }
+
+    /// As it is printed.
+    pub fn row(&self, unit: &'static str, kind: Option<Kind>) -> Row {
+        let part = |of: u32, all: u32| (all > 0).then(|| f64::from(of) / f64::from(all));
+        Row {
+            unit,
+            kind,
+            events: self.true_events,
+            told: self.told,
+            precision: part(self.told - self.invented, self.told),
+            recall: part(self.found, self.true_events),
+            missed: self.true_events - self.found,
+            missed_without_force: self.missed_without_force,
+            delay_ms: self.delay_ms(50),
+            delay_95_ms: self.delay_ms(95),
+        }
+    }
+}
+
+/// A row of the table.
+#[derive(Debug, Serialize)]
+pub struct Row {
+    /// How the unit was made ready.
+    pub unit: &'static str,
+    /// What happened; all of it when none.
+    pub kind: Option<Kind>,
+    /// True events.
+    pub events: u32,
+    /// Told ones.
+    pub told: u32,
+    /// Part of the told ones that are true, and of the true ones that are told.
+    pub precision: Option<f64>,
+    /// See above.
+    pub recall: Option<f64>,
+    /// True ones that were not told, and those of them with frames without a force.
+    pub missed: u32,
+    /// See above.
+    pub missed_without_force: u32,
+    /// Median, and what 95 of 100 are within, ms.
+    pub delay_ms: Option<f64>,
+    /// See above.
+    pub delay_95_ms: Option<f64>,
+}
+
+/// Frames from the first to the last in which something is.
+type Event = RangeInclusive<usize>;
+
+fn events(frames: &[Frame], is: impl Fn(&Frame) -> bool) -> Vec<Event> {
+    let mut events: Vec<Event> = Vec::new();
+    for (at, _) in frames.iter().enumerate().filter(|(_, frame)| is(frame)) {
+        match events.last_mut() {
+            Some(event) if at - event.end() <= GAP + 1 => *event = *event.start()..=at,
+            _ => events.push(at..=at),
+        }
+    }
+    events
+}
+
+/// The frames of an event and those in which it can be told yet.
+fn belonging<'f>(frames: &'f [Frame], event: &Event) -> impl Iterator<Item = &'f Frame> {
+    let last_s = frames[*event.end()].time_s + LATE_S;
+    let after = frames[*event.start()..].iter();
+    after.take_while(move |frame| frame.time_s <= last_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames of 10 ms: `t` is true, `x` told, `b` both, `n` true without a force.
+    fn frames(text: &str) -> Vec<Frame> {
+        let mut slipped_mm = 0.0;
+        let frames = text.chars().enumerate().map(|(at, what)| {
+            slipped_mm += if "tbn".contains(what) { 0.06 } else { 0.0 };
+            Frame {
+                time_s: at as f64 * 0.01,
+                slips: "tbn".contains(what),
+                told_slip: "xb".contains(what),
+                has_force: what != 'n',
+                slipped_mm,
+                ..Frame::default()
+            }
+        });
+        frames.collect()
+    }
+
+    fn counts(text: &str) -> [u32; 5] {
+        let score = Score::of_slips(&frames(text));
+        [
+            score.true_events,
+            score.found,
+            score.told,
+            score.invented,
+            score.missed_without_force,
+        ]
+    }
+
+    #[test]
+    fn events_are_found_missed_and_invented() {
+        assert_eq!(counts("...tttbbb....."), [1, 1, 1, 0, 0]);
+        assert_eq!(counts("...tttttt....."), [1, 0, 0, 0, 0]);
+        assert_eq!(counts("...tttnnn....."), [1, 0, 0, 0, 1]);
+        assert_eq!(counts("......xx......"), [0, 0, 1, 1, 0]);
+        assert_eq!(
+            counts("...tttttt...xx"),
+            [1, 1, 1, 0, 0],
+            "late, and its own"
+        );
+        assert_eq!(counts("ttt........xxx"), [1, 0, 1, 1, 0], "too late");
+        assert_eq!(counts("..bb.bb...bb.."), [2, 2, 2, 0, 0], "a short gap");
+        assert_eq!(
+            counts("......b......."),
+            [0, 0, 1, 0, 0],
+            "too short to count"
+        );
+    }
+
+    #[test]
+    fn delays_are_counted_from_the_first_frame() {
+        let mut score = Score::of_slips(&frames("...tttbbb......"));
+        score.merge(&Score::of_slips(&frames("...bbbbb.......")));
+        assert!((score.delay_ms(95).unwrap() - 30.0).abs() < 1e-9);
+        assert_eq!(score.delay_ms(0), Some(0.0));
+        assert_eq!(Score::default().delay_ms(50), None);
+    }
+}

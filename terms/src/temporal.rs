@@ -1,0 +1,284 @@
+//! What is made of one force after another: contact, slip, a filter, and re-zeroing. Their limits
+//! are settings that a device keeps.
+
+use crate::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
+use core::fmt;
+
+/// How forces are followed from frame to frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct TemporalSettings {
+    /// When something touches the film.
+    pub contact: ContactLimits,
+    /// When what touches it slips.
+    pub slip: SlipLimits,
+    /// What is sent in place of each frame's own force.
+    pub filter: Filter,
+    /// Whether the rest position follows what drifts; `None` for never.
+    pub rezero: Option<Rezero>,
+}
+
+/// When something touches the film: from `begins` on, until |F| is below `ends`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct ContactLimits {
+    /// |F| with which a contact begins, 1 µN to 1 N.
+    pub begins: UnsignedMicroNewtons,
+    /// |F| below which it ends, 1 µN to `begins`.
+    pub ends: UnsignedMicroNewtons,
+}
+
+/// When a contact slips: its place moves by `distance` within a time `within`, while the
+/// tangential force is at least `ratio` of the normal one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct SlipLimits {
+    /// How far the place moves, 1 µm to 5 mm.
+    pub distance: Micrometres,
+    /// In what time at most, 10 to 100 ms.
+    pub within: Milliseconds,
+    /// Least tangential over normal force, 0 to 2.
+    pub ratio: Permille,
+}
+
+/// What is sent in place of each frame's own force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub enum Filter {
+    /// Nothing: each frame's own force.
+    #[default]
+    None,
+    /// A first-order low-pass of each component.
+    LowPass {
+        /// Its time constant, 1 to 10,000 ms, and by as much a steady change comes later.
+        time_constant: Milliseconds,
+    },
+    /// The median of each component in three frames: a steady change comes one frame later.
+    MedianOfThree,
+}
+
+/// How the rest position follows what drifts while nothing touches the film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Rezero {
+    /// How long nothing touched the film before it begins, 1 to 3600 s.
+    pub after: Milliseconds,
+    /// Farthest that a coordinate of a marker's rest position moves in a second, 1 to 100.
+    pub rate: MilliPx,
+    /// Farthest that it moves in all from where it was tared, 1 to 250.
+    pub total: MilliPx,
+}
+
+impl TemporalSettings {
+    /// A contact from 2 mN on until 1 mN; a slip of 60 µm within 50 ms, from a tenth of the normal
+    /// force on; no filter, no re-zeroing.
+    pub const USUAL: TemporalSettings = TemporalSettings {
+        contact: ContactLimits {
+            begins: UnsignedMicroNewtons(2_000),
+            ends: UnsignedMicroNewtons(1_000),
+        },
+        slip: SlipLimits {
+            distance: Micrometres(60),
+            within: Milliseconds(50),
+            ratio: Permille(100),
+        },
+        filter: Filter::None,
+        rezero: None,
+    };
+}
+
+impl Default for TemporalSettings {
+    /// [`TemporalSettings::USUAL`].
+    fn default() -> Self {
+        TemporalSettings::USUAL
+    }
+}
+
+impl Default for ContactLimits {
+    /// Those of [`TemporalSettings::USUAL`].
+    fn default() -> Self {
+        TemporalSettings::USUAL.contact
+    }
+}
+
+impl Default for SlipLimits {
+    /// Those of [`TemporalSettings::USUAL`].
+    fn default() -> Self {
+        TemporalSettings::USUAL.slip
+    }
+}
+
+impl Default for Rezero {
+    /// After 10 s, by 5 thousandths of a pixel a second, 100 in all.
+    fn default() -> Self {
+        Rezero {
+            after: Milliseconds(10_000),
+            rate: MilliPx(5),
+            total: MilliPx(100),
+        }
+    }
+}
+
+/// A setting that is outside its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TemporalError {
+    /// [`ContactLimits::begins`].
+    ContactBegins,
+    /// [`ContactLimits::ends`].
+    ContactEnds,
+    /// [`SlipLimits::distance`].
+    SlipDistance,
+    /// [`SlipLimits::within`].
+    SlipWithin,
+    /// [`SlipLimits::ratio`].
+    SlipRatio,
+    /// The time constant of [`Filter::LowPass`].
+    TimeConstant,
+    /// [`Rezero::after`].
+    RezeroAfter,
+    /// [`Rezero::rate`].
+    RezeroRate,
+    /// [`Rezero::total`].
+    RezeroTotal,
+}
+
+impl fmt::Display for TemporalError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            TemporalError::ContactBegins => "a contact begins at 0.001 to 1000 mN",
+            TemporalError::ContactEnds => "a contact ends at 0.001 mN to where it begins",
+            TemporalError::SlipDistance => "a slip's distance is 1 to 5000 µm",
+            TemporalError::SlipWithin => "a slip's time is 10 to 100 ms",
+            TemporalError::SlipRatio => "a slip's ratio is 0 to 2",
+            TemporalError::TimeConstant => "the filter's time constant is 1 to 10000 ms",
+            TemporalError::RezeroAfter => "re-zeroing begins after 1 to 3600 s",
+            TemporalError::RezeroRate => "the rate of re-zeroing is 0.001 to 0.1 px a second",
+            TemporalError::RezeroTotal => "re-zeroing moves by 0.001 to 0.25 px in all",
+        })
+    }
+}
+
+impl TemporalSettings {
+    /// Whether each is within its range.
+    ///
+    /// # Errors
+    /// The first that is not.
+    pub fn check(&self) -> Result<(), TemporalError> {
+        let TemporalSettings {
+            contact: ContactLimits { begins, ends },
+            slip,
+            filter,
+            rezero,
+        } = self;
+        let within = |is_within: bool, error| is_within.then_some(()).ok_or(error);
+        let begins_within = (1..=1_000_000).contains(&begins.0);
+        within(begins_within, TemporalError::ContactBegins)?;
+        let ends_within = (1..=begins.0).contains(&ends.0);
+        within(ends_within, TemporalError::ContactEnds)?;
+        let distance_within = (1..=5_000).contains(&slip.distance.0);
+        within(distance_within, TemporalError::SlipDistance)?;
+        let time_within = (10..=100).contains(&slip.within.0);
+        within(time_within, TemporalError::SlipWithin)?;
+        within(slip.ratio.0 <= 2_000, TemporalError::SlipRatio)?;
+        if let Filter::LowPass { time_constant } = filter {
+            let constant_within = (1..=10_000).contains(&time_constant.0);
+            within(constant_within, TemporalError::TimeConstant)?;
+        }
+        let Some(Rezero { after, rate, total }) = rezero else {
+            return Ok(());
+        };
+        let after_within = (1_000..=3_600_000).contains(&after.0);
+        within(after_within, TemporalError::RezeroAfter)?;
+        within((1..=100).contains(&rate.0), TemporalError::RezeroRate)?;
+        within((1..=250).contains(&total.0), TemporalError::RezeroTotal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_within_their_ranges() {
+        let settings = TemporalSettings {
+            rezero: Some(Rezero::default()),
+            ..TemporalSettings::default()
+        };
+        assert_eq!(settings.check(), Ok(()));
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named() {
+        type Edit = fn(&mut TemporalSettings);
+        let low_pass = |ms| Filter::LowPass {
+            time_constant: Milliseconds(ms),
+        };
+        let good: [Edit; 4] = [
+            |s| s.contact.ends = s.contact.begins,
+            |s| s.slip.ratio = Permille(2_000),
+            |s| s.filter = Filter::MedianOfThree,
+            |s| s.rezero = Some(Rezero::default()),
+        ];
+        for edit in good {
+            let mut settings = TemporalSettings::default();
+            edit(&mut settings);
+            assert_eq!(settings.check(), Ok(()));
+        }
+        for (constant, is_good) in [(0, false), (1, true), (10_000, true), (10_001, false)] {
+            let settings = TemporalSettings {
+                filter: low_pass(constant),
+                ..TemporalSettings::default()
+            };
+            assert_eq!(settings.check().is_ok(), is_good, "{constant}");
+        }
+        let bad: [(Edit, TemporalError); 8] = [
+            (
+                |s| s.contact.begins.0 = 1_000_001,
+                TemporalError::ContactBegins,
+            ),
+            (|s| s.contact.ends.0 = 2_001, TemporalError::ContactEnds),
+            (|s| s.contact.ends.0 = 0, TemporalError::ContactEnds),
+            (|s| s.slip.distance.0 = 0, TemporalError::SlipDistance),
+            (|s| s.slip.within.0 = 101, TemporalError::SlipWithin),
+            (|s| s.slip.ratio.0 = 2_001, TemporalError::SlipRatio),
+            (
+                |s| {
+                    s.rezero = Some(Rezero {
+                        after: Milliseconds(999),
+                        ..Rezero::default()
+                    });
+                },
+                TemporalError::RezeroAfter,
+            ),
+            (
+                |s| {
+                    s.rezero = Some(Rezero {
+                        total: MilliPx(251),
+                        ..Rezero::default()
+                    });
+                },
+                TemporalError::RezeroTotal,
+            ),
+        ];
+        for (edit, error) in bad {
+            let mut settings = TemporalSettings::default();
+            edit(&mut settings);
+            assert_eq!(settings.check(), Err(error));
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Tests that cross rooms. One program, so that its tests run side by side whatever they are about,
+//! and are linked once; `cargo test -p hivtac-tests hard_cases::` runs one file's.
+
+mod bring_up;
+mod calibration;
+mod cortex_m7;
+mod documents;
+mod faults;
+mod forces;
+mod formats;
+mod hard_cases;
+mod hard_cases_anywhere;
+mod markers;
+mod moving;
+mod panics;
+mod placement;
+mod places;
+mod recordings;
+mod rooms;
+mod snapshots;
+mod status_bits;
+mod steps;
+mod tares;
+mod view;
+mod wire_vectors;
