@@ -81,11 +81,12 @@ impl Dilation {
         let (mut occupied, mut set_rows) = (0, 0);
         for (y, row) in self.incoming(rows).chunks_exact(row_words).enumerate() {
             // Leading zeros are 32 of an empty word only: there is no branch in this loop.
-            let words = row.iter().rev();
-            let empty = words.fold(u32::MAX, |empty, word| {
-                empty << 1 | word.leading_zeros() >> 5
+            let shift_in = |empty, word: &u32| empty << 1 | word.leading_zeros() >> 5;
+            let (first, pairs) = row.as_rchunks::<2>();
+            let empty = pairs.iter().rev().fold(u32::MAX, |empty, [left, right]| {
+                shift_in(shift_in(empty, right), left)
             });
-            let in_row = !empty;
+            let in_row = !first.iter().fold(empty, shift_in);
             occupied |= in_row;
             set_rows |= u32::from(in_row != 0) << y;
         }
@@ -152,7 +153,8 @@ impl Dilation {
     #[inline(always)]
     pub fn passed(&self, i: usize, [x0, end]: [u16; 2]) -> u32 {
         let first = (i + usize::from(self.radius)) * self.words + usize::from(x0 / 32);
-        let (start, columns) = (u32::from(x0 % 32), u32::from(end - x0));
+        let columns = u32::from(end).wrapping_sub(u32::from(x0));
+        let start = u32::from(x0 % 32);
         match self.mask.get(first..first + 2) {
             // Most runs of a marker.
             Some([word, next]) if (1..=32).contains(&columns) => {

@@ -103,7 +103,6 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         let (left, exhausted) = self.runs_left.overflowing_sub(count);
         self.runs_left = left;
         self.exhausted |= exhausted;
-        self.overflowed |= exhausted;
         self.idle = count == 0;
         let mut all = 0;
         let mut passed = |run: [u16; 2]| {
@@ -154,7 +153,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
 
     /// Whether the storage was too small: blobs are then missing or cut.
     pub fn overflowed(&self) -> bool {
-        self.overflowed
+        self.overflowed || self.exhausted
     }
 
     /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.

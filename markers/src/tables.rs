@@ -20,14 +20,21 @@ pub trait Pixels {
 
     /// Thresholds several rows of `width` pixels, which lie one after the other. `mask` has
     /// ⌈width / 32⌉ words for each. Says whether any bit is set.
+    #[inline(always)]
     fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         if width.is_multiple_of(32) {
             // One long row.
             return self.mask_row(rows, mask);
         }
+        self.mask_each_row(rows, width, mask)
+    }
+
+    /// [`mask_rows`](Self::mask_rows) one row after the other, of any width.
+    #[inline(never)]
+    fn mask_each_row(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         let rows = rows.chunks(self.row_length(width).max(1));
         let mut any = false;
-        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width))) {
+        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width).max(1))) {
             any |= self.mask_row(row, mask);
         }
         any

@@ -84,7 +84,7 @@ pub struct Reciprocal {
 
 impl Reciprocal {
     /// Of a number that is at least 1; 0 divides as 1 does.
-    #[inline(never)]
+    #[inline(always)]
     pub fn of(divisor: u32) -> Reciprocal {
         let divisor = divisor.max(1);
         let zeros = divisor.leading_zeros();
@@ -116,18 +116,27 @@ impl Reciprocal {
 
     /// `part` / divisor, of 65,536, limited to 32 bits.
     pub fn part(&self, part: i32) -> i32 {
-        limited(self.times(i64::from(part) << 16))
+        let product = i64::from(part) * i64::from(self.mantissa as i32);
+        limited((product >> 14) >> self.shift)
     }
 }
 
 /// `value`·`factor` / 2^`bits`, limited to 32 bits.
+#[inline(always)]
 pub fn scaled(value: i32, factor: i32, bits: u32) -> i32 {
     limited((i64::from(value) * i64::from(factor)) >> bits)
 }
 
 /// The nearest number of 32 bits.
+#[inline(always)]
 pub fn limited(value: i64) -> i32 {
-    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+    let (high, low) = ((value >> 32) as i32, value as i32);
+    // The upper word of what fits is the sign of the lower one.
+    if high == low >> 31 {
+        low
+    } else {
+        i32::MAX ^ (high >> 31)
+    }
 }
 
 /// ⌊(B² − 1)/d⌋ − B = ⌊((B − 1 − d)·B + B − 1) / d⌋ for d of B/2 or more, a half word at a time.

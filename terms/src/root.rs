@@ -41,7 +41,7 @@ pub fn root(square: u64) -> u32 {
 
 /// √`square` from 16 bits: off by at most 2⁻¹⁵ of it, and rounded down to a whole number. A third
 /// of what [`root`] takes.
-#[inline(never)]
+#[inline(always)]
 pub fn rough_root(square: u64) -> u32 {
     if square == 0 {
         return 0;
@@ -55,8 +55,8 @@ pub fn rough_root(square: u64) -> u32 {
 #[inline(always)]
 fn sixteen_bits(high: u32) -> u32 {
     // The index is 0 to 191; every root has its highest bit set, and so is not 0.
-    let index = ((high >> 24) as usize).wrapping_sub(64) % 192;
-    let eight = u32::from(EIGHT_BITS[index]) | 0x80;
+    let index = ((high >> 24) as usize).wrapping_sub(64);
+    let eight = u32::from(EIGHT_BITS.get(index).copied().unwrap_or_default()) | 0x80;
     (eight << 7) + (high >> 9) / eight
 }
 

@@ -128,38 +128,53 @@ unsafe extern "C" {
     fn hivtac_weigh_luma(end: *const u8, table: *const u8, count: usize) -> u64;
 }
 
-/// As [`portable::threshold_bytes`](super::portable::threshold_bytes) for the first words of the
-/// mask: for how many, all pairs of whole ones, and what they are, or-ed.
-pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> (usize, u32) {
-    let pairs = pairs_of_words(row, mask);
-    let (row, table, words) = (row.as_ptr(), table.as_ptr(), pairs.len());
-    if words == 0 {
-        return (0, 0);
+/// As [`portable::threshold_bytes`](super::portable::threshold_bytes) and whether any bit is set,
+/// for rows of 32 pixels for each word of a mask of pairs of words; `None` of others.
+#[inline(always)]
+pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> Option<bool> {
+    let words = mask.len();
+    if !is_of_pairs(row, words) {
+        return None;
     }
     // SAFETY: the row has 32 pixels for each of the words, of which there are two at least.
-    let all = unsafe { hivtac_threshold_bytes(row, table, pairs.as_mut_ptr(), words) };
-    (words, all)
+    let all =
+        unsafe { hivtac_threshold_bytes(row.as_ptr(), table.as_ptr(), mask.as_mut_ptr(), words) };
+    Some(all != 0)
 }
 
-/// As [`portable::threshold_cr`](super::portable::threshold_cr) for the first words of the mask:
-/// for how many, all pairs of whole ones, and what they are, or-ed.
-pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> (usize, u32) {
-    let pairs = pairs_of_words(row, mask);
-    let (range, words) = (pairs.as_mut_ptr_range(), pairs.len());
-    if words == 0 {
-        return (0, 0);
+/// As [`portable::threshold_cr`](super::portable::threshold_cr) and whether any bit is set, for rows
+/// of 32 pixels for each word of a mask of pairs of words; `None` of others.
+#[inline(always)]
+pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> Option<bool> {
+    if !is_of_pairs(row, mask.len()) {
+        return None;
     }
-    let (row, low) = (row.as_ptr(), in_all_bytes(low));
+    let range = mask.as_mut_ptr_range();
     // SAFETY: the row has 32 pixels for each of the words, of which there are two at least.
-    let all = unsafe { hivtac_threshold_cr(row, low, range.start, range.end) };
-    (words, all)
+    let all =
+        unsafe { hivtac_threshold_cr(row.as_ptr(), in_all_bytes(low), range.start, range.end) };
+    Some(all != 0)
 }
 
-/// The words of the mask for which a row has 32 pixels each, but for one left over.
-fn pairs_of_words<'m>(row: &[u16], mask: &'m mut [u32]) -> &'m mut [u32] {
-    let whole = whole_words(row, mask, 32);
-    let pairs = whole.len() & !1;
-    whole.split_at_mut(pairs).0
+/// Whether a row has 32 pixels for each of so many words, which are pairs.
+#[inline(always)]
+fn is_of_pairs(row: &[u16], words: usize) -> bool {
+    words > 0 && words.is_multiple_of(2) && row.len() == 32 * words
+}
+
+/// Does the first words of a mask by a kernel of rows of pairs of words, and says for how many: all
+/// pairs for which the row has 32 pixels each.
+pub fn first_pairs(
+    row: &[u16],
+    mask: &mut [u32],
+    kernel: impl FnOnce(&[u16], &mut [u32]) -> Option<bool>,
+) -> usize {
+    let words = whole_words(row, mask, 32).len() & !1;
+    let part = row.get(..32 * words).zip(mask.get_mut(..words));
+    match part.and_then(|(row, mask)| kernel(row, mask)) {
+        Some(_) => words,
+        None => 0,
+    }
 }
 
 /// As [`portable::threshold_luma`](super::portable::threshold_luma) for the first words of the
@@ -234,6 +249,7 @@ fn whole_words<'m>(row: &[u16], mask: &'m mut [u32], each: usize) -> &'m mut [u3
 /// The edges of a row of the mask, of `near` words of which `rows` begins with those of three rows
 /// that lie `row_words` apart; their number. Zero when `rows` is too short for that, or there is no
 /// room.
+#[inline(always)]
 pub fn dilate_edges(
     rows: &[u32],
     row_words: usize,

@@ -18,30 +18,48 @@ pub use {
 
 /// The mask of a row of pixels through a table of bytes, and whether anything is set: see
 /// `portable::threshold_bytes`.
+#[inline]
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
-    let (done, all) = cortex_m7::threshold_bytes(table, row, mask);
-    #[cfg(not(armv7em))]
-    let (done, all) = (0, 0);
-    if done == mask.len() {
-        return all != 0;
+    if let Some(any) = cortex_m7::threshold_bytes(table, row, mask) {
+        return any;
     }
+    threshold_bytes_in_parts(table, row, mask)
+}
+
+#[inline(never)]
+fn threshold_bytes_in_parts(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> bool {
+    #[cfg(armv7em)]
+    let done = cortex_m7::first_pairs(row, mask, |row, mask| {
+        cortex_m7::threshold_bytes(table, row, mask)
+    });
+    #[cfg(not(armv7em))]
+    let done = 0;
     portable::threshold_bytes(table, row, mask, done);
-    all != 0 || any_set(mask)
+    any_set(mask)
 }
 
 /// The mask of a row of YUV422 by its Cr, and whether anything is set: see
 /// `portable::threshold_cr`.
+#[inline]
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
-    let (done, all) = cortex_m7::threshold_cr(low, row, mask);
-    #[cfg(not(armv7em))]
-    let (done, all) = (0, 0);
-    if done == mask.len() {
-        return all != 0;
+    if let Some(any) = cortex_m7::threshold_cr(low, row, mask) {
+        return any;
     }
+    threshold_cr_in_parts(low, row, mask)
+}
+
+#[inline(never)]
+fn threshold_cr_in_parts(low: u8, row: &[u16], mask: &mut [u32]) -> bool {
+    #[cfg(armv7em)]
+    let done = cortex_m7::first_pairs(row, mask, |row, mask| {
+        cortex_m7::threshold_cr(low, row, mask)
+    });
+    #[cfg(not(armv7em))]
+    let done = 0;
     portable::threshold_cr(low, row, mask, done);
-    all != 0 || any_set(mask)
+    any_set(mask)
 }
 
 /// The mask of a row of mono pixels, and whether anything is set: see `portable::threshold_luma`.

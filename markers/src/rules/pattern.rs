@@ -116,6 +116,7 @@ pub fn distance(a: (Px, Px), b: (Px, Px)) -> Px {
 }
 
 /// Length of a vector, to 2⁻¹⁵ of it, limited to 32 bits.
+#[inline(never)]
 pub fn length(vector: [i32; 2]) -> i32 {
     let [x, y] = vector.map(|part| (i64::from(part) * i64::from(part)) as u64);
     rough_root(x + y).min(i32::MAX as u32) as i32
