@@ -10,6 +10,8 @@ use crate::mask::{MAX_WORDS, any_set, last_word_bits, words_of};
 #[derive(Clone, Debug)]
 pub struct Majority {
     rows: [[u32; MAX_WORDS]; 2],
+    specks: u32,
+    holes: u32,
 }
 
 impl Majority {
@@ -17,12 +19,24 @@ impl Majority {
     pub const fn new() -> Majority {
         Majority {
             rows: [[0; MAX_WORDS]; 2],
+            specks: 0,
+            holes: 0,
         }
     }
 
     /// Starts a frame.
     pub fn begin(&mut self) {
-        self.rows = [[0; MAX_WORDS]; 2];
+        *self = Majority::new();
+    }
+
+    /// Set pixels of the frame that were taken out.
+    pub fn specks(&self) -> u32 {
+        self.specks
+    }
+
+    /// Unset pixels of the frame that were filled.
+    pub fn holes(&self) -> u32 {
+        self.holes
     }
 
     /// Replaces rows of `width` pixels, as they come in, by the majority around the pixels of the
@@ -41,6 +55,10 @@ impl Majority {
                     *word &= last_word_bits(width);
                 }
                 any |= any_set(row);
+                for (before, after) in middle.iter().zip(row.iter()) {
+                    self.specks += (before & !after).count_ones();
+                    self.holes += (!before & after).count_ones();
+                }
             }
             let [above, middle] = &mut self.rows;
             *above = *middle;

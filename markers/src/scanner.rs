@@ -101,6 +101,10 @@ pub struct Scan<'a> {
     /// Pixels that passed the threshold, before dilation; of a frame of too many runs, as far as it
     /// was looked at.
     pub set_pixels: u32,
+    /// Set pixels that [cleaning](ScanSettings::cleaned) took out.
+    pub specks: u32,
+    /// Unset ones that it filled.
+    pub holes: u32,
     /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width,
     /// [`Status::BLOB_OVERFLOW`] when there were more than `BLOBS` blobs or
     /// [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
@@ -292,6 +296,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         Scan {
             blobs: self.blobs(),
             set_pixels: self.set_pixels,
+            specks: self.majority.specks(),
+            holes: self.majority.holes(),
             status: self.status,
         }
     }

@@ -118,8 +118,12 @@ impl Weights {
     }
 }
 
+/// Red below this, of 255, is too little: three levels of five bits.
+const DARKEST_RED: u8 = 24;
+
 /// How red a pixel (red in bits 15–11) is: ⌊80·(2r − g − b)/r⌋ − 28 of 8-bit channels, from 0 to
-/// [`FULL_WEIGHT`]; 0 for greys, and without red.
+/// [`FULL_WEIGHT`]; 0 for greys, and for what is nearly black: of three levels of red and less no
+/// ratio is to be had.
 ///
 /// Where film and marker are equally bright in red, as grey film and red tape are, (2r − g − b)/r
 /// grows linearly with the part of a pixel that the marker covers. Being a ratio, it does not
@@ -131,8 +135,8 @@ impl Weights {
 pub const fn redness(pixel: u16) -> u8 {
     let [red, green, blue] = rgb888(pixel);
     let excess = 2 * red as i32 - green as i32 - blue as i32;
-    // Where twice r is above g + b r is not 0; the quotient is at most 160.
-    if excess <= 0 || red == 0 {
+    // The quotient is at most 160.
+    if excess <= 0 || red < DARKEST_RED {
         return 0;
     }
     let weight = 80 * excess / red as i32 - 28;

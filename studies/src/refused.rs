@@ -8,6 +8,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::weights::Weights;
 use hivtac_scene::{Format, MARKERS, Options, Paint, Patch, Salt, Specks};
+use hivtac_sensing::force::Force;
 use hivtac_sensing::model::Model;
 use hivtac_terms::status::Status;
 use rayon::prelude::*;
@@ -64,26 +65,28 @@ struct Row {
     case: String,
     is_good: bool,
     frames: u32,
-    /// With a force.
-    kept: u32,
-    /// Of these, by the second look.
-    second_look: u32,
+    /// With a force by the first look, and by the second.
+    looks: [Kept; 2],
+    /// The rest, by what refused them.
+    refused: std::collections::BTreeMap<&'static str, u32>,
+}
+
+/// Frames with a force.
+#[derive(Default, Serialize)]
+struct Kept {
+    frames: u32,
     /// With a marker more than 0.3 px off.
     wrong_px: u32,
     /// With a force off by more than three stated standard uncertainties.
     beyond_three_sigmas: u32,
     /// Of these, by more than a hand feels.
     wrong_force: u32,
-    /// Of all kept frames: the largest distance of a marker from its place, px.
+    /// The largest distance of a marker from its place, px.
     worst_px: f64,
-    /// The root mean square of one coordinate of a marker, px, squared and summed; see `rms_px`.
-    #[serde(skip)]
+    /// Of coordinates of markers, px, summed.
     squares: f64,
-    rms_px: f64,
     /// The largest error in stated standard uncertainties: of direction, |F| and place.
     worst_sigmas: [f64; 3],
-    /// The rest, by what refused them.
-    refused: std::collections::BTreeMap<&'static str, u32>,
 }
 
 /// Something round at a place around a marker's middle: which marker and which way is the
@@ -116,7 +119,7 @@ fn gain(gain: f64) -> Options {
     }
 }
 
-const CASES: [Case; 15] = [
+const CASES: [Case; 19] = [
     Case {
         name: "nothing",
         is_good: true,
@@ -175,9 +178,29 @@ const CASES: [Case; 15] = [
         },
     },
     Case {
+        name: "2 % red salt",
+        is_good: true,
+        options: |_| salt(0.02),
+    },
+    Case {
+        name: "3 % red salt",
+        is_good: true,
+        options: |_| salt(0.03),
+    },
+    Case {
         name: "5 % red salt",
         is_good: true,
         options: |_| salt(0.05),
+    },
+    Case {
+        name: "light × 0.15",
+        is_good: true,
+        options: |_| gain(0.15),
+    },
+    Case {
+        name: "light × 0.12",
+        is_good: true,
+        options: |_| gain(0.12),
     },
     Case {
         name: "light × 0.1",
@@ -222,9 +245,10 @@ impl Refused {
             return page::print_rows(&rows);
         }
         let mut text = String::from(
-            "| frames with | kept | of these by the second look | marker, rms | worst | farther than \
-             0.3 px | beyond 3 σ: direction, \\|F\\| or place | wrong force | refused by \
-             |\n|---|--:|--:|--:|--:|--:|--:|--:|---|\n",
+            "| frames with | kept | by the second look | marker, rms and worst: first look | \
+             second | farther than 0.3 px: first | second | beyond 3 σ (worst of direction, \
+             \\|F\\|, place): first | second | wrong force: first | second | refused by \
+             |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|\n",
         );
         text.extend(rows.iter().map(Row::line));
         print!("{text}");
@@ -256,9 +280,7 @@ impl Refused {
             is_good: case.is_good,
             ..Row::default()
         };
-        let mut row = rows.into_iter().fold(first, Row::and);
-        row.rms_px = (row.squares / f64::from(8 * row.kept)).sqrt();
-        Ok(row)
+        Ok(rows.into_iter().fold(first, Row::and))
     }
 }
 
@@ -271,9 +293,52 @@ impl Row {
             }
             return Ok(());
         };
-        self.kept += 1;
-        let second_look = answer.status.contains(Status::FRAME_DISTURBED);
-        self.second_look += u32::from(second_look);
+        let look = usize::from(answer.status.contains(Status::FRAME_DISTURBED));
+        self.looks[look].take(answer, force)
+    }
+
+    fn and(mut self, other: Row) -> Row {
+        self.frames += other.frames;
+        for (kept, other) in self.looks.iter_mut().zip(&other.looks) {
+            kept.add(other);
+        }
+        for (name, count) in other.refused {
+            *self.refused.entry(name).or_default() += count;
+        }
+        self
+    }
+
+    fn line(&self) -> String {
+        let percent = |part: u32| 100.0 * f64::from(part) / f64::from(self.frames);
+        let refused: Vec<String> = self
+            .refused
+            .iter()
+            .map(|(name, count)| format!("`{name}` {:.1} %", percent(*count)))
+            .collect();
+        let [first, second] = &self.looks;
+        let kept = format!(
+            "| {} | {:.2} % of {} | {:.1} % ",
+            self.case,
+            percent(first.frames + second.frames),
+            self.frames,
+            percent(second.frames)
+        );
+        let both = |cell: fn(&Kept) -> String| format!("| {} | {} ", cell(first), cell(second));
+        [
+            kept,
+            both(Kept::px),
+            both(|kept| kept.wrong_px.to_string()),
+            both(Kept::sigmas),
+            both(|kept| kept.wrong_force.to_string()),
+            format!("| {} |\n", refused.join(", ")),
+        ]
+        .concat()
+    }
+}
+
+impl Kept {
+    fn take(&mut self, answer: &Answer, force: &Force) -> Result<()> {
+        self.frames += 1;
         let off_px = answer.off_px.unwrap_or([[f64::INFINITY; 2]; 4]);
         let far_px = off_px
             .iter()
@@ -294,10 +359,8 @@ impl Row {
         Ok(())
     }
 
-    fn and(mut self, other: Row) -> Row {
+    fn add(&mut self, other: &Kept) {
         self.frames += other.frames;
-        self.kept += other.kept;
-        self.second_look += other.second_look;
         self.wrong_px += other.wrong_px;
         self.beyond_three_sigmas += other.beyond_three_sigmas;
         self.wrong_force += other.wrong_force;
@@ -306,35 +369,23 @@ impl Row {
         for (worst, other) in self.worst_sigmas.iter_mut().zip(other.worst_sigmas) {
             *worst = worst.max(other);
         }
-        for (name, count) in other.refused {
-            *self.refused.entry(name).or_default() += count;
-        }
-        self
     }
 
-    fn line(&self) -> String {
-        let percent = |part: u32| 100.0 * f64::from(part) / f64::from(self.frames);
-        let refused: Vec<String> = self
-            .refused
-            .iter()
-            .map(|(name, count)| format!("`{name}` {:.1} %", percent(*count)))
-            .collect();
+    /// Root mean square of a coordinate of a marker, and the largest distance.
+    fn px(&self) -> String {
+        if self.frames == 0 {
+            return "–".to_owned();
+        }
+        let rms = (self.squares / f64::from(8 * self.frames)).sqrt();
+        format!("{rms:.3}, {:.2} px", self.worst_px)
+    }
+
+    fn sigmas(&self) -> String {
         let [direction, magnitude, place] = self.worst_sigmas;
-        let px = match self.kept {
-            0 => "– | –".to_owned(),
-            _ => format!("{:.3} px | {:.2} px", self.rms_px, self.worst_px),
-        };
-        format!(
-            "| {} | {:.2} % of {} | {:.1} % | {px} | {} | {} (worst {direction:.1}, \
-             {magnitude:.1}, {place:.1}) | {} | {} |\n",
-            self.case,
-            percent(self.kept),
-            self.frames,
-            percent(self.second_look),
-            self.wrong_px,
-            self.beyond_three_sigmas,
-            self.wrong_force,
-            refused.join(", ")
-        )
+        let beyond = self.beyond_three_sigmas;
+        if self.frames == 0 {
+            return "–".to_owned();
+        }
+        format!("{beyond} ({direction:.1}, {magnitude:.1}, {place:.1})")
     }
 }

@@ -385,7 +385,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let (force, trust) = match model.forward.as_ref().zip(resting) {
             Some((forward, resting)) => {
                 let blur = match self.look {
-                    Look::Again(_) => BLUR,
+                    Look::Again(..) => BLUR,
                     Look::First | Look::Wanted(_) => Px(0),
                 };
                 resting.force(forward, &model.range, (markers, blur), &output)
