@@ -119,7 +119,7 @@ fn gain(gain: f64) -> Options {
     }
 }
 
-const CASES: [Case; 19] = [
+const CASES: [Case; 17] = [
     Case {
         name: "nothing",
         is_good: true,
@@ -183,11 +183,6 @@ const CASES: [Case; 19] = [
         options: |_| salt(0.02),
     },
     Case {
-        name: "3 % red salt",
-        is_good: true,
-        options: |_| salt(0.03),
-    },
-    Case {
         name: "5 % red salt",
         is_good: true,
         options: |_| salt(0.05),
@@ -196,11 +191,6 @@ const CASES: [Case; 19] = [
         name: "light × 0.15",
         is_good: true,
         options: |_| gain(0.15),
-    },
-    Case {
-        name: "light × 0.12",
-        is_good: true,
-        options: |_| gain(0.12),
     },
     Case {
         name: "light × 0.1",

@@ -258,7 +258,7 @@ impl TaredSensor {
     pub fn sense_in_bands(&mut self, frame: &Frame, rows: usize) -> Measurement {
         let (words, sensor) = (frame.words(), &mut self.sensor);
         let length = words.len() / usize::from(sensor.settings().geometry.height) * rows;
-        let mut push = |sensor: &mut Sensor<'_>| {
+        let push = |sensor: &mut Sensor<'_>| {
             let mut above: &[u16] = &[];
             for band in words.chunks(length) {
                 sensor.push_rows_below(above, band);

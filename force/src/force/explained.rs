@@ -28,6 +28,10 @@ pub struct Resting {
 /// A marker that rests this far from where it rested when the model was made, px in Q16.16, is
 /// another unit's: half a pixel.
 const LARGEST_DRIFT: u32 = 1 << 15;
+/// What is left over of markers that are known less well, in parts of its variance, is seldom more
+/// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
+/// the light: in 1 of 1,000 frames).
+const UNEXPLAINED_BLURRED: f32 = 5.0;
 /// Areas at which a marker's noise is known, in parts of the one at rest.
 const AREAS: [f32; 2] = [0.5, 6.0];
 
@@ -92,16 +96,15 @@ impl Resting {
             for i in [0, 1] {
                 let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
-                let mut seen = scale * at_rest_px[i] * growth.max(0.1);
-                if blur > 0.0 {
-                    seen = libm::sqrtf(seen * seen + blur * blur);
-                }
+                let seen = scale * at_rest_px[i] * growth.max(0.1);
                 // What is wrong with another unit is more than noise, and no two markers share it.
-                sigma[2 * k + i] = match self.other {
-                    None => seen,
-                    Some(Tolerance { shape, .. }) => {
-                        libm::sqrtf(seen * seen + shape * shape * (x * x + y * y))
-                    }
+                let unknown = match self.other {
+                    None => blur * blur,
+                    Some(Tolerance { shape, .. }) => shape * shape * (x * x + y * y) + blur * blur,
+                };
+                sigma[2 * k + i] = match unknown > 0.0 {
+                    true => libm::sqrtf(seen * seen + unknown),
+                    false => seen,
                 };
             }
         }
@@ -132,7 +135,13 @@ impl Resting {
         markers: (&[Marker; 4], Px),
         output: &Output,
     ) -> (Force, Status) {
-        self.told(forward, range, &self.estimate(forward, markers, output))
+        let estimate = self.estimate(forward, markers, output);
+        let (force, mut status) = self.told(forward, range, &estimate);
+        let (_, blur) = markers;
+        if blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED {
+            status |= Status::UNEXPLAINED;
+        }
+        (force, status)
     }
 
     /// What a sample says of a load that was found.

@@ -37,6 +37,9 @@ const SPECKS_PART: u32 = 2_400;
 /// More specks than one in this many draw markers aside (seen: 0.33 px at 5 % of salt, 0.24 px at
 /// 3 %).
 const MOST_SPECKS_PART: u32 = 40;
+/// So do holes in markers, more than one in this many of the mask's pixels: the light is too little
+/// for colours (seen: 0.013 of them at 0.2 of the light, 0.049 and more at 0.15).
+const HOLES_PART: u32 = 64;
 /// A frame is dim when so many of the cleaned mask's pixels, of four, pass the threshold (seen: half
 /// at 0.28 of the light, all at 0.4).
 const DIM_FOURTHS: u32 = 3;
@@ -111,12 +114,17 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let Geometry { width, height, .. } = self.settings.geometry;
         let pixels = u32::from(width) * u32::from(height);
         let Scan {
-            set_pixels, specks, ..
+            set_pixels,
+            specks,
+            holes,
+            ..
         } = self.scanner.finish(&self.pixels);
         let status = first.measurement.status;
         let is_dim = 4 * first.set_pixels < DIM_FOURTHS * set_pixels
             && !status.intersects(Status::BLOB_OVERFLOW | Status::UNEXPLAINED);
         let has_specks = specks >= pixels / SPECKS_PART;
-        (is_dim || has_specks) && specks <= pixels / MOST_SPECKS_PART
+        (is_dim || has_specks)
+            && specks <= pixels / MOST_SPECKS_PART
+            && holes <= set_pixels / HOLES_PART
     }
 }
