@@ -40,8 +40,8 @@ impl History {
         kept.then_some(&self.rows[place][..])
     }
 
-    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] + 1 rows before row `end` that are in memory; rows
-    /// have at most 800 pixels.
+    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] + 1 rows before row `end` that are in memory;
+    /// rows have at most 800 pixels.
     pub fn keep(&mut self, band: &Band<'_>, end: u16, count: u8) {
         for y in end.saturating_sub(u16::from(count))..end {
             let place = usize::from(y % ROWS);

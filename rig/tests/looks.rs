@@ -1,4 +1,5 @@
-//! Frames full of salt: the flashed firmware looks at each of them again, in the time that there is.
+//! Frames full of salt: the flashed firmware looks at each of them again, in the time that there
+//! is.
 
 use crate::common::{Run, Setup, firmware, instructions_per_second};
 use hivtac_terms::status::Status;

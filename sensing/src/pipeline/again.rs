@@ -40,8 +40,8 @@ const MOST_SPECKS_PART: u32 = 40;
 /// So do holes in markers, more than one in this many of the mask's pixels: the light is too little
 /// for colours (seen: 0.013 of them at 0.2 of the light, 0.049 and more at 0.15).
 const HOLES_PART: u32 = 64;
-/// A frame is dim when so many of the cleaned mask's pixels, of four, pass the threshold (seen: half
-/// at 0.28 of the light, all at 0.4).
+/// A frame is dim when fewer pixels pass the threshold than so many of four of the cleaned mask's
+/// (seen: half at 0.28 of the light, more than all in good light).
 const DIM_FOURTHS: u32 = 3;
 /// Standard uncertainty of a coordinate of a marker of the cleaned mask beside that of noise:
 /// 0.08 px (seen: 0.05 px at a fifth of the light).

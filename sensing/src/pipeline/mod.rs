@@ -48,7 +48,7 @@ const SATURATED_PART: u32 = 2;
 /// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
 /// up in a `T`.
 ///
-/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it shall stay:
+/// It holds all its storage, about 76 KiB and the table (64 KiB), so build it where it shall stay:
 /// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
 /// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
 /// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
