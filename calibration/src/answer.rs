@@ -8,6 +8,7 @@ use hivtac_sensing::network::Network;
 use hivtac_sensing::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::units::Px;
 
 use crate::dataset::Observation;
 use crate::weights::features_from_q16;
@@ -66,7 +67,7 @@ impl<'m> Chip<'m> {
             Marker { x, y, area }
         };
         let markers = std::array::from_fn(marker);
-        let estimate = resting.estimate(forward, &markers, &output);
+        let estimate = resting.estimate(forward, (&markers, Px(0)), &output);
         let (force, status) = resting.told(forward, &self.model.range, &estimate);
         Ok((force, status, estimate.looks))
     }

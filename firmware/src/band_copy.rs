@@ -89,6 +89,12 @@ impl BandCopy {
         })
     }
 
+    /// Bands are fetched anew that were fetched before: none was copied ahead, and none lies above
+    /// the next.
+    pub fn rewind(&mut self) {
+        (self.ahead, self.before) = (None, None);
+    }
+
     /// Begins to copy a band into the next buffer. What was under way is given up.
     fn start(&mut self, sequence: u32) {
         let Some(buffer) = self.buffers.get_mut(self.next) else {

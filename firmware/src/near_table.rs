@@ -60,6 +60,13 @@ impl Pixels for NearTable {
         }
     }
 
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        match &self.0 {
+            Some(table) => table.mask_covered_rows(rows, width, mask),
+            None => mask.fill(0),
+        }
+    }
+
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         self.0.as_ref().map_or(0, |table| table.weight(row, column))
     }

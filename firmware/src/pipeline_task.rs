@@ -86,6 +86,7 @@ pub async fn run(
         model,
         next_threshold: NextThreshold::NONE,
         bands,
+        last_band: 0,
         follower: Follower::new(SHAPE),
         busy_us: 0,
         newest: 0,
@@ -119,6 +120,8 @@ struct PipelineTask {
     model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
+    /// Sequence number of the band that was scanned last.
+    last_band: u32,
     follower: Follower,
     /// Spent on the frame under way, µs.
     busy_us: u32,
@@ -212,6 +215,7 @@ impl PipelineTask {
         let fetched = self.bands.fetch(band, capture::finished);
         let rows = fetched.as_ref().map(|fetched| fetched.rows);
         self.snapshots.band(band.index, rows);
+        self.last_band = band.sequence;
         if let Some(band) = &fetched {
             self.sensor.push_rows_below(band.above, band.rows);
         }
@@ -338,7 +342,10 @@ impl PipelineTask {
     /// Measures the frame whose rows were scanned.
     fn deliver(&mut self, delivery: &Delivery) {
         let begun = Instant::now();
-        let measurement = self.sensor.finish_frame();
+        let mut measurement = self.sensor.finish_frame();
+        if self.taring.is_none() {
+            self.look_again(&mut measurement, delivery);
+        }
         self.newest = delivery.edge.number;
         let followed = self.temporal.follow(moment(delivery), &measurement);
         let sample = self.sample(delivery, &measurement, &followed);
@@ -363,6 +370,28 @@ impl PipelineTask {
         // Behind the sample, which goes first.
         let threshold = self.sensor.threshold();
         self.snapshots.frame(frame, time_us, threshold);
+    }
+
+    /// Looks at the frame again when the pipeline asks for it and all its bands are still in the
+    /// ring. What is overwritten meanwhile leaves the measurement as it is.
+    fn look_again(&mut self, measurement: &mut Measurement, delivery: &Delivery) {
+        if !self.sensor.look_again() {
+            return;
+        }
+        self.bands.rewind();
+        let first = self.last_band.wrapping_sub(u32::from(SHAPE.bands()) - 1);
+        for index in 0..SHAPE.bands() {
+            let band = Band {
+                sequence: first.wrapping_add(u32::from(index)),
+                index,
+                edge: delivery.edge,
+            };
+            let Some(fetched) = self.bands.fetch(&band, capture::finished) else {
+                return;
+            };
+            self.sensor.push_rows_below(fetched.above, fetched.rows);
+        }
+        *measurement = self.sensor.finish_frame();
     }
 
     fn sample(

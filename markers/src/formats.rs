@@ -86,6 +86,14 @@ impl<T: Table> Pixels for Formats<T> {
         }
     }
 
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        match &self.threshold {
+            Threshold::Rgb565(_) => self.table.mask_covered_rows(rows, width, mask),
+            Threshold::Yuv422(yuv422) => yuv422.mask_covered_rows(rows, width, mask),
+            Threshold::Mono(mono) => mono.mask_covered_rows(rows, width, mask),
+        }
+    }
+
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         match &self.threshold {
             Threshold::Rgb565(_) => self.table.weight(row, column),

@@ -4,11 +4,11 @@
 use crate::dilate::MAX_DILATIONS;
 use crate::mask::MAX_WIDTH;
 
-/// Rows that the dilation holds back at most.
-const ROWS: u16 = MAX_DILATIONS as u16;
+/// Rows that the dilation and the majority hold back at most.
+const ROWS: u16 = MAX_DILATIONS as u16 + 1;
 
-/// The rows of a frame that came last, and that may no longer be where they were: [`MAX_DILATIONS`]
-/// of them.
+/// The rows of a frame that came last, and that may no longer be where they were: one more than
+/// [`MAX_DILATIONS`].
 #[derive(Clone, Debug)]
 pub struct History {
     rows: [[u16; MAX_WIDTH as usize]; ROWS as usize],
@@ -40,8 +40,8 @@ impl History {
         kept.then_some(&self.rows[place][..])
     }
 
-    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] rows before row `end` that are in memory; rows
-    /// have at most 800 pixels.
+    /// Keeps the last `count` ≤ [`MAX_DILATIONS`] + 1 rows before row `end` that are in memory;
+    /// rows have at most 800 pixels.
     pub fn keep(&mut self, band: &Band<'_>, end: u16, count: u8) {
         for y in end.saturating_sub(u16::from(count))..end {
             let place = usize::from(y % ROWS);

@@ -10,6 +10,7 @@
 //! | `mask`, `dilate`, `history`, `runs` | rows of bits, and runs of them |
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
 //! | `scanner` | from rows to blobs, as they come |
+//! | `majority` | specks and holes taken out of rows of bits |
 //! | `rules` | which four blobs are the markers, and whether to trust them |
 //! | `settings` | what must be told before the first frame |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
@@ -32,6 +33,7 @@ mod dilate;
 mod history;
 mod kernels;
 mod label;
+mod majority;
 mod mask;
 mod moments;
 #[cfg(test)]

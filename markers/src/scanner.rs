@@ -6,6 +6,7 @@ use crate::blob::Blob;
 use crate::dilate::{Dilation, MAX_ROWS};
 use crate::history::{Band, History};
 use crate::label::Labeller;
+use crate::majority::Majority;
 use crate::mask::{any_set, last_word_bits, words_of};
 use crate::tables::Pixels;
 use hivtac_terms::status::Status;
@@ -31,6 +32,10 @@ pub struct ScanSettings {
     /// A frame of more runs is not looked at to its end: [`Status::BLOB_OVERFLOW`]. It bounds the
     /// time that noise takes.
     pub max_runs: u32,
+    /// Whether the mask is of the pixels that a marker covers at least half, whatever the light
+    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: of a frame
+    /// with specks or little light.
+    pub cleaned: bool,
 }
 
 /// Why a frame cannot be scanned.
@@ -96,6 +101,10 @@ pub struct Scan<'a> {
     /// Pixels that passed the threshold, before dilation; of a frame of too many runs, as far as it
     /// was looked at.
     pub set_pixels: u32,
+    /// Set pixels that [cleaning](ScanSettings::cleaned) took out.
+    pub specks: u32,
+    /// Unset ones that it filled.
+    pub holes: u32,
     /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width,
     /// [`Status::BLOB_OVERFLOW`] when there were more than `BLOBS` blobs or
     /// [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
@@ -111,6 +120,7 @@ pub struct Scan<'a> {
 #[derive(Clone, Debug)]
 pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
+    majority: Majority,
     dilation: Dilation,
     labels: Labeller<BLOBS>,
     /// The pixels of rows that the dilation still holds, when they are weighed and may not stay
@@ -135,7 +145,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
                 min_area: 0,
                 weighted: false,
                 max_runs: u32::MAX,
+                cleaned: false,
             },
+            majority: Majority::new(),
             dilation: Dilation::new(),
             labels: Labeller::new(),
             history: History::new(),
@@ -159,6 +171,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         settings.check()?;
         self.settings = settings;
         self.dilation.begin(settings.width, settings.dilations);
+        if settings.cleaned {
+            self.majority.begin();
+        }
         self.history.clear();
         self.status = Status::OK;
         self.active = true;
@@ -189,8 +204,9 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
 
     /// The same without copying: the rows that came last are still in memory when the next ones
     /// come, and are then `above`: all of the frame, or at least as many as there are dilations,
-    /// one after the other. With fewer, a frame whose pixels are weighed becomes incomplete where
-    /// one of them would have been needed.
+    /// one after the other; one more in a frame that is [cleaned](ScanSettings::cleaned). With
+    /// fewer, a frame whose pixels are weighed becomes incomplete where one of them would have been
+    /// needed.
     pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
         self.push_whole(pixels, above, rows, Stay::Here);
     }
@@ -230,16 +246,22 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             let mut any = false;
             if !self.labels.is_exhausted() {
                 let (part, width) = (band.part(self.rows_in, rows), self.settings.width);
-                any = pixels.mask_rows(part, width, self.dilation.incoming(rows));
+                let incoming = self.dilation.incoming(rows);
+                any = if self.settings.cleaned {
+                    pixels.mask_covered_rows(part, width, incoming);
+                    self.majority.filter(incoming, width)
+                } else {
+                    pixels.mask_rows(part, width, incoming)
+                };
             }
             self.take(pixels, band, rows, any);
             left -= rows;
         }
         // What ends a frame is weighed when it is finished.
-        let ends = self.rows_in == self.settings.height && !self.is_quiet();
+        let ends =
+            self.rows_in == self.settings.height && (self.settings.cleaned || !self.is_quiet());
         if self.settings.weighted && (stay == Stay::Gone || ends) {
-            self.history
-                .keep(band, self.rows_in, self.settings.dilations);
+            self.history.keep(band, self.rows_in, self.late());
         }
     }
 
@@ -256,7 +278,11 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if let Some(last) = incoming.last_mut() {
             *last &= last_word_bits(self.settings.width);
         }
-        let any = any_set(incoming);
+        let any = if self.settings.cleaned {
+            self.majority.filter(incoming, self.settings.width)
+        } else {
+            any_set(incoming)
+        };
         self.take(&(), &Band::WITHOUT_PIXELS, 1, any);
     }
 
@@ -270,6 +296,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         Scan {
             blobs: self.blobs(),
             set_pixels: self.set_pixels,
+            specks: self.majority.specks(),
+            holes: self.majority.holes(),
             status: self.status,
         }
     }
@@ -284,6 +312,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     #[inline(always)]
     pub fn is_settled(&self) -> bool {
         self.labels.is_idle()
+    }
+
+    /// Rows that come out behind those that come in.
+    #[inline(always)]
+    fn late(&self) -> u8 {
+        self.dilation.radius() + u8::from(self.settings.cleaned)
     }
 
     /// How many rows are still missing.
@@ -313,7 +347,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
 
     /// Passes rows through the dilation to the labels, where the pixels of their runs are weighed.
     fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
-        let late = u16::from(self.dilation.radius());
+        let late = u16::from(self.late());
         let near = self.dilation.near();
         // Nothing of the frame lies above its first row.
         let above = usize::from(late.saturating_sub(self.rows_in));
@@ -341,9 +375,13 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         if self.rows_in < self.settings.height {
             self.status |= Status::FRAME_INCOMPLETE;
         }
-        let late = usize::from(self.dilation.radius());
+        let late = usize::from(self.late());
         if !self.labels.is_exhausted() {
-            self.dilation.incoming(late).fill(0);
+            let incoming = self.dilation.incoming(late);
+            incoming.fill(0);
+            if self.settings.cleaned && self.majority.filter(incoming, self.settings.width) {
+                self.dilation.look(late);
+            }
             let band = match pixels.row_length(self.settings.width) {
                 0 => Band::WITHOUT_PIXELS,
                 _ => Band::EMPTY,

@@ -53,6 +53,10 @@ impl Pixels for ScreenedTable {
         any_set(mask)
     }
 
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        self.table.mask_covered_rows(rows, width, mask);
+    }
+
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         self.table.weight(row, column)
     }

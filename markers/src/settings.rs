@@ -86,6 +86,7 @@ impl Settings {
             min_area: self.min_area,
             weighted: self.centroid == CentroidEstimator::RednessWeighted,
             max_runs: FEWEST_RUNS + pixels / PIXELS_PER_RUN,
+            cleaned: false,
         }
     }
 }

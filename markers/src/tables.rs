@@ -40,6 +40,12 @@ pub trait Pixels {
         any
     }
 
+    /// Masks several rows, as [`mask_rows`](Self::mask_rows) does, by the pixels that a marker
+    /// covers at least half, whatever the light; where that is not to be told, by the threshold.
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        self.mask_rows(rows, width, mask);
+    }
+
     /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the
     /// row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
@@ -112,8 +118,12 @@ impl Weights {
     }
 }
 
+/// Red below this, of 255, is too little: three levels of five bits.
+const DARKEST_RED: u8 = 24;
+
 /// How red a pixel (red in bits 15–11) is: ⌊80·(2r − g − b)/r⌋ − 28 of 8-bit channels, from 0 to
-/// [`FULL_WEIGHT`]; 0 for greys, and without red.
+/// [`FULL_WEIGHT`]; 0 for greys, and for what is nearly black: of three levels of red and less no
+/// ratio is to be had.
 ///
 /// Where film and marker are equally bright in red, as grey film and red tape are, (2r − g − b)/r
 /// grows linearly with the part of a pixel that the marker covers. Being a ratio, it does not
@@ -125,8 +135,8 @@ impl Weights {
 pub const fn redness(pixel: u16) -> u8 {
     let [red, green, blue] = rgb888(pixel);
     let excess = 2 * red as i32 - green as i32 - blue as i32;
-    // Where twice r is above g + b r is not 0; the quotient is at most 160.
-    if excess <= 0 || red == 0 {
+    // The quotient is at most 160.
+    if excess <= 0 || red < DARKEST_RED {
         return 0;
     }
     let weight = 80 * excess / red as i32 - 28;
@@ -155,6 +165,17 @@ impl ByteTable {
         let mut table = ByteTable::CLOSED;
         table.set(hsv_box, order)?;
         Ok(table)
+    }
+
+    /// Bit i is set where pixel i of up to four has bit 7 of its byte set.
+    #[inline(always)]
+    fn covered(&self, pixels: &[u16]) -> u32 {
+        let mut bytes = [0; 4];
+        let filled = bytes.iter_mut().zip(pixels);
+        filled.for_each(|(byte, raw)| *byte = self.byte(*raw));
+        // Bit 8·i moves to bit 28 + i by the factor's bit 28 − 7·i; no two terms meet.
+        let tops = (u32::from_le_bytes(bytes) >> 7) & 0x0101_0101;
+        tops.wrapping_mul(0x1020_4080) >> 28
     }
 
     /// The byte of the pixel that lies in memory as `raw`.
@@ -189,6 +210,18 @@ impl Pixels for ByteTable {
 
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool {
         threshold_bytes(&self.bytes, row, mask)
+    }
+
+    /// By bit 7 of a byte: weights of 64 and more, two thirds of what a marker has inside.
+    #[inline(never)]
+    fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
+        let rows = rows.chunks(usize::from(width).max(1));
+        for (row, mask) in rows.zip(mask.chunks_exact_mut(words_of(width).max(1))) {
+            for (word, pixels) in mask.iter_mut().zip(row.chunks(32)) {
+                let fours = pixels.chunks(4).rev();
+                *word = fours.fold(0, |bits, four| bits << 4 | self.covered(four));
+            }
+        }
     }
 
     fn weight(&self, row: &[u16], column: u16) -> u8 {
@@ -290,6 +323,12 @@ mod tests {
                 let sums = table.weigh(&row, run);
                 let columns = usize::from(run.x0)..(usize::from(run.x1) + 1).min(row.len());
                 let weights = columns.map(|x| (x as u32, u32::from(redness(row[x].swap_bytes()))));
+                let width = row.len() as u16;
+                table.mask_covered_rows(&row, width, &mut mask);
+                for (x, &raw) in row.iter().enumerate() {
+                    let bit = mask[x / 32] >> (x % 32) & 1 == 1;
+                    prop_assert_eq!(bit, redness(raw.swap_bytes()) >= 64);
+                }
                 let (sum, sum_x) = weights.fold((0, 0), |(s, sx), (x, w)| (s + w, sx + w * x));
                 prop_assert_eq!((sums.sum, sums.sum_x), (sum, sum_x));
                 Ok(())

@@ -11,6 +11,7 @@ mod faults;
 mod firmware;
 mod format;
 mod health;
+mod looks;
 mod models;
 mod openmv;
 mod rules;

@@ -18,6 +18,8 @@ pub struct Motion {
     /// Lines from frame to frame, blank ones included; `None` with a global shutter.
     lines: Option<u16>,
     before: Option<[Marker; 4]>,
+    /// What the frame under way showed, which may be looked at again.
+    now: Option<[Marker; 4]>,
 }
 
 impl Motion {
@@ -25,6 +27,7 @@ impl Motion {
     pub const GLOBAL: Motion = Motion {
         lines: None,
         before: None,
+        now: None,
     };
 
     /// A frame every so many lines, blank ones included, of which each exposes a row.
@@ -32,17 +35,23 @@ impl Motion {
         Motion {
             lines: Some(lines),
             before: None,
+            now: None,
         }
     }
 
     /// The next frame does not follow the one before at once.
     pub fn forget(&mut self) {
-        self.before = None;
+        (self.before, self.now) = (None, None);
+    }
+
+    /// The next frame begins.
+    pub fn begin_frame(&mut self) {
+        self.before = self.now.take();
     }
 
     /// The frame ended, and showed these markers or none.
     pub fn ended(&mut self, seen: Option<&[Marker; 4]>) {
-        self.before = seen.copied();
+        self.now = seen.copied();
     }
 
     /// Markers as they were while the middle row of a frame of so many rows was exposed; `None`
@@ -106,6 +115,7 @@ mod tests {
             let frame = |at| PLACES.map(|place| seen(place, velocity, at));
             let mut motion = Motion::rolling(LINES);
             motion.ended(Some(&frame(-1.0)));
+            motion.begin_frame();
             let moved = motion.at_the_middle(&frame(0.0), ROWS).unwrap();
             for (moved, place) in moved.iter().zip(PLACES) {
                 let there = marker(place[0], place[1]);
@@ -124,6 +134,8 @@ mod tests {
         let mut motion = Motion::rolling(LINES);
         assert_eq!(motion.at_the_middle(&now, ROWS), None);
         motion.ended(Some(&before));
+        assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        motion.begin_frame();
         assert!(
             motion
                 .at_the_middle(&now, ROWS)
@@ -131,10 +143,13 @@ mod tests {
         );
         motion.forget();
         assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        motion.ended(Some(&before));
         motion.ended(None);
+        motion.begin_frame();
         assert_eq!(motion.at_the_middle(&now, ROWS), None);
         let mut global = Motion::GLOBAL;
         global.ended(Some(&before));
+        global.begin_frame();
         assert_eq!(global.at_the_middle(&now, ROWS), None);
     }
 
@@ -149,6 +164,7 @@ mod tests {
         });
         let mut motion = Motion::rolling(600);
         motion.ended(Some(&first));
+        motion.begin_frame();
         assert!(motion.at_the_middle(&turned, 600).is_some());
     }
 }

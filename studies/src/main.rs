@@ -13,6 +13,7 @@ mod page;
 mod paper;
 mod peers;
 mod press;
+mod refused;
 mod scene;
 mod slip;
 mod tangential;
@@ -55,6 +56,9 @@ enum Command {
     /// Compare with the paper's own pipeline (OpenCV, a float network 3×512) on the same rendered
     /// frames. What it renders and trains is kept in a folder: an interrupted run goes on.
     Peers(peers::PeersArgs),
+    /// Disturb frames by salt, specks, glare, dim light, noise and JPEG, and count those that keep
+    /// their force.
+    Refused(refused::Refused),
     /// Look at the simulated sensor: frames, its film, what each of its effects does.
     #[command(subcommand)]
     Scene(scene::SceneCommand),
@@ -88,6 +92,7 @@ fn main() -> Result<()> {
         Command::Mono(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Peers(study) => study.run(),
+        Command::Refused(study) => study.run(),
         Command::Scene(command) => command.run(),
         Command::Slip(study) => study.run(),
         Command::Tangential(study) => study.run(),

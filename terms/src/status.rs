@@ -67,6 +67,9 @@ bits! {
     UNEXPLAINED = 20, "unexplained";
     /// Re-zeroing moved the rest position from where it was taken.
     REZEROED = 21, "rezeroed";
+    /// The frame has specks or little light: its markers were found by a second look, and the
+    /// standard uncertainties are larger.
+    FRAME_DISTURBED = 22, "frame_disturbed";
 }
 
 impl Status {

@@ -76,6 +76,7 @@ fn scanner(criterion: &mut Criterion) {
             min_area: 1,
             weighted: false,
             max_runs: u32::MAX,
+            cleaned: false,
         };
         let mut group = criterion.benchmark_group("scanner");
         group.throughput(Throughput::Elements(frame.pixels.len() as u64));

@@ -239,7 +239,7 @@ impl TaredSensor {
     ) -> Result<Result<Rest, Refusal>> {
         let mut tare = TareBuilder::new(wanted).context("a number of frames")?;
         for frame in frames {
-            let measurement = self.sense(&frame);
+            let measurement = self.sensor.measure_frame(&frame.words());
             if let Some(outcome) = self.sensor.tare_with(&mut tare, &measurement) {
                 self.sensor.set_tare(outcome.ok());
                 return Ok(outcome);
@@ -248,9 +248,30 @@ impl TaredSensor {
         Err(anyhow!("too few frames that show markers"))
     }
 
-    /// The whole pipeline on a frame.
+    /// The whole pipeline on a frame, which it looks at again when it refuses it.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
-        self.sensor.measure_frame(&frame.words())
+        self.sensor.measure_frame_closely(&frame.words())
+    }
+
+    /// The same from bands of so many rows, of which two are in memory at a time, as on the
+    /// microcontroller.
+    pub fn sense_in_bands(&mut self, frame: &Frame, rows: usize) -> Measurement {
+        let (words, sensor) = (frame.words(), &mut self.sensor);
+        let length = words.len() / usize::from(sensor.settings().geometry.height) * rows;
+        let push = |sensor: &mut Sensor<'_>| {
+            let mut above: &[u16] = &[];
+            for band in words.chunks(length) {
+                sensor.push_rows_below(above, band);
+                above = band;
+            }
+            sensor.finish_frame()
+        };
+        sensor.begin_frame();
+        let mut measurement = push(sensor);
+        if sensor.look_again() {
+            measurement = push(sensor);
+        }
+        measurement
     }
 
     /// What the pipeline makes of a frame.

@@ -25,6 +25,7 @@ fn worst_error(pixels: &impl Pixels, rows: &[u16], frame: &Frame) -> f64 {
         min_area: 40,
         weighted: true,
         max_runs: u32::MAX,
+        cleaned: false,
     };
     scanner.begin(settings).unwrap();
     rows.chunks(7 * pixels.row_length(320))

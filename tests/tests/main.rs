@@ -10,6 +10,7 @@ mod forces;
 mod formats;
 mod hard_cases;
 mod hard_cases_anywhere;
+mod looks;
 mod markers;
 mod moving;
 mod panics;

@@ -43,7 +43,7 @@ fn answer(model: &Model<'_>, markers: &[Marker; 4], guess: [i32; 5]) -> (Force, 
     };
     let resting = Resting::of_model(model, &model.rest).unwrap();
     let forward = model.forward.as_ref().unwrap();
-    resting.force(forward, &model.range, markers, &output)
+    resting.force(forward, &model.range, (markers, Px(0)), &output)
 }
 
 /// From guesses that are a millimetre and a fifth of the force off, and from the middle of the
@@ -138,7 +138,7 @@ fn a_bad_guess_takes_more_steps() {
                 place,
                 input_saturated: false,
             };
-            resting.estimate(forward, markers, &output).looks
+            resting.estimate(forward, (markers, Px(0)), &output).looks
         };
         assert_eq!(looks(&markers, [1_500, -2_000]), 1 + steps);
         assert!((3..=7).contains(&looks(&markers, [0, 0])));

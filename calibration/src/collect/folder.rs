@@ -148,10 +148,11 @@ fn pair(numbers: Option<[f64; 2]>) -> String {
 const OF_THE_MODEL: Status =
     Status(Status::MODEL_MISSING.0 | Status::MODEL_MISMATCH.0 | Status::UNEXPLAINED.0);
 
-/// The names of the bits that forbid a force for what the frame shows: those of a frame without
-/// markers, or of one whose markers are implausible.
+/// The names of the bits that say that a frame is none to learn from: without markers, with
+/// implausible ones, or disturbed.
 fn reasons(sample: &Sample) -> String {
-    let frame = Status(Status::NO_FORCE.0 & !OF_THE_MODEL.0 & sample.status.0);
+    let bad = Status::NO_FORCE.0 & !OF_THE_MODEL.0 | Status::FRAME_DISTURBED.0;
+    let frame = Status(bad & sample.status.0);
     let names: Vec<_> = frame.names().collect();
     if names.is_empty() && sample.markers.is_none() {
         // A sensor that sends no markers although they were found would be a bug of its firmware.

@@ -11,7 +11,7 @@ use crate::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before there is a frame.
@@ -28,6 +28,10 @@ pub struct Resting {
 /// A marker that rests this far from where it rested when the model was made, px in Q16.16, is
 /// another unit's: half a pixel.
 const LARGEST_DRIFT: u32 = 1 << 15;
+/// What is left over of markers that are known less well, in parts of its variance, is seldom more
+/// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
+/// the light: in 1 of 1,000 frames).
+const UNEXPLAINED_BLURRED: f32 = 5.0;
 /// Areas at which a marker's noise is known, in parts of the one at rest.
 const AREAS: [f32; 2] = [0.5, 6.0];
 
@@ -72,10 +76,11 @@ impl Resting {
     }
 
     /// How markers moved from there.
-    fn observed(&self, forward: &Forward<'_>, markers: &[Marker; 4]) -> Observed {
+    fn observed(&self, forward: &Forward<'_>, markers: &[Marker; 4], blur: Px) -> Observed {
         let mut moved: Column = [0.0; 8];
         let mut sigma = [0.0; 8];
         let scale = self.mounting.scale();
+        let blur = scale * blur.to_f32();
         for (k, marker) in markers.iter().enumerate() {
             let [x, y] = self.px[k];
             let [x, y] = self
@@ -93,28 +98,31 @@ impl Resting {
                 // A law that falls to nothing within the areas would weigh a marker as certain.
                 let seen = scale * at_rest_px[i] * growth.max(0.1);
                 // What is wrong with another unit is more than noise, and no two markers share it.
-                sigma[2 * k + i] = match self.other {
-                    None => seen,
-                    Some(Tolerance { shape, .. }) => {
-                        libm::sqrtf(seen * seen + shape * shape * (x * x + y * y))
-                    }
+                let unknown = match self.other {
+                    None => blur * blur,
+                    Some(Tolerance { shape, .. }) => shape * shape * (x * x + y * y) + blur * blur,
+                };
+                sigma[2 * k + i] = match unknown > 0.0 {
+                    true => libm::sqrtf(seen * seen + unknown),
+                    false => seen,
                 };
             }
         }
         Observed { moved, sigma }
     }
 
-    /// The load that explains the markers best, from the network's answer on.
+    /// The load that explains the markers best, from the network's answer on. `blur` is a standard
+    /// uncertainty of each coordinate beside that of noise, 0 or more.
     pub fn estimate(
         &self,
         forward: &Forward<'_>,
-        markers: &[Marker; 4],
+        (markers, blur): (&[Marker; 4], Px),
         output: &Output,
     ) -> Estimate {
         let newtons = output.values.map(|part| part as f32 * 1e-6);
         let place_mm = output.place.map(|part| part as f32 * 1e-3);
         let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
-        let observed = self.observed(forward, markers);
+        let observed = self.observed(forward, markers, blur);
         forward.estimate(&observed, &self.mounting, guess)
     }
 
@@ -124,10 +132,16 @@ impl Resting {
         &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
-        markers: &[Marker; 4],
+        markers: (&[Marker; 4], Px),
         output: &Output,
     ) -> (Force, Status) {
-        self.told(forward, range, &self.estimate(forward, markers, output))
+        let estimate = self.estimate(forward, markers, output);
+        let (force, mut status) = self.told(forward, range, &estimate);
+        let (_, blur) = markers;
+        if blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED {
+            status |= Status::UNEXPLAINED;
+        }
+        (force, status)
     }
 
     /// What a sample says of a load that was found.

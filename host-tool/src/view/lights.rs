@@ -128,6 +128,10 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "no single contact explains where the markers are",
             "press with one tip; at rest, take a new tare",
         ),
+        Status::FRAME_DISTURBED => (
+            "specks or little light disturb the picture: the force is less certain",
+            "clean film and lens; look at the light, then find the exposure anew: hivtac expose",
+        ),
         _ => (
             "this tool does not know of it",
             "use the hivtac of the firmware's release",

@@ -161,6 +161,7 @@ pub fn settings(mask: &Mask, dilations: u8, min_area: u32) -> ScanSettings {
         min_area,
         weighted: false,
         max_runs: u32::MAX,
+        cleaned: false,
     }
 }
 

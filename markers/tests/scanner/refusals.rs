@@ -16,6 +16,7 @@ fn missing_extra_and_wrong_rows_make_a_frame_incomplete() {
         min_area: 1,
         weighted: false,
         max_runs: u32::MAX,
+        cleaned: false,
     };
     let status = |rows: &[usize]| {
         let mut scanner = Scanner::<4>::new();
@@ -121,6 +122,7 @@ fn settings_out_of_range_are_named() {
         min_area: 0,
         weighted: false,
         max_runs: u32::MAX,
+        cleaned: false,
     };
     let mut scanner = Scanner::<1>::new();
     assert_eq!(scanner.begin(good), Ok(()));

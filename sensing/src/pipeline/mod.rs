@@ -1,5 +1,6 @@
 //! Rows in, measurement out.
 
+mod again;
 mod ahead;
 #[cfg(test)]
 mod marker_tests;
@@ -9,6 +10,7 @@ mod tests;
 
 use crate::known_answer::{self, Answer};
 use crate::motion::Motion;
+use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_force::features::Features;
 use hivtac_force::force::{self, Force, Resting};
@@ -26,6 +28,7 @@ use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
+use hivtac_terms::units::Px;
 
 /// What one frame gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -46,7 +49,7 @@ const SATURATED_PART: u32 = 2;
 /// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
 /// up in a `T`.
 ///
-/// It holds all its storage, about 74 KiB and the table (64 KiB), so build it where it shall stay:
+/// It holds all its storage, about 76 KiB and the table (64 KiB), so build it where it shall stay:
 /// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
 /// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
 /// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
@@ -63,6 +66,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     prepared: Option<Prepared>,
     ahead: Ahead,
     motion: Motion,
+    look: Look,
 }
 
 /// What follows from settings, model and tare before there is a frame.
@@ -97,6 +101,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             prepared: None,
             ahead: Ahead::Off,
             motion: Motion::GLOBAL,
+            look: Look::First,
         }
     }
 
@@ -177,6 +182,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Starts a frame and forgets the one before, but for where its markers were.
     pub fn begin_frame(&mut self) {
+        self.motion.begin_frame();
+        self.look = Look::First;
         // An error cannot happen after `configure`, and makes every frame incomplete before it.
         let _ = self.scanner.begin(self.settings.scan());
         self.ahead = Ahead::Nothing;
@@ -210,10 +217,26 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.finish_frame()
     }
 
+    /// The same, and [looks again](Self::look_again) when that may help.
+    pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
+        let measurement = self.measure_frame(frame);
+        if !self.look_again() {
+            return measurement;
+        }
+        self.push_rows(frame);
+        self.finish_frame()
+    }
+
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
+        if let Look::Again(first) = self.look {
+            return self.finish_look(&first);
+        }
         let measurement = self.measure_scanned();
         self.motion.ended(measurement.markers.as_ref());
+        if self.wants_again(&measurement) {
+            self.look = Look::Wanted(measurement);
+        }
         measurement
     }
 
@@ -275,6 +298,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Works out anew what follows from settings, model and tare.
     fn prepare(&mut self) {
         self.ahead = Ahead::Off;
+        self.look = Look::First;
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self
@@ -366,7 +390,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .as_ref()
             .and_then(|prepared| prepared.resting.as_ref());
         let (force, trust) = match model.forward.as_ref().zip(resting) {
-            Some((forward, resting)) => resting.force(forward, &model.range, markers, &output),
+            Some((forward, resting)) => {
+                let blur = match self.look {
+                    Look::Again(..) => BLUR,
+                    Look::First | Look::Wanted(_) => Px(0),
+                };
+                resting.force(forward, &model.range, (markers, blur), &output)
+            }
             None => force::of_outputs(model, &output),
         };
         *status |= trust;

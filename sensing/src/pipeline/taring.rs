@@ -1,6 +1,6 @@
 //! The frame that was measured, as one of those that make a rest position.
 
-use super::{Measurement, Sensor};
+use super::{Look, Measurement, Sensor};
 use crate::tare::{Refusal, TareBuilder};
 use hivtac_force::rest::Rest;
 use hivtac_markers::tables::Table;
@@ -15,6 +15,10 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         tare: &mut TareBuilder,
         measurement: &Measurement,
     ) -> Option<Result<Rest, Refusal>> {
+        // The blobs of another look are no rest position's.
+        if matches!(self.look, Look::Again(..)) {
+            return None;
+        }
         let markers = measurement.markers.as_ref()?;
         let features = measurement.features.as_ref()?;
         let found = self.find_markers().ok()?;

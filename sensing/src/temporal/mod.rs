@@ -127,11 +127,13 @@ impl Temporal {
                 status |= bit;
             }
         }
+        // The markers of another mask are no rest position's.
+        let is_disturbed = measurement.status.contains(Status::FRAME_DISTURBED);
         let rest = rezero.and_then(|rezero| {
             let untouched = measurement
                 .features
                 .as_ref()
-                .filter(|_| touched == Some(false));
+                .filter(|_| touched == Some(false) && !is_disturbed);
             self.rezeroing.follow(&rezero, at.time_us, untouched)
         });
         Followed {

@@ -4,7 +4,7 @@
 //! While nothing has touched the film for long enough, each coordinate of the rest position goes
 //! towards where the markers are, the mean of a second, by no more than a rate; never farther from
 //! where it was taken than a total. It goes nowhere during a contact, nor in frames without a
-//! force.
+//! force or with [`frame_disturbed`](hivtac_terms::status::Status::FRAME_DISTURBED).
 //!
 //! A force that is too small to be a contact looks like drift. What grows no faster than the rate
 //! is followed, and so missing in every force from then on: up to the total, and no more. What

@@ -216,6 +216,26 @@ impl Tared<'_> {
     /// # Errors
     /// When the film cannot take the press.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
+        self.said(unit, load, number, measure)
+    }
+
+    /// The same of a sensor that looks again at a frame that it refuses.
+    ///
+    /// # Errors
+    /// When the film cannot take the press.
+    pub fn answer_closely(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
+        self.said(unit, load, number, |sensor, frame| {
+            sensor.measure_frame_closely(&frame.words())
+        })
+    }
+
+    fn said(
+        &mut self,
+        unit: &TestedUnit,
+        load: Load,
+        number: u64,
+        measure: impl Fn(&mut Sensor<'_>, &Frame) -> Measurement,
+    ) -> Result<Answer> {
         let frame = unit.scene.render_load(&unit.with_tip(load)?, number)?;
         let seen = measure(&mut self.sensor, &frame);
         let off = |k: usize| {

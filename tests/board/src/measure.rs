@@ -151,6 +151,7 @@ fn scan(
         min_area: 1,
         weighted: false,
         max_runs: u32::MAX,
+        cleaned: false,
     };
     let pixels = sensor.pixels();
     let begun = scanner.begin(settings);

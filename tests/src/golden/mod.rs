@@ -170,6 +170,7 @@ impl<'b> Runner<'b> {
             min_area,
             weighted: self.sent.weighted,
             max_runs: u32::MAX,
+            cleaned: false,
         };
         self.scanner.begin(settings).map_err(ScriptError::Scan)?;
         let (scanner, pixels) = (&mut self.scanner, &self.pixels);
@@ -245,7 +246,7 @@ impl<'b> Runner<'b> {
         counting_begins();
         let features = Features::of_markers(&markers);
         let output = network.run(&model, &features, &rest.features);
-        let found = resting.force(forward, &model.range, &markers, &output);
+        let found = resting.force(forward, &model.range, (&markers, Px(0)), &output);
         counting_ends();
         say(results, self.cases, format_args!("{found:?}"))
     }

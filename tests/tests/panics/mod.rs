@@ -93,7 +93,7 @@ const REASONS: [(&str, usize, &str); 20] = [
     ),
     (
         "hivtac_firmware",
-        4,
+        5,
         "at the start only: tasks are spawned once, and the settings are constants that the \
          model's proof fits",
     ),

@@ -1,0 +1,381 @@
+//! Frames that are not perfect: how many keep their force, and whether any is wrong without a word.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, anyhow};
+use clap::Args;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
+use hivtac_calibration::weights::Weights;
+use hivtac_scene::{Format, MARKERS, Options, Paint, Patch, Salt, Specks};
+use hivtac_sensing::force::Force;
+use hivtac_sensing::model::Model;
+use hivtac_terms::status::Status;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::anywhere::WEIGHTS;
+use crate::page;
+use crate::press::{Answer, Off, REACH_MM, TestedUnit, press_of_any};
+
+/// The least |F|, N: what counts as a contact.
+const LEAST_N: f64 = 0.002;
+/// The largest, N.
+const MOST_N: f64 = 0.2;
+/// A marker that is farther off without a word is silently wrong, px.
+const WRONG_PX: f64 = 0.3;
+/// So is a force that is off by more than so many of its stated standard uncertainties, when that
+/// is more than a hand feels: of the direction, degrees, of |F|, mN, and of the place, µm.
+const WRONG_SIGMAS: f64 = 3.0;
+const NO_FAULT: [f64; 3] = [5.0, 5.0, 250.0];
+/// Presses that one sensor sees.
+const CHUNK: u32 = 125;
+/// Scenes of a case in which something lies at a random place.
+const VARIANTS: u32 = 24;
+
+/// Show the sensor frames that are not perfect, one disturbance at a time.
+#[derive(Args)]
+pub struct Refused {
+    /// A weights file of a network that tells places, with its film.
+    #[arg(long, default_value = WEIGHTS)]
+    weights: PathBuf,
+    /// Frames of each case.
+    #[arg(long, default_value_t = 10_000)]
+    frames: u32,
+    /// Only the cases whose names contain this.
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Print one JSON object and write no page.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What disturbs frames.
+struct Case {
+    name: &'static str,
+    /// Whether its frames are good enough for a force.
+    is_good: bool,
+    /// Of one of [`VARIANTS`] scenes.
+    options: fn(u32) -> Options,
+}
+
+/// What became of the frames of a case.
+#[derive(Default, Serialize)]
+struct Row {
+    case: String,
+    is_good: bool,
+    frames: u32,
+    /// With a force by the first look, and by the second.
+    looks: [Kept; 2],
+    /// The rest, by what refused them.
+    refused: std::collections::BTreeMap<&'static str, u32>,
+}
+
+/// Frames with a force.
+#[derive(Default, Serialize)]
+struct Kept {
+    frames: u32,
+    /// With a marker more than 0.3 px off.
+    wrong_px: u32,
+    /// With a force off by more than three stated standard uncertainties.
+    beyond_three_sigmas: u32,
+    /// Of these, by more than a hand feels.
+    wrong_force: u32,
+    /// The largest distance of a marker from its place, px.
+    worst_px: f64,
+    /// Of coordinates of markers, px, summed.
+    squares: f64,
+    /// The largest error in stated standard uncertainties: of direction, |F| and place.
+    worst_sigmas: [f64; 3],
+}
+
+/// Something round at a place around a marker's middle: which marker and which way is the
+/// variant's.
+fn patch_at(variant: u32, far_mm: f64, radius_mm: f64, paint: Paint) -> Options {
+    let [x, y] = MARKERS[variant as usize % 4].centre_mm;
+    let (sin, cos) = (f64::from(variant) * 2.399_963).sin_cos();
+    Options {
+        patches: vec![Patch {
+            centre_mm: [x + far_mm * cos, y + far_mm * sin],
+            radius_mm,
+            paint,
+        }],
+        ..Options::default()
+    }
+}
+
+fn salt(fraction: f64) -> Options {
+    let paint = Paint::Red;
+    Options {
+        salt: Salt { fraction, paint },
+        ..Options::default()
+    }
+}
+
+fn gain(gain: f64) -> Options {
+    Options {
+        gain,
+        ..Options::default()
+    }
+}
+
+const CASES: [Case; 17] = [
+    Case {
+        name: "nothing",
+        is_good: true,
+        options: |_| Options::default(),
+    },
+    Case {
+        name: "0.1 % red salt",
+        is_good: true,
+        options: |_| salt(0.001),
+    },
+    Case {
+        name: "1 % red salt",
+        is_good: true,
+        options: |_| salt(0.01),
+    },
+    Case {
+        name: "glare of 0.1 mm on a rim",
+        is_good: true,
+        options: |variant| patch_at(variant, 0.45, 0.1, Paint::Glare),
+    },
+    Case {
+        name: "2,000 red specks of 0.05 mm",
+        is_good: true,
+        options: |_| Options {
+            specks: Specks {
+                count: 2000,
+                radius_mm: 0.05,
+            },
+            ..Options::default()
+        },
+    },
+    Case {
+        name: "light × 0.28",
+        is_good: true,
+        options: |_| gain(0.28),
+    },
+    Case {
+        name: "light × 0.2",
+        is_good: true,
+        options: |_| gain(0.2),
+    },
+    Case {
+        name: "noise × 4",
+        is_good: true,
+        options: |_| Options {
+            noise: 4.0 * Options::default().noise,
+            ..Options::default()
+        },
+    },
+    Case {
+        name: "JPEG of quality 85",
+        is_good: true,
+        options: |_| Options {
+            format: Format::Jpeg { quality: 85 },
+            ..Options::default()
+        },
+    },
+    Case {
+        name: "2 % red salt",
+        is_good: true,
+        options: |_| salt(0.02),
+    },
+    Case {
+        name: "5 % red salt",
+        is_good: true,
+        options: |_| salt(0.05),
+    },
+    Case {
+        name: "light × 0.15",
+        is_good: true,
+        options: |_| gain(0.15),
+    },
+    Case {
+        name: "light × 0.1",
+        is_good: true,
+        options: |_| gain(0.1),
+    },
+    Case {
+        name: "glare of 0.1 mm on a marker",
+        is_good: true,
+        options: |variant| patch_at(variant, 0.05, 0.1, Paint::Glare),
+    },
+    Case {
+        name: "glare of 0.25 mm on a rim",
+        is_good: false,
+        options: |variant| patch_at(variant, 0.4, 0.25, Paint::Glare),
+    },
+    Case {
+        name: "a red disc half over a marker",
+        is_good: false,
+        options: |variant| patch_at(variant, 0.5, 0.5, Paint::Red),
+    },
+    Case {
+        name: "a red disc of a quarter of a marker's size on its rim",
+        is_good: false,
+        options: |variant| patch_at(variant, 0.5, 0.25, Paint::Red),
+    },
+];
+
+impl Refused {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// When a file cannot be read or written, or a press cannot be made.
+    pub fn run(&self) -> Result<()> {
+        let bytes = export(&Weights::load(&self.weights)?)?;
+        let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+        let cases = CASES.iter().filter(|case| case.name.contains(&self.only));
+        let rows: Vec<Row> = cases
+            .map(|case| self.case(&model, case))
+            .collect::<Result<_>>()?;
+        if self.json {
+            return page::print_rows(&rows);
+        }
+        let mut text = String::from(
+            "| frames with | kept | by the second look | marker, rms and worst: first look | \
+             second | farther than 0.3 px: first | second | beyond 3 σ (worst of direction, \
+             \\|F\\|, place): first | second | wrong force: first | second | refused by \
+             |\n|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|\n",
+        );
+        text.extend(rows.iter().map(Row::line));
+        print!("{text}");
+        page::write("refused.md", include_str!("refused.md"), &text)
+    }
+
+    fn case(&self, model: &Model<'_>, case: &Case) -> Result<Row> {
+        let nominal = TestedUnit::new(&model.conditions, Options::default(), 0.5, 1)?;
+        let chunks = (0..self.frames.div_ceil(CHUNK)).into_par_iter();
+        let rows = chunks.map(|chunk| {
+            let to = (CHUNK * (chunk + 1)).min(self.frames);
+            let options = (case.options)(chunk % VARIANTS);
+            // Noise, salt and specks are another seed's.
+            let seed = u64::from(1 + chunk % VARIANTS);
+            let unit = TestedUnit::new(&model.conditions, options, 0.5, seed)?;
+            let mut tared = nominal.tare(model)?;
+            let mut row = Row::default();
+            for number in CHUNK * chunk..to {
+                let load = press_of_any(number, [LEAST_N, MOST_N], REACH_MM)?;
+                if unit.shows_all(&load)? {
+                    row.take(&tared.answer_closely(&unit, load, number.into())?)?;
+                }
+            }
+            Ok(row)
+        });
+        let rows: Vec<Row> = rows.collect::<Result<_>>()?;
+        let first = Row {
+            case: case.name.to_owned(),
+            is_good: case.is_good,
+            ..Row::default()
+        };
+        Ok(rows.into_iter().fold(first, Row::and))
+    }
+}
+
+impl Row {
+    fn take(&mut self, answer: &Answer) -> Result<()> {
+        self.frames += 1;
+        let Some(force) = &answer.force else {
+            for name in answer.refusals() {
+                *self.refused.entry(name).or_default() += 1;
+            }
+            return Ok(());
+        };
+        let look = usize::from(answer.status.contains(Status::FRAME_DISTURBED));
+        self.looks[look].take(answer, force)
+    }
+
+    fn and(mut self, other: Row) -> Row {
+        self.frames += other.frames;
+        for (kept, other) in self.looks.iter_mut().zip(&other.looks) {
+            kept.add(other);
+        }
+        for (name, count) in other.refused {
+            *self.refused.entry(name).or_default() += count;
+        }
+        self
+    }
+
+    fn line(&self) -> String {
+        let percent = |part: u32| 100.0 * f64::from(part) / f64::from(self.frames);
+        let refused: Vec<String> = self
+            .refused
+            .iter()
+            .map(|(name, count)| format!("`{name}` {:.1} %", percent(*count)))
+            .collect();
+        let [first, second] = &self.looks;
+        let kept = format!(
+            "| {} | {:.2} % of {} | {:.1} % ",
+            self.case,
+            percent(first.frames + second.frames),
+            self.frames,
+            percent(second.frames)
+        );
+        let both = |cell: fn(&Kept) -> String| format!("| {} | {} ", cell(first), cell(second));
+        [
+            kept,
+            both(Kept::px),
+            both(|kept| kept.wrong_px.to_string()),
+            both(Kept::sigmas),
+            both(|kept| kept.wrong_force.to_string()),
+            format!("| {} |\n", refused.join(", ")),
+        ]
+        .concat()
+    }
+}
+
+impl Kept {
+    fn take(&mut self, answer: &Answer, force: &Force) -> Result<()> {
+        self.frames += 1;
+        let off_px = answer.off_px.unwrap_or([[f64::INFINITY; 2]; 4]);
+        let far_px = off_px
+            .iter()
+            .fold(0.0, |far: f64, [x, y]| far.max(x.hypot(*y)));
+        self.worst_px = self.worst_px.max(far_px);
+        self.wrong_px += u32::from(far_px > WRONG_PX);
+        self.squares += off_px.iter().flatten().map(|off| off * off).sum::<f64>();
+        let off = Off::of(force, &answer.load)?;
+        let bounds = [DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND];
+        let sigmas: [f64; 3] = std::array::from_fn(|k| off.errors[k] / off.bounds[k] * bounds[k]);
+        for (worst, sigmas) in self.worst_sigmas.iter_mut().zip(sigmas) {
+            *worst = worst.max(sigmas);
+        }
+        let beyond = sigmas.map(|sigmas| sigmas > WRONG_SIGMAS);
+        self.beyond_three_sigmas += u32::from(beyond.contains(&true));
+        let felt = (0..3).any(|k| beyond[k] && off.errors[k] > NO_FAULT[k]);
+        self.wrong_force += u32::from(felt);
+        Ok(())
+    }
+
+    fn add(&mut self, other: &Kept) {
+        self.frames += other.frames;
+        self.wrong_px += other.wrong_px;
+        self.beyond_three_sigmas += other.beyond_three_sigmas;
+        self.wrong_force += other.wrong_force;
+        self.worst_px = self.worst_px.max(other.worst_px);
+        self.squares += other.squares;
+        for (worst, other) in self.worst_sigmas.iter_mut().zip(other.worst_sigmas) {
+            *worst = worst.max(other);
+        }
+    }
+
+    /// Root mean square of a coordinate of a marker, and the largest distance.
+    fn px(&self) -> String {
+        if self.frames == 0 {
+            return "–".to_owned();
+        }
+        let rms = (self.squares / f64::from(8 * self.frames)).sqrt();
+        format!("{rms:.3}, {:.2} px", self.worst_px)
+    }
+
+    fn sigmas(&self) -> String {
+        let [direction, magnitude, place] = self.worst_sigmas;
+        let beyond = self.beyond_three_sigmas;
+        if self.frames == 0 {
+            return "–".to_owned();
+        }
+        format!("{beyond} ({direction:.1}, {magnitude:.1}, {place:.1})")
+    }
+}

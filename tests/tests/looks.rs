@@ -1,0 +1,103 @@
+//! Frames that are looked at again: disturbed ones keep their force, within what it states; what
+//! hides too much of a marker stays refused; good frames are looked at once.
+
+use hivtac_scene::{MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Specks};
+use hivtac_terms::status::Status;
+use hivtac_tests::judged::{Contacts, Judged};
+use hivtac_tests::models;
+use hivtac_tests::pictures::Random;
+use hivtac_tests::tared::TaredSensor;
+
+const PRESSES: Contacts = Contacts {
+    force_n: [0.01, 0.15],
+    ratio: 0.14,
+    place_mm: 4.0,
+};
+const FRAMES: u64 = 60;
+
+/// How many frames have a force, and how many of these by the second look; none is wrong.
+fn kept(options: Options) -> (u32, u32) {
+    let mut sensor = TaredSensor::of_model(models::anywhere(1)).unwrap();
+    let mut in_bands = TaredSensor::of_model(models::anywhere(1)).unwrap();
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
+    let scene = scene.with_options(options).unwrap();
+    let mut random = Random::new(29);
+    let (mut forces, mut second) = (0, 0);
+    for number in 0..FRAMES {
+        let load = PRESSES.draw(&mut random).unwrap();
+        let frame = scene.render_load(&load, number).unwrap();
+        let seen = sensor.sense(&frame);
+        assert_eq!(seen, in_bands.sense_in_bands(&frame, 8), "{load:?}");
+        if let Judged::Wrong(how) = Judged::of(&seen, &frame.truth) {
+            panic!("{how}");
+        }
+        forces += u32::from(seen.force.is_some());
+        let looked = seen.status.contains(Status::FRAME_DISTURBED);
+        second += u32::from(looked && seen.force.is_some());
+    }
+    println!("{forces} of {FRAMES}, {second} second");
+    (forces, second)
+}
+
+fn salt(fraction: f64) -> Options {
+    let paint = Paint::Red;
+    Options {
+        salt: Salt { fraction, paint },
+        ..Options::default()
+    }
+}
+
+fn patched(far_mm: f64, radius_mm: f64, paint: Paint) -> Options {
+    let [x, y] = MARKERS[2].centre_mm;
+    Options {
+        patches: vec![Patch {
+            centre_mm: [x + far_mm, y],
+            radius_mm,
+            paint,
+        }],
+        ..Options::default()
+    }
+}
+
+#[test]
+fn good_frames_are_looked_at_once() {
+    assert_eq!(kept(Options::default()), (FRAMES as u32, 0));
+}
+
+#[test]
+fn salt_and_specks_are_taken_out() {
+    let specks = Specks {
+        count: 2000,
+        radius_mm: 0.05,
+    };
+    let specks = Options {
+        specks,
+        ..Options::default()
+    };
+    for options in [salt(0.01), specks] {
+        let (forces, second) = kept(options);
+        assert!(forces >= 57 && second == forces, "{forces}");
+    }
+}
+
+#[test]
+fn markers_in_dim_light_are_found() {
+    for gain in [0.28, 0.2] {
+        let (forces, second) = kept(Options {
+            gain,
+            ..Options::default()
+        });
+        assert!(forces >= 57 && second == forces, "{gain}: {forces}");
+    }
+}
+
+#[test]
+fn what_hides_much_of_an_edge_or_grows_on_it_stays_refused() {
+    for options in [
+        patched(0.4, 0.25, Paint::Glare),
+        patched(0.5, 0.5, Paint::Red),
+        patched(0.5, 0.25, Paint::Red),
+    ] {
+        assert_eq!(kept(options), (0, 0));
+    }
+}
