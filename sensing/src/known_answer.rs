@@ -9,8 +9,8 @@ use crate::network::Network;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
-/// What a force says: α, β (m°), |F|, the vector (µN), two uncertainties (m°, µN), the place and its
-/// uncertainty (µm; 0 without a place).
+/// What a force says: α, β (m°), |F|, the vector (µN), two uncertainties (m°, µN), the place and
+/// its uncertainty (µm; 0 without a place).
 pub type Answer = [i32; 11];
 
 /// Markers move from their common centre by one part in this many of their distance.

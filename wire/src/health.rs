@@ -65,8 +65,8 @@ pub enum Problem {
     AnotherCamera = 9,
     /// A register of the camera did not hold what was written.
     CameraRegisters = 10,
-    /// Frames take another time than they should, by the device's own clock: that or the camera's is
-    /// wrong.
+    /// Frames take another time than they should, by the device's own clock: that or the camera's
+    /// is wrong.
     Clocks = 11,
     /// The built-in model's answer to a known question is another than on a computer.
     Arithmetic = 12,

@@ -142,8 +142,8 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> O
     Some(all != 0)
 }
 
-/// As [`portable::threshold_cr`](super::portable::threshold_cr) and whether any bit is set, for rows
-/// of 32 pixels for each word of a mask of pairs of words; `None` of others.
+/// As [`portable::threshold_cr`](super::portable::threshold_cr) and whether any bit is set, for
+/// rows of 32 pixels for each word of a mask of pairs of words; `None` of others.
 #[inline(always)]
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> Option<bool> {
     if !is_of_pairs(row, mask.len()) {
