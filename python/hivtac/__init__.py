@@ -22,6 +22,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -249,7 +250,16 @@ class Recording:
         return _sample(*numbers)
 
 
-def _sample(sequence, frame, time, host_time, bits, names, force, markers) -> Sample:
+def _sample(
+    sequence: int,
+    frame: int,
+    time: float,
+    host_time: float,
+    bits: int,
+    names: list[str],
+    force: Any,
+    markers: list[tuple[float, float, int]] | None,
+) -> Sample:
     vector, (alpha, beta), magnitude, direction_sigma, magnitude_sigma, place = force or (
         None,
         (None, None),

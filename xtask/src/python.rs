@@ -20,7 +20,7 @@ pub fn obstacle() -> Option<&'static str> {
     }
     environment().err().map(|error| {
         eprintln!("{error:#}");
-        "pip cannot install maturin and numpy: is PyPI within reach?"
+        "pip cannot install maturin, mypy and numpy: is PyPI within reach?"
     })
 }
 
@@ -31,10 +31,10 @@ fn folder() -> PathBuf {
 /// The Python of an environment that has what building and testing need.
 fn environment() -> Result<PathBuf> {
     let python = folder().join("bin/python");
-    if !process::succeeds(Command::new(&python).args(["-c", "import maturin, numpy"])) {
+    if !process::succeeds(Command::new(&python).args(["-c", "import maturin, mypy, numpy"])) {
         let mut venv = Command::new("python3");
         process::run(venv.args(["-m", "venv", "--clear"]).arg(folder()))?;
-        process::run(pip(&python).args(["maturin>=1.9,<2", "numpy"]))?;
+        process::run(pip(&python).args(["maturin>=1.9,<2", "mypy", "numpy"]))?;
     }
     Ok(python)
 }
@@ -52,10 +52,10 @@ fn pip(python: &Path) -> Command {
 }
 
 /// Installs the package as a user does, but in the profile of the other tests' programs, and runs
-/// its tests on the firmware in the rig.
+/// its tests on the firmware in the rig; its annotations are checked, too.
 ///
 /// # Errors
-/// When it cannot be built, or a test fails.
+/// When it cannot be built, an annotation is wrong, or a test fails.
 pub fn test(firmware: &Path, tally: &mut Tally) -> Result<()> {
     let python = environment()?;
     let mut install = pip(&python);
@@ -70,6 +70,16 @@ pub fn test(firmware: &Path, tally: &mut Tally) -> Result<()> {
     ]);
     install.env("MATURIN_PEP517_ARGS", "--profile tools");
     process::run(install.current_dir(workspace::root()))?;
+    let mut types = Command::new(&python);
+    types.args([
+        "-m",
+        "mypy",
+        "--strict",
+        "--cache-dir",
+        "target/mypy",
+        "python/hivtac",
+    ]);
+    process::run(types.current_dir(workspace::root()))?;
     let mut command = Command::new(&python);
     command
         .args(["-W", "error", "python/tests/test_hivtac.py"])
