@@ -258,9 +258,11 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             left -= rows;
         }
         // What ends a frame is weighed when it is finished.
-        let ends =
-            self.rows_in == self.settings.height && (self.settings.cleaned || !self.is_quiet());
-        if self.settings.weighted && (stay == Stay::Gone || ends) {
+        let ends = |scanner: &Self| {
+            let settings = &scanner.settings;
+            scanner.rows_in == settings.height && (settings.cleaned || !scanner.is_quiet())
+        };
+        if self.settings.weighted && (stay == Stay::Gone || ends(self)) {
             self.history.keep(band, self.rows_in, self.late());
         }
     }

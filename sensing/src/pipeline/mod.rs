@@ -229,9 +229,13 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
-        if let Look::Again(first) = self.look {
-            return self.finish_look(&first);
+        match self.look {
+            Look::Again(first) => self.finish_look(&first),
+            Look::First | Look::Wanted(_) => self.finish_first_look(),
         }
+    }
+
+    fn finish_first_look(&mut self) -> Measurement {
         let measurement = self.measure_scanned();
         self.motion.ended(measurement.markers.as_ref());
         if self.wants_again(&measurement) {
