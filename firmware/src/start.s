@@ -6,7 +6,6 @@
     .syntax unified
     .section .text.__pre_init, "ax", %progbits
     .global __pre_init
-    .weak   LOADER_WANTED           // a program that never asks has none
     .type __pre_init, %function
     .thumb_func
 __pre_init:

@@ -197,7 +197,13 @@ class WithoutASensor(unittest.TestCase):
         self.assertGreater(turns, 50)
 
     def test_ctrl_c_ends_a_wait(self):
-        program = "import sys, hivtac; print(flush=True); hivtac.open(sys.argv[1], timeout=60)"
+        # What runs in a shell's background ignores SIGINT, and so do its children.
+        program = (
+            "import signal, sys, hivtac\n"
+            "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+            "print(flush=True)\n"
+            "hivtac.open(sys.argv[1], timeout=60)\n"
+        )
         with silent() as port:
             process = subprocess.Popen(
                 [sys.executable, "-c", program, port],
