@@ -141,11 +141,10 @@ fn a_long_frame_is_told_and_costs_no_other() {
     assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
     let told = run.frames_after_a_loss();
     let missing = run.missing_frames();
-    assert_eq!(told.len(), stats.dropped_size as usize, "{told:?}");
-    assert!(
-        missing.iter().all(|frame| told.contains(&(frame + 1))),
-        "{missing:?} {told:?}"
-    );
+    // Two that follow each other are told by one sample, the next.
+    assert!((1..=stats.dropped_size as usize).contains(&told.len()));
+    let is_told = |frame: &u32| told.contains(&(frame + 1)) || missing.contains(&(frame + 1));
+    assert!(missing.iter().all(is_told), "{missing:?} {told:?}");
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
