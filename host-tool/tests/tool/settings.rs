@@ -218,12 +218,17 @@ fn a_reset_is_the_devices_own() {
     assert_eq!(commands(&device), [Request::Reset]);
 }
 
-/// What a device is told, and what it says that it keeps.
-fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
+/// What a device is told, and what the tool says.
+fn told(arguments: &[&str]) -> (Vec<Request>, String) {
     let device = device();
     let run = run(&[arguments, &["--port", &device.port]].concat());
     assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
-    let commands = commands(&device);
+    (commands(&device), run.stdout)
+}
+
+/// What a device is told, and what it says that it keeps.
+fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
+    let (commands, text) = told(arguments);
     let [Request::GetSettings, Request::SetTemporal(settings), keep] = &commands[..] else {
         panic!("{commands:?}");
     };
@@ -232,7 +237,7 @@ fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
         ..Selection::NONE
     };
     assert_eq!(*keep, Request::Keep(only_temporal));
-    (*settings, run.stdout)
+    (*settings, text)
 }
 
 #[test]
@@ -345,10 +350,7 @@ fn the_guide_shows_what_setting_prints() {
 
 /// What a device's camera is set to, and what the tool says that it keeps.
 fn camera_changed(arguments: &[&str]) -> (CameraSettings, String) {
-    let device = device();
-    let run = run(&[arguments, &["--port", &device.port]].concat());
-    assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
-    let commands = commands(&device);
+    let (commands, text) = told(arguments);
     let [
         Request::GetSettings,
         Request::SetCamera(settings),
@@ -363,7 +365,7 @@ fn camera_changed(arguments: &[&str]) -> (CameraSettings, String) {
         ..Selection::NONE
     };
     assert_eq!(*keep, Request::Keep(only_camera));
-    (*settings, run.stdout)
+    (*settings, text)
 }
 
 #[test]
