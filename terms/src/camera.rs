@@ -85,6 +85,17 @@ impl Rate {
     }
 }
 
+impl RateLimits {
+    /// Of so many frames a second, with the shortest and the longest exposure.
+    pub const fn new(frames_per_second: u16, [shortest, longest]: [Microseconds; 2]) -> RateLimits {
+        RateLimits {
+            frames_per_second,
+            shortest,
+            longest,
+        }
+    }
+}
+
 impl CameraLimits {
     /// Those at a rate.
     pub const fn at(&self, rate: Rate) -> RateLimits {
@@ -133,21 +144,9 @@ mod tests {
     use std::string::ToString;
 
     const LIMITS: CameraLimits = CameraLimits([
-        RateLimits {
-            frames_per_second: 156,
-            shortest: Microseconds(24),
-            longest: Microseconds(6_405),
-        },
-        RateLimits {
-            frames_per_second: 78,
-            shortest: Microseconds(47),
-            longest: Microseconds(12_810),
-        },
-        RateLimits {
-            frames_per_second: 39,
-            shortest: Microseconds(93),
-            longest: Microseconds(25_620),
-        },
+        RateLimits::new(156, [Microseconds(24), Microseconds(6_405)]),
+        RateLimits::new(78, [Microseconds(47), Microseconds(12_810)]),
+        RateLimits::new(39, [Microseconds(93), Microseconds(25_620)]),
     ]);
 
     fn exposed(us: u32, rate: Rate) -> CameraSettings {

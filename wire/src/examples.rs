@@ -197,11 +197,7 @@ pub fn longest_camera() -> CameraSettings {
 }
 
 fn longest_camera_report() -> CameraReport {
-    let limits = RateLimits {
-        frames_per_second: u16::MAX,
-        shortest: Microseconds(u32::MAX),
-        longest: Microseconds(u32::MAX),
-    };
+    let limits = RateLimits::new(u16::MAX, [Microseconds(u32::MAX); 2]);
     CameraReport {
         settings: longest_camera(),
         exposure: Microseconds(u32::MAX),
@@ -634,13 +630,10 @@ pub fn any_camera() -> impl Strategy<Value = CameraSettings> {
 }
 
 fn any_camera_report() -> impl Strategy<Value = CameraReport> {
-    let limits = any::<[(u16, u32, u32); 3]>();
+    let limits = any::<[(u16, [u32; 2]); 3]>();
     (any_camera(), any::<(u32, u16)>(), limits).prop_map(|(settings, (exposure, gain), limits)| {
-        let limits = limits.map(|(frames_per_second, shortest, longest)| RateLimits {
-            frames_per_second,
-            shortest: Microseconds(shortest),
-            longest: Microseconds(longest),
-        });
+        let limits =
+            limits.map(|(frames, exposures)| RateLimits::new(frames, exposures.map(Microseconds)));
         CameraReport {
             settings,
             exposure: Microseconds(exposure),

@@ -187,19 +187,14 @@ mod tests {
     use hivtac_terms::camera::{CameraLimits, RateLimits};
 
     fn report(settings: CameraSettings) -> CameraReport {
-        let limits = |frames_per_second, shortest, longest| RateLimits {
-            frames_per_second,
-            shortest: Microseconds(shortest),
-            longest: Microseconds(longest),
-        };
         CameraReport {
             settings,
             exposure: Microseconds(2_512),
             gain: Sixteenths(24),
             limits: CameraLimits([
-                limits(156, 24, 6_405),
-                limits(78, 47, 12_810),
-                limits(39, 93, 25_620),
+                RateLimits::new(156, [24, 6_405].map(Microseconds)),
+                RateLimits::new(78, [47, 12_810].map(Microseconds)),
+                RateLimits::new(39, [93, 25_620].map(Microseconds)),
             ]),
         }
     }

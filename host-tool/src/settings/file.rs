@@ -306,11 +306,7 @@ mod tests {
     use hivtac_wire::settings::CameraReport;
 
     fn camera() -> CameraReport {
-        let limits = RateLimits {
-            frames_per_second: 156,
-            shortest: Microseconds(24),
-            longest: Microseconds(6_405),
-        };
+        let limits = RateLimits::new(156, [24, 6_405].map(Microseconds));
         CameraReport {
             settings: CameraSettings {
                 exposure: Some(Microseconds(2_500)),

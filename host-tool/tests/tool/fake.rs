@@ -252,19 +252,14 @@ pub fn settings() -> SettingsReport {
 
 /// The camera as the light needs it.
 fn camera() -> CameraReport {
-    let limits = |frames_per_second, shortest, longest| RateLimits {
-        frames_per_second,
-        shortest: Microseconds(shortest),
-        longest: Microseconds(longest),
-    };
     CameraReport {
         settings: CameraSettings::default(),
         exposure: Microseconds(5_922),
         gain: Sixteenths(24),
         limits: CameraLimits([
-            limits(156, 24, 6_405),
-            limits(78, 47, 12_810),
-            limits(39, 93, 25_620),
+            RateLimits::new(156, [24, 6_405].map(Microseconds)),
+            RateLimits::new(78, [47, 12_810].map(Microseconds)),
+            RateLimits::new(39, [93, 25_620].map(Microseconds)),
         ]),
     }
 }
