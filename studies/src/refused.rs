@@ -119,104 +119,65 @@ fn gain(gain: f64) -> Options {
     }
 }
 
+/// One of which the force is wanted.
+const fn good(name: &'static str, options: fn(u32) -> Options) -> Case {
+    Case {
+        name,
+        is_good: true,
+        options,
+    }
+}
+
+/// One that shall be refused.
+const fn bad(name: &'static str, options: fn(u32) -> Options) -> Case {
+    Case {
+        name,
+        is_good: false,
+        options,
+    }
+}
+
 const CASES: [Case; 17] = [
-    Case {
-        name: "nothing",
-        is_good: true,
-        options: |_| Options::default(),
-    },
-    Case {
-        name: "0.1 % red salt",
-        is_good: true,
-        options: |_| salt(0.001),
-    },
-    Case {
-        name: "1 % red salt",
-        is_good: true,
-        options: |_| salt(0.01),
-    },
-    Case {
-        name: "glare of 0.1 mm on a rim",
-        is_good: true,
-        options: |variant| patch_at(variant, 0.45, 0.1, Paint::Glare),
-    },
-    Case {
-        name: "2,000 red specks of 0.05 mm",
-        is_good: true,
-        options: |_| Options {
-            specks: Specks {
-                count: 2000,
-                radius_mm: 0.05,
-            },
-            ..Options::default()
+    good("nothing", |_| Options::default()),
+    good("0.1 % red salt", |_| salt(0.001)),
+    good("1 % red salt", |_| salt(0.01)),
+    good("glare of 0.1 mm on a rim", |variant| {
+        patch_at(variant, 0.45, 0.1, Paint::Glare)
+    }),
+    good("2,000 red specks of 0.05 mm", |_| Options {
+        specks: Specks {
+            count: 2000,
+            radius_mm: 0.05,
         },
-    },
-    Case {
-        name: "light × 0.28",
-        is_good: true,
-        options: |_| gain(0.28),
-    },
-    Case {
-        name: "light × 0.2",
-        is_good: true,
-        options: |_| gain(0.2),
-    },
-    Case {
-        name: "noise × 4",
-        is_good: true,
-        options: |_| Options {
-            noise: 4.0 * Options::default().noise,
-            ..Options::default()
-        },
-    },
-    Case {
-        name: "JPEG of quality 85",
-        is_good: true,
-        options: |_| Options {
-            format: Format::Jpeg { quality: 85 },
-            ..Options::default()
-        },
-    },
-    Case {
-        name: "2 % red salt",
-        is_good: true,
-        options: |_| salt(0.02),
-    },
-    Case {
-        name: "5 % red salt",
-        is_good: true,
-        options: |_| salt(0.05),
-    },
-    Case {
-        name: "light × 0.15",
-        is_good: true,
-        options: |_| gain(0.15),
-    },
-    Case {
-        name: "light × 0.1",
-        is_good: true,
-        options: |_| gain(0.1),
-    },
-    Case {
-        name: "glare of 0.1 mm on a marker",
-        is_good: true,
-        options: |variant| patch_at(variant, 0.05, 0.1, Paint::Glare),
-    },
-    Case {
-        name: "glare of 0.25 mm on a rim",
-        is_good: false,
-        options: |variant| patch_at(variant, 0.4, 0.25, Paint::Glare),
-    },
-    Case {
-        name: "a red disc half over a marker",
-        is_good: false,
-        options: |variant| patch_at(variant, 0.5, 0.5, Paint::Red),
-    },
-    Case {
-        name: "a red disc of a quarter of a marker's size on its rim",
-        is_good: false,
-        options: |variant| patch_at(variant, 0.5, 0.25, Paint::Red),
-    },
+        ..Options::default()
+    }),
+    good("light × 0.28", |_| gain(0.28)),
+    good("light × 0.2", |_| gain(0.2)),
+    good("noise × 4", |_| Options {
+        noise: 4.0 * Options::default().noise,
+        ..Options::default()
+    }),
+    good("JPEG of quality 85", |_| Options {
+        format: Format::Jpeg { quality: 85 },
+        ..Options::default()
+    }),
+    good("2 % red salt", |_| salt(0.02)),
+    good("5 % red salt", |_| salt(0.05)),
+    good("light × 0.15", |_| gain(0.15)),
+    good("light × 0.1", |_| gain(0.1)),
+    good("glare of 0.1 mm on a marker", |variant| {
+        patch_at(variant, 0.05, 0.1, Paint::Glare)
+    }),
+    bad("glare of 0.25 mm on a rim", |variant| {
+        patch_at(variant, 0.4, 0.25, Paint::Glare)
+    }),
+    bad("a red disc half over a marker", |variant| {
+        patch_at(variant, 0.5, 0.5, Paint::Red)
+    }),
+    bad(
+        "a red disc of a quarter of a marker's size on its rim",
+        |variant| patch_at(variant, 0.5, 0.25, Paint::Red),
+    ),
 ];
 
 impl Refused {
