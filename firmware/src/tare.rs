@@ -26,8 +26,7 @@ impl Taring {
     /// For command `id`, over `frames` good frames; when the host `insists`, also while something
     /// moves or touches the film. `None` when that number is out of its range.
     pub fn begin(id: u16, frames: u16, insists: bool) -> Option<Self> {
-        let frame_us = camera::frame_us(camera::report().settings.rate);
-        let frame_time = Duration::from_micros(frame_us.into());
+        let frame_time = camera::frame_time(camera::report().settings.rate);
         let patience = frame_time * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
         let builder = TareBuilder::new(frames)?;
         Some(Self {

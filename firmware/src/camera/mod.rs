@@ -25,14 +25,34 @@ pub use {ov7725::*, ov7725_registers::Format};
 use crate::shared::{CAMERA, EXPOSURE_MIDDLE_US};
 use crate::vsync;
 use core::sync::atomic::Ordering;
+use embassy_time::{Duration, Instant};
 use hivtac_capture::Edge;
-use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
 
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
+
+/// What it can be set to.
+pub const LIMITS: CameraLimits = CameraLimits([
+    limits(Rate::Full),
+    limits(Rate::Half),
+    limits(Rate::Quarter),
+]);
+
+const fn limits(rate: Rate) -> RateLimits {
+    RateLimits::new((1_000_000 / frame_us(rate)) as u16, exposures(rate))
+}
+
+/// Exposure and gain are taken as they are after this time: ten frames at a slow rate.
+const PATIENCE: Duration = Duration::from_millis(300);
+
+/// Time from frame to frame.
+pub fn frame_time(rate: Rate) -> Duration {
+    Duration::from_micros(frame_us(rate).into())
+}
 
 /// How long frames take by the device's own clock, by the newest two that were looked at.
 #[derive(Default)]
@@ -59,6 +79,43 @@ impl Pace {
     /// How long the newest ones took, µs; nothing before there were two.
     pub fn frame_us(&self) -> Option<u32> {
         self.frame_us
+    }
+}
+
+/// A search for exposure and gain: over once they are the same for so many frames, or after
+/// [`PATIENCE`].
+struct Search<F> {
+    frames: u32,
+    begun: Instant,
+    /// What they are.
+    found: F,
+    /// Frames in a row for which they are that.
+    steady: u32,
+}
+
+impl<F: PartialEq> Search<F> {
+    /// Begins with what they are.
+    fn new(frames: u32, found: F) -> Self {
+        Self {
+            frames,
+            begun: Instant::now(),
+            found,
+            steady: 1,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.steady >= self.frames || self.begun.elapsed() >= PATIENCE
+    }
+
+    /// What they are a frame later.
+    fn look(&mut self, now: F) {
+        self.steady = if now == self.found {
+            self.steady + 1
+        } else {
+            1
+        };
+        self.found = now;
     }
 }
 

@@ -7,11 +7,11 @@ use super::mt9v034_registers::{
     ROW_CLOCKS, SHUTTER_WIDTH, TABLE, blank_rows, longest_exposure, rows_for,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Pace, Setting, store};
+use super::{Bus, Error, Pace, Search, Setting, frame_time, store};
 use crate::board::{CameraLines, XCLK_HZ};
-use embassy_time::{Duration, Instant, Timer};
+use embassy_time::{Duration, Timer};
 use hivtac_sensing::motion::Motion;
-use hivtac_terms::camera::{CameraLimits, CameraSettings, LEAST_GAIN, Rate, RateLimits};
+use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, Rate};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 
@@ -36,19 +36,12 @@ pub const fn frame_us(rate: Rate) -> u32 {
     rows_us(HEIGHT + blank_rows(rate))
 }
 
-/// What it can be set to: exposures of a row to the longest.
-pub const LIMITS: CameraLimits = CameraLimits([
-    limits(Rate::Full),
-    limits(Rate::Half),
-    limits(Rate::Quarter),
-]);
-
-const fn limits(rate: Rate) -> RateLimits {
-    RateLimits {
-        frames_per_second: (1_000_000 / frame_us(rate)) as u16,
-        shortest: Microseconds(rows_us(1) + 1),
-        longest: Microseconds(rows_us(longest_exposure(rate))),
-    }
+/// Shortest and longest exposure: a row to the longest.
+pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
+    [
+        Microseconds(rows_us(1) + 1),
+        Microseconds(rows_us(longest_exposure(rate))),
+    ]
 }
 
 /// PIXCLK edge on which data is stable.
@@ -63,8 +56,6 @@ const SETTLE: Duration = Duration::from_millis(20);
 /// Frames in a row with the same exposure and gain are steady. The control looks at every third
 /// frame.
 const STEADY_FRAMES: u32 = 9;
-/// Exposure and gain are taken as they are after this time.
-const PATIENCE: Duration = Duration::from_millis(300);
 /// The camera's control side.
 pub struct Camera {
     registers: Registers,
@@ -100,8 +91,8 @@ impl Camera {
         self.registers.write(RESET, 1_u16)
     }
 
-    /// Writes the register table after a reset, and sets it so, within [`LIMITS`]; returns when the
-    /// camera sends well exposed frames so.
+    /// Writes the register table after a reset, and sets it so, within [`LIMITS`](super::LIMITS);
+    /// returns when the camera sends well exposed frames so.
     pub async fn configure(
         &mut self,
         _format: Format,
@@ -112,7 +103,8 @@ impl Camera {
         self.set(settings).await
     }
 
-    /// Sets it so, within [`LIMITS`]; returns when it sends well exposed frames so.
+    /// Sets it so, within [`LIMITS`](super::LIMITS); returns when it sends well exposed
+    /// frames so.
     pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
         self.settings = settings;
         self.registers.set(rows_for(settings.rate)).await?;
@@ -121,7 +113,7 @@ impl Camera {
 
     /// Time from frame to frame.
     pub fn frame_time(&self) -> Duration {
-        Duration::from_micros(frame_us(self.settings.rate).into())
+        frame_time(self.settings.rate)
     }
 
     /// There is but one format.
@@ -142,16 +134,13 @@ impl Camera {
         self.registers
             .write(AEC_AGC_ENABLE, LOCKED | self.automatic())?;
         self.pace = Pace::default();
-        let begun = Instant::now();
-        let (mut found, mut steady) = (self.exposure()?, 1);
-        while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
+        let mut search = Search::new(STEADY_FRAMES, self.exposure()?);
+        while !search.is_over() {
             Timer::after(self.frame_time()).await;
             self.pace.look();
-            let now = self.exposure()?;
-            steady = if now == found { steady + 1 } else { 1 };
-            found = now;
+            search.look(self.exposure()?);
         }
-        self.take(found);
+        self.take(search.found);
         self.registers.set(&self.locked).await?;
         // What was set is in force from the next frame on.
         Timer::after(2 * self.frame_time()).await;

@@ -7,11 +7,11 @@ use super::ov7725_registers::{
     clock,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Pace, Setting, store};
+use super::{Bus, Error, Pace, Search, Setting, frame_time, store};
 use crate::board::{CameraLines, XCLK_HZ};
-use embassy_time::{Duration, Instant, Timer};
+use embassy_time::{Duration, Timer};
 use hivtac_sensing::motion::Motion;
-use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
+use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 
@@ -45,19 +45,12 @@ pub const fn frame_us(rate: Rate) -> u32 {
     (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
 }
 
-/// What it can be set to: exposures of a line to a frame.
-pub const LIMITS: CameraLimits = CameraLimits([
-    limits(Rate::Full),
-    limits(Rate::Half),
-    limits(Rate::Quarter),
-]);
-
-const fn limits(rate: Rate) -> RateLimits {
-    RateLimits {
-        frames_per_second: (1_000_000 / frame_us(rate)) as u16,
-        shortest: Microseconds(frame_us(rate).div_ceil(LINES as u32)),
-        longest: Microseconds(frame_us(rate)),
-    }
+/// Shortest and longest exposure: a line to a frame.
+pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
+    [
+        Microseconds(frame_us(rate).div_ceil(LINES as u32)),
+        Microseconds(frame_us(rate)),
+    ]
 }
 
 /// PCLK edge on which data is stable.
@@ -73,9 +66,6 @@ const SETTLE: Duration = Duration::from_millis(20);
 const FRAMES_TO_SETTLE: u32 = 10;
 /// Frames in a row with the same exposure and gain are steady.
 const STEADY_FRAMES: u32 = 3;
-/// Exposure and gain are taken as they are after this time: the data sheet's ten frames at its
-/// slowest rate.
-const PATIENCE: Duration = Duration::from_millis(300);
 /// The camera's control side.
 pub struct Camera {
     registers: Registers,
@@ -109,8 +99,8 @@ impl Camera {
         self.registers.write(COM7, COM7_RESET)
     }
 
-    /// Writes the register table after a reset, and sets it so, within [`LIMITS`]; returns when the
-    /// camera sends well exposed frames so.
+    /// Writes the register table after a reset, and sets it so, within [`LIMITS`](super::LIMITS);
+    /// returns when the camera sends well exposed frames so.
     pub async fn configure(
         &mut self,
         format: Format,
@@ -125,7 +115,8 @@ impl Camera {
         self.lock_exposure().await
     }
 
-    /// Sets it so, within [`LIMITS`]; returns when it sends well exposed frames so.
+    /// Sets it so, within [`LIMITS`](super::LIMITS); returns when it sends well exposed
+    /// frames so.
     pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
         let before = core::mem::replace(&mut self.settings, settings);
         if settings.rate != before.rate {
@@ -137,7 +128,7 @@ impl Camera {
 
     /// Time from frame to frame.
     pub fn frame_time(&self) -> Duration {
-        Duration::from_micros(self.frame_us().into())
+        frame_time(self.settings.rate)
     }
 
     fn frame_us(&self) -> u32 {
@@ -164,16 +155,13 @@ impl Camera {
         }
         self.registers.write(COM8, LOCKED | self.automatic())?;
         self.pace = Pace::default();
-        let begun = Instant::now();
-        let (mut found, mut steady) = (self.exposure()?, 1);
-        while steady < STEADY_FRAMES && begun.elapsed() < PATIENCE {
+        let mut search = Search::new(STEADY_FRAMES, self.exposure()?);
+        while !search.is_over() {
             Timer::after(self.frame_time()).await;
             self.pace.look();
-            let now = self.exposure()?;
-            steady = if now == found { steady + 1 } else { 1 };
-            found = now;
+            search.look(self.exposure()?);
         }
-        self.take(found);
+        self.take(search.found);
         self.registers.set(&self.locked).await?;
         let half_lines = 2 * LINES_TO_MIDDLE_ROW - self.lines();
         let middle_us = half_lines * self.frame_us() / (2 * u32::from(LINES));
