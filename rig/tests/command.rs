@@ -147,7 +147,9 @@ fn a_script_gives_bytes_truth_and_counters() {
     let read = |name: &str| std::fs::read(path(name)).unwrap();
     assert!(!read("out").is_empty());
     let stats: serde_json::Value = serde_json::from_slice(&read("stats")).unwrap();
-    assert_eq!(stats["virtual_s"], 0.2);
+    // A run ends with the instruction under way: a few nanoseconds after its time is over.
+    let virtual_s = stats["virtual_s"].as_f64().unwrap();
+    assert!((0.2..0.200_001).contains(&virtual_s), "{virtual_s}");
     assert_eq!(stats["usb"]["bytes_in"], read("out").len());
     let truth = String::from_utf8(read("truth")).unwrap();
     assert_eq!(
