@@ -2,13 +2,12 @@
 
 use anyhow::Result;
 use hivtac_sensing::features::Features;
-use hivtac_sensing::force::{self, Force, Resting};
+use hivtac_sensing::force::{self, Force, FrameNoise, Resting};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
 use hivtac_sensing::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::units::Px;
 
 use crate::dataset::Observation;
 use crate::weights::features_from_q16;
@@ -67,8 +66,9 @@ impl<'m> Chip<'m> {
             Marker { x, y, area }
         };
         let markers = std::array::from_fn(marker);
-        let estimate = resting.estimate(forward, (&markers, Px(0)), &output);
-        let (force, status) = resting.told(forward, &self.model.range, &estimate);
+        let noise = FrameNoise::AS_MODELLED;
+        let estimate = resting.estimate(forward, &markers, noise, &output);
+        let (force, status) = resting.told(forward, &self.model.range, noise, &estimate);
         Ok((force, status, estimate.looks))
     }
 }

@@ -208,7 +208,7 @@ impl PipelineTask {
         if band.index == 0 {
             self.busy_us = 0;
             if band.edge.number != self.newest.wrapping_add(1) {
-                self.sensor.forget_motion();
+                self.sensor.forget_frame();
             }
             self.sensor.begin_frame();
         }
@@ -323,7 +323,7 @@ impl PipelineTask {
     /// which frames pass.
     fn threshold_changed(&mut self) {
         self.follow();
-        self.sensor.forget_motion();
+        self.sensor.forget_frame();
         self.temporal.begin_anew();
         let mut missed = false;
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {

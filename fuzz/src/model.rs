@@ -9,7 +9,6 @@ use hivtac_force::network::Network;
 use hivtac_force::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;
-use hivtac_terms::units::Px;
 use hivtac_wire::frame::CRC32;
 
 use crate::markers;
@@ -91,7 +90,7 @@ fn force(model: &Model<'_>, rest: &Rest, markers: &[Marker; 4]) {
     let (force, _) = of_outputs(model, &output);
     is_sound(&force);
     if let (Some(forward), Some(resting)) = (&model.forward, Resting::of_model(model, rest)) {
-        let (force, _) = resting.force(forward, &model.range, (markers, Px(0)), &output);
+        let (force, _) = resting.force(forward, &model.range, markers, &output);
         is_sound(&force);
     }
 }

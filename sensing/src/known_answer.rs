@@ -26,9 +26,7 @@ pub fn of(model: &Model<'_>, network: &mut Network) -> Answer {
     let output = network.run(model, &features, &model.rest.features);
     let resting = Resting::of_model(model, &model.rest);
     let (force, _) = match model.forward.as_ref().zip(resting) {
-        Some((forward, resting)) => {
-            resting.force(forward, &model.range, (&markers, Px(0)), &output)
-        }
+        Some((forward, resting)) => resting.force(forward, &model.range, &markers, &output),
         None => force::of_outputs(model, &output),
     };
     let [x, y, z] = force.cartesian.map(|component| component.0);

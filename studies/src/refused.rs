@@ -7,7 +7,7 @@ use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::weights::Weights;
-use hivtac_scene::{Format, MARKERS, Options, Paint, Patch, Salt, Specks};
+use hivtac_scene::{Format, Load, MARKERS, Options, Paint, Patch, Salt, Specks};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::Model;
 use hivtac_terms::status::Status;
@@ -28,8 +28,15 @@ const WRONG_PX: f64 = 0.3;
 /// is more than a hand feels: of the direction, degrees, of |F|, mN, and of the place, µm.
 const WRONG_SIGMAS: f64 = 3.0;
 const NO_FAULT: [f64; 3] = [5.0, 5.0, 250.0];
-/// Presses that one sensor sees.
-const CHUNK: u32 = 125;
+/// Frames that one sensor sees.
+const CHUNK: u32 = 400;
+/// Frames of each before they count: 0.2 s at 156 frames a second, in which the sensor comes to
+/// know how noisy they are.
+const UNCOUNTED: u32 = 32;
+/// Frames on the way from one press to the next.
+const ON_THE_WAY: u32 = 16;
+/// The first press: no limit was chosen by it or those after it.
+const FIRST: u32 = 50_000;
 /// Scenes of a case in which something lies at a random place.
 const VARIANTS: u32 = 24;
 
@@ -87,6 +94,18 @@ struct Kept {
     squares: f64,
     /// The largest error in stated standard uncertainties: of direction, |F| and place.
     worst_sigmas: [f64; 3],
+}
+
+/// What presses in a frame of a way from press to press.
+fn on_the_way(frame: u32) -> Result<Load> {
+    let press = FIRST + frame / ON_THE_WAY;
+    let [from, to] = [press, press + 1].map(|k| press_of_any(k, [LEAST_N, MOST_N], REACH_MM));
+    let (from, to) = (from?, to?);
+    let part = f64::from(frame % ON_THE_WAY) / f64::from(ON_THE_WAY);
+    let between = |from: f64, to: f64| from + part * (to - from);
+    let vector_n = std::array::from_fn(|k| between(from.vector_n()[k], to.vector_n()[k]));
+    let offset_mm = std::array::from_fn(|k| between(from.offset_mm()[k], to.offset_mm()[k]));
+    Ok(Load::from_vector(vector_n)?.with_offset_mm(offset_mm)?)
 }
 
 /// Something round at a place around a marker's middle: which marker and which way is the
@@ -213,14 +232,20 @@ impl Refused {
             let to = (CHUNK * (chunk + 1)).min(self.frames);
             let options = (case.options)(chunk % VARIANTS);
             // Noise, salt and specks are another seed's.
-            let seed = u64::from(1 + chunk % VARIANTS);
+            let seed = u64::from(FIRST + chunk);
             let unit = TestedUnit::new(&model.conditions, options, 0.5, seed)?;
             let mut tared = nominal.tare(model)?;
             let mut row = Row::default();
-            for number in CHUNK * chunk..to {
-                let load = press_of_any(number, [LEAST_N, MOST_N], REACH_MM)?;
-                if unit.shows_all(&load)? {
-                    row.take(&tared.answer_closely(&unit, load, number.into())?)?;
+            let from = CHUNK * chunk;
+            let begins = (CHUNK + UNCOUNTED) * chunk;
+            for number in begins..begins + UNCOUNTED + to - from {
+                let load = on_the_way(number)?;
+                if !unit.shows_all(&load)? {
+                    continue;
+                }
+                let answer = tared.answer_next(&unit, load, number.into())?;
+                if number >= begins + UNCOUNTED {
+                    row.take(&answer)?;
                 }
             }
             Ok(row)

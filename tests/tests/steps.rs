@@ -1,7 +1,7 @@
 //! The film run forwards, by the committed model: it finds the contact that moves the markers so,
 //! refuses what none does, and survives anything.
 
-use hivtac_sensing::force::{Force, Resting};
+use hivtac_sensing::force::{Force, FrameNoise, Resting};
 use hivtac_sensing::forward::{Forward, Markers, Pose, STEPS_AT_MOST};
 use hivtac_sensing::model::encode::FORWARD_OFFSET;
 use hivtac_sensing::model::{Model, ModelError};
@@ -43,7 +43,7 @@ fn answer(model: &Model<'_>, markers: &[Marker; 4], guess: [i32; 5]) -> (Force, 
     };
     let resting = Resting::of_model(model, &model.rest).unwrap();
     let forward = model.forward.as_ref().unwrap();
-    resting.force(forward, &model.range, (markers, Px(0)), &output)
+    resting.force(forward, &model.range, markers, &output)
 }
 
 /// From guesses that are a millimetre and a fifth of the force off, and from the middle of the
@@ -138,7 +138,9 @@ fn a_bad_guess_takes_more_steps() {
                 place,
                 input_saturated: false,
             };
-            resting.estimate(forward, (markers, Px(0)), &output).looks
+            resting
+                .estimate(forward, markers, FrameNoise::AS_MODELLED, &output)
+                .looks
         };
         assert_eq!(looks(&markers, [1_500, -2_000]), 1 + steps);
         assert!((3..=7).contains(&looks(&markers, [0, 0])));

@@ -1,6 +1,6 @@
 //! The force that explains the markers best, by the film run forwards.
 
-use super::{Force, Place, Polar, trust};
+use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::forward::{
     Column, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Systematic,
     Tolerance,
@@ -11,7 +11,7 @@ use crate::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before there is a frame.
@@ -76,11 +76,16 @@ impl Resting {
     }
 
     /// How markers moved from there.
-    fn observed(&self, forward: &Forward<'_>, markers: &[Marker; 4], blur: Px) -> Observed {
+    fn observed(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker; 4],
+        frame: FrameNoise,
+    ) -> Observed {
         let mut moved: Column = [0.0; 8];
         let mut sigma = [0.0; 8];
         let scale = self.mounting.scale();
-        let blur = scale * blur.to_f32();
+        let blur = scale * frame.blur.to_f32();
         for (k, marker) in markers.iter().enumerate() {
             let [x, y] = self.px[k];
             let [x, y] = self
@@ -96,7 +101,7 @@ impl Resting {
             for i in [0, 1] {
                 let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
-                let seen = scale * at_rest_px[i] * growth.max(0.1);
+                let seen = frame.times * scale * at_rest_px[i] * growth.max(0.1);
                 // What is wrong with another unit is more than noise, and no two markers share it.
                 let unknown = match self.other {
                     None => blur * blur,
@@ -111,50 +116,36 @@ impl Resting {
         Observed { moved, sigma }
     }
 
-    /// The load that explains the markers best, from the network's answer on. `blur` is a standard
-    /// uncertainty of each coordinate beside that of noise, 0 or more.
+    /// The load that explains the markers best, from the network's answer on.
     pub fn estimate(
         &self,
         forward: &Forward<'_>,
-        (markers, blur): (&[Marker; 4], Px),
+        markers: &[Marker; 4],
+        noise: FrameNoise,
         output: &Output,
     ) -> Estimate {
         let newtons = output.values.map(|part| part as f32 * 1e-6);
         let place_mm = output.place.map(|part| part as f32 * 1e-3);
         let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
-        let observed = self.observed(forward, markers, blur);
+        let observed = self.observed(forward, markers, noise);
         forward.estimate(&observed, &self.mounting, guess)
     }
 
-    /// The force of [`Self::estimate`]; [`Status::UNEXPLAINED`] when it explains the markers badly,
-    /// or is the largest that the tables hold.
-    pub fn force(
-        &self,
-        forward: &Forward<'_>,
-        range: &CalibratedRange,
-        markers: (&[Marker; 4], Px),
-        output: &Output,
-    ) -> (Force, Status) {
-        let estimate = self.estimate(forward, markers, output);
-        let (force, mut status) = self.told(forward, range, &estimate);
-        let (_, blur) = markers;
-        if blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED {
-            status |= Status::UNEXPLAINED;
-        }
-        (force, status)
-    }
-
-    /// What a sample says of a load that was found.
+    /// What a sample says of a load that was found in a frame of that noise;
+    /// [`Status::UNEXPLAINED`] when it explains the markers badly, or is the largest that the
+    /// tables hold.
     pub fn told(
         &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
+        noise: FrameNoise,
         estimate: &Estimate,
     ) -> (Force, Status) {
         let unit = self.systematic(forward, &estimate.pose);
         let force = force(forward, estimate, &unit);
         let mut status = trust(&force, range);
-        if !estimate.is_explained(&unit) {
+        let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
+        if is_blurred || !estimate.is_explained(&unit) {
             status |= Status::UNEXPLAINED;
         }
         // Where the tables end, a larger force may explain the markers better.
@@ -162,6 +153,19 @@ impl Resting {
             status |= Status::MAGNITUDE_OUT_OF_RANGE | Status::UNEXPLAINED;
         }
         (force, status)
+    }
+
+    /// The force of [`Self::estimate`] as [`Self::told`], of a frame whose noise is as modelled.
+    pub fn force(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        markers: &[Marker; 4],
+        output: &Output,
+    ) -> (Force, Status) {
+        let noise = FrameNoise::AS_MODELLED;
+        let estimate = self.estimate(forward, markers, noise, output);
+        self.told(forward, range, noise, &estimate)
     }
 
     /// How well a load is known at best, by what is known of the unit.

@@ -12,6 +12,7 @@
 
 mod contact;
 mod explained;
+mod noise;
 mod place;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ mod tests;
 pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT, is_contact};
 pub use explained::Resting;
 pub use hivtac_terms::force::{Force, Place};
+pub use noise::{FrameNoise, NoiseLevel};
 
 use crate::model::{CalibratedRange, Model, OutputKind};
 use crate::network::Output;

@@ -47,7 +47,9 @@ struct Linearization {
     /// What the load does not explain of the markers: the sum of squares in parts of their
     /// variances.
     unexplained: f32,
-    /// That, and how unlikely the load is.
+    /// By coordinate.
+    left: Column,
+    /// That square, and how unlikely the load is.
     square: f32,
     solved: Option<Solved>,
 }
@@ -103,6 +105,7 @@ impl<'a> Descent<'a> {
         Estimate {
             pose: self.here.pose,
             unexplained: self.here.unexplained,
+            left: self.here.left,
             solved: self.here.solved,
             looks: self.looks,
         }
@@ -155,6 +158,7 @@ impl Linearization {
         Linearization {
             pose,
             unexplained: square(&left),
+            left,
             square: square(&equations.side),
             solved: solve(equations.columns, equations.side),
         }

@@ -10,6 +10,13 @@ use super::systematic::Systematic;
 /// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
 /// of three degrees of freedom is more than 17.7 then.
 pub const UNEXPLAINED: f32 = 17.7;
+/// χ² of one degree of freedom is more than this in 1 of 2,000: what is not known of a unit counts
+/// as if all of it lay in one coordinate of what is left over, where it makes the most.
+const UNEXPLAINED_OF_UNIT: f32 = 12.1;
+/// χ² of three degrees of freedom, and of one, is more than these in 1 of 6: what is left over
+/// beyond them is taken for noise that is larger than the model says.
+const USUAL: f32 = 5.0;
+const USUAL_OF_UNIT: f32 = 1.9;
 /// No less force has a direction, N.
 const LEAST_N: f32 = 1e-9;
 /// Steps that a frame takes at most: more than the model asks for while what they led to does not
@@ -33,6 +40,9 @@ pub struct Estimate {
     pub pose: Pose,
     /// What it does not explain: the sum of squares in parts of their variances.
     pub unexplained: f32,
+    /// That by coordinate, in parts of their standard uncertainties: of each marker away from the
+    /// pattern's middle and across that.
+    pub left: Column,
     /// What the markers say at this load; `None` where they do not tell its parts.
     pub solved: Option<Solved>,
     /// How often the film was run forwards: once where the steps begin, and once for each step.
@@ -92,24 +102,32 @@ impl Estimate {
     /// Whether a load explains the markers, by their noise and what is not known of the unit; what
     /// is no number explains nothing.
     pub fn is_explained(&self, unit: &Systematic) -> bool {
-        let wider = 1.0 + unit.residual * unit.residual;
-        (0.0..=UNEXPLAINED * wider).contains(&self.unexplained)
+        let of_unit = UNEXPLAINED_OF_UNIT * unit.residual * unit.residual;
+        (0.0..=UNEXPLAINED + of_unit).contains(&self.unexplained)
+    }
+
+    /// How many times the markers' stated noise what is left over speaks for, at least 1.
+    fn noisier(&self, unit: &Systematic) -> f32 {
+        let usual = USUAL + USUAL_OF_UNIT * unit.residual * unit.residual;
+        libm::sqrtf(1.0 + (self.unexplained - usual).max(0.0) / USUAL)
     }
 
     /// How well the load is known, by the markers' noise and what is not known of the unit; `None`
-    /// where the markers do not tell its parts.
+    /// where the markers do not tell its parts. Noise counts as larger where more is left over than
+    /// it explains as a rule.
     pub fn sigma(&self, stiffness: &Stiffness, unit: &Systematic) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;
         let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);
         let tilt = [(1, 1), (1, 2), (2, 2)].map(covariance);
         let place = [(3, 3), (3, 4), (4, 4)].map(covariance);
-        let place_mm = stated(place) * core::f32::consts::FRAC_1_SQRT_2;
-        let size = libm::sqrtf(covariance((0, 0)));
+        let noisier = self.noisier(unit);
+        let place_mm = noisier * stated(place) * core::f32::consts::FRAC_1_SQRT_2;
+        let size = noisier * libm::sqrtf(covariance((0, 0)));
         let per_size_n = stiffness.per_size_n(self.pose.size);
         let magnitude_n = stiffness.magnitude_n(self.pose.size).max(LEAST_N);
         Some(Sigma {
             direction: both(
-                stated(across(&self.pose, tilt)),
+                noisier * stated(across(&self.pose, tilt)),
                 unit.across_n / magnitude_n,
             ),
             magnitude_n: per_size_n * both(size, unit.size),
@@ -151,4 +169,93 @@ pub fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
         0.0
     };
     libm::sqrtf(trace) * (1.0 + 0.132 * narrow)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const STIFFNESS: Stiffness = Stiffness {
+        linear_n: 0.2,
+        cubic_n: 0.1,
+    };
+
+    /// Of a load of which what is left over is as given.
+    fn estimate(unexplained: f32) -> Estimate {
+        let mut spread = [[0.0; 5]; 5];
+        for (k, row) in spread.iter_mut().enumerate() {
+            row[k] = 0.001 * (k + 1) as f32;
+        }
+        Estimate {
+            pose: Pose {
+                size: 0.5,
+                tilt: [0.1, 0.05],
+                place_mm: [1.0, -2.0],
+            },
+            unexplained,
+            left: Column::default(),
+            solved: Some(Solved {
+                unknowns: [0.0; 5],
+                left_over: unexplained,
+                explained: 0.0,
+                spread,
+            }),
+            looks: 1,
+        }
+    }
+
+    fn parts(unexplained: f32, unit: &Systematic) -> [f32; 3] {
+        let sigma = estimate(unexplained).sigma(&STIFFNESS, unit).unwrap();
+        [sigma.direction, sigma.magnitude_n, sigma.place_mm]
+    }
+
+    fn unit(residual: f32) -> Systematic {
+        Systematic {
+            residual,
+            ..Systematic::default()
+        }
+    }
+
+    /// Noise of n times what is stated leaves n² times as much over, and is stated n times as
+    /// large.
+    #[test]
+    fn what_is_left_over_beyond_the_usual_widens_all_three() {
+        let stated = parts(1.0, &unit(0.0));
+        assert_eq!(parts(USUAL, &unit(0.0)), stated);
+        for times in [1.5f32, 1.8] {
+            let wider = parts(USUAL * times * times, &unit(0.0));
+            for (wider, stated) in wider.into_iter().zip(stated) {
+                assert!((wider / stated - times).abs() < 1e-5, "{wider} {stated}");
+            }
+        }
+    }
+
+    /// What is not known of the unit explains some of what is left over.
+    #[test]
+    fn on_a_unit_of_which_little_is_known_more_is_usual() {
+        let left_over = 4.99 + 9.0 * USUAL_OF_UNIT;
+        assert_eq!(parts(left_over, &unit(3.0)), parts(1.0, &unit(0.0)));
+        assert!(parts(left_over, &unit(2.9))[0] > parts(1.0, &unit(0.0))[0]);
+        let most = UNEXPLAINED + 9.0 * UNEXPLAINED_OF_UNIT;
+        assert!(estimate(most).is_explained(&unit(3.0)));
+        assert!(!estimate(1.001 * most).is_explained(&unit(3.0)));
+    }
+
+    proptest! {
+        /// No uncertainty becomes smaller by more that is left over, whatever the numbers.
+        #[test]
+        fn more_that_is_left_over_never_makes_a_force_surer(
+            less in prop_oneof![0.0f32..100.0, any::<f32>()],
+            more in prop_oneof![0.0f32..100.0, any::<f32>()],
+            residual in prop_oneof![0.0f32..10.0, any::<f32>()],
+        ) {
+            let unit = unit(residual);
+            let explained = [less, more].map(|part| estimate(part).is_explained(&unit));
+            prop_assert!(!(explained[1] && less < more && less >= 0.0) || explained[0]);
+            for (less, more) in parts(less.min(more), &unit).into_iter().zip(parts(less.max(more), &unit)) {
+                prop_assert!(more >= less, "{more} {less}");
+            }
+        }
+    }
 }

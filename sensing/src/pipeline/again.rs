@@ -10,7 +10,10 @@
 //!
 //! A false marker has another chance to pass by that, and larger uncertainties explain more. So
 //! what the second look shows counts only where it shows, too, that specks or little light disturb
-//! the frame; a thing on the film, a reflection or several touches alone do not.
+//! the frame, or where frames are [noisy](NoiseLevel); a thing on the film, a reflection or several
+//! touches alone do not.
+//!
+//! [NoiseLevel]: hivtac_force::force::NoiseLevel
 
 use super::{Measurement, Sensor};
 use hivtac_markers::scanner::{Scan, ScanSettings};
@@ -43,6 +46,8 @@ const HOLES_PART: u32 = 64;
 /// A frame is dim when fewer pixels pass the threshold than so many of four of the cleaned mask's
 /// (seen: half at 0.28 of the light, more than all in good light).
 const DIM_FOURTHS: u32 = 3;
+/// Frames are noisy when their noise is so many times as large as modelled.
+const NOISY: f32 = 2.0;
 /// Standard uncertainty of a coordinate of a marker of the cleaned mask beside that of noise:
 /// 0.08 px (seen: 0.05 px at a fifth of the light).
 pub(super) const BLUR: Px = Px(5_243);
@@ -109,7 +114,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         second
     }
 
-    /// Whether specks that can be taken out, or little light, are why the first look gave nothing.
+    /// Whether specks that can be taken out, little light or noise are why the first look gave nothing.
     fn is_disturbed(&mut self, first: &First) -> bool {
         let Geometry { width, height, .. } = self.settings.geometry;
         let pixels = u32::from(width) * u32::from(height);
@@ -120,10 +125,11 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             ..
         } = self.scanner.finish(&self.pixels);
         let status = first.measurement.status;
-        let is_dim = 4 * first.set_pixels < DIM_FOURTHS * set_pixels
-            && !status.intersects(Status::BLOB_OVERFLOW | Status::UNEXPLAINED);
         let has_specks = specks >= pixels / SPECKS_PART;
-        (is_dim || has_specks)
+        let is_dim = 4 * first.set_pixels < DIM_FOURTHS * set_pixels
+            && !status.contains(Status::BLOB_OVERFLOW);
+        let is_noisy = self.noise.of_frame(Px(0)).times >= NOISY;
+        (has_specks || (is_dim || is_noisy) && !status.contains(Status::UNEXPLAINED))
             && specks <= pixels / MOST_SPECKS_PART
             && holes <= set_pixels / HOLES_PART
     }

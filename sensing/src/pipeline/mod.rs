@@ -13,7 +13,7 @@ use crate::motion::Motion;
 use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_force::features::Features;
-use hivtac_force::force::{self, Force, Resting};
+use hivtac_force::force::{self, Force, NoiseLevel, Resting};
 use hivtac_force::model::Model;
 use hivtac_force::network::Network;
 use hivtac_force::rest::Rest;
@@ -66,6 +66,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     prepared: Option<Prepared>,
     ahead: Ahead,
     motion: Motion,
+    noise: NoiseLevel,
     look: Look,
 }
 
@@ -101,6 +102,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             prepared: None,
             ahead: Ahead::Off,
             motion: Motion::GLOBAL,
+            noise: NoiseLevel::AS_MODELLED,
             look: Look::First,
         }
     }
@@ -175,14 +177,18 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.motion = motion;
     }
 
-    /// The next frame does not follow the one before at once: how the markers move is not known.
-    pub fn forget_motion(&mut self) {
+    /// The next frame does not follow the one before at once: how the markers move is not known,
+    /// nor what of a change is noise.
+    pub fn forget_frame(&mut self) {
         self.motion.forget();
+        self.noise.forget_frame();
     }
 
-    /// Starts a frame and forgets the one before, but for where its markers were.
+    /// Starts a frame and forgets the one before, but for where its markers were and what they left
+    /// unexplained.
     pub fn begin_frame(&mut self) {
         self.motion.begin_frame();
+        self.noise.begin_frame();
         self.look = Look::First;
         // An error cannot happen after `configure`, and makes every frame incomplete before it.
         let _ = self.scanner.begin(self.settings.scan());
@@ -210,7 +216,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.look_ahead();
     }
 
-    /// Measures a frame that lies in memory: all rows from the top, one after the other.
+    /// Measures a frame that lies in memory: all rows from the top, one after the other. A frame that
+    /// does not follow the one before wants [`forget_frame`](Self::forget_frame) first.
     pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
         self.begin_frame();
         self.push_rows(frame);
@@ -303,6 +310,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     fn prepare(&mut self) {
         self.ahead = Ahead::Off;
         self.look = Look::First;
+        self.noise = NoiseLevel::AS_MODELLED;
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self
@@ -395,11 +403,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .and_then(|prepared| prepared.resting.as_ref());
         let (force, trust) = match model.forward.as_ref().zip(resting) {
             Some((forward, resting)) => {
-                let blur = match self.look {
-                    Look::Again(..) => BLUR,
-                    Look::First | Look::Wanted(_) => Px(0),
-                };
-                resting.force(forward, &model.range, (markers, blur), &output)
+                let is_again = matches!(self.look, Look::Again(_));
+                let blur = if is_again { BLUR } else { Px(0) };
+                let noise = self.noise.of_frame(blur);
+                let estimate = resting.estimate(forward, markers, noise, &output);
+                if !is_again {
+                    self.noise.saw(noise, &estimate.left);
+                }
+                resting.told(forward, &model.range, noise, &estimate)
             }
             None => force::of_outputs(model, &output),
         };

@@ -211,19 +211,21 @@ impl Tared<'_> {
         Ok(mean)
     }
 
-    /// What the sensor says of a press on its unit; the number selects the noise.
+    /// What the sensor says of a press on its unit, alone; the number selects the noise.
     ///
     /// # Errors
     /// When the film cannot take the press.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
+        self.sensor.forget_frame();
         self.said(unit, load, number, measure)
     }
 
-    /// The same of a sensor that looks again at a frame that it refuses.
+    /// The same of a press that follows the one before, by a sensor that looks again at a frame
+    /// that it refuses.
     ///
     /// # Errors
     /// When the film cannot take the press.
-    pub fn answer_closely(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
+    pub fn answer_next(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
         self.said(unit, load, number, |sensor, frame| {
             sensor.measure_frame_closely(&frame.words())
         })

@@ -246,7 +246,7 @@ impl<'b> Runner<'b> {
         counting_begins();
         let features = Features::of_markers(&markers);
         let output = network.run(&model, &features, &rest.features);
-        let found = resting.force(forward, &model.range, (&markers, Px(0)), &output);
+        let found = resting.force(forward, &model.range, &markers, &output);
         counting_ends();
         say(results, self.cases, format_args!("{found:?}"))
     }
