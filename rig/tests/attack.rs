@@ -6,9 +6,12 @@
 
 use crate::common::{Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
+use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
-use hivtac_wire::message::Request;
+use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_wire::message::{MODEL_BYTES, ModelPart, Request};
 use hivtac_wire::settings::Selection;
 use serde_json::Value;
 
@@ -83,19 +86,56 @@ fn setup_packet(numbers: &mut Numbers) -> [u8; 8] {
     packet
 }
 
-/// Bytes for the device: noise, and messages that are whole, damaged or cut.
-fn bytes(numbers: &mut Numbers) -> Vec<u8> {
+/// Exposure, gain and rate: what a camera can do and what it cannot, or nothing asked of it.
+fn camera_settings(numbers: &mut Numbers) -> CameraSettings {
+    let exposure = Microseconds(numbers.below(30_000) as u32);
+    let gain = Sixteenths(numbers.below(80) as u16);
+    CameraSettings {
+        exposure: (numbers.below(2) == 0).then_some(exposure),
+        gain: (numbers.below(2) == 0).then_some(gain),
+        rate: numbers.one_of(&Rate::ALL),
+    }
+}
+
+/// A part of a model that is none.
+fn model_part(numbers: &mut Numbers) -> ModelPart {
+    let bytes = numbers.bytes::<64>();
+    ModelPart {
+        offset: 32 * numbers.below(4) as u32,
+        bytes: bytes[..numbers.below(65) as usize].iter().copied().collect(),
+    }
+}
+
+/// Whatever a host may ask for that neither changes what a force is nor restarts the device.
+fn request(numbers: &mut Numbers) -> Request {
+    let frames = 1 + numbers.below(8) as u16;
+    let bytes = numbers.below(2 * MODEL_BYTES as u64) as u32;
     let requests = [
         Request::GetInfo,
         Request::Start,
         Request::StartWithMarkers,
         Request::Stop,
+        Request::Expose,
         Request::Snapshot,
         Request::Inspect,
         Request::GetSettings,
+        Request::GetHealth,
+        Request::Tare { frames },
+        Request::SetThreshold(Threshold::red(PixelFormat::Rgb565)),
+        Request::SetCamera(camera_settings(numbers)),
+        Request::BeginModel { bytes },
+        Request::ModelPart(model_part(numbers)),
+        Request::UseModel,
+        Request::UseBuiltInModel,
         Request::Keep(Selection::NONE),
+        Request::Keep(Selection::ALL),
     ];
-    let request = requests[numbers.below(requests.len() as u64) as usize].clone();
+    requests[numbers.below(requests.len() as u64) as usize].clone()
+}
+
+/// Bytes for the device: noise, and messages that are whole, damaged or cut.
+fn bytes(numbers: &mut Numbers) -> Vec<u8> {
+    let request = request(numbers);
     let mut message = match numbers.below(5) {
         0 => numbers.bytes::<96>().to_vec(),
         1 => hello(),
