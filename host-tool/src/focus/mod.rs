@@ -125,7 +125,7 @@ impl Focus {
 fn row(name: &str, cells: impl IntoIterator<Item = impl ToString>) -> String {
     let cells = cells
         .into_iter()
-        .map(|cell| format!("{:>14}", cell.to_string()));
+        .map(|cell| format!("{:>16}", cell.to_string()));
     format!("  {name:<7}{}", cells.collect::<String>())
 }
 

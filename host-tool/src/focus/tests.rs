@@ -195,9 +195,9 @@ fn a_person_sees_a_table_with_the_limits() {
     let text = Focus::of(&frame(|options| options.lens.blur_px = 1.5), &device()).text();
     let lines: Vec<_> = text.lines().collect();
     assert_eq!(lines[0], "frame 7");
-    assert!(lines[1].starts_with("  marker        rim, px"), "{text}");
-    assert!(lines[2].starts_with("  0                !4."), "{text}");
-    assert!(lines[6].starts_with("  right           ≤ 3.5"), "{text}");
+    assert!(lines[1].starts_with("  marker          rim, px"), "{text}");
+    assert!(lines[2].starts_with("  0                  !4."), "{text}");
+    assert!(lines[6].starts_with("  right             ≤ 3.5 "), "{text}");
     assert!(
         lines[7].starts_with("  pattern  centre 0.0 px (≤ 9), turn "),
         "{text}"
