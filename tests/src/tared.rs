@@ -248,8 +248,9 @@ impl TaredSensor {
         Err(anyhow!("too few frames that show markers"))
     }
 
-    /// The whole pipeline on a frame, which it looks at again when it refuses it.
+    /// The whole pipeline on a frame that follows none, which it looks at again when it refuses it.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
+        self.sensor.forget_frame();
         self.sensor.measure_frame_closely(&frame.words())
     }
 
@@ -266,6 +267,7 @@ impl TaredSensor {
             }
             sensor.finish_frame()
         };
+        sensor.forget_frame();
         sensor.begin_frame();
         let mut measurement = push(sensor);
         if sensor.look_again() {
