@@ -169,7 +169,16 @@ impl Finder {
     /// else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does, or there are too many
     /// candidates.
     pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
-        let candidates = self.candidates(blobs)?;
+        let mut candidates = Vec::<Shape, MAX_CANDIDATES>::new();
+        for blob in blobs {
+            if let Some(shape) = self.candidate(blob) {
+                let pushed = candidates.push(shape);
+                pushed.map_err(|_| Status::MARKERS_AMBIGUOUS)?;
+            }
+        }
+        if candidates.len() < 4 {
+            return Err(Status::MARKERS_MISSING);
+        }
         let mut found = None;
         let mut reason = Status::MARKERS_AMBIGUOUS;
         for set in sets_of_four(candidates.len()) {
@@ -187,24 +196,11 @@ impl Finder {
         found.ok_or(reason)
     }
 
-    fn candidates(&self, blobs: &[Blob]) -> Result<Vec<Shape, MAX_CANDIDATES>, Status> {
-        let mut candidates = Vec::new();
-        for shape in blobs
-            .iter()
-            .filter(|blob| self.may_be_marker(blob))
-            .filter_map(|blob| Shape::of_blob(blob, self.centroid))
-        {
-            if shape.fill < LEAST_FILL {
-                continue;
-            }
-            candidates
-                .push(shape)
-                .map_err(|_| Status::MARKERS_AMBIGUOUS)?;
+    fn candidate(&self, blob: &Blob) -> Option<Shape> {
+        if !self.may_be_marker(blob) {
+            return None;
         }
-        if candidates.len() < 4 {
-            return Err(Status::MARKERS_MISSING);
-        }
-        Ok(candidates)
+        Shape::of_blob(blob, self.centroid).filter(|shape| shape.fill >= LEAST_FILL)
     }
 
     /// Plausible area, and no pixel on the border: what touches it is cut.
