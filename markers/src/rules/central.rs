@@ -1,4 +1,5 @@
-//! How the pixels of a blob lie around their mean: variances and third moments, in single precision.
+//! How the pixels of a blob lie around their mean: variances and third moments, in single
+//! precision.
 
 use crate::blob::Blob;
 

@@ -43,7 +43,8 @@ impl Direction {
 /// E|d|²d of a shape, scaled to a round one: the square of its length, px².
 ///
 /// `third` are its third moments, px³, and `by` are one over the variances along and across the
-/// direction, px⁻². A vector is as long whichever way it is looked at, so that |d|² alone is turned.
+/// direction, px⁻². A vector is as long whichever way it is looked at, so that |d|² alone is
+/// turned.
 pub fn squared_lean([xxx, xxy, xyy, yyy]: [f32; 4], direction: &Direction, by: [f32; 2]) -> f32 {
     let [cc, cs, ss] = direction.products;
     let [p, r] = [cc * by[0] + ss * by[1], ss * by[0] + cc * by[1]];
