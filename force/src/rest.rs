@@ -54,13 +54,8 @@ impl Rest {
     /// wrong.
     pub fn fits(&self, geometry: &Geometry) -> bool {
         let center = Pattern::of_centroids(self.features.centroids).center;
-        let sum: i64 = self
-            .features
-            .centroids
-            .iter()
-            .map(|&centroid| i64::from(distance(centroid, center).0))
-            .sum();
-        let expected = 4 * i64::from(geometry.rest_distance().0);
-        (sum - expected).abs() * 100 <= expected * 15
+        let [a, b, c, d] = self.features.centroids.map(|point| distance(point, center));
+        let expected = 4.0 * geometry.rest_distance().to_f32();
+        (a + b + c + d - expected).abs() <= 0.15 * expected
     }
 }

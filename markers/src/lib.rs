@@ -1,4 +1,4 @@
-//! Pixels to four markers: `no_std`, no allocation, integers only.
+//! Pixels to four markers: `no_std`, no allocation; integers, and single precision in `rules`.
 //!
 //! ```text
 //! rows ─threshold→ bit rows ─dilate→ runs ─label→ blobs (moments) ─rules→ 4 markers
@@ -39,3 +39,5 @@ mod moments;
 #[cfg(test)]
 mod numerics;
 mod runs;
+
+pub use kernels::sqrt;

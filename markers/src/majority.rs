@@ -44,7 +44,7 @@ impl Majority {
     #[inline(never)]
     pub fn filter(&mut self, rows: &mut [u32], width: u16) -> bool {
         let mut any = false;
-        for row in rows.chunks_exact_mut(words_of(width).clamp(1, MAX_WORDS)) {
+        for row in rows.chunks_exact_mut(words_of(width).max(1)) {
             let mut raw = [0; MAX_WORDS];
             let filled = raw.iter_mut().zip(row.iter());
             filled.for_each(|(raw, word)| *raw = *word);

@@ -1,5 +1,5 @@
-//! Quotients of 64 bits from 32-bit instructions, several times as fast on a Cortex-M as the
-//! compiler's library: exact ones, and such as are good enough for what is compared with a limit.
+//! Exact quotients of 64 bits from 32-bit instructions, several times as fast on a Cortex-M as the
+//! compiler's library.
 //!
 //! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, two words divided by d take
 //! two products and two corrections (Möller and Granlund, *Improved division by invariant
@@ -72,73 +72,6 @@ impl Divisor {
     }
 }
 
-/// One over a number, to 2⁻²⁷ of it: for what is only compared with a limit. It is made in half the
-/// cycles of a [`Divisor`], and multiplied with in a third.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reciprocal {
-    /// 2⁶¹ / the divisor, shifted until its highest bit is set: 2²⁹ to 2³⁰.
-    mantissa: u32,
-    /// 1 / divisor = mantissa / 2^(shift + 30).
-    shift: u32,
-}
-
-impl Reciprocal {
-    /// Of a number that is at least 1; 0 divides as 1 does.
-    #[inline(always)]
-    pub fn of(divisor: u32) -> Reciprocal {
-        let divisor = divisor.max(1);
-        let zeros = divisor.leading_zeros();
-        let normalized = divisor << zeros;
-        // 16 bits of it, rounded up: the quotient is too small by less than 2⁻¹⁴ of it.
-        let upper = (normalized >> 16) + 1;
-        let rough = (u32::MAX / upper) << 13;
-        // Newton's step x·(2 − x·d): squares what is missing.
-        let product = (u64::from(rough) * u64::from(normalized)) >> 32;
-        let missing = (1 << 29) - product as u32;
-        let more = (u64::from(rough) * u64::from(missing)) >> 29;
-        Reciprocal {
-            mantissa: rough + more as u32,
-            shift: 31 - zeros,
-        }
-    }
-
-    /// `value` / divisor of one within ±2⁶¹, and a little less where it is not a whole number.
-    #[inline]
-    pub fn times(&self, value: i64) -> i64 {
-        let (value, factor) = (value << 2, u64::from(self.mantissa));
-        let (high, low) = ((value >> 32) as i32, u64::from(value as u32));
-        let product = i64::from(high) * factor as i64 + ((low * factor) >> 32) as i64;
-        // A shift by 0 to 31, word by word.
-        let (high, low) = ((product >> 32) as i32, product as u32);
-        let carried = ((high as u32) << 1) << (31 - self.shift);
-        i64::from(high >> self.shift) << 32 | i64::from(low >> self.shift | carried)
-    }
-
-    /// `part` / divisor, of 65,536, limited to 32 bits.
-    pub fn part(&self, part: i32) -> i32 {
-        let product = i64::from(part) * i64::from(self.mantissa as i32);
-        limited((product >> 14) >> self.shift)
-    }
-}
-
-/// `value`·`factor` / 2^`bits`, limited to 32 bits.
-#[inline(always)]
-pub fn scaled(value: i32, factor: i32, bits: u32) -> i32 {
-    limited((i64::from(value) * i64::from(factor)) >> bits)
-}
-
-/// The nearest number of 32 bits.
-#[inline(always)]
-pub fn limited(value: i64) -> i32 {
-    let (high, low) = ((value >> 32) as i32, value as i32);
-    // The upper word of what fits is the sign of the lower one.
-    if high == low >> 31 {
-        low
-    } else {
-        i32::MAX ^ (high >> 31)
-    }
-}
-
 /// ⌊(B² − 1)/d⌋ − B = ⌊((B − 1 − d)·B + B − 1) / d⌋ for d of B/2 or more, a half word at a time.
 #[inline(always)]
 fn reciprocal(divisor: u32) -> u32 {
@@ -192,19 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reciprocal_is_near() {
-        let spread = (0..1 << 20u32).map(|near: u32| near.wrapping_mul(0x9e37_79b9));
-        for divisor in spread.chain(1..1 << 17).chain((0..1 << 17).map(|by| !by)) {
-            let (divisor, by) = (divisor.max(1), Reciprocal::of(divisor));
-            let exact = (1u64 << 61) as f64 / f64::from(divisor);
-            let error = by.times((1 << 61) - 1) as f64 / exact - 1.0;
-            assert!(error.abs() < 2f64.powi(-27), "{divisor}: {error:e}");
-        }
-    }
-
-    #[test]
     fn nothing_is_divided_by_zero() {
-        assert_eq!(Reciprocal::of(0).times(7), Reciprocal::of(1).times(7));
         assert_eq!(Divisor::new(0).quotient(7), 7);
     }
 
@@ -238,17 +159,6 @@ mod tests {
         ) {
             let (dividend, exact) = (dividend >> shift, i64::from(divisor));
             prop_assert_eq!(Divisor::new(divisor).signed_quotient(dividend), dividend / exact);
-        }
-
-        #[test]
-        fn a_reciprocal_gives_nearly_the_quotient(
-            value: i64, shift in 2..64u32, divisor in divisors(),
-        ) {
-            let value = value >> shift;
-            let exact = value as f64 / f64::from(divisor);
-            let error = Reciprocal::of(divisor).times(value) as f64 - exact;
-            let allowed = 1.0 + exact.abs() / (1u64 << 27) as f64;
-            prop_assert!(error.abs() <= allowed, "{error}");
         }
     }
 }

@@ -131,7 +131,8 @@ impl Geometry {
     /// distance·d/R. A lens that is symmetric about its axis shows a circle about the axis as a
     /// circle, so this holds for any lens and any height or tilt of the film.
     pub fn across(&self, distance: Px) -> Px {
-        Across::of(self).at(distance)
+        let product = i64::from(distance.0) * i64::from(self.marker_diameter.0);
+        saturated(Divisor::new(self.marker_radius.0).signed_quotient(product))
     }
 
     /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with
@@ -142,29 +143,6 @@ impl Geometry {
         let (sin, cos) = sin_cos(MilliDegrees(theta as i32));
         let factor_q30 = ((sin * cos) >> ONE_BITS) * RADIAN / theta;
         saturated((i64::from(self.across(distance).0) * factor_q30) >> ONE_BITS)
-    }
-}
-
-/// [`Geometry::across`] for many distances.
-#[derive(Clone, Copy, Debug)]
-pub struct Across {
-    diameter: i64,
-    by_radius: Divisor,
-}
-
-impl Across {
-    /// By a geometry's markers.
-    pub fn of(geometry: &Geometry) -> Across {
-        Across {
-            diameter: geometry.marker_diameter.0.into(),
-            by_radius: Divisor::new(geometry.marker_radius.0),
-        }
-    }
-
-    /// The width of a marker's image at this distance from the axis.
-    pub fn at(&self, distance: Px) -> Px {
-        let product = i64::from(distance.0) * self.diameter;
-        saturated(self.by_radius.signed_quotient(product))
     }
 }
 

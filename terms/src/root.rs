@@ -39,18 +39,6 @@ pub fn root(square: u64) -> u32 {
     corrected(estimate, scaled) >> (shift / 2)
 }
 
-/// √`square` from 16 bits: off by at most 2⁻¹⁵ of it, and rounded down to a whole number. A third
-/// of what [`root`] takes.
-#[inline(always)]
-pub fn rough_root(square: u64) -> u32 {
-    if square == 0 {
-        return 0;
-    }
-    let shift = square.leading_zeros() & !1;
-    let high = ((square << shift) >> 32) as u32;
-    (sixteen_bits(high).min(0xffff) << 16) >> (shift / 2)
-}
-
 /// √`high` of one that is 2³⁰ or more, off by at most 1: 2¹⁵ to 2¹⁶.
 #[inline(always)]
 fn sixteen_bits(high: u32) -> u32 {
@@ -96,7 +84,6 @@ mod tests {
     #[test]
     fn small_numbers_and_the_largest() {
         (0..1 << 20).for_each(check);
-        assert_eq!([0, 1, 4, u64::MAX].map(rough_root), [0, 1, 2, 0xffff_0000]);
         (0..1 << 12).for_each(|below| check(u64::MAX - below));
     }
 
@@ -135,13 +122,6 @@ mod tests {
             // (2r − 1)² ≤ 4n ≤ (2r + 1)²
             prop_assert!(rounded == 0 || (2 * rounded - 1).pow(2) <= 4 * square);
             prop_assert!(4 * square <= (2 * rounded + 1).pow(2));
-        }
-
-        #[test]
-        fn a_rough_root_is_near_it(number: u64, shift in 0..64u32) {
-            let square = number >> shift;
-            let (rough, root) = (f64::from(rough_root(square)), (square as f64).sqrt());
-            prop_assert!((rough - root).abs() <= root / 32_768.0 + 1.0, "{rough} {root}");
         }
     }
 }

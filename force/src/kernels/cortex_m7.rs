@@ -20,8 +20,6 @@ global_asm!(include_str!("dot8.s"), options(raw));
 global_asm!(include_str!("dot16.s"), options(raw));
 #[cfg(target_abi = "eabihf")]
 global_asm!(include_str!("spline.s"), options(raw));
-#[cfg(target_abi = "eabihf")]
-global_asm!(include_str!("sqrt.s"), options(raw));
 
 unsafe extern "C" {
     /// Equals `portable::multiply` for a layer of int8 weights, given inputs that [`hivtac_expand`]
@@ -138,10 +136,6 @@ unsafe extern "C" {
         end: *const Factors,
         sums: *mut [f32; 6],
     );
-
-    /// Equals `libm::sqrtf`: IEEE 754's square root, by VSQRT.
-    #[cfg(target_abi = "eabihf")]
-    fn hivtac_root(square: f32) -> f32;
 }
 
 /// The proof of [`hivtac_dot8`] for the widest layer.
@@ -246,12 +240,4 @@ pub fn spline(
         )
     };
     Some(sums)
-}
-
-/// As `libm::sqrtf`, which computes it bit by bit here.
-#[cfg(target_abi = "eabihf")]
-#[inline(always)]
-pub fn sqrt(square: f32) -> f32 {
-    // SAFETY: it changes nothing but its result.
-    unsafe { hivtac_root(square) }
 }

@@ -9,6 +9,8 @@
 mod cortex_m7;
 mod portable;
 
+pub use hivtac_markers::sqrt;
+
 use crate::layer::{Layer, MAX_WIDTH};
 
 /// What a kernel may read beyond the inputs of the widest layer: it loads ahead.
@@ -85,13 +87,4 @@ pub fn spline(
         return sums;
     }
     portable::spline(steps, line, node, parts, factors)
-}
-
-/// A square root, to the nearest.
-#[inline(always)]
-pub fn sqrt(square: f32) -> f32 {
-    #[cfg(all(armv7em, target_abi = "eabihf"))]
-    return cortex_m7::sqrt(square);
-    #[cfg(not(all(armv7em, target_abi = "eabihf")))]
-    libm::sqrtf(square)
 }

@@ -9,6 +9,8 @@
 //! depend on data, and all follow the procedure call standard: r0–r3, r12 and the flags are lost,
 //! the Q flag may be set.
 
+#[cfg(target_abi = "eabihf")]
+use core::arch::asm;
 use core::arch::global_asm;
 use core::ops::Range;
 
@@ -268,4 +270,24 @@ pub fn dilate_edges(
         hivtac_dilate_edges(rows, stride, words, column, begin, last)
     };
     (end as usize - begin as usize) / 2
+}
+
+/// As `libm::sqrtf`, which computes it bit by bit here. The compiler gives out no register of the
+/// floating-point unit, so that the number goes there and back.
+#[cfg(target_abi = "eabihf")]
+#[inline(always)]
+pub fn sqrt(square: f32) -> f32 {
+    let mut bits = square.to_bits();
+    // SAFETY: it changes nothing but its result and a register that it says.
+    unsafe {
+        asm!(
+            "vmov s0, {bits}",
+            "vsqrt.f32 s0, s0",
+            "vmov {bits}, s0",
+            bits = inout(reg) bits,
+            out("s0") _,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    f32::from_bits(bits)
 }

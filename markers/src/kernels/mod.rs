@@ -16,6 +16,15 @@ pub use {
     portable::{weigh_bytes, weigh_luma},
 };
 
+/// A square root, to the nearest.
+#[inline(always)]
+pub fn sqrt(square: f32) -> f32 {
+    #[cfg(all(armv7em, target_abi = "eabihf"))]
+    return cortex_m7::sqrt(square);
+    #[cfg(not(all(armv7em, target_abi = "eabihf")))]
+    libm::sqrtf(square)
+}
+
 /// The mask of a row of pixels through a table of bytes, and whether anything is set: see
 /// `portable::threshold_bytes`.
 #[inline]

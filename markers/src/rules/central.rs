@@ -1,85 +1,79 @@
-//! How the pixels of a blob lie around their mean: variances and third moments, to 2⁻²⁷ of them and
-//! their last place.
+//! How the pixels of a blob lie around their mean: variances and third moments, in single
+//! precision.
 
 use crate::blob::Blob;
-use hivtac_terms::division::{Reciprocal, limited};
 
 /// Central moments of a blob per pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Central {
-    /// E x², E xy, E y² and what a pixel has as it is a square, px² with 12 fractional bits. Below
-    /// 800²/4 px².
-    pub variance: [i32; 3],
-    /// E x³, E x²y, E xy², E y³, px³ with 8 fractional bits. Those beyond ±2²³ px³, of no marker,
-    /// are as those.
-    pub third: [i32; 4],
+    /// E x², E xy, E y² and what a pixel has as it is a square, px². Below 800²/4 px².
+    pub variance: [f32; 3],
+    /// E x³, E x²y, E xy², E y³, px³.
+    pub third: [f32; 4],
 }
 
-/// A pixel is a square, not a point: 1/12 px² in Q12.
-const PIXEL_VARIANCE: i32 = 341;
+/// A pixel is a square, not a point, px².
+const PIXEL_VARIANCE: f32 = 1.0 / 12.0;
 
 impl Central {
     /// Of a blob of at least one pixel, with one over its area.
     ///
-    /// Sums are first taken about a whole pixel next to the mean, exactly: no term is beyond 3 ·
+    /// Sums are first taken about the whole pixel next to the mean, exactly: no term is beyond 3 ·
     /// 640,000 · 799³ < 2⁵¹. About the mean, which is (a, b) away from that, they are then
     /// corrected.
-    pub fn of_blob(blob: &Blob, by_area: &Reciprocal) -> Central {
-        let area = i64::from(blob.area);
-        let [sx, sy, sxx, sxy, syy] = [
-            blob.sum_x,
-            blob.sum_y,
-            blob.sum_xx,
-            blob.sum_xy,
-            blob.sum_yy,
-        ]
-        .map(|sum| sum as i64);
+    pub fn of_blob(blob: &Blob, by_area: f32) -> Central {
+        // Below 2²⁹ each.
+        let [sx, sy] = [blob.sum_x, blob.sum_y].map(|sum| sum as u32);
+        let [x, y] = [sx, sy].map(|sum| ((sum + blob.area / 2) / blob.area.max(1)) as i32);
+        let [area, sx, sy] = [blob.area, sx, sy].map(|sum| sum as i32);
+        let (dx, dy) = (sx - x * area, sy - y * area);
+        let [sxx, sxy, syy] = [blob.sum_xx, blob.sum_xy, blob.sum_yy].map(|sum| sum as i64);
         let [sxxx, sxxy, sxyy, syyy] =
             [blob.sum_xxx, blob.sum_xxy, blob.sum_xyy, blob.sum_yyy].map(|sum| sum as i64);
-        let [x, y] = [sx, sy].map(|sum| by_area.times(sum + area / 2));
-        let (dx, dy) = (sx - x * area, sy - y * area);
-        let (xx, yy) = (sxx - x * (sx + dx), syy - y * (sy + dy));
-        let second = [xx, sxy - x * sy - y * dx, yy];
+        let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
+        let (xx, yy) = (sxx - product(x, sx + dx), syy - product(y, sy + dy));
+        let second = [xx, sxy - product(x, sy) - product(y, dx), yy];
+        let [wide_x, wide_y] = [x, y].map(i64::from);
         let third = [
-            sxxx - x * (2 * sxx - x * sx + xx),
-            sxxy - x * (2 * sxy - x * sy) - y * xx,
-            sxyy - y * (2 * sxy - y * sx) - x * yy,
-            syyy - y * (2 * syy - y * sy + yy),
+            sxxx - wide_x * (2 * sxx - product(x, sx) + xx),
+            sxxy - wide_x * (2 * sxy - product(x, sy)) - wide_y * xx,
+            sxyy - wide_y * (2 * sxy - product(y, sx)) - wide_x * yy,
+            syyy - wide_y * (2 * syy - product(y, sy) + yy),
         ];
-        let [a, b] = [dx, dy].map(|sum| by_area.times(sum << 16) as i32);
-        let second = second.map(|sum| by_area.times(sum << 12) as i32);
-        let third = third.map(|sum| limited(by_area.times(sum << 8)));
+        let [a, b] = [dx, dy].map(|sum| sum as f32 * by_area);
+        let second = second.map(|sum| rounded(sum) * by_area);
+        let third = third.map(|sum| rounded(sum) * by_area);
         about_the_mean([a, b], second, third)
     }
 }
 
-/// From about a point that is (a, b) off the mean, px with 16 fractional bits: E(x−a)² = E x² − a²
-/// and so on.
+/// From about a point that is (a, b) off the mean, px: E(x−a)² = E x² − a² and so on.
 fn about_the_mean(
-    [a, b]: [i32; 2],
-    [xx, xy, yy]: [i32; 3],
-    [xxx, xxy, xyy, yyy]: [i32; 4],
+    [a, b]: [f32; 2],
+    [xx, xy, yy]: [f32; 3],
+    [xxx, xxy, xyy, yyy]: [f32; 4],
 ) -> Central {
-    let product = |p: i32, q: i32| i64::from(p) * i64::from(q);
-    let variance = [
-        xx - (product(a, a) >> 20) as i32,
-        xy - (product(a, b) >> 20) as i32,
-        yy - (product(b, b) >> 20) as i32,
-    ];
-    // E(x−a)³ = E x³ − a·(2·E x² + the variance), and E(x−a)²(y−b) = E x²y − 2·a·E xy − b·the
-    // variance along x.
-    let [vxx, _, vyy] = variance;
+    let [vxx, vxy, vyy] = [xx - a * a, xy - a * b, yy - b * b];
+    // E(x−a)³ = E x³ − a·(2·E x² + the variance) + a³, and E(x−a)²(y−b) = E x²y − 2·a·E xy − b·the
+    // variance along x + a²·b. The last terms, at most 1/8 px³, are left out.
     let third = [
-        (xxx, 2 * product(a, xx) + product(a, vxx)),
-        (xxy, 2 * product(a, xy) + product(b, vxx)),
-        (xyy, 2 * product(b, xy) + product(a, vyy)),
-        (yyy, 2 * product(b, yy) + product(b, vyy)),
+        xxx - a * (xx + xx + vxx),
+        xxy - (a + a) * xy - b * vxx,
+        xyy - (b + b) * xy - a * vyy,
+        yyy - b * (yy + yy + vyy),
     ];
-    let [vxx, vxy, vyy] = variance;
     Central {
         variance: [vxx + PIXEL_VARIANCE, vxy, vyy + PIXEL_VARIANCE],
-        third: third.map(|(moment, shift)| limited(i64::from(moment) - (shift >> 20))),
+        third,
     }
+}
+
+/// One within ±2⁶² in single precision, by two conversions of 32 bits, as the processor has none of
+/// 64. The lower word is taken with its sign, so that a small number is all in it.
+fn rounded(sum: i64) -> f32 {
+    let low = sum as i32;
+    let high = ((sum - i64::from(low)) >> 32) as i32;
+    high as f32 * 4_294_967_296.0 + low as f32
 }
 
 #[cfg(test)]
@@ -87,6 +81,12 @@ pub mod tests {
     use super::*;
     use crate::runs::Run;
     use crate::tables::Weights;
+    use proptest::prelude::*;
+
+    /// With one over its area.
+    pub fn of_whole(blob: &Blob) -> Central {
+        Central::of_blob(blob, 1.0 / blob.area as f32)
+    }
 
     /// The pixels inside, as a blob.
     pub fn blob(inside: impl Fn(f64, f64) -> bool) -> Blob {
@@ -129,9 +129,9 @@ pub mod tests {
             mean(&|x, y| x * y * y),
             mean(&|_, y| y * y * y),
         ];
-        let central = Central::of_blob(&sum, &Reciprocal::of(sum.area));
+        let central = of_whole(&sum);
         for (found, expected) in central.third.iter().zip(expected) {
-            let found = f64::from(*found) / 256.0;
+            let found = f64::from(*found);
             assert!((found - expected).abs() < 0.05, "{found} {expected}");
         }
         let expected = [
@@ -140,8 +140,8 @@ pub mod tests {
             mean(&|_, y| y * y) + 1.0 / 12.0,
         ];
         for (found, expected) in central.variance.iter().zip(expected) {
-            let found = f64::from(*found) / 4_096.0;
-            assert!((found - expected).abs() < 0.002, "{found} {expected}");
+            let found = f64::from(*found);
+            assert!((found - expected).abs() < 1e-4, "{found} {expected}");
         }
     }
 
@@ -149,17 +149,23 @@ pub mod tests {
     /// moment.
     #[test]
     fn what_fills_the_largest_frame_does_not_overflow() {
+        let near = |found: f32, expected: f64| {
+            let off = (f64::from(found) - expected).abs();
+            assert!(off <= 1e-6 * expected.abs() + 0.2, "{found} {expected}");
+        };
         let pixel = |x: u16, y: u16| Blob::of_run(Run { x0: x, x1: x }, y, Weights::NONE);
         let mut corners = pixel(0, 0);
         corners.add(&pixel(799, 799));
-        let central = Central::of_blob(&corners, &Reciprocal::of(2));
-        let expected = 399.5_f64.powi(2) * 4_096.0;
-        for (found, more) in central.variance.iter().zip([341.0, 0.0, 341.0]) {
-            assert!((f64::from(*found) - expected - more).abs() < 8.0, "{found}");
+        let expected = 399.5_f64.powi(2);
+        for found in of_whole(&corners).variance {
+            near(found, expected);
         }
         corners.add(&pixel(0, 1));
-        let third = Central::of_blob(&corners, &Reciprocal::of(3)).third;
-        assert!(third.iter().all(|third| *third > 1 << 30), "{third:?}");
+        // Of 799 px once and 0 px twice: 2/27 of the cube.
+        let expected = 799_f64.powi(3) * 2.0 / 27.0;
+        for found in of_whole(&corners).third {
+            assert!((f64::from(found) / expected - 1.0).abs() < 0.01, "{found}");
+        }
         let mut whole: Option<Blob> = None;
         for y in 0..800 {
             let row = Blob::of_run(Run { x0: 0, x1: 799 }, y, Weights::NONE);
@@ -168,17 +174,24 @@ pub mod tests {
                 none => *none = Some(row),
             }
         }
-        let central = Central::of_blob(&whole.unwrap(), &Reciprocal::of(640_000));
-        let expected = 800.0_f64.powi(2) / 12.0 * 4_096.0;
+        let central = of_whole(&whole.unwrap());
+        let expected = 800.0_f64.powi(2) / 12.0;
         for (found, expected) in central.variance.iter().zip([expected, 0.0, expected]) {
-            assert!(
-                (f64::from(*found) - expected).abs() < 8.0,
-                "{found} {expected}"
-            );
+            near(*found, expected);
         }
+        // Symmetric: 2⁻²³ of what 400 px to the third are.
         assert!(
-            central.third.iter().all(|third| third.abs() < 700),
+            central.third.iter().all(|third| third.abs() < 8.0),
             "{central:?}"
         );
+    }
+
+    proptest! {
+        #[test]
+        fn sums_are_rounded_once_or_twice(sum: i64, shift in 2..64u32) {
+            let sum = sum >> shift;
+            let error = f64::from(rounded(sum)) - sum as f64;
+            prop_assert!(error.abs() <= (sum as f64).abs() / (1 << 23) as f64, "{}", error);
+        }
     }
 }

@@ -5,97 +5,70 @@
 //! pixel more or less on the edge of a disc shifts its centroid and E|d|²d so that the two nearly
 //! cancel.
 
-use super::pattern::length;
-use hivtac_terms::division::{Reciprocal, limited, scaled};
-
 /// Which way to look at a shape: along a direction and across it.
 #[derive(Clone, Copy, Debug)]
 pub struct Direction {
-    cos: i32,
-    sin: i32,
     /// cos², cos·sin, sin².
-    products: [i32; 3],
+    products: [f32; 3],
 }
 
 impl Direction {
-    /// Of cosine and sine with 14 fractional bits, as are all parts.
-    pub fn new(cos: i32, sin: i32) -> Direction {
+    /// Of a vector that is not zero, and one over its square.
+    pub fn of([x, y]: [f32; 2], by_square: f32) -> Direction {
+        let (cos, sin) = (x * by_square, y * by_square);
         Direction {
-            cos,
-            sin,
-            products: [cos * cos, cos * sin, sin * sin].map(|product| product >> 14),
+            products: [x * cos, y * cos, y * sin],
         }
     }
 
     /// xᵀ·M·x of a symmetric M = [p q; q r] along the direction.
-    pub fn along(&self, [p, q, r]: [i32; 3]) -> i32 {
+    pub fn along(&self, [p, q, r]: [f32; 3]) -> f32 {
         let [cc, cs, ss] = self.products;
-        sum([(cc, p), (2 * cs, q), (ss, r)])
+        cc * p + (cs + cs) * q + ss * r
     }
 
     /// The same across it.
-    pub fn across(&self, [p, q, r]: [i32; 3]) -> i32 {
+    pub fn across(&self, [p, q, r]: [f32; 3]) -> f32 {
         let [cc, cs, ss] = self.products;
-        sum([(ss, p), (-2 * cs, q), (cc, r)])
+        ss * p - (cs + cs) * q + cc * r
     }
 
     /// Of M, along it on one side and across it on the other.
-    pub fn mixed(&self, [p, q, r]: [i32; 3]) -> i32 {
+    pub fn mixed(&self, [p, q, r]: [f32; 3]) -> f32 {
         let [cc, cs, ss] = self.products;
-        sum([(-cs, p), (cc - ss, q), (cs, r)])
-    }
-
-    /// A vector's parts along and across it.
-    fn turned(&self, p: i32, q: i32) -> [i32; 2] {
-        [
-            sum([(self.cos, p), (self.sin, q)]),
-            sum([(self.cos, q), (-self.sin, p)]),
-        ]
+        cs * (r - p) + (cc - ss) * q
     }
 }
 
-/// Σ of factors with 14 fractional bits times values.
-fn sum<const N: usize>(terms: [(i32, i32); N]) -> i32 {
-    let products = terms.map(|(factor, value)| i64::from(factor) * i64::from(value));
-    limited(products.iter().sum::<i64>() >> 14)
-}
-
-/// E|d|²d of a shape, scaled to a round one, times its variance: px² with 16 fractional bits.
+/// E|d|²d of a shape, scaled to a round one: the square of its length, px².
 ///
-/// `third` are its third moments, px³ with 8 fractional bits. `by` divides by the variances along
-/// and across the direction, in px² with 12 fractional bits, and `deviation` is the root of the
-/// second of them, in px with 16.
-pub fn lean(
-    [xxx, xxy, xyy, yyy]: [i32; 4],
-    direction: &Direction,
-    by: [&Reciprocal; 2],
-    deviation: i32,
-) -> i32 {
-    let parts = [(xxx, xxy), (xxy, xyy), (xyy, yyy)].map(|(p, q)| direction.turned(p, q));
-    // px³ with 8 bits over px² with 12 are px with 16 once they are shifted by 20.
-    let rounded = |third: [i32; 3]| {
-        let parts = [direction.along(third), direction.across(third)].map(|it| i64::from(it) << 20);
-        limited(by[0].times(parts[0]) + by[1].times(parts[1]))
-    };
-    let [[xx, yx], [xy, yy], [xz, yz]] = parts;
-    let lean = length([[xx, xy, xz], [yx, yy, yz]].map(rounded));
-    scaled(lean, deviation, 16)
+/// `third` are its third moments, px³, and `by` are one over the variances along and across the
+/// direction, px⁻². A vector is as long whichever way it is looked at, so that |d|² alone is
+/// turned.
+pub fn squared_lean([xxx, xxy, xyy, yyy]: [f32; 4], direction: &Direction, by: [f32; 2]) -> f32 {
+    let [cc, cs, ss] = direction.products;
+    let [p, r] = [cc * by[0] + ss * by[1], ss * by[0] + cc * by[1]];
+    let q = (cs + cs) * (by[0] - by[1]);
+    let x = p * xxx + q * xxy + r * xyy;
+    let y = p * xxy + q * xyy + r * yyy;
+    x * x + y * y
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::blob::Blob;
-    use crate::rules::{central::Central, central::tests::blob};
+    use crate::rules::central::{
+        Central,
+        tests::{blob, of_whole},
+    };
 
     /// px².
-    fn lean_of(blob: &Blob) -> f64 {
-        let Central { variance, third } = Central::of_blob(blob, &Reciprocal::of(blob.area));
-        let [by_xx, by_yy] = [variance[0], variance[2]].map(|it| Reciprocal::of(it as u32));
-        let deviation = (f64::from(variance[2]) / 4_096.0).sqrt() * 65_536.0;
-        let direction = Direction::new(1 << 14, 0);
-        let lean = lean(third, &direction, [&by_xx, &by_yy], deviation as i32);
-        f64::from(lean) / 65_536.0
+    fn lean_of(blob: &Blob) -> f32 {
+        let Central { variance, third } = of_whole(blob);
+        let by = [variance[0], variance[2]].map(|it| 1.0 / it);
+        let direction = Direction::of([1.0, 0.0], 1.0);
+        (variance[2] * squared_lean(third, &direction, by)).sqrt()
     }
 
     #[test]

@@ -48,7 +48,6 @@ use crate::blob::Blob;
 use crate::settings::Settings;
 use heapless::Vec;
 use hivtac_terms::conditions::CentroidEstimator;
-use hivtac_terms::geometry::Across;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
@@ -56,7 +55,7 @@ use pattern::Pattern;
 use shape::{RadialShape, Shape, nominal_edge};
 
 /// Four markers, how their images look, and the pattern they make.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Markers 0–3.
     pub markers: [Marker; 4],
@@ -87,7 +86,7 @@ impl Found {
 }
 
 /// What a rest position is to judge of a marker's image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Image {
     /// As the pattern's centre sees it.
     radial: RadialShape,
@@ -95,14 +94,14 @@ struct Image {
     area: u32,
     /// [`Shape::passed`].
     passed: u32,
-    /// Its width by the optics, without what the mask adds, px in Q16.16.
-    expected: i32,
+    /// Its width by the optics, without what the mask adds, px.
+    expected: f32,
     /// [`Shape::hollow`].
-    hollow: i32,
+    hollow: f32,
     /// [`Shape::lopsided`].
-    lopsided: i32,
+    lopsided: f32,
     /// [`Shape::density`].
-    density: i32,
+    density: f32,
 }
 
 /// More candidates than this are not sorted out: 8 make 70 sets of four.
@@ -113,18 +112,17 @@ const SMALLEST_PART: u32 = 3;
 /// A candidate has at most this many times a marker's area at rest: at twice the rest's distance
 /// from the axis it has less than four times, before dilation adds its share.
 const LARGEST_MULTIPLE: u32 = 8;
-/// Candidates fill their ellipse at least so far, of 65,536 (0.93). A disc has 0.97 to 1 at any
-/// size and tilt, a half disc 0.95, two touching discs 0.88, a crescent less.
-const LEAST_FILL: i32 = 60_950;
-/// How far a marker may be from the optical law in width, of 256 (±37.5 %): threshold, light and
-/// blur are unknown before there is a rest position, and under a tip far off the middle the
-/// pattern's centre is not on the axis.
-const SIZE_TOLERANCE: i64 = 96;
-/// Narrowest marker, along the radius over across it, of 256 (0.2): foreshortened by distance and
-/// steepest film.
-const LEAST_ASPECT: i64 = 51;
-/// Widest, of 256 (1.15): round, and the noise of a small picture.
-const LARGEST_ASPECT: i64 = 294;
+/// Candidates fill their ellipse at least so far. A disc has 0.97 to 1 at any size and tilt, a half
+/// disc 0.95, two touching discs 0.88, a crescent less.
+const LEAST_FILL: f32 = 0.93;
+/// How far a marker may be from the optical law in width: threshold, light and blur are unknown
+/// before there is a rest position, and under a tip far off the middle the pattern's centre is not
+/// on the axis.
+const SIZE_TOLERANCE: f32 = 0.375;
+/// Narrowest marker, along the radius over across it: foreshortened by distance and steepest film.
+const LEAST_ASPECT: f32 = 0.199;
+/// Widest: round, and the noise of a small picture.
+const LARGEST_ASPECT: f32 = 1.152;
 
 /// Finds the markers among the blobs of a frame. Holds all that follows from the settings before
 /// there is a frame.
@@ -134,10 +132,13 @@ pub struct Finder {
     size: [u16; 2],
     /// The picture's middle.
     center: (Px, Px),
-    /// A marker's distance from it at rest.
-    rest_distance: Px,
-    across: Across,
-    edge: Px,
+    /// A marker's distance from it at rest, px.
+    rest_distance: f32,
+    /// A marker's width across the radius over its distance from the middle: see
+    /// [`Geometry::across`](hivtac_terms::geometry::Geometry::across).
+    across: f32,
+    /// What the mask adds to it, px.
+    edge: f32,
     areas: (u32, u32),
     centroid: CentroidEstimator,
 }
@@ -152,9 +153,9 @@ impl Finder {
         Finder {
             size: [geometry.width, geometry.height],
             center: geometry.center(),
-            rest_distance: geometry.rest_distance(),
-            across: Across::of(geometry),
-            edge,
+            rest_distance: geometry.rest_distance().to_f32(),
+            across: geometry.marker_diameter.0 as f32 / geometry.marker_radius.0.max(1) as f32,
+            edge: edge.to_f32(),
             areas: (smallest.max(1), largest),
             centroid: settings.centroid,
         }
@@ -168,7 +169,16 @@ impl Finder {
     /// else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does, or there are too many
     /// candidates.
     pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
-        let candidates = self.candidates(blobs)?;
+        let mut candidates = Vec::<Shape, MAX_CANDIDATES>::new();
+        for blob in blobs {
+            if let Some(shape) = self.candidate(blob) {
+                let pushed = candidates.push(shape);
+                pushed.map_err(|_| Status::MARKERS_AMBIGUOUS)?;
+            }
+        }
+        if candidates.len() < 4 {
+            return Err(Status::MARKERS_MISSING);
+        }
         let mut found = None;
         let mut reason = Status::MARKERS_AMBIGUOUS;
         for set in sets_of_four(candidates.len()) {
@@ -186,24 +196,11 @@ impl Finder {
         found.ok_or(reason)
     }
 
-    fn candidates(&self, blobs: &[Blob]) -> Result<Vec<Shape, MAX_CANDIDATES>, Status> {
-        let mut candidates = Vec::new();
-        for shape in blobs
-            .iter()
-            .filter(|blob| self.may_be_marker(blob))
-            .filter_map(|blob| Shape::of_blob(blob, self.centroid))
-        {
-            if shape.fill < LEAST_FILL {
-                continue;
-            }
-            candidates
-                .push(shape)
-                .map_err(|_| Status::MARKERS_AMBIGUOUS)?;
+    fn candidate(&self, blob: &Blob) -> Option<Shape> {
+        if !self.may_be_marker(blob) {
+            return None;
         }
-        if candidates.len() < 4 {
-            return Err(Status::MARKERS_MISSING);
-        }
-        Ok(candidates)
+        Shape::of_blob(blob, self.centroid).filter(|shape| shape.fill >= LEAST_FILL)
     }
 
     /// Plausible area, and no pixel on the border: what touches it is cut.
@@ -241,16 +238,11 @@ impl Finder {
     /// A marker's image, when its size fits its distance from the pattern's centre.
     fn image(&self, shape: &Shape, pattern: &Pattern) -> Option<Image> {
         let radial = shape.about(pattern.center)?;
-        let expected = self.across.at(radial.distance).0;
-        let excess = i64::from((radial.across - self.edge.0).abs_diff(expected));
-        // ⌊256·along / across⌋ within the limits.
-        let (along, across) = (
-            256 * i64::from(radial.along),
-            i64::from(radial.across.max(1)),
-        );
-        let is_plausible = excess * 256 <= i64::from(expected) * SIZE_TOLERANCE
-            && along >= LEAST_ASPECT * across
-            && along < (LARGEST_ASPECT + 1) * across;
+        let expected = radial.distance * self.across;
+        let excess = radial.across - self.edge - expected;
+        let is_plausible = excess.abs() <= expected * SIZE_TOLERANCE
+            && radial.along >= LEAST_ASPECT * radial.across
+            && radial.along <= LARGEST_ASPECT * radial.across;
         is_plausible.then_some(Image {
             radial,
             area: shape.area,

@@ -8,41 +8,37 @@
 //! strain the test for a thing that stands in for a marker.
 
 use super::shape::Shape;
-use hivtac_terms::angle::atan2;
-use hivtac_terms::division::Reciprocal;
-use hivtac_terms::root::rough_root;
-use hivtac_terms::units::{MilliDegrees, Px};
+use crate::kernels::sqrt;
+use hivtac_terms::units::Px;
 
 /// What four points in the order of the identities make.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pattern {
     /// Their mean.
     pub center: (Px, Px),
-    /// Half the side of the square that fits best, px in Q16.16.
-    pub half_side: i32,
-    /// How far that square is turned, x towards y.
-    pub turn: MilliDegrees,
-    /// Stretch and shear, in parts of the square's size, of 65,536.
-    pub strain: [i32; 2],
-    /// Taper along x and y, in parts of the square's half side, of 65,536.
-    pub taper: [i32; 2],
+    /// Half the side of the square that fits best, px.
+    pub half_side: f32,
+    /// How far that square is turned, x towards y: cosine and sine.
+    pub turn: [f32; 2],
+    /// Stretch and shear, in parts of the square's size.
+    pub strain: [f32; 2],
+    /// Taper along x and y, in parts of the square's half side.
+    pub taper: [f32; 2],
 }
 
 /// Limits of a pattern before there is a rest position: lens, mounting and punched film are as they
-/// come. Turned by at most 20°.
-const LARGEST_TURN: MilliDegrees = MilliDegrees(20_000);
-/// Strain of at most 0.075, of 65,536 (seen: 0.065, under a tip 4 mm off the middle).
-const LARGEST_STRAIN: i32 = 4_915;
-/// Taper of at most 0.15, of 65,536.
-const LARGEST_TAPER: i32 = 9_830;
-/// Centre at most 0.8 of the half side at rest away from the picture's middle; of 256.
-const LARGEST_SHIFT: i64 = 205;
-/// 0.75 to 2.2 times as large as at rest, of 256: a film pulled outwards, and one that nearly
-/// touches the lens.
-const SCALE: (i64, i64) = (192, 563);
+/// come. Turned by at most 20°: the tangent.
+const LARGEST_TURN: f32 = 0.363_97;
+/// Strain (seen: 0.065, under a tip 4 mm off the middle).
+const LARGEST_STRAIN: f32 = 0.075;
+const LARGEST_TAPER: f32 = 0.15;
+/// The centre's distance from the picture's middle, in parts of the half side at rest.
+const LARGEST_SHIFT: f32 = 0.801;
+/// Times as large as at rest: a film pulled outwards, and one that nearly touches the lens.
+const SCALE: (f32, f32) = (0.75, 2.2);
 
-/// √½ of 256: a square's half side over its half diagonal.
-const SQRT_HALF: i64 = 181;
+/// A square's half side over its half diagonal.
+const SQRT_HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
 
 /// (Sign of x, sign of y) of markers 0–3 around their centre.
 const SIGNS: [(i32, i32); 4] = [(-1, -1), (1, -1), (1, 1), (-1, 1)];
@@ -84,40 +80,58 @@ impl Pattern {
         let (xx, yx) = project(|(x, _)| x);
         let (xy, yy) = project(|(_, y)| y);
         let (taper_x, taper_y) = project(|(x, y)| x * y);
-        // Eight half sides.
-        let size = length([xx + yy, yx - xy]).max(1);
-        let by_size = Reciprocal::of(size as u32);
+        // Eight half sides, turned; points that are all one make a small square.
+        let turned = [xx + yy, yx - xy].map(|part| part as f32);
+        let size = larger(length(turned), 1.0);
+        let by_size = 1.0 / size;
+        let parts = |parts: [i32; 2]| parts.map(|part| part as f32 * by_size);
         Pattern {
             center: (Px(sum_x >> 2), Px(sum_y >> 2)),
-            half_side: size / 8,
-            turn: atan2(i64::from(yx - xy), i64::from(xx + yy)),
-            strain: [xx - yy, xy + yx].map(|part| by_size.part(part)),
-            taper: [taper_x, taper_y].map(|part| by_size.part(2 * part)),
+            half_side: size * (1.0 / 8.0 / 65_536.0),
+            turn: turned.map(|part| part * by_size),
+            strain: parts([xx - yy, xy + yx]),
+            taper: parts([2 * taper_x, 2 * taper_y]),
         }
     }
 
     /// Whether it can be the markers of a sensor in any state, from geometry alone: `center` is the
-    /// picture's, and at rest they are `rest_distance` from it.
-    pub fn is_plausible(&self, center: (Px, Px), rest_distance: Px) -> bool {
-        let rest = i64::from(rest_distance.0) * SQRT_HALF / 256;
-        let shift = i64::from(distance(self.center, center).0);
-        self.turn.0.abs() <= LARGEST_TURN.0
-            && length(self.strain) <= LARGEST_STRAIN
-            && length(self.taper) <= LARGEST_TAPER
-            && shift * 256 <= rest * LARGEST_SHIFT
-            && (rest * SCALE.0..=rest * SCALE.1).contains(&(i64::from(self.half_side) * 256))
+    /// picture's, and at rest they are `rest_distance` px from it.
+    pub fn is_plausible(&self, center: (Px, Px), rest_distance: f32) -> bool {
+        let rest = rest_distance * SQRT_HALF;
+        let [cos, sin] = self.turn;
+        sin.abs() <= cos * LARGEST_TURN
+            && is_within(self.strain, LARGEST_STRAIN)
+            && is_within(self.taper, LARGEST_TAPER)
+            && is_within(offset(self.center, center), rest * LARGEST_SHIFT)
+            && (rest * SCALE.0..=rest * SCALE.1).contains(&self.half_side)
     }
 }
 
-/// Distance of two points, both in a picture, to 2⁻¹⁵ of it.
-pub fn distance(a: (Px, Px), b: (Px, Px)) -> Px {
-    let (dx, dy) = (a.0 - b.0, a.1 - b.1);
-    Px(length([dx.0, dy.0]))
+/// From point b to point a, both in a picture, px.
+pub fn offset(a: (Px, Px), b: (Px, Px)) -> [f32; 2] {
+    [(a.0 - b.0).to_f32(), (a.1 - b.1).to_f32()]
 }
 
-/// Length of a vector, to 2⁻¹⁵ of it, limited to 32 bits.
-#[inline(never)]
-pub fn length(vector: [i32; 2]) -> i32 {
-    let [x, y] = vector.map(|part| (i64::from(part) * i64::from(part)) as u64);
-    rough_root(x + y).min(i32::MAX as u32) as i32
+/// Distance of two points, both in a picture, px.
+pub fn distance(a: (Px, Px), b: (Px, Px)) -> f32 {
+    length(offset(a, b))
+}
+
+/// The larger of two numbers. `f32::max` is a call of a library where the processor has no
+/// instruction for it.
+#[inline(always)]
+pub fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Length of a vector.
+#[inline(always)]
+pub fn length([x, y]: [f32; 2]) -> f32 {
+    sqrt(x * x + y * y)
+}
+
+/// Whether a vector is at most so long, of a limit of at least 0.
+#[inline(always)]
+pub fn is_within([x, y]: [f32; 2], limit: f32) -> bool {
+    x * x + y * y <= limit * limit
 }

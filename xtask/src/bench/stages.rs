@@ -128,7 +128,6 @@ fn stage_of_name(name: &str) -> Option<&'static str> {
         ("dilate", "dilation"),
         ("dot", "network"),
         ("spline", "steps"),
-        ("root", "steps"),
         ("expand", "network"),
         ("activate", "network"),
     ];

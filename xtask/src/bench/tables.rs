@@ -92,6 +92,9 @@ fn pixels(frame: &str) -> f64 {
     sides.product()
 }
 
+/// What follows the moments, and all calls of a library, of which some belong to what comes before.
+const FROM_MOMENTS: [&str; 5] = ["markers", "features", "network", "angles, force", "library"];
+
 /// The stages of one case.
 fn stages(measured: &Measured) -> String {
     let mut text =
@@ -99,7 +102,11 @@ fn stages(measured: &Measured) -> String {
     let known = stages::ORDER
         .iter()
         .filter_map(|stage| Some((*stage, *measured.stages.get(stage)?)));
-    for (stage, cost) in known.chain([("together", measured.total())]) {
+    let sums = [
+        ("from the moments to the force", measured.of(&FROM_MOMENTS)),
+        ("together", measured.total()),
+    ];
+    for (stage, cost) in known.chain(sums) {
         let floor = cost.instructions as f64 / 2.0;
         let (instructions, cycles) = (grouped(cost.instructions), cycles(cost));
         let _ = writeln!(
