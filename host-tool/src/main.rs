@@ -9,6 +9,7 @@ mod files;
 mod finding;
 mod firmware;
 mod focus;
+mod follow;
 mod force_json;
 mod health;
 mod help;
@@ -161,7 +162,7 @@ enum Command {
         #[arg(
             long,
             value_name = "N",
-            default_value_t = 32,
+            default_value_t = command::TARE_FRAMES,
             value_parser = clap::value_parser!(u16).range(1..=256)
         )]
         frames: u16,
