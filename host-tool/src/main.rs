@@ -3,6 +3,7 @@
 mod auto_threshold;
 mod bring_up;
 mod check;
+mod clock;
 mod command;
 mod decimal;
 mod files;
@@ -23,6 +24,7 @@ mod picture;
 mod raw;
 mod record;
 mod replay;
+mod ros;
 mod sense;
 mod settings;
 mod snapshot;
