@@ -20,6 +20,7 @@ import sys
 import tempfile
 import time
 import unittest
+import zlib
 from pathlib import Path
 
 # Everything stays on this computer, whatever networks it has.
@@ -305,6 +306,22 @@ class OfARecording(unittest.TestCase):
                         said = serve.said()
                         self.assertRegex(said, "another node .* is called /hivtac, too")
 
+    def test_of_several_sensors_each_has_names_of_its_own(self):
+        other_file = self.file.with_name("other.mcap")
+        other_file.write_bytes(of_another(self.file.read_bytes(), b"hivtac-rig-2"))
+        node = Node()
+        units = [b"hivtac-rig-1".hex(), b"hivtac-rig-2".hex()]
+        readers = [
+            node.reader(f"rt/hivtac/unit_{unit}/wrench", WrenchStamped) for unit in units
+        ]
+        with Replay(self.file) as one, Replay(other_file) as other:
+            with Serve(*ROS2, *one.port, *other.port):
+                for unit, reader in zip(units, readers):
+                    wrench = next(taken(reader))
+                    self.assertEqual(
+                        wrench.header.frame_id, f"hivtac_unit_{unit}_film"
+                    )
+
     def test_one_sensor_is_not_served_twice(self):
         with Replay(self.file) as one, Replay(self.file) as other:
             refused = self.refused("--foxglove", *one.port, *other.port[:2])
@@ -335,6 +352,35 @@ class Replay:
         self._process.kill()
         self._process.wait()
         self._process.stdout.close()
+
+
+def of_another(recording, unit):
+    """The recording with the number of another sensor in its hellos (docs/wire.md)."""
+    old, place = b"hivtac-rig-1", 0
+    while (place := recording.find(old, place)) >= 0:
+        begin, end = recording.rfind(b"\0", 0, place) + 1, recording.find(b"\0", place)
+        body = cobs_decoded(recording[begin:end])[:-4].replace(old, unit)
+        frame = cobs_encoded(body + zlib.crc32(body).to_bytes(4, "little"))
+        assert len(frame) == end - begin
+        recording = recording[:begin] + frame + recording[end:]
+        place = end
+    return recording
+
+
+def cobs_decoded(frame):
+    bytes_, place = b"", 0
+    while place < len(frame):
+        code = frame[place]
+        bytes_ += frame[place + 1 : place + code]
+        place += code
+        if code < 255 and place < len(frame):
+            bytes_ += b"\0"
+    return bytes_
+
+
+def cobs_encoded(bytes_):
+    assert all(len(part) < 254 for part in bytes_.split(b"\0"))
+    return b"".join(bytes([len(part) + 1]) + part for part in bytes_.split(b"\0"))
 
 
 def port(rig):
