@@ -24,6 +24,7 @@ import zlib
 from pathlib import Path
 
 # Everything stays on this computer, whatever networks it has.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["CYCLONEDDS_URI"] = (
     "<General><Interfaces><NetworkInterface name='lo' multicast='true'/></Interfaces>"
     "</General><Discovery><ParticipantIndex>auto</ParticipantIndex>"

@@ -9,15 +9,16 @@ use crate::output::note;
 use crate::ros::channel::Channel;
 use crate::ros::{DIAGNOSTICS, Definition, trigger_reply};
 use hivtac_host::failure::Failure;
-use ros2_client::dds::rustdds::RTPSEntity;
+use ros2_client::dds::rustdds::{DomainParticipantBuilder, RTPSEntity};
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
-    Context, ContextOptions, Message, MessageTypeName, Name, Node, NodeName, NodeOptions,
-    Publisher, QosProfile, RmwRequestId, Server, ServiceMapping, ServiceTypeName,
+    Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, QosProfile,
+    RmwRequestId, Server, ServiceMapping, ServiceTypeName,
 };
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use std::fmt::{self, Display};
+use std::net::Ipv4Addr;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -125,8 +126,13 @@ impl Ros2 {
                  UDP allowed?"
             ))
         };
-        let options = ContextOptions::new().domain_id(domain);
-        let context = Context::with_options(options).map_err(|error| failed(&error))?;
+        let mut participant = DomainParticipantBuilder::new(domain);
+        if stays_here() {
+            participant = participant.with_only_networks([Ipv4Addr::LOCALHOST]);
+        }
+        let participant = participant.build().map_err(|error| failed(&error))?;
+        let context = Context::from_domain_participant(participant);
+        let context = context.map_err(|error| failed(&error))?;
         let node_name = NodeName::new("/", name).map_err(|error| failed(&error))?;
         // A log topic and parameters would be empty.
         let options = NodeOptions::new().enable_rosout(false);
@@ -175,6 +181,12 @@ impl Ros2 {
         }
         self.is_told = is_anothers;
     }
+}
+
+/// Whether the environment says, as to all of ROS 2, that nothing may leave this computer.
+fn stays_here() -> bool {
+    let is = |name: &str, value: &str| std::env::var_os(name).is_some_and(|it| it == value);
+    is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") || is("ROS_LOCALHOST_ONLY", "1")
 }
 
 /// Where a device's names are.
