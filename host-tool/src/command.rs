@@ -18,6 +18,8 @@ use std::time::Duration;
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 /// Time a tare may need besides.
 pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
+/// Good frames that a tare averages when nothing else is said.
+pub const TARE_FRAMES: u16 = 32;
 
 /// How to take a tare.
 pub struct Tare {

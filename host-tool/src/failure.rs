@@ -8,6 +8,8 @@ use std::fmt;
 pub enum Kind {
     /// A file, an image or an argument is not usable.
     Input,
+    /// An option that cannot be used so, or that this program was built without.
+    Usage,
     /// No device: none found, the port cannot be opened, or nobody answers.
     NoDevice,
     /// The device speaks another version of the protocol.
@@ -28,8 +30,9 @@ pub enum Kind {
 
 impl Kind {
     /// All kinds, in the order of their exit codes.
-    pub const ALL: [Kind; 9] = [
+    pub const ALL: [Kind; 10] = [
         Kind::Input,
+        Kind::Usage,
         Kind::NoDevice,
         Kind::Version,
         Kind::Lost,
@@ -44,6 +47,7 @@ impl Kind {
     pub fn meaning(self) -> &'static str {
         match self {
             Kind::Input => "a file, a picture or the output cannot be used",
+            Kind::Usage => "wrong usage",
             Kind::NoDevice => "no device: none found, the port cannot be opened, or nobody answers",
             Kind::Version => "the device speaks another version of the protocol",
             Kind::Lost => "the connection was lost",
@@ -61,6 +65,7 @@ impl Kind {
     pub fn exit_code(self) -> u8 {
         match self {
             Kind::Input => 1,
+            Kind::Usage => 2,
             Kind::NoDevice => 3,
             Kind::Version => 4,
             Kind::Lost => 5,

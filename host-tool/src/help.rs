@@ -28,9 +28,8 @@ fn with_exit_codes(command: Command, codes: &str) -> Command {
 
 /// Each code with what it means, lowest first.
 fn exit_codes() -> String {
-    let usage = "wrong usage".to_owned();
     let done = "done; also when the reader of the output went away (broken pipe)".to_owned();
-    let mut codes = vec![(0, done), (2, usage)];
+    let mut codes = vec![(0, done)];
     codes.extend(Kind::ALL.map(|kind| (kind.exit_code(), kind.meaning().to_owned())));
     codes.sort_unstable();
     let lines = codes

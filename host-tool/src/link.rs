@@ -162,7 +162,7 @@ impl Link {
         let name = &self.name;
         let message = format!(
             "connection to {name} lost: {why}; cable pulled or device reset? \
-             (`hivtac monitor --reconnect` goes on when it is back)"
+             (`monitor --reconnect`, `view` and `serve` go on when it is back)"
         );
         Failure::new(Kind::Lost, message)
     }

@@ -3,12 +3,14 @@
 mod auto_threshold;
 mod bring_up;
 mod check;
+mod clock;
 mod command;
 mod decimal;
 mod files;
 mod finding;
 mod firmware;
 mod focus;
+mod follow;
 mod force_json;
 mod health;
 mod help;
@@ -22,7 +24,13 @@ mod picture;
 mod raw;
 mod record;
 mod replay;
+mod ros;
 mod sense;
+#[cfg_attr(
+    not(all(feature = "ros2", feature = "foxglove")),
+    allow(dead_code, reason = "only what these features add uses it")
+)]
+mod serve;
 mod settings;
 mod snapshot;
 mod tally;
@@ -48,6 +56,7 @@ use hivtac_wire::settings::Name;
 use lines::Format;
 use settings::camera::{self, Wanted};
 use settings::temporal::{Change, RezeroChange, small_thousandths, thousandths};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -161,7 +170,7 @@ enum Command {
         #[arg(
             long,
             value_name = "N",
-            default_value_t = 32,
+            default_value_t = command::TARE_FRAMES,
             value_parser = clap::value_parser!(u16).range(1..=256)
         )]
         frames: u16,
@@ -274,6 +283,16 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Serve forces to other programs, as a node of ROS 2 or for Foxglove, until Ctrl-C
+    ///
+    /// For a hivtac that was built with it: `cargo install --path host-tool --features
+    /// ros2,foxglove`. Prints `ready` and where; goes on after a lost connection, which diagnostics
+    /// tell. Topics of the node, each below its name: `wrench`, `place`, `markers`, `contact`,
+    /// `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are below
+    /// /NODE/SENSOR.
+    ///
+    /// Example: hivtac serve --ros2 --foxglove
+    Serve(ServeArguments),
     /// Write a template to print: where the film is punched and the dots are stuck, as SVG
     ///
     /// Example: hivtac template film.svg
@@ -911,6 +930,63 @@ struct MonitorArguments {
 }
 
 #[derive(Args)]
+struct ServeArguments {
+    #[command(flatten)]
+    devices: Devices,
+    #[command(flatten)]
+    outlets: Outlets,
+    /// The node's name in ROS 2
+    #[arg(long, value_name = "NODE", default_value = "hivtac", requires = "ros2")]
+    name: String,
+    /// ROS 2's domain, 0–232; ROS_DOMAIN_ID when not given, else 0
+    #[arg(
+        long,
+        value_name = "ID",
+        requires = "ros2",
+        value_parser = clap::value_parser!(u16).range(0..=i64::from(serve::LAST_DOMAIN))
+    )]
+    domain: Option<u16>,
+    /// Where Foxglove finds it; port 0 for any that is free. Only this computer can reach
+    /// 127.0.0.1, others too 0.0.0.0: whoever reaches it can read everything
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        default_value = "127.0.0.1:8765",
+        requires = "foxglove"
+    )]
+    listen: SocketAddr,
+    /// Where it is as one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Args)]
+#[group(required = true, multiple = true)]
+struct Outlets {
+    /// As a node of ROS 2, which needs no ROS to be installed here
+    #[arg(long)]
+    ros2: bool,
+    /// For Foxglove, over its WebSocket
+    #[arg(long)]
+    foxglove: bool,
+}
+
+impl ServeArguments {
+    fn options(self) -> Result<serve::Options, Failure> {
+        Ok(serve::Options {
+            addresses: self.devices.addresses()?,
+            patience: self.devices.timeout,
+            ros2: self.outlets.ros2,
+            foxglove: self.outlets.foxglove,
+            name: self.name,
+            domain: self.domain,
+            listen: self.listen,
+            json: self.json,
+        })
+    }
+}
+
+#[derive(Args)]
 struct SenseArguments {
     /// Pictures
     #[arg(required = true, value_name = "IMAGE")]
@@ -1045,6 +1121,7 @@ fn run(command: Command) -> Result<(), Failure> {
             folder: recordings,
             json,
         }),
+        Command::Serve(arguments) => serve::run(&arguments.options()?),
         Command::Template { file, preset, json } => template::run(&file, preset, json),
         Command::BringUp {
             device,

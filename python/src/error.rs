@@ -42,6 +42,8 @@ pub fn raised(failure: Failure) -> PyErr {
         Kind::Interrupted => {
             interrupt::take().unwrap_or_else(|| PyKeyboardInterrupt::new_err(text))
         }
-        Kind::Input | Kind::Rate | Kind::Loss | Kind::NotRight => Error::new_err(text),
+        Kind::Input | Kind::Usage | Kind::Rate | Kind::Loss | Kind::NotRight => {
+            Error::new_err(text)
+        }
     }
 }

@@ -21,52 +21,8 @@ import numpy as np
 
 import hivtac
 
-# The emulator runs at about a tenth of real time, and tests share the processors.
-PATIENCE = 60.0
-
-
-class Rig:
-    """The rig with the firmware, at a TCP port of its own."""
-
-    def __init__(self, scene="demo", *options):
-        self._folder = tempfile.TemporaryDirectory()
-        self.truth_file = Path(self._folder.name) / "truth"
-        self._process = subprocess.Popen(
-            [
-                os.environ["HIVTAC_RIG"],
-                "--tcp",
-                "0",
-                "--truth",
-                self.truth_file,
-                "--scene",
-                scene,
-                *options,
-                os.environ["HIVTAC_ELF"],
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        said = self._process.stdout.readline()
-        self.port = "tcp:" + said.strip().split("tcp=", 1)[1]
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.kill()
-        self._process.stdout.close()
-        self._folder.cleanup()
-
-    def kill(self):
-        self._process.kill()
-        self._process.wait()
-
-    def truth(self):
-        """What is true of each frame, by its number."""
-        lines = self.truth_file.read_text().splitlines()
-        whole = [json.loads(line) for line in lines if line.endswith("}")]
-        return {line["frame"]: line for line in whole}
+sys.path.append(str(Path(__file__).parents[2] / "tests/python"))
+from rig import PATIENCE, Rig, true_force  # noqa: E402
 
 
 class OnTheRig(unittest.TestCase):
@@ -228,11 +184,6 @@ class silent:
 
     def __exit__(self, *_):
         self._listener.close()
-
-
-def true_force(true):
-    """N, of a line of the rig's truth."""
-    return [true["x_n"], true["y_n"], true["z_n"]]
 
 
 if __name__ == "__main__":

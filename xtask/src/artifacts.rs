@@ -72,17 +72,24 @@ fn firmware_command(toolchain: &Toolchain) -> Command {
     command
 }
 
+/// Features of the host tool that the tool of users has only when they ask for it.
+pub const SERVING: &str = "ros2,foxglove";
+
 /// The host tool `hivtac`, without what reads pictures.
 pub fn host_tool() -> Result<PathBuf> {
+    build(&mut host_tool_command(), "hivtac")
+}
+
+/// The same with all that `hivtac serve` can.
+pub fn serving_tool() -> Result<PathBuf> {
+    build(host_tool_command().args(["--features", SERVING]), "hivtac")
+}
+
+fn host_tool_command() -> Command {
     let mut command = cargo("build", workspace::root());
-    command.args([
-        "--profile",
-        TOOLS,
-        "--package",
-        "hivtac",
-        "--no-default-features",
-    ]);
-    build(&mut command, "hivtac")
+    command.args(["--profile", TOOLS, "--package", "hivtac"]);
+    command.arg("--no-default-features");
+    command
 }
 
 /// The calibration.

@@ -9,7 +9,9 @@ use clap::Args;
 use crate::artifacts::Board;
 use crate::report::{Report, run_tests};
 use crate::toolchain::{self, Toolchain, cargo};
-use crate::{artifacts, bench, columns, fuzz, licences, packages, process, python, workspace};
+use crate::{
+    artifacts, bench, columns, fuzz, licences, packages, process, python, served, workspace,
+};
 
 /// The workspaces: folder, and whether it has more than one package.
 const WORKSPACES: [(&str, bool); 4] = [
@@ -94,6 +96,11 @@ impl Test {
         if self.wants("tests: python") {
             report.optional("tests: python", python::obstacle(), |tally| {
                 python::test(&artifacts::firmware(toolchain)?, tally)
+            });
+        }
+        if self.wants("tests: serve") {
+            report.optional("tests: serve", served::obstacle(), |tally| {
+                served::test(&artifacts::firmware(toolchain)?, tally)
             });
         }
     }
@@ -247,11 +254,14 @@ fn host_lints() -> Result<()> {
         "hivtac-board",
         "--all-targets",
     ]);
+    let mut serving = artifacts::clippy(workspace::root());
+    serving.args(["--package", "hivtac", "--bins"]);
+    serving.args(["--features", artifacts::SERVING]);
     let mut rig = artifacts::rig_cargo("clippy");
     rig.arg("--all-targets");
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
     counter.arg("--release");
-    for command in [&mut root, &mut rig, &mut counter] {
+    for command in [&mut root, &mut serving, &mut rig, &mut counter] {
         process::run(command.args(["--", "-D", "warnings"]))?;
     }
     Ok(())

@@ -1,12 +1,13 @@
 //! A recording as MCAP in ROS 2's profile: what `ros2 bag play`, Foxglove and `PlotJuggler` read,
 //! and beside it every message of the device as it came, which `hivtac replay` reads.
 
-use super::ros::{self, Definition};
+use crate::clock::Clock;
+use crate::ros::channel::{Channel, Frames, messages, topic_of};
+use crate::ros::{self, Definition};
 use hivtac_host::recording::WIRE;
 use hivtac_host::shown::unit_number;
-use hivtac_terms::status::Status;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
-use hivtac_wire::message::{DeviceHello, DeviceMessage, Sample};
+use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapResult, WriteOptions, Writer};
 use std::collections::BTreeMap;
@@ -15,70 +16,46 @@ use std::io::BufWriter;
 
 /// Bytes of a chunk at most: what a full disk costs at the end.
 const CHUNK: u64 = 1 << 18;
-/// The frame that forces and places are in: x to the right in the image, y down; a press has z < 0.
-const FILM_FRAME: &str = "hivtac_film";
-/// The frame of the markers.
-const IMAGE_FRAME: &str = "hivtac_image";
-
-/// Channels, in the order of [`Topics::create`].
-#[derive(Clone, Copy)]
-enum Topic {
-    Wrench,
-    Place,
-    Markers,
-    Contact,
-    Slip,
-    Status,
-    Wire,
-}
+/// How many topics a sensor has: its channels, and its messages as they came.
+const TOPICS: usize = Channel::ALL.len() + 1;
+/// Place of the topic of the messages as they came.
+const AS_THEY_CAME: usize = Channel::ALL.len();
 
 /// The file under way.
 pub struct Bag {
     writer: Writer<BufWriter<File>>,
+    frames: Frames,
     sensors: Vec<Topics>,
 }
 
 /// The topics of a sensor.
 struct Topics {
-    channels: [u16; 7],
-    counts: [u32; 7],
-    /// Of the first sample: host time, ns since 1970, and device time, µs.
-    first: Option<(u64, u64)>,
+    numbers: [u16; TOPICS],
+    counts: [u32; TOPICS],
+    clock: Clock,
 }
 
 impl Topics {
-    /// Those of a device, in their order as [`Topic`] has them.
+    /// Those of a device: one for each [`Channel`], and that of its messages as they came.
     fn create(writer: &mut Writer<BufWriter<File>>, hello: &DeviceHello) -> McapResult<Topics> {
         let unit = unit_number(&hello.device_id);
-        let topics: [(&str, &Definition); 7] = [
-            ("/wrench", &ros::WRENCH),
-            ("/place", &ros::POINT),
-            ("/markers", &ros::POLYGON),
-            ("/contact", &ros::BOOL),
-            ("/slip", &ros::BOOL),
-            ("/status", &ros::STRING),
-            (WIRE, &ros::BYTES),
-        ];
-        let mut channels = [0; 7];
-        for (channel, (topic, definition)) in channels.iter_mut().zip(topics) {
+        let channels = Channel::ALL.iter();
+        let channels =
+            channels.map(|channel| (format!("/{}", channel.name()), channel.definition()));
+        let topics: Vec<(String, &Definition)> =
+            channels.chain([(WIRE.to_owned(), &ros::BYTES)]).collect();
+        let mut numbers = [0; TOPICS];
+        for (number, (topic, definition)) in numbers.iter_mut().zip(topics) {
             let text = definition.text.as_bytes();
             let schema = writer.add_schema(definition.name, "ros2msg", text)?;
-            let topic = format!("/hivtac/unit_{unit}{topic}");
-            *channel = writer.add_channel(schema, &topic, "cdr", &BTreeMap::new())?;
+            let topic = topic_of(&unit) + &topic;
+            *number = writer.add_channel(schema, &topic, "cdr", &BTreeMap::new())?;
         }
         Ok(Topics {
-            channels,
-            counts: [0; 7],
-            first: None,
+            numbers,
+            counts: [0; TOPICS],
+            clock: Clock::default(),
         })
-    }
-
-    /// When a sample's frame was exposed on the host's clock: by the device's clock since the first
-    /// one, which has no jitter.
-    fn stamp_ns(&mut self, sample: &Sample, now_ns: u64) -> u64 {
-        let (host_ns, device_us) = *self.first.get_or_insert((now_ns, sample.time_us));
-        let since_us = sample.time_us.wrapping_sub(device_us) as i64;
-        host_ns.saturating_add_signed(since_us.saturating_mul(1_000))
     }
 }
 
@@ -104,6 +81,7 @@ impl Bag {
             .map(|hello| Topics::create(&mut writer, hello));
         let mut bag = Bag {
             sensors: sensors.collect::<McapResult<_>>()?,
+            frames: Frames::of("hivtac"),
             writer,
         };
         for (sensor, hello) in hellos.iter().enumerate() {
@@ -121,7 +99,10 @@ impl Bag {
     ) -> McapResult<()> {
         let mut buffer = [0; MAX_DEVICE_FRAME];
         let stamp_ns = match message {
-            DeviceMessage::Sample(sample) => self.sensors[sensor].stamp_ns(sample, now_ns),
+            DeviceMessage::Sample(sample) => {
+                let clock = &mut self.sensors[sensor].clock;
+                clock.stamp_ns(sample.time_us, now_ns)
+            }
             _ => now_ns,
         };
         let when = When {
@@ -130,48 +111,21 @@ impl Bag {
             stamp_ns,
         };
         if let Ok(frame) = encode(message, &mut buffer) {
-            self.write(Topic::Wire, &ros::bytes(frame), when)?;
+            self.write(AS_THEY_CAME, &ros::bytes(frame), when)?;
         }
-        match message {
-            DeviceMessage::Sample(sample) => self.sample(sample, when),
-            _ => Ok(()),
-        }
-    }
-
-    fn sample(&mut self, sample: &Sample, when: When) -> McapResult<()> {
-        let Sample {
-            force,
-            markers,
-            status,
-            ..
-        } = sample;
-        let stamp_ns = when.stamp_ns;
-        if let Some(force) = force {
-            let wrench = ros::wrench(stamp_ns, FILM_FRAME, force);
-            self.write(Topic::Wrench, &wrench, when)?;
-            if let Some(place) = ros::point(stamp_ns, FILM_FRAME, force) {
-                self.write(Topic::Place, &place, when)?;
-            }
-            for (topic, bit) in [
-                (Topic::Contact, Status::CONTACT),
-                (Topic::Slip, Status::SLIP),
-            ] {
-                self.write(topic, &ros::bool(status.contains(bit)), when)?;
+        if let DeviceMessage::Sample(sample) = message {
+            for (channel, data) in messages(sample, stamp_ns, &self.frames) {
+                self.write(channel as usize, &data, when)?;
             }
         }
-        if let Some(markers) = markers {
-            let markers = ros::polygon(stamp_ns, IMAGE_FRAME, markers);
-            self.write(Topic::Markers, &markers, when)?;
-        }
-        let names: Vec<_> = status.names().collect();
-        self.write(Topic::Status, &ros::string(&names.join(" ")), when)
+        Ok(())
     }
 
-    fn write(&mut self, topic: Topic, data: &[u8], when: When) -> McapResult<()> {
-        let topic = topic as usize;
+    /// Writes a message to one of a sensor's topics.
+    fn write(&mut self, topic: usize, data: &[u8], when: When) -> McapResult<()> {
         let sensor = &mut self.sensors[when.sensor];
         let header = MessageHeader {
-            channel_id: sensor.channels[topic],
+            channel_id: sensor.numbers[topic],
             sequence: sensor.counts[topic],
             log_time: when.now_ns,
             publish_time: when.stamp_ns,

@@ -2,7 +2,6 @@
 
 mod bag;
 mod listen;
-mod ros;
 mod table;
 
 pub use listen::Heard;

@@ -4,7 +4,7 @@ use hivtac_terms::status::Status;
 use serde::Serialize;
 
 /// How bad it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// As it should be.
@@ -15,23 +15,31 @@ pub enum Level {
     Bad,
 }
 
-/// One status bit for the page.
+/// One status bit for a person.
 #[derive(Debug, Serialize)]
 pub struct Light {
     /// The bit's value.
     bit: u32,
     /// Its name, as in all output.
-    name: &'static str,
-    level: Level,
+    pub name: &'static str,
+    /// How bad it is.
+    pub level: Level,
     /// What it means.
-    meaning: &'static str,
+    pub meaning: &'static str,
     /// What to do; empty when nothing has to be done.
-    advice: &'static str,
+    pub advice: &'static str,
 }
 
 /// Every bit that a status can have, lowest first.
 pub fn all() -> Vec<Light> {
-    let lights = Status::NAMES.iter().map(|(bit, name)| {
+    of(Status(u32::MAX))
+}
+
+/// Every bit of a status, lowest first.
+pub fn of(status: Status) -> Vec<Light> {
+    let bits = Status::NAMES.iter();
+    let bits = bits.filter(|(bit, _)| status.contains(*bit));
+    let lights = bits.map(|(bit, name)| {
         let (meaning, advice) = words(*bit);
         Light {
             bit: bit.0,
@@ -99,7 +107,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
         ),
         Status::TARE_MISSING => (
             "no rest position was taken on this unit",
-            "touch nothing, and press \"Tare\"",
+            "touch nothing, and take a tare",
         ),
         Status::NOT_CALIBRATED => (
             "the model is of a simulated sensor, not of this unit",

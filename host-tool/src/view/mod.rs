@@ -2,7 +2,7 @@
 
 mod events;
 mod feed;
-mod lights;
+pub mod lights;
 mod order;
 mod owner;
 mod picture;
@@ -10,7 +10,7 @@ mod recorder;
 mod request;
 mod response;
 mod server;
-mod state;
+pub mod state;
 mod token;
 mod unstalled;
 

@@ -1,31 +1,24 @@
-//! The one thread that talks to a device: reads what it sends, does what the page orders, and
-//! connects again when the cable was pulled.
+//! The one thread that talks to a device for the page: keeps what it sends, and does what the page
+//! orders.
 
 use super::feed::Feed;
 use super::order::{Answer, Order, Posted};
 use super::recorder::Recorder;
 use super::state::State;
-use crate::command::TARE_PATIENCE;
+use crate::command::{TARE_FRAMES, TARE_PATIENCE};
+use crate::follow::{Follower, follow};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::take;
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
-use hivtac_host::stop;
+use hivtac_wire::decoder::Rejected;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-/// Time between two looks for orders.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// Time between two tellings of the state.
 const TELL_EVERY: Duration = Duration::from_millis(250);
-/// Time between two attempts to connect again.
-const RETRY_EVERY: Duration = Duration::from_millis(500);
-/// Silence after which the device is asked whether it is still there.
-const SILENCE: Duration = Duration::from_secs(5);
-/// Frames of a tare.
-const TARE_FRAMES: u16 = 32;
 
 /// A device and what is known of it.
 pub struct Owner {
@@ -43,8 +36,6 @@ struct Watched {
     told: Instant,
     /// Something came since.
     is_new: bool,
-    /// When the last sample came.
-    heard: Instant,
 }
 
 impl Watched {
@@ -52,7 +43,6 @@ impl Watched {
         self.state.take(&message);
         self.recorder.message(&message);
         if let DeviceMessage::Sample(sample) = message {
-            self.heard = Instant::now();
             self.feed.sample(sample);
         }
         self.is_new = true;
@@ -93,7 +83,6 @@ impl Owner {
             recorder,
             told: Instant::now(),
             is_new: false,
-            heard: Instant::now(),
         };
         watched.tell();
         Owner {
@@ -104,74 +93,10 @@ impl Owner {
         }
     }
 
-    /// Until it is interrupted, through as many connections as it takes.
+    /// Until it is interrupted.
     pub fn run(mut self, link: Link) {
-        let mut connected = Some(link);
-        while !stop::requested() {
-            let Some(mut link) = connected.take() else {
-                // Long enough for a person to see that it was lost.
-                if self.wait().is_ok() {
-                    connected = self.connect();
-                }
-                continue;
-            };
-            let result = self.converse(&mut link);
-            self.watched.state.tally.rejected(link.rejected());
-            if let Err(failure) = result {
-                self.watched.trouble(failure.to_string());
-                self.watched.recorder.end(Err(failure));
-                self.watched.tell();
-            }
-        }
-    }
-
-    /// Time without a device, in which orders are refused.
-    fn wait(&mut self) -> Result<(), Failure> {
-        let end = Instant::now() + RETRY_EVERY;
-        loop {
-            let left = end.saturating_duration_since(Instant::now());
-            match self.orders.recv_timeout(left.min(LOOK_EVERY)) {
-                Ok(posted) => posted.answer(Answer::Failed("the device is not there".to_owned())),
-                Err(_) if left.is_zero() => return Ok(()),
-                Err(_) => stop::check()?,
-            }
-        }
-    }
-
-    fn connect(&mut self) -> Option<Link> {
-        match Link::connect(&self.address, self.patience) {
-            Ok((link, hello)) => {
-                self.watched.state.tally.connected_again();
-                self.watched.state.hello = hello;
-                Some(link)
-            }
-            // What was lost is told already; another release of the firmware is news.
-            Err(failure) if failure.kind == Kind::Version => {
-                self.watched.trouble(failure.to_string());
-                None
-            }
-            Err(_) => None,
-        }
-    }
-
-    /// One connection, from the start of samples to its loss.
-    fn converse(&mut self, link: &mut Link) -> Result<(), Failure> {
-        for request in [Request::GetInfo, Request::StartWithMarkers] {
-            self.request(link, request, self.patience)?;
-        }
-        self.watched.heard = Instant::now();
-        loop {
-            if let Some(message) = link.receive(Instant::now() + LOOK_EVERY)? {
-                self.watched.message(message);
-            }
-            self.watched.tell_now_and_then();
-            if self.watched.heard.elapsed() >= SILENCE {
-                self.probe(link)?;
-            }
-            while let Ok(posted) = self.orders.try_recv() {
-                self.obey(link, posted)?;
-            }
-        }
+        let address = self.address.clone();
+        follow(&address, self.patience, link, &mut self);
     }
 
     fn request(
@@ -182,22 +107,6 @@ impl Owner {
     ) -> Result<(), Failure> {
         let watched = &mut self.watched;
         link.request(request, patience, |message| watched.message(message))
-    }
-
-    /// Finds out whether a silent device still knows of this conversation.
-    fn probe(&mut self, link: &mut Link) -> Result<(), Failure> {
-        match self.request(link, Request::GetInfo, self.patience) {
-            Err(failure) if failure.kind == Kind::Refused => {
-                Err(link.lost("the device sends nothing and does not answer"))
-            }
-            Err(failure) => Err(failure),
-            Ok(()) => {
-                self.watched.heard = Instant::now();
-                let why = "the device answers, but sends no samples: does its camera run?";
-                self.watched.trouble(why.to_owned());
-                Ok(())
-            }
-        }
     }
 
     /// Does what is ordered; a refusal is an answer, a lost connection an end.
@@ -273,5 +182,40 @@ impl Owner {
         let taken = take(link, self.patience, |message| watched.message(message))?;
         let hello = self.watched.state.hello.clone();
         Ok(Answer::Picture(Box::new((taken, hello))))
+    }
+}
+
+impl Follower for Owner {
+    fn message(&mut self, message: DeviceMessage) {
+        self.watched.message(message);
+    }
+
+    fn lost(&mut self, failure: Failure, rejected: Rejected) {
+        self.watched.state.tally.rejected(rejected);
+        self.watched.trouble(failure.to_string());
+        self.watched.recorder.end(Err(failure));
+        self.watched.tell();
+    }
+
+    fn connected_again(&mut self, hello: DeviceHello) {
+        self.watched.state.tally.connected_again();
+        self.watched.state.hello = hello;
+    }
+
+    fn trouble(&mut self, why: String) {
+        self.watched.trouble(why);
+    }
+
+    fn turn(&mut self, mut link: Option<&mut Link>) -> Result<bool, Failure> {
+        self.watched.tell_now_and_then();
+        let mut is_asked = false;
+        while let Ok(posted) = self.orders.try_recv() {
+            match &mut link {
+                Some(link) => self.obey(link, posted)?,
+                None => posted.answer(Answer::Failed("the device is not there".to_owned())),
+            }
+            is_asked = true;
+        }
+        Ok(is_asked)
     }
 }

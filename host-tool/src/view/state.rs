@@ -18,15 +18,17 @@ const LINES: usize = 8;
 
 /// Everything about a device but its samples.
 pub struct State {
-    port: String,
+    /// The port's name.
+    pub port: String,
     /// As the device said it last.
     pub hello: DeviceHello,
     /// Why there are no samples; nothing while they come.
     pub trouble: Option<String>,
-    /// Losses since the page's server was started.
+    /// Losses since the program was started.
     pub tally: Tally,
     times_us: VecDeque<u64>,
-    stats: Option<Stats>,
+    /// The device's newest counters.
+    pub stats: Option<Stats>,
     lines: VecDeque<String>,
 }
 
@@ -86,7 +88,7 @@ impl State {
     }
 
     /// Samples a second, by the device's clock.
-    fn rate_hz(&self) -> Option<f64> {
+    pub fn rate_hz(&self) -> Option<f64> {
         let (first, last) = self.times_us.front().zip(self.times_us.back())?;
         let steps = self.times_us.len().checked_sub(1)?;
         (last > first).then(|| steps as f64 * 1e6 / (last - first) as f64)

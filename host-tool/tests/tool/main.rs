@@ -12,6 +12,7 @@ mod monitor;
 mod recordings;
 mod run;
 mod sense;
+mod serve;
 mod settings;
 mod snapshot;
 mod threshold_auto;

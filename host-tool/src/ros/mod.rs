@@ -1,5 +1,7 @@
 //! Messages as ROS 2 has them: their definitions, and CDR, which is how they are coded.
 
+pub mod channel;
+
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 
@@ -121,6 +123,65 @@ uint32 stride
 ",
 };
 
+/// How devices stand.
+#[cfg(any(feature = "ros2", feature = "foxglove"))]
+pub const DIAGNOSTICS: Definition = Definition {
+    name: "diagnostic_msgs/msg/DiagnosticArray",
+    text: concat!(
+        "\
+std_msgs/Header header
+diagnostic_msgs/DiagnosticStatus[] status
+================================================================================
+",
+        header!(),
+        "\
+MSG: diagnostic_msgs/DiagnosticStatus
+byte OK=0
+byte WARN=1
+byte ERROR=2
+byte STALE=3
+byte level
+string name
+string message
+string hardware_id
+diagnostic_msgs/KeyValue[] values
+================================================================================
+MSG: diagnostic_msgs/KeyValue
+string key
+string value
+"
+    ),
+};
+
+/// How bad something is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Level {
+    /// As it should be.
+    Ok = 0,
+    /// There are forces; something about them is not as it should be.
+    Warn = 1,
+    /// There are no forces.
+    Error = 2,
+    /// Nothing came so far.
+    Stale = 3,
+}
+
+/// How a device stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnosis {
+    /// How bad it is.
+    pub level: Level,
+    /// Which device.
+    pub name: String,
+    /// What is, and what to do.
+    pub message: String,
+    /// The device's serial number.
+    pub hardware_id: String,
+    /// Everything else that is known.
+    pub values: Vec<(&'static str, String)>,
+}
+
 /// Little-endian CDR: numbers lie at multiples of their size, counted from behind its first four
 /// bytes.
 struct Cdr(Vec<u8>);
@@ -193,6 +254,32 @@ pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker; 4]) -> Vec<u8> {
         numbers
             .into_iter()
             .for_each(|number| cdr.number(number.to_le_bytes()));
+    }
+    cdr.0
+}
+
+/// What a service of the type `std_srvs/srv/Trigger` answers.
+#[cfg(feature = "ros2")]
+pub fn trigger_reply(success: bool, message: &str) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.number([u8::from(success)]);
+    cdr.string(message);
+    cdr.0
+}
+
+/// [`DIAGNOSTICS`] of one device.
+pub fn diagnostics(stamp_ns: u64, diagnosis: &Diagnosis) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, "");
+    cdr.number(1u32.to_le_bytes());
+    cdr.number([diagnosis.level as u8]);
+    cdr.string(&diagnosis.name);
+    cdr.string(&diagnosis.message);
+    cdr.string(&diagnosis.hardware_id);
+    cdr.number((diagnosis.values.len() as u32).to_le_bytes());
+    for (key, value) in &diagnosis.values {
+        cdr.string(key);
+        cdr.string(value);
     }
     cdr.0
 }

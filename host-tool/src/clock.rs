@@ -1,0 +1,87 @@
+//! When a frame was exposed, on this computer's clock.
+
+/// How fast the two clocks may run apart, as a part of the time: more than quartz crystals do.
+const DRIFT: u64 = 10_000;
+/// A sample is never later than this, ns, unless one of the clocks was set, or the device started
+/// anew.
+const LATEST_NS: u64 = 1_000_000_000;
+
+/// Turns a device's time into this computer's: by the sample that came soonest after its frame, as
+/// far as clocks let that be known, so that what delays single samples moves no stamp.
+#[derive(Clone, Debug, Default)]
+pub struct Clock {
+    /// Of the sample before: device time, µs, and how far this computer's clock is ahead of the
+    /// device's, ns.
+    last: Option<(u64, i128)>,
+}
+
+impl Clock {
+    /// When a frame was exposed, ns since 1970, by its device time, µs, and when its sample came,
+    /// ns since 1970. Never later than that.
+    pub fn stamp_ns(&mut self, device_us: u64, came_ns: u64) -> u64 {
+        let device_ns = i128::from(device_us) * 1_000;
+        let seen = i128::from(came_ns) - device_ns;
+        let ahead = match self.last {
+            None => seen,
+            Some((last_us, ahead)) => {
+                let since_ns = u128::from(device_us.saturating_sub(last_us)) * 1_000;
+                let ahead = ahead + (since_ns / u128::from(DRIFT)) as i128;
+                match seen < ahead || seen - ahead > i128::from(LATEST_NS) {
+                    true => seen,
+                    false => ahead,
+                }
+            }
+        };
+        self.last = Some((device_us, ahead));
+        u64::try_from(device_ns + ahead).unwrap_or(came_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const START: u64 = 1_700_000_000_000_000_000;
+    const FRAME_US: u64 = 6_405;
+
+    /// Samples of a device whose clock runs so much faster, in parts of a million, each delayed by
+    /// up to 8 ms; gives by how much stamps are off in the end, ns.
+    fn error_ns(parts: i64, frames: u64) -> i64 {
+        let mut clock = Clock::default();
+        let mut error = 0;
+        for frame in 0..frames {
+            let true_us = frame * FRAME_US;
+            let drifted_us = true_us as i64 + true_us as i64 * parts / 1_000_000;
+            let device_us = drifted_us as u64 + 5_000_000;
+            let delay_ns = 8_000_000 * (frame * 7 % 11) / 10;
+            let true_ns = START + true_us * 1_000;
+            let stamp = clock.stamp_ns(device_us, true_ns + delay_ns);
+            assert!(stamp <= true_ns + delay_ns);
+            error = stamp as i64 - true_ns as i64;
+        }
+        error
+    }
+
+    #[test]
+    fn delays_of_single_samples_move_no_stamp() {
+        assert!(error_ns(0, 1_000).abs() < 10_000, "{}", error_ns(0, 1_000));
+    }
+
+    #[test]
+    fn clocks_that_run_apart_for_hours_stay_together() {
+        for parts in [-40, 40] {
+            let error = error_ns(parts, 1_000_000);
+            assert!(error.abs() < 20_000, "{parts}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_device_that_starts_anew_and_a_clock_that_is_set_are_followed() {
+        let mut clock = Clock::default();
+        assert_eq!(clock.stamp_ns(900_000_000, START), START);
+        assert_eq!(clock.stamp_ns(2_000, START + 5), START + 5);
+        let later = START + 3_600_000_000_000;
+        assert_eq!(clock.stamp_ns(9_000, later), later);
+        assert_eq!(clock.stamp_ns(16_000, START), START);
+    }
+}

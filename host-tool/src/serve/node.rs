@@ -1,0 +1,316 @@
+//! A node of ROS 2: topics, diagnostics, and a service that takes a tare.
+//!
+//! Writers are reliable, so that reliable and best-effort subscriptions both get what is written;
+//! one that does not keep up loses the oldest of the last ten messages of a topic.
+
+use super::sensor::{Answer, TareOrder};
+use super::{Outlet, Served};
+use crate::output::note;
+use crate::ros::channel::Channel;
+use crate::ros::{DIAGNOSTICS, Definition, trigger_reply};
+use hivtac_host::failure::Failure;
+use ros2_client::dds::rustdds::{DomainParticipantBuilder, RTPSEntity};
+use ros2_client::qos::{History, WhenFull};
+use ros2_client::{
+    Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, QosProfile,
+    RmwRequestId, Server, ServiceMapping, ServiceTypeName,
+};
+use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
+use serde::ser::{Serialize, SerializeTuple, Serializer};
+use std::fmt::{self, Display};
+use std::net::Ipv4Addr;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::time::{Duration, Instant};
+
+/// Messages of a topic that are kept for those that lost them.
+const KEPT: usize = 10;
+/// Bytes of CDR before a message: its encoding, which the writer puts there.
+const ENCODING: usize = 4;
+/// Bytes in front of a request and its reply, by which Cyclone DDS's clients know which reply is
+/// theirs; other clients are told beside the message.
+const CYCLONES_HEADER: usize = 16;
+/// A request for a tare has no more bytes than this.
+const LONGEST_REQUEST: usize = 64;
+/// Time between two looks for another node of this name.
+const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// A message as CDR, without its encoding: what is written and read is what is in here.
+#[derive(Clone)]
+struct Body(Vec<u8>);
+
+impl Body {
+    /// Of CDR with its encoding.
+    fn of(data: &[u8]) -> Body {
+        Body(data.get(ENCODING..).unwrap_or_default().to_vec())
+    }
+}
+
+impl Message for Body {}
+
+impl Serialize for Body {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut bytes = serializer.serialize_tuple(self.0.len())?;
+        self.0
+            .iter()
+            .try_for_each(|byte| bytes.serialize_element(byte))?;
+        bytes.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Body {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Body, D::Error> {
+        deserializer.deserialize_tuple(LONGEST_REQUEST, ToTheEnd)
+    }
+}
+
+/// Reads bytes until there are no more.
+struct ToTheEnd;
+
+impl<'de> Visitor<'de> for ToTheEnd {
+    type Value = Body;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("bytes")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut bytes: A) -> Result<Body, A::Error> {
+        let mut all = Vec::new();
+        while let Ok(Some(byte)) = bytes.next_element() {
+            all.push(byte);
+        }
+        Ok(Body(all))
+    }
+}
+
+/// A request that waits for its device.
+struct Waiting {
+    request: RmwRequestId,
+    /// What Cyclone DDS's clients want back.
+    header: Vec<u8>,
+    answer: Receiver<Answer>,
+}
+
+/// What there is of a device.
+struct Sensor {
+    /// In the order of [`Channel::ALL`].
+    publishers: Vec<Publisher<Body>>,
+    tare: Server<Body, Body>,
+    orders: SyncSender<TareOrder>,
+    waiting: Vec<Waiting>,
+}
+
+/// The node.
+pub struct Ros2 {
+    sensors: Vec<Sensor>,
+    diagnostics: Publisher<Body>,
+    looked: Instant,
+    /// Another node of this name was told of.
+    is_told: bool,
+    node: Node,
+    context: Context,
+    /// What only this node should write, as DDS calls it.
+    own_topic: String,
+    domain: u16,
+}
+
+impl Ros2 {
+    /// Takes part in a domain as a node with this name, and the devices' topics and services below
+    /// it.
+    ///
+    /// # Errors
+    /// When there is no network to take part in, not even this computer's own.
+    pub fn open(name: &str, domain: u16, served: &[Served]) -> Result<Ros2, Failure> {
+        let failed = |error: &dyn Display| {
+            Failure::input(format!(
+                "cannot take part in ROS 2's domain {domain}: {error}; is a network up, and is \
+                 UDP allowed?"
+            ))
+        };
+        let mut participant = DomainParticipantBuilder::new(domain);
+        if stays_here() {
+            participant = participant.with_only_networks([Ipv4Addr::LOCALHOST]);
+        }
+        let participant = participant.build().map_err(|error| failed(&error))?;
+        let context = Context::from_domain_participant(participant);
+        let context = context.map_err(|error| failed(&error))?;
+        let node_name = NodeName::new("/", name).map_err(|error| failed(&error))?;
+        // A log topic and parameters would be empty.
+        let options = NodeOptions::new().enable_rosout(false);
+        let mut node = context
+            .new_node(node_name, options)
+            .map_err(|error| failed(&error))?;
+        let sensors = served.iter().map(|served| {
+            let folder = folder(name, served.name.as_deref());
+            Sensor::open(&mut node, &folder, served).map_err(|error| failed(&error))
+        });
+        let sensors = sensors.collect::<Result<_, _>>()?;
+        let diagnostics = Name::new("/", "diagnostics").map_err(|error| failed(&error))?;
+        let diagnostics = publisher(&mut node, &diagnostics, &DIAGNOSTICS);
+        let folder = folder(
+            name,
+            served.first().and_then(|served| served.name.as_deref()),
+        );
+        Ok(Ros2 {
+            sensors,
+            diagnostics: diagnostics.map_err(|error| failed(&error))?,
+            looked: Instant::now(),
+            is_told: false,
+            node,
+            context,
+            own_topic: format!("rt{folder}/{}", Channel::Status.name()),
+            domain,
+        })
+    }
+
+    /// Says so, once, when another node has this one's name: their messages would be mixed.
+    fn look_for_another(&mut self) {
+        let participant = self.context.domain_participant();
+        let own = participant.guid().prefix;
+        let writers = participant.discovered_writers();
+        let is_anothers = writers.iter().any(|writer| {
+            let data = &writer.publication_topic_data;
+            data.topic_name == self.own_topic && data.key.prefix != own
+        });
+        if is_anothers && !self.is_told {
+            note(&format!(
+                "hivtac: another node in domain {} is called {}, too, and their messages are \
+                 mixed; end one, or start it with another --name",
+                self.domain,
+                self.node.fully_qualified_name()
+            ));
+        }
+        self.is_told = is_anothers;
+    }
+}
+
+/// Whether the environment says, as to all of ROS 2, that nothing may leave this computer.
+fn stays_here() -> bool {
+    let is = |name: &str, value: &str| std::env::var_os(name).is_some_and(|it| it == value);
+    is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") || is("ROS_LOCALHOST_ONLY", "1")
+}
+
+/// Where a device's names are.
+fn folder(name: &str, sensor: Option<&str>) -> String {
+    match sensor {
+        None => format!("/{name}"),
+        Some(sensor) => format!("/{name}/{sensor}"),
+    }
+}
+
+fn qos() -> QosProfile {
+    QosProfile::publisher_default()
+        .reliability_reliable(WhenFull::Fail)
+        .history(History::KeepLast { depth: KEPT })
+}
+
+fn publisher(
+    node: &mut Node,
+    name: &Name,
+    definition: &Definition,
+) -> ros2_client::CreateResult<Publisher<Body>> {
+    let mut parts = definition.name.split('/');
+    let package = parts.next().unwrap_or_default();
+    let kind = MessageTypeName::new(package, parts.next_back().unwrap_or_default());
+    let topic = node.create_topic(name, kind, &qos())?;
+    node.create_publisher(&topic, None)
+}
+
+impl Sensor {
+    fn open(
+        node: &mut Node,
+        folder: &str,
+        served: &Served,
+    ) -> Result<Sensor, Box<dyn std::error::Error>> {
+        let publishers = Channel::ALL.iter().map(|channel| {
+            let name = Name::new(folder, channel.name())?;
+            Ok(publisher(node, &name, channel.definition())?)
+        });
+        let publishers = publishers.collect::<Result<_, Box<dyn std::error::Error>>>()?;
+        let tare = node.create_server(
+            ServiceMapping::Enhanced,
+            &Name::new(folder, "tare")?,
+            &ServiceTypeName::new("std_srvs", "Trigger"),
+            qos(),
+            qos(),
+        )?;
+        Ok(Sensor {
+            publishers,
+            tare,
+            orders: served.orders.clone(),
+            waiting: Vec::new(),
+        })
+    }
+
+    /// Passes on what was asked for, and answers what is done.
+    fn turn(&mut self) {
+        while let Ok(Some((request, body))) = self.tare.receive_request() {
+            let is_cyclones = body.0.len() > CYCLONES_HEADER;
+            let header = if is_cyclones { CYCLONES_HEADER } else { 0 };
+            let (answering, answer) = sync_channel(1);
+            let busy = Err("the device is busy with tares; try again later".to_owned());
+            if let Err(error) = self.orders.try_send(TareOrder(answering)) {
+                let (std::sync::mpsc::TrySendError::Full(order)
+                | std::sync::mpsc::TrySendError::Disconnected(order)) = error;
+                let _ = order.0.try_send(busy);
+            }
+            self.waiting.push(Waiting {
+                request,
+                header: body.0[..header].to_vec(),
+                answer,
+            });
+        }
+        let tare = &self.tare;
+        self.waiting
+            .retain(|waiting| match waiting.answer.try_recv() {
+                Ok(answer) => {
+                    waiting.reply(tare, &answer);
+                    false
+                }
+                Err(TryRecvError::Empty) => true,
+                Err(TryRecvError::Disconnected) => {
+                    waiting.reply(tare, &Err("the program ends".to_owned()));
+                    false
+                }
+            });
+    }
+}
+
+impl Waiting {
+    fn reply(&self, tare: &Server<Body, Body>, answer: &Answer) {
+        let (Ok(text) | Err(text)) = answer;
+        let reply = trigger_reply(answer.is_ok(), text);
+        let body = [self.header.as_slice(), &Body::of(&reply).0].concat();
+        if let Err(error) = tare.send_response(self.request, Body(body)) {
+            note(&format!(
+                "hivtac: the answer to a tare could not be sent: {error}"
+            ));
+        }
+    }
+}
+
+impl Outlet for Ros2 {
+    fn told(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("ros2", self.node.fully_qualified_name()),
+            ("domain", self.domain.to_string()),
+        ]
+    }
+
+    fn publish(&mut self, sensor: usize, channel: Channel, data: &[u8], _: u64) -> bool {
+        let publisher = &self.sensors[sensor].publishers[channel as usize];
+        publisher.publish(Body::of(data)).is_ok()
+    }
+
+    fn diagnostics(&mut self, data: &[u8], _: u64) {
+        // The next one comes in a second.
+        let _ = self.diagnostics.publish(Body::of(data));
+    }
+
+    fn turn(&mut self) {
+        self.sensors.iter_mut().for_each(Sensor::turn);
+        if self.looked.elapsed() >= LOOK_EVERY {
+            self.looked = Instant::now();
+            self.look_for_another();
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! `hivtac serve`, as far as it goes without a program that receives it; what arrives there is
+//! looked at by `tests/python/test_serve.py`.
+
+use crate::run::*;
+
+/// Its exit code and what it says on standard error.
+fn refused(options: &[&str]) -> (Option<i32>, String) {
+    let finished = run(&[&["serve"], options].concat());
+    assert_eq!(finished.stdout, "", "{finished:?}");
+    (finished.code, finished.stderr)
+}
+
+#[test]
+fn it_says_what_is_missing() {
+    let (code, said) = refused(&[]);
+    assert_eq!(code, Some(2));
+    assert!(said.contains("--ros2|--foxglove"), "{said}");
+    for (options, word) in [
+        (["--ros2", "--domain", "233"], "233 is not in 0..=232"),
+        (["--foxglove", "--listen", "8765"], "--listen"),
+        (["--foxglove", "--domain", "1"], "--ros2"),
+    ] {
+        let (code, said) = refused(&options);
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains(word), "{said}");
+    }
+}
+
+/// One line, before any device is looked for.
+#[cfg(not(any(feature = "ros2", feature = "foxglove")))]
+#[test]
+fn a_tool_that_was_built_without_it_says_how_to_build_it() {
+    for feature in ["ros2", "foxglove"] {
+        let (code, said) = refused(&[&format!("--{feature}"), "--port", "no-such-port"]);
+        assert_eq!(code, Some(2), "{said}");
+        let how = format!("cargo install --path host-tool --features {feature}\n");
+        assert!(
+            said.starts_with("hivtac: this hivtac was built without"),
+            "{said}"
+        );
+        assert!(said.ends_with(&how) && said.lines().count() == 1, "{said}");
+    }
+}
+
+#[cfg(feature = "ros2")]
+#[test]
+fn names_and_domains_that_ros_2_does_not_have_are_refused() {
+    let (code, said) = refused(&["--ros2", "--name", "left thumb"]);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("--name left thumb: a node's name"), "{said}");
+    let finished = std::process::Command::new(env!("CARGO_BIN_EXE_hivtac"))
+        .args(["serve", "--ros2"])
+        .env("ROS_DOMAIN_ID", "lab")
+        .output()
+        .unwrap();
+    assert_eq!(finished.status.code(), Some(2));
+    let said = String::from_utf8(finished.stderr).unwrap();
+    assert!(said.contains("ROS_DOMAIN_ID is lab"), "{said}");
+    let (code, said) = refused(&["--ros2", "--port", "no-such-port"]);
+    assert_eq!(code, Some(3), "{said}");
+}
