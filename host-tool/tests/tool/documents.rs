@@ -61,7 +61,7 @@ fn every_exit_code_has_its_meaning() {
         let [_, meaning, _] = row(text, &kind.exit_code().to_string());
         assert_eq!(meaning, kind.meaning());
     }
-    // Those and success, and the table's head.
+    // Those, success, and the table's head.
     assert_eq!(text.matches("\n| ").count(), Kind::ALL.len() + 2);
 }
 
