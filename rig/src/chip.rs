@@ -1,9 +1,9 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
 //! core that it lacks.
 //!
-//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for seven slots itself:
-//! DCMI, MDMA, CRS, the flash, and the three blocks of OTG2; everything else goes to the part's own
-//! models.
+//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for eight slots itself:
+//! DCMI, MDMA, DMAMUX1, CRS, the flash, and the three blocks of OTG2; everything else goes to the
+//! part's own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::Access;
@@ -24,6 +24,7 @@ use crate::flash::{Bank, Flash};
 use crate::late_line::LateLine;
 use crate::mdma::Mdma;
 use crate::otg::{Blocks, SharedCore};
+use crate::request_mux::RequestMux;
 use crate::rules::Rules;
 use crate::usb_host::SharedHost;
 
@@ -69,6 +70,7 @@ pub struct Chip {
     pub mdma: Mdma,
     crs: Crs,
     flash: Flash,
+    request_mux: RequestMux,
     control_bus: ControlBus,
     held_bus: HeldBus,
     late: LateLine,
@@ -86,6 +88,7 @@ pub struct Chip {
     mdma_slot: usize,
     crs_slot: usize,
     flash_slot: usize,
+    request_mux_slot: usize,
     vsync: Level,
     wiring: Wiring,
 }
@@ -123,6 +126,7 @@ impl Chip {
         let mdma_slot = part.bus().slot("MDMA")?;
         let crs_slot = part.bus().slot("CRS")?;
         let flash_slot = part.bus().slot("Flash")?;
+        let request_mux_slot = part.bus().slot("DMAMUX1")?;
         let i2c_slot = part.bus().slot("I2C1")?;
         let mut chip = Self {
             dormant: Dormant::new(part.bus()),
@@ -132,6 +136,8 @@ impl Chip {
             mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), seed),
             flash: Flash::new(bank, rules.clone()),
             flash_slot,
+            request_mux: RequestMux::default(),
+            request_mux_slot,
             rules,
             board,
             revision,
@@ -251,6 +257,7 @@ impl Mcu for Chip {
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crs);
         Device::reset(&mut self.flash);
+        Device::reset(&mut self.request_mux);
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);
@@ -282,6 +289,9 @@ impl Mcu for Chip {
         }
         if slot == self.flash_slot {
             return (self.part.bus_mut(), Some(&mut self.flash));
+        }
+        if slot == self.request_mux_slot {
+            return (self.part.bus_mut(), Some(&mut self.request_mux));
         }
         if slot == self.crs_slot {
             return (self.part.bus_mut(), Some(&mut self.crs));

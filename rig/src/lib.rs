@@ -38,6 +38,7 @@ pub mod machine;
 pub mod mdma;
 pub mod otg;
 pub mod report;
+mod request_mux;
 mod rom;
 pub mod rules;
 pub mod run;

@@ -6,6 +6,7 @@
 //! overruns. Pixels leave only through DCMI_DR, by a DMA request through DMAMUX1 or by the
 //! processor.
 
+mod flow;
 mod receiver;
 mod signals;
 mod timeline;
@@ -19,9 +20,9 @@ use crate::busy_bus::{Chance, InterruptLine};
 use crate::camera::SharedCamera;
 use crate::faults::{Faults, Kind};
 use crate::rules::Rules;
-use receiver::{Overrun, Receiver, Settings, control};
-use signals::{Frame, Run, sampled_while_changing};
-use timeline::{Epoch, Next, Step};
+use receiver::{Receiver, Settings, control};
+use signals::Frame;
+use timeline::{Bytes, Epoch, Next, Step};
 
 /// Bytes per event: one FIFO's worth.
 const GROUP: u32 = 4 * receiver::FIFO_WORDS as u32;
@@ -78,6 +79,8 @@ pub struct Dcmi {
     frame: Option<Frame>,
     epoch: Epoch,
     next: Option<Next>,
+    /// Bytes that are due and wait for the FIFO to be emptied.
+    due: Option<Bytes>,
     receiver: Receiver,
     settings: Settings,
     raised: u32,
@@ -110,6 +113,7 @@ impl Dcmi {
             frame: None,
             epoch: Epoch::default(),
             next: None,
+            due: None,
             receiver: Receiver::default(),
             settings: Settings::default(),
             raised: 0,
@@ -145,6 +149,7 @@ impl Dcmi {
     /// The part was reset: the registers are back, the sensor goes on.
     pub fn part_reset(&mut self) {
         self.receiver.reset();
+        self.due = None;
         self.settings = Settings::default();
         (self.raised, self.enabled) = (0, 0);
         self.interrupt.reset();
@@ -209,52 +214,6 @@ impl Dcmi {
         }
     }
 
-    fn bytes(&mut self, run: Run, from: u32, context: &mut DeviceContext<'_>) {
-        let to = (from + GROUP).min(run.bytes);
-        let waiting = self.receiver.waiting();
-        let ends = to == run.bytes && run.ends_line;
-        if self.receive(&run, from, to, ends).is_err() {
-            self.raised |= flag::OVERRUN;
-            self.counters.overruns += 1;
-        } else {
-            self.counters.words += (self.receiver.waiting() - waiting) as u64;
-        }
-        if ends {
-            self.raised |= flag::LINE;
-        }
-        self.wait_for_the_bus(context);
-        self.drive(context);
-        if to < run.bytes && self.listens() {
-            self.plan_group(run, to, context);
-        } else {
-            self.plan_from(run.line + 1, context);
-        }
-    }
-
-    fn receive(&mut self, run: &Run, from: u32, to: u32, ends: bool) -> Result<(), Overrun> {
-        let Some(frame) = &mut self.frame else {
-            return Ok(());
-        };
-        let at_stable_edge = frame.output.stable_at_rising == self.settings.has(control::RISING);
-        let base = u64::from(run.line) << 32;
-        let picture = |exposed| self.camera.lock().picture(exposed);
-        let bytes = frame.bytes(run, from, to, picture);
-        for (i, byte) in (from..to).zip(bytes) {
-            let sampled = if at_stable_edge {
-                byte
-            } else {
-                sampled_while_changing(self.last_byte, byte, base + u64::from(i))
-            };
-            self.last_byte = byte;
-            self.receiver
-                .byte(sampled & self.pins.data, &self.settings)?;
-        }
-        if ends {
-            self.receiver.end_line()?;
-        }
-        Ok(())
-    }
-
     /// On a busy bus the DMA gets the words of a group only after a while.
     fn wait_for_the_bus(&mut self, context: &mut DeviceContext<'_>) {
         let now = context.now().0;
@@ -281,6 +240,7 @@ impl Dcmi {
         self.settings.control = value;
         if !self.settings.has(control::ENABLE) {
             self.receiver.reset();
+            self.due = None;
             return;
         }
         let unsupported = [
@@ -328,6 +288,7 @@ impl Device for Dcmi {
         let value = match register {
             Register::Dr => {
                 let word = self.receiver.take();
+                self.receive_due();
                 self.drive(context);
                 word
             }
@@ -346,6 +307,7 @@ impl Device for Dcmi {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        self.catch_up(context);
         let landed = registers.get(register) as u32;
         match register {
             Register::Cr => self.write_control(landed),
@@ -365,6 +327,8 @@ impl Device for Dcmi {
         if self.interrupt.falls_at(event, context) {
             return;
         }
+        // What is still there was not taken in time.
+        self.receive_all_due();
         if self.bus.take_if(|bus| *bus == event).is_some() {
             return self.drive(context);
         }
@@ -381,7 +345,7 @@ impl Device for Dcmi {
             Step::Retry => self.start_over(registers, context),
             Step::VsyncBegins => self.begin_frame(registers, context),
             Step::VsyncEnds => self.end_vsync(registers, context),
-            Step::Bytes(run, from) => self.bytes(run, from, context),
+            Step::Bytes(bytes) => self.bytes(bytes, context),
         }
     }
 
@@ -390,6 +354,7 @@ impl Device for Dcmi {
     }
 
     fn reset_line(&mut self, _registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.catch_up(context);
         let requested = self.requested;
         let pins = self.pins;
         self.part_reset();

@@ -15,10 +15,18 @@ pub(super) enum Step {
     VsyncBegins,
     /// VSYNC goes back.
     VsyncEnds,
-    /// Bytes of a run, from this one on.
-    Bytes(Run, u32),
+    /// Bytes arrive.
+    Bytes(Bytes),
     /// A silent sensor may speak again.
     Retry,
+}
+
+/// Some of a run's bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bytes {
+    pub run: Run,
+    pub from: u32,
+    pub to: u32,
 }
 
 /// The step that is planned.
@@ -112,9 +120,20 @@ impl Dcmi {
     }
 
     pub(super) fn plan_group(&mut self, run: Run, from: u32, context: &mut DeviceContext<'_>) {
+        self.plan_bytes(run, from, (from + GROUP).min(run.bytes), context);
+    }
+
+    /// Plans that bytes arrive when the last of them is on the lines.
+    pub(super) fn plan_bytes(
+        &mut self,
+        run: Run,
+        from: u32,
+        to: u32,
+        context: &mut DeviceContext<'_>,
+    ) {
         let Some(frame) = &self.frame else { return };
-        let at = frame.instant(run.line, run.start + (from + GROUP).min(run.bytes));
-        self.plan(Step::Bytes(run, from), at, context);
+        let at = frame.instant(run.line, run.start + to);
+        self.plan(Step::Bytes(Bytes { run, from, to }), at, context);
     }
 
     /// Whether data lines matter at all now.

@@ -1,0 +1,306 @@
+//! How the bytes of a line reach the FIFO: in groups of one FIFO's worth, each at the instant at
+//! which its last byte is on the lines.
+//!
+//! Every event stops the core. So where the DMA took each word of a line's first two groups at
+//! once, the rest of that line is one event, at its end, and the groups follow each other as the
+//! FIFO is emptied. All that happens at a line's beginning or end is where it would be: interrupts
+//! of the interface, and of a DMA whose blocks are whole lines; and a counter that has moved since
+//! the last block tells so. Whoever writes to the interface amid the line finds what has come by
+//! then, and the rest comes in groups. Different from the chip: memory that is read amid a line has
+//! less of it; where the DMA is stopped amid a line, the overrun comes when the line ends; and where
+//! the sensor starts over amid a line, the rest of it that was on the lines is lost.
+//!
+//! A fault that disturbs the camera or the DMA keeps all lines of the run in groups.
+
+use rigless::device::DeviceContext;
+
+use super::receiver::Overrun;
+use super::signals::{Run, sampled_while_changing};
+use super::timeline::{Bytes, Step};
+use super::{Dcmi, GROUP, control, flag};
+use crate::faults::Kind;
+
+impl Dcmi {
+    pub(super) fn bytes(&mut self, bytes: Bytes, context: &mut DeviceContext<'_>) {
+        // Both groups so far left at once.
+        let flows = bytes.from == GROUP && self.receiver.waiting() == 0 && !self.is_disturbed();
+        self.receive_group(bytes);
+        self.receive_due();
+        self.wait_for_the_bus(context);
+        self.drive(context);
+        let Bytes { run, to, .. } = bytes;
+        if to == run.bytes || !self.listens() {
+            self.plan_from(run.line + 1, context);
+        } else if flows {
+            self.plan_bytes(run, to, run.bytes, context);
+        } else {
+            self.plan_group(run, to, context);
+        }
+    }
+
+    /// Whether a fault may hold up words or end them amid a line.
+    fn is_disturbed(&self) -> bool {
+        let disturbing = [
+            Kind::BusBusy,
+            Kind::DcmiOverrun,
+            Kind::CameraAbsent,
+            Kind::CameraSilent,
+        ];
+        disturbing
+            .into_iter()
+            .any(|kind| self.faults.asked_for(kind))
+    }
+
+    /// Receives what is due up to the next word that has to leave first.
+    pub(super) fn receive_due(&mut self) {
+        while let Some(due) = self.due.take_if(|_| self.receiver.waiting() == 0) {
+            self.receive_group(due);
+        }
+    }
+
+    /// Receives what is due, although words wait.
+    pub(super) fn receive_all_due(&mut self) {
+        while let Some(due) = self.due.take() {
+            self.receive_group(due);
+        }
+    }
+
+    /// Receives the first group of what is due, and leaves the rest of it due.
+    fn receive_group(&mut self, Bytes { run, from, to }: Bytes) {
+        let group = (from + GROUP).min(to);
+        let waiting = self.receiver.waiting();
+        let ends = group == run.bytes && run.ends_line;
+        if self.receive(&run, from, group, ends).is_err() {
+            self.raised |= flag::OVERRUN;
+            self.counters.overruns += 1;
+            if !self.listens() {
+                return;
+            }
+        } else {
+            self.counters.words += (self.receiver.waiting() - waiting) as u64;
+        }
+        if ends {
+            self.raised |= flag::LINE;
+        }
+        let from = group;
+        self.due = (group < to).then_some(Bytes { run, from, to });
+    }
+
+    /// Before something happens to the interface amid a line that arrives as one: what came until
+    /// now is received, and the rest arrives in groups.
+    pub(super) fn catch_up(&mut self, context: &mut DeviceContext<'_>) {
+        let (Some(next), Some(frame)) = (self.next, &self.frame) else {
+            return;
+        };
+        let Step::Bytes(Bytes { run, from, to }) = next.step else {
+            return;
+        };
+        if to - from <= GROUP {
+            return;
+        }
+        let now = context.now().0;
+        let came = |until: u32| frame.instant(run.line, run.start + until) <= now;
+        let groups = (from..to).step_by(GROUP as usize).skip(1);
+        let until = groups.take_while(|&until| came(until)).last();
+        if let Some(to) = until {
+            self.due = Some(Bytes { run, from, to });
+            self.receive_due();
+        }
+        self.plan_group(run, until.unwrap_or(from), context);
+    }
+
+    fn receive(&mut self, run: &Run, from: u32, to: u32, ends: bool) -> Result<(), Overrun> {
+        let Some(frame) = &mut self.frame else {
+            return Ok(());
+        };
+        let at_stable_edge = frame.output.stable_at_rising == self.settings.has(control::RISING);
+        let base = u64::from(run.line) << 32;
+        let picture = |exposed| self.camera.lock().picture(exposed);
+        let bytes = frame.bytes(run, from, to, picture);
+        for (i, byte) in (from..to).zip(bytes) {
+            let sampled = if at_stable_edge {
+                byte
+            } else {
+                sampled_while_changing(self.last_byte, byte, base + u64::from(i))
+            };
+            self.last_byte = byte;
+            self.receiver
+                .byte(sampled & self.pins.data, &self.settings)?;
+        }
+        if ends {
+            self.receiver.end_line()?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Camera, SharedCamera, Supply, part};
+    use crate::dcmi::Pins;
+    use crate::faults::Faults;
+    use crate::frame_source::TestPicture;
+    use crate::rules::Rules;
+    use crate::truth::TruthLog;
+    use rigless::device::Device;
+    use rigless::mcu::Mcu;
+    use rigless::soc::stm32h743::Stm32h743;
+    use rigless::soc::stm32h743::generated::dcmi::Register;
+    use rigless::time::VirtualNanos;
+
+    /// A part, its camera interface that captures, and what a DMA took from it.
+    struct Bench {
+        part: Stm32h743,
+        slot: usize,
+        dcmi: Dcmi,
+        words: Vec<u32>,
+    }
+
+    impl Bench {
+        fn new() -> Bench {
+            let (faults, rules) = (Faults::default(), Rules::default());
+            let camera = SharedCamera::new(Camera::new(
+                part::Kind::Ov7725,
+                Box::new(TestPicture),
+                TruthLog::default(),
+                faults.clone(),
+                rules.clone(),
+                1,
+            ));
+            camera.lock().supply(Supply {
+                powered: true,
+                clock_hz: 24_000_000,
+                sccb: true,
+                reset: false,
+            });
+            let part = Stm32h743::new().unwrap();
+            let slot = part.bus().slot("DCMI").unwrap();
+            let mut dcmi = Dcmi::new(camera, faults, rules, 1);
+            let pins = Pins {
+                data: 0xFF,
+                clock: true,
+                hsync: true,
+                vsync: true,
+            };
+            dcmi.wire(pins, 240_000_000);
+            let mut bench = Bench {
+                part,
+                slot,
+                dcmi,
+                words: Vec::new(),
+            };
+            let polarities = control::RISING | control::VSYNC_BLANKS_HIGH;
+            let capture = control::ENABLE | control::CAPTURE | polarities;
+            bench.write(0, Register::Cr, capture);
+            let (registers, mut context) = bench.part.bus_mut().drive(VirtualNanos(0), slot);
+            bench.dcmi.start_over(registers, &mut context);
+            bench
+        }
+
+        fn write(&mut self, at_ns: u64, register: Register, value: u32) {
+            let (registers, mut context) =
+                (self.part.bus_mut()).drive(VirtualNanos(at_ns), self.slot);
+            registers.set(register, value.into());
+            Device::write(
+                &mut self.dcmi,
+                register,
+                value.into(),
+                registers,
+                &mut context,
+            );
+        }
+
+        /// The next thing happens, and the DMA takes words while there are any.
+        fn step(&mut self) {
+            let next = self.dcmi.next.expect("the camera goes on");
+            let (registers, mut context) = self.part.bus_mut().drive(next.at, self.slot);
+            self.dcmi.on_event(next.event, registers, &mut context);
+            self.take(next.at);
+        }
+
+        fn take(&mut self, at: VirtualNanos) {
+            while self.dcmi.receiver.waiting() > 0 {
+                let (registers, mut context) = self.part.bus_mut().drive(at, self.slot);
+                let word = Device::read(&mut self.dcmi, Register::Dr, registers, &mut context);
+                self.words.push(word.expect("a word") as u32);
+            }
+        }
+
+        /// The bytes that arrive next, if any do.
+        fn coming(&self) -> Option<Bytes> {
+            match self.dcmi.next?.step {
+                Step::Bytes(bytes) => Some(bytes),
+                _ => None,
+            }
+        }
+
+        /// Until the rest of a line is to arrive as one.
+        fn until_the_rest_of_a_line(&mut self) -> Bytes {
+            for _ in 0..1_000 {
+                if let Some(bytes) = self.coming().filter(|it| it.to - it.from > GROUP) {
+                    return bytes;
+                }
+                self.step();
+            }
+            panic!("every line arrives in groups");
+        }
+
+        /// When so many bytes of the run that arrives next are on the lines, ns.
+        fn instant(&self, until: u32) -> u64 {
+            let run = self.coming().expect("bytes").run;
+            let frame = self.dcmi.frame.as_ref().expect("a frame");
+            frame.instant(run.line, run.start + until)
+        }
+    }
+
+    #[test]
+    fn a_line_that_flows_arrives_in_three_steps() {
+        let mut bench = Bench::new();
+        let rest = bench.until_the_rest_of_a_line();
+        assert_eq!((rest.from, rest.to), (2 * GROUP, rest.run.bytes));
+        assert_eq!(bench.words.len() as u32 * 4, rest.from);
+        bench.step();
+        assert_eq!(bench.words.len() as u32 * 4, rest.run.bytes);
+        assert_eq!(bench.dcmi.counters.overruns, 0);
+    }
+
+    /// What is on the lines by then is received, the rest in groups, and all of it is the same.
+    #[test]
+    fn a_write_amid_a_line_finds_what_has_come_and_loses_nothing() {
+        let [mut bench, mut undisturbed] = [Bench::new(), Bench::new()];
+        let rest = bench.until_the_rest_of_a_line();
+        undisturbed.until_the_rest_of_a_line();
+        let until = rest.from + 5 * GROUP;
+        let at = bench.instant(until) + 1;
+        bench.write(at, Register::Ier, 0);
+        bench.take(VirtualNanos(at));
+        assert_eq!(bench.words.len() as u32 * 4, until);
+        let coming = bench.coming().expect("the next group");
+        assert_eq!((coming.from, coming.to), (until, until + GROUP));
+        while bench.words.len() as u32 * 4 < rest.run.bytes {
+            bench.step();
+        }
+        undisturbed.step();
+        assert_eq!(bench.words, undisturbed.words);
+        assert_eq!(bench.dcmi.counters, undisturbed.dcmi.counters);
+        assert_eq!(
+            bench.dcmi.next.map(|next| next.at),
+            undisturbed.dcmi.next.map(|next| next.at)
+        );
+    }
+
+    /// A DMA that stops amid a line costs the frame, at the latest when the next line begins.
+    #[test]
+    fn words_that_nobody_takes_overrun() {
+        let mut bench = Bench::new();
+        bench.until_the_rest_of_a_line();
+        for _ in 0..2 {
+            let next = bench.dcmi.next.expect("the camera goes on");
+            let (registers, mut context) = bench.part.bus_mut().drive(next.at, bench.slot);
+            bench.dcmi.on_event(next.event, registers, &mut context);
+        }
+        assert_eq!(bench.dcmi.counters.overruns, 1);
+        assert!(!bench.dcmi.receiver.capturing());
+    }
+}
