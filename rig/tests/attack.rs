@@ -102,7 +102,10 @@ fn model_part(numbers: &mut Numbers) -> ModelPart {
     let bytes = numbers.bytes::<64>();
     ModelPart {
         offset: 32 * numbers.below(4) as u32,
-        bytes: bytes[..numbers.below(65) as usize].iter().copied().collect(),
+        bytes: bytes[..numbers.below(65) as usize]
+            .iter()
+            .copied()
+            .collect(),
     }
 }
 
