@@ -167,7 +167,7 @@ def first_alike(forces, truth):
                 distance(force, true_force(truth[frame]))
                 for force, frame in zip(forces, of_these)
             )
-            if max(off) < 5e-3:
+            if max(off) < 2e-3:
                 return start
     return None
 
@@ -178,7 +178,7 @@ def pressed(messages):
     for message in messages:
         newest = [*newest, message][-ALIKE:]
         sizes = [math.hypot(*number(it.wrench.force)) for it in newest]
-        if len(newest) == ALIKE and max(sizes) - min(sizes) > 0.03:
+        if len(newest) == ALIKE and max(sizes) - min(sizes) > 0.06:
             return newest
     raise AssertionError("the wrenches ended")
 
@@ -332,6 +332,24 @@ class OfARecording(unittest.TestCase):
     def refused(self, *options):
         tool = [os.environ["HIVTAC_TOOL"], "serve", *options]
         return subprocess.run(tool, capture_output=True, text=True, timeout=30)
+
+
+class WithoutASensor(unittest.TestCase):
+    def test_what_ros_2_does_not_have_is_refused(self):
+        for options, domain, code, words in [
+            (["--name", "left thumb"], "0", 2, "--name left thumb: a node's name"),
+            ([], "lab", 2, "ROS_DOMAIN_ID is lab; .* from 0 to 232"),
+            ([], "233", 2, "ROS_DOMAIN_ID is 233"),
+            (["--port", "no-such-port"], "232", 3, "no-such-port"),
+        ]:
+            refused = subprocess.run(
+                [os.environ["HIVTAC_TOOL"], "serve", "--ros2", *options],
+                env=os.environ | {"ROS_DOMAIN_ID": domain},
+                capture_output=True,
+                text=True,
+            )
+            self.assertEqual(refused.returncode, code, refused.stderr)
+            self.assertRegex(refused.stderr, words)
 
 
 class Replay:

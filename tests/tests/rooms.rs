@@ -94,20 +94,39 @@ fn every_package_has_a_room() {
     }
 }
 
+/// What building a package of the workspace in a folder builds, a line each.
+fn tree_of(folder: &str, package: &str, features: &str) -> String {
+    let arguments = [
+        "tree",
+        "--package",
+        package,
+        "--features",
+        features,
+        "--prefix",
+        "none",
+        "--edges",
+        "normal,build",
+    ];
+    cargo(&root().join(folder), &arguments)
+}
+
+/// Users build it themselves.
+#[test]
+fn the_host_tool_is_small_unless_more_is_asked_for() {
+    let packages = |features: &str| {
+        let tree = tree_of("", "hivtac", features);
+        let lines = tree
+            .lines()
+            .map(|line| line.trim_end_matches(" (*)").to_owned());
+        lines.collect::<BTreeSet<_>>().len()
+    };
+    assert!(packages("") < 150, "{}", packages(""));
+    assert!(packages("ros2") > 150, "the test can see features");
+}
+
 #[test]
 fn the_demo_builds_no_training_and_no_solver() {
-    let of = |folder: &str, package: &str| {
-        let arguments = [
-            "tree",
-            "--package",
-            package,
-            "--prefix",
-            "none",
-            "--edges",
-            "normal,build",
-        ];
-        cargo(&root().join(folder), &arguments)
-    };
+    let of = |folder: &str, package: &str| tree_of(folder, package, "");
     let demo = [
         of("", "hivtac"),
         of("", "hivtac-firmware"),

@@ -17,7 +17,7 @@ use ros2_client::{
 };
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
-use std::fmt::{self, Display};
+use std::fmt;
 use std::net::Ipv4Addr;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
@@ -120,44 +120,42 @@ impl Ros2 {
     /// # Errors
     /// When there is no network to take part in, not even this computer's own.
     pub fn open(name: &str, domain: u16, served: &[Served]) -> Result<Ros2, Failure> {
-        let failed = |error: &dyn Display| {
+        Ros2::try_to_open(name, domain, served).map_err(|error| {
             Failure::input(format!(
                 "cannot take part in ROS 2's domain {domain}: {error}; is a network up, and is \
                  UDP allowed?"
             ))
-        };
+        })
+    }
+
+    fn try_to_open(
+        name: &str,
+        domain: u16,
+        served: &[Served],
+    ) -> Result<Ros2, Box<dyn std::error::Error>> {
         let mut participant = DomainParticipantBuilder::new(domain);
         if stays_here() {
             participant = participant.with_only_networks([Ipv4Addr::LOCALHOST]);
         }
-        let participant = participant.build().map_err(|error| failed(&error))?;
-        let context = Context::from_domain_participant(participant);
-        let context = context.map_err(|error| failed(&error))?;
-        let node_name = NodeName::new("/", name).map_err(|error| failed(&error))?;
+        let context = Context::from_domain_participant(participant.build()?)?;
         // A log topic and parameters would be empty.
         let options = NodeOptions::new().enable_rosout(false);
-        let mut node = context
-            .new_node(node_name, options)
-            .map_err(|error| failed(&error))?;
-        let sensors = served.iter().map(|served| {
-            let folder = folder(name, served.name.as_deref());
-            Sensor::open(&mut node, &folder, served).map_err(|error| failed(&error))
-        });
+        let mut node = context.new_node(NodeName::new("/", name)?, options)?;
+        let folders = served.iter().map(|it| folder(name, it.name.as_deref()));
+        let folders: Vec<String> = folders.collect();
+        let sensors = served.iter().zip(&folders);
+        let sensors = sensors.map(|(served, folder)| Sensor::open(&mut node, folder, served));
         let sensors = sensors.collect::<Result<_, _>>()?;
-        let diagnostics = Name::new("/", "diagnostics").map_err(|error| failed(&error))?;
-        let diagnostics = publisher(&mut node, &diagnostics, &DIAGNOSTICS);
-        let folder = folder(
-            name,
-            served.first().and_then(|served| served.name.as_deref()),
-        );
+        let diagnostics = Name::new("/", "diagnostics")?;
+        let first = folders.first().map_or("", String::as_str);
         Ok(Ros2 {
             sensors,
-            diagnostics: diagnostics.map_err(|error| failed(&error))?,
+            diagnostics: publisher(&mut node, &diagnostics, &DIAGNOSTICS)?,
             looked: Instant::now(),
             is_told: false,
             node,
             context,
-            own_topic: format!("rt{folder}/{}", Channel::Status.name()),
+            own_topic: format!("rt{first}/{}", Channel::Status.name()),
             domain,
         })
     }
@@ -241,37 +239,36 @@ impl Sensor {
         })
     }
 
-    /// Passes on what was asked for, and answers what is done.
-    fn turn(&mut self) {
+    /// Passes on what was asked for.
+    fn pass_on(&mut self) {
         while let Ok(Some((request, body))) = self.tare.receive_request() {
             let is_cyclones = body.0.len() > CYCLONES_HEADER;
             let header = if is_cyclones { CYCLONES_HEADER } else { 0 };
             let (answering, answer) = sync_channel(1);
-            let busy = Err("the device is busy with tares; try again later".to_owned());
-            if let Err(error) = self.orders.try_send(TareOrder(answering)) {
-                let (std::sync::mpsc::TrySendError::Full(order)
-                | std::sync::mpsc::TrySendError::Disconnected(order)) = error;
-                let _ = order.0.try_send(busy);
-            }
+            // One too many is dropped, and answered when that is found out.
+            let _ = self.orders.try_send(TareOrder(answering));
             self.waiting.push(Waiting {
                 request,
                 header: body.0[..header].to_vec(),
                 answer,
             });
         }
+    }
+
+    /// Answers what is done.
+    fn answer(&mut self) {
         let tare = &self.tare;
-        self.waiting
-            .retain(|waiting| match waiting.answer.try_recv() {
-                Ok(answer) => {
-                    waiting.reply(tare, &answer);
-                    false
-                }
-                Err(TryRecvError::Empty) => true,
+        self.waiting.retain(|waiting| {
+            let answer = match waiting.answer.try_recv() {
+                Err(TryRecvError::Empty) => return true,
                 Err(TryRecvError::Disconnected) => {
-                    waiting.reply(tare, &Err("the program ends".to_owned()));
-                    false
+                    Err("the device is busy with other tares; try again later".to_owned())
                 }
-            });
+                Ok(answer) => answer,
+            };
+            waiting.reply(tare, &answer);
+            false
+        });
     }
 }
 
@@ -307,7 +304,10 @@ impl Outlet for Ros2 {
     }
 
     fn turn(&mut self) {
-        self.sensors.iter_mut().for_each(Sensor::turn);
+        for sensor in &mut self.sensors {
+            sensor.pass_on();
+            sensor.answer();
+        }
         if self.looked.elapsed() >= LOOK_EVERY {
             self.looked = Instant::now();
             self.look_for_another();

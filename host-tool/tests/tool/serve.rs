@@ -41,21 +41,3 @@ fn a_tool_that_was_built_without_it_says_how_to_build_it() {
         assert!(said.ends_with(&how) && said.lines().count() == 1, "{said}");
     }
 }
-
-#[cfg(feature = "ros2")]
-#[test]
-fn names_and_domains_that_ros_2_does_not_have_are_refused() {
-    let (code, said) = refused(&["--ros2", "--name", "left thumb"]);
-    assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains("--name left thumb: a node's name"), "{said}");
-    let finished = std::process::Command::new(env!("CARGO_BIN_EXE_hivtac"))
-        .args(["serve", "--ros2"])
-        .env("ROS_DOMAIN_ID", "lab")
-        .output()
-        .unwrap();
-    assert_eq!(finished.status.code(), Some(2));
-    let said = String::from_utf8(finished.stderr).unwrap();
-    assert!(said.contains("ROS_DOMAIN_ID is lab"), "{said}");
-    let (code, said) = refused(&["--ros2", "--port", "no-such-port"]);
-    assert_eq!(code, Some(3), "{said}");
-}
