@@ -1,8 +1,8 @@
 //! How the bytes of a line reach the FIFO: in groups of one FIFO's worth, each at the instant at
 //! which its last byte is on the lines.
 //!
-//! Every event stops the core. So where the DMA took each word of a line's first two groups at
-//! once, the rest of that line is one event, at its end, and the groups follow each other as the
+//! Every event stops the core. So where the DMA took each word of a line's first group at once, what
+//! follows its second one is one event, at the line's end, and the groups follow each other as the
 //! FIFO is emptied. All that happens at a line's beginning or end is where it would be: interrupts
 //! of the interface, and of a DMA whose blocks are whole lines; and a counter that has moved since
 //! the last block tells so. Whoever writes to the interface amid the line finds what has come by
@@ -10,7 +10,8 @@
 //! less of it; where the DMA is stopped amid a line, the overrun comes when the line ends; and where
 //! the sensor starts over amid a line, the rest of it that was on the lines is lost.
 //!
-//! A fault that disturbs the camera or the DMA keeps all lines of the run in groups.
+//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups, and a busy bus
+//! all lines of a run in which it is ever busy.
 
 use rigless::device::DeviceContext;
 
@@ -22,8 +23,10 @@ use crate::faults::Kind;
 
 impl Dcmi {
     pub(super) fn bytes(&mut self, bytes: Bytes, context: &mut DeviceContext<'_>) {
-        // Both groups so far left at once.
-        let flows = bytes.from == GROUP && self.receiver.waiting() == 0 && !self.is_disturbed();
+        // The first group left at once.
+        let flows = bytes.from == GROUP
+            && self.receiver.waiting() == 0
+            && !self.is_disturbed(&bytes.run, context.now().0);
         self.receive_group(bytes);
         self.receive_due();
         self.wait_for_the_bus(context);
@@ -38,17 +41,18 @@ impl Dcmi {
         }
     }
 
-    /// Whether a fault may hold up words or end them amid a line.
-    fn is_disturbed(&self) -> bool {
-        let disturbing = [
-            Kind::BusBusy,
-            Kind::DcmiOverrun,
-            Kind::CameraAbsent,
-            Kind::CameraSilent,
-        ];
-        disturbing
-            .into_iter()
-            .any(|kind| self.faults.asked_for(kind))
+    /// Whether a fault may hold up words of a run or end it early.
+    fn is_disturbed(&self, run: &Run, now_ns: u64) -> bool {
+        let Some(frame) = &self.frame else {
+            return true;
+        };
+        let end_ns = frame.instant(run.line, run.start + run.bytes);
+        let disturbing = [Kind::DcmiOverrun, Kind::CameraAbsent, Kind::CameraSilent];
+        let disturbs = |kind| {
+            let change = self.faults.next_change(kind, now_ns);
+            self.faults.on(kind, now_ns) || change.is_some_and(|at| at <= end_ns)
+        };
+        self.faults.asked_for(Kind::BusBusy) || disturbing.into_iter().any(disturbs)
     }
 
     /// Receives what is due up to the next word that has to leave first.
