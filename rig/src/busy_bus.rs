@@ -12,7 +12,7 @@ use crate::faults::{Faults, Kind};
 
 /// A write is on its way for at most so long, ns: longer than a handler takes from there to its
 /// end.
-const LONGEST_WRITE_NS: u64 = 2_000;
+pub const LONGEST_WRITE_NS: u64 = 2_000;
 
 /// Numbers that a seed decides.
 #[derive(Clone, Debug)]

@@ -21,6 +21,7 @@ use crate::dcmi::Dcmi;
 use crate::dormant::Dormant;
 use crate::faults::Faults;
 use crate::flash::{Bank, Flash};
+use crate::late_flags::LateFlags;
 use crate::late_line::LateLine;
 use crate::mdma::Mdma;
 use crate::otg::{Blocks, SharedCore};
@@ -74,6 +75,7 @@ pub struct Chip {
     control_bus: ControlBus,
     held_bus: HeldBus,
     late: LateLine,
+    late_flags: LateFlags,
     rules: Rules,
     board: board::Kind,
     revision: Revision,
@@ -118,7 +120,8 @@ impl Chip {
             part::Kind::Ov7725 => part.i2c[0].attach(Sccb::new(camera.clone())),
             part::Kind::Mt9v034 => part.i2c[0].attach(TwoWire::new(camera.clone())),
         };
-        let core = SharedCore::default();
+        let core = SharedCore::new(faults.clone(), seed);
+        let late_flags = LateFlags::new(faults.clone(), seed);
         let mut otg = Blocks::fit(&mut part, &core, &host)?;
         otg.wake_host(part.bus_mut(), VirtualNanos(0));
         let slots = board::Slots::of(part.bus(), board)?;
@@ -143,6 +146,7 @@ impl Chip {
             revision,
             led_flashes_ns: Vec::new(),
             late: LateLine::default(),
+            late_flags,
             crs: Crs::default(),
             part,
             camera,
@@ -216,11 +220,13 @@ impl Chip {
     pub fn settle(&mut self, at: VirtualNanos) {
         self.control_bus.settle(&mut self.part, at);
         self.late.settle(&mut self.part, at);
+        self.late_flags.settle(&mut self.part, at);
     }
 
     /// The core has read or written something.
     pub fn accessed(&mut self, access: &Access, value: u64) {
         self.late.accessed(access, value);
+        self.late_flags.accessed(&mut self.part, access, value);
     }
 
     /// Puts the VSYNC line's level on its pin.
@@ -249,6 +255,8 @@ impl Mcu for Chip {
         self.otg.exchange(&mut self.part);
         self.part.reset(at, cause);
         self.core.lock().reset();
+        self.core.line().reset();
+        self.late_flags.reset();
         self.camera.lock().host_reset();
         self.otg = Blocks::fit(&mut self.part, &self.core, &self.host)
             .expect("a part that was fitted once");

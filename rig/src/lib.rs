@@ -16,7 +16,7 @@
 //! | [`dcmi`], [`camera`], [`frame_source`], `control_bus` | the camera interface; the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`mdma`], [`flash`] | the DMA controller that reaches DTCM; the flash's second bank, and cuts of the power |
 //! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
-//! | [`faults`], [`rules`], `late_line`, [`dma_reach`] | what goes wrong on request; what firmware must not do |
+//! | [`faults`], [`rules`], `late_line`, `late_flags`, [`dma_reach`] | what goes wrong on request; what firmware must not do |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
 pub mod arrivals;
@@ -32,6 +32,7 @@ mod dormant;
 pub mod faults;
 pub mod flash;
 pub mod frame_source;
+mod late_flags;
 mod late_line;
 pub mod link;
 pub mod machine;

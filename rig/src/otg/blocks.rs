@@ -159,7 +159,7 @@ impl Block {
 
     fn drive(&self, context: &mut DeviceContext<'_>) {
         let level = Level::from(self.core.lock().interrupt());
-        context.interrupt(0, level);
+        self.core.line().drive(level, context);
     }
 
     fn schedule_host(&mut self, at_ns: u64, context: &mut DeviceContext<'_>) {
@@ -201,6 +201,7 @@ impl ErasedDevice for Block {
         _registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
+        self.core.line().read_back(context);
         let value = self.read_word(self.offset(row), context.now().0);
         self.drive(context);
         Some(value.into())
@@ -223,6 +224,7 @@ impl ErasedDevice for Block {
         _registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        self.core.line().falls_at(event, context);
         if self.tick != Some(event) {
             return;
         }

@@ -21,6 +21,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub use blocks::{Block, Blocks};
 use endpoint::{In, Out};
 
+use crate::busy_bus::InterruptLine;
+use crate::faults::Faults;
+
 /// Endpoints each way.
 pub const ENDPOINTS: usize = 9;
 
@@ -117,13 +120,29 @@ pub struct Core {
 }
 
 /// The core as its register blocks and the host share it.
-#[derive(Clone, Debug, Default)]
-pub struct SharedCore(Arc<Mutex<Core>>);
+#[derive(Clone, Debug)]
+pub struct SharedCore {
+    core: Arc<Mutex<Core>>,
+    line: Arc<Mutex<InterruptLine>>,
+}
 
 impl SharedCore {
+    /// One out of reset; `seed` decides what a busy bus does to its interrupt line.
+    pub fn new(faults: Faults, seed: u64) -> Self {
+        Self {
+            core: Arc::default(),
+            line: Arc::new(Mutex::new(InterruptLine::new(faults, seed))),
+        }
+    }
+
     /// The core. One thread runs the whole rig, so nobody waits here.
     pub fn lock(&self) -> MutexGuard<'_, Core> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.core.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Its interrupt line, likewise.
+    pub fn line(&self) -> MutexGuard<'_, InterruptLine> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
