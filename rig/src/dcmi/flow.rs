@@ -10,8 +10,8 @@
 //! amid a line has less of it; where the DMA is stopped amid a line, the overrun comes when the
 //! line ends; and where the sensor starts over amid a line, the rest that was on it is lost.
 //!
-//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups, and a busy bus
-//! all lines of a run in which it is ever busy.
+//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups, and a busy
+//! bus all lines of a run in which it is ever busy.
 
 use rigless::device::DeviceContext;
 
