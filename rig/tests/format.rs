@@ -109,9 +109,9 @@ fn a_change_waits_for_a_camera_that_is_away() {
     assert!(!last.status.contains(Status::MARKERS_MISSING), "{last:?}");
 }
 
-/// A line that flows reaches memory in three steps, any other one in groups of bytes, as all do where
-/// the bus is to be busy, here long after the end. The device sends the same, at the same times, also when a change of
-/// the format stops and starts the capture amid a line.
+/// A line that flows reaches memory in three steps, any other one in groups of bytes, as all do
+/// where the bus is to be busy, here long after the end. The device sends the same, at the same
+/// times, also when a change of the format stops and starts the capture.
 #[test]
 fn how_lines_reach_memory_changes_nothing() {
     let setup = || Setup::new(firmware(), 330).at(225, set_threshold(80, RED_CR));

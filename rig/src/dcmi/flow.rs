@@ -1,17 +1,17 @@
 //! How the bytes of a line reach the FIFO: in groups of one FIFO's worth, each at the instant at
 //! which its last byte is on the lines.
 //!
-//! Every event stops the core. So where the DMA took each word of a line's first group at once, what
-//! follows its second one is one event, at the line's end, and the groups follow each other as the
-//! FIFO is emptied. All that happens at a line's beginning or end is where it would be: interrupts
-//! of the interface, and of a DMA whose blocks are whole lines; and a counter that has moved since
-//! the last block tells so. Whoever writes to the interface amid the line finds what has come by
-//! then, and the rest comes in groups. Different from the chip: memory that is read amid a line has
-//! less of it; where the DMA is stopped amid a line, the overrun comes when the line ends; and where
-//! the sensor starts over amid a line, the rest of it that was on the lines is lost.
+//! Every event stops the core. So where the DMA took each word of a line's first group at once,
+//! what follows its second one is one event, at the line's end, and the groups follow each other as
+//! the FIFO is emptied. All that happens at a line's beginning or end is where it would be:
+//! interrupts of the interface, and of a DMA whose blocks are whole lines; and a counter that has
+//! moved since the last block tells so. Whoever writes to the interface amid the line finds what
+//! has come by then, and the rest comes in groups. Different from the chip: memory that is read
+//! amid a line has less of it; where the DMA is stopped amid a line, the overrun comes when the
+//! line ends; and where the sensor starts over amid a line, the rest that was on it is lost.
 //!
-//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups, and a busy bus
-//! all lines of a run in which it is ever busy.
+//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups, and a busy
+//! bus all lines of a run in which it is ever busy.
 
 use rigless::device::DeviceContext;
 
