@@ -114,7 +114,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         second
     }
 
-    /// Whether specks that can be taken out, little light or noise are why the first look gave nothing.
+    /// Whether specks that can be taken out, little light or noise are why the first look gave
+    /// nothing.
     fn is_disturbed(&mut self, first: &First) -> bool {
         let Geometry { width, height, .. } = self.settings.geometry;
         let pixels = u32::from(width) * u32::from(height);

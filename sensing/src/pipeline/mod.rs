@@ -216,8 +216,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.look_ahead();
     }
 
-    /// Measures a frame that lies in memory: all rows from the top, one after the other. A frame that
-    /// does not follow the one before wants [`forget_frame`](Self::forget_frame) first.
+    /// Measures a frame that lies in memory: all rows from the top, one after the other. A frame
+    /// that does not follow the one before wants [`forget_frame`](Self::forget_frame) first.
     pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
         self.begin_frame();
         self.push_rows(frame);
