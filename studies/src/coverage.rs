@@ -39,10 +39,10 @@ pub struct Coverage {
     #[arg(long, default_value_t = 10_000)]
     presses: u32,
     /// Units drawn, each after ten loads.
-    #[arg(long, default_value_t = 40)]
+    #[arg(long, default_value_t = 100)]
     units: u64,
     /// Presses of each of them.
-    #[arg(long, default_value_t = 250)]
+    #[arg(long, default_value_t = 100)]
     unit_presses: u32,
     /// Print one JSON object and write no page.
     #[arg(long)]
@@ -285,7 +285,7 @@ impl Tenths {
         } = self;
         let mut text = format!(
             "\n## {units}\n\n{presses} presses with a force, {refused} without, {hidden} more with \
-             a marker out of the picture or beyond the simulated film.\n"
+             a marker out of the picture or beyond the\nsimulated film.\n"
         );
         for (name, parts, digits) in [
             ("\\|F\\|, mN", &self.by_force_mn, 0),
