@@ -6,7 +6,7 @@
 //! the square of the difference of two frames is the variance of noise alone: little light, a high
 //! gain or flickering specks show in it, and a force, a fast one too, does not.
 
-use crate::forward::{Column, UNEXPLAINED};
+use crate::forward::{Column, UNEXPLAINED, square};
 use crate::kernels::sqrt;
 use hivtac_terms::units::Px;
 
@@ -81,14 +81,13 @@ impl NoiseLevel {
     /// Takes what a frame left over when `noise` was expected of it.
     pub fn saw(&mut self, noise: FrameNoise, left: &Column) {
         let left = left.map(|part| part * noise.times);
-        let square = left.iter().fold(0.0, |sum, part| sum + part * part);
         // What the largest noise does not explain is no noise.
-        self.now = (square <= LARGEST * UNEXPLAINED).then_some(left);
+        self.now = (square(&left) <= LARGEST * UNEXPLAINED).then_some(left);
         let Some((before, left)) = self.before.as_ref().zip(self.now.as_ref()) else {
             return;
         };
-        let apart = left.iter().zip(before).map(|(now, before)| now - before);
-        let variance = apart.fold(0.0, |sum, part| sum + part * part) / (2.0 * LEFT_OVER);
+        let apart: Column = core::array::from_fn(|i| left[i] - before[i]);
+        let variance = square(&apart) / (2.0 * LEFT_OVER);
         let seen = variance.min(MOST_AT_ONCE * self.variance);
         let mean = self.variance + (seen - self.variance) / FRAMES;
         self.variance = mean.clamp(1.0 / LARGEST, 2.0 * LARGEST);

@@ -5,7 +5,7 @@ use super::estimate::{Estimate, Observed, UNEXPLAINED};
 use super::mounting::Mounting;
 use super::pose::{Pose, limited};
 use super::predict::{CORNERS, Prediction};
-use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
+use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve, square};
 use crate::kernels::sqrt;
 
 /// A step that would explain no more than this of the residual, in parts of the noise's variance,
@@ -135,10 +135,6 @@ impl Equations {
         }
         all
     }
-}
-
-fn square(parts: &[f32]) -> f32 {
-    parts.iter().fold(0.0, |sum, part| sum + part * part)
 }
 
 impl Linearization {

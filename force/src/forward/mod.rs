@@ -38,6 +38,7 @@ pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED, stated
 pub use mounting::{Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
 pub use predict::{Markers, Prediction, Tables};
+pub(crate) use solve::square;
 pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
 pub use systematic::{KNOTS, PARTS, PLACES, SIZES, Systematic, SystematicGrid};
 pub use table::{Answer, Place, Steps, Table};

@@ -16,6 +16,11 @@ const LEAST_OWN: f32 = 1e-3;
 /// A column of the markers' equations.
 pub type Column = [f32; EQUATIONS];
 
+/// The square of what has these parts.
+pub(crate) fn square(parts: &[f32]) -> f32 {
+    parts.iter().fold(0.0, |sum, part| sum + part * part)
+}
+
 /// What equations say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solved {
@@ -92,7 +97,7 @@ pub fn solve<const N: usize>(
     let mut solved = Solved {
         unknowns: [0.0; UNKNOWNS],
         left_over,
-        explained: along.iter().fold(0.0, |sum, part| sum + part * part),
+        explained: square(&along),
         spread: inverse,
     };
     for (row, unknown) in solved.unknowns.iter_mut().enumerate() {
