@@ -1,10 +1,18 @@
 //! When a frame was exposed, on this computer's clock.
 
+use std::time::{SystemTime, UNIX_EPOCH};
+
 /// How fast the two clocks may run apart, as a part of the time: more than quartz crystals do.
 const DRIFT: u64 = 10_000;
 /// A sample is never later than this, ns, unless one of the clocks was set, or the device started
 /// anew.
 const LATEST_NS: u64 = 1_000_000_000;
+
+/// This computer's time, ns since 1970.
+pub fn now_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.unwrap_or_default().as_nanos() as u64
+}
 
 /// Turns a device's time into this computer's: by the sample that came soonest after its frame, as
 /// far as clocks let that be known, so that what delays single samples moves no stamp.

@@ -43,6 +43,18 @@ struct Tared {
     moved_px: Option<f64>,
 }
 
+/// A tare when nothing else is said: the request, how long it may take, and what is said once it is
+/// done.
+pub fn usual_tare(patience: Duration) -> (Request, Duration, String) {
+    let frames = TARE_FRAMES;
+    let done = taken_over(frames);
+    (Request::Tare { frames }, patience.max(TARE_PATIENCE), done)
+}
+
+fn taken_over(frames: u16) -> String {
+    format!("tare taken over {frames} frames")
+}
+
 /// Takes the mean of the next good frames as the rest position, and tells it.
 pub fn tare(address: &Address, patience: Duration, tare: &Tare) -> Result<(), Failure> {
     let Tare { frames, keep, .. } = *tare;
@@ -67,7 +79,7 @@ pub fn tare(address: &Address, patience: Duration, tare: &Tare) -> Result<(), Fa
     let report = report.map(|report| Tared::of(tare, &report));
     let line = match &report {
         Some(report) => report.line(),
-        None => format!("tare taken over {frames} frames"),
+        None => taken_over(frames),
     };
     output::tell(tare.json, &line, &json!(report))
 }

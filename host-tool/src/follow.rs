@@ -1,5 +1,6 @@
 //! A device that is followed through as many connections as it takes.
 
+use crate::output::note;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
@@ -11,9 +12,9 @@ use std::time::{Duration, Instant};
 /// Time between two turns of the follower.
 const TURN_EVERY: Duration = Duration::from_millis(20);
 /// Time between two attempts to connect again.
-const RETRY_EVERY: Duration = Duration::from_millis(500);
+pub const RETRY_EVERY: Duration = Duration::from_millis(500);
 /// Silence after which the device is asked whether it is still there.
-const SILENCE: Duration = Duration::from_secs(5);
+pub const SILENCE: Duration = Duration::from_secs(5);
 
 /// Whom everything about a device is told.
 pub trait Follower {
@@ -51,6 +52,14 @@ pub fn follow(address: &Address, patience: Duration, link: Link, follower: &mut 
             follower.lost(failure, link.rejected());
         }
     }
+}
+
+/// Says that a device is there again, since when it was lost.
+pub fn note_connected_again(port: &str, lost: Instant) {
+    let seconds = lost.elapsed().as_secs_f32();
+    note(&format!(
+        "hivtac: connected again to {port} after {seconds:.1} s"
+    ));
 }
 
 /// Time without a device.

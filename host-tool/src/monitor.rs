@@ -1,5 +1,6 @@
 //! `hivtac monitor`: the forces as they come, and a summary at the end.
 
+use crate::follow::{RETRY_EVERY, SILENCE, note_connected_again};
 use crate::lines::{Format, Row};
 use crate::output::{self, Reader, note, print};
 use crate::tally::Tally;
@@ -11,10 +12,6 @@ use hivtac_host::stop;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use std::time::{Duration, Instant};
 
-/// Time between two attempts to connect again.
-const RETRY_EVERY: Duration = Duration::from_millis(500);
-/// Silence after which the device is asked whether it is still there.
-const SILENCE: Duration = Duration::from_secs(5);
 /// Longest wait for the last counters at the end, however patient it is otherwise.
 const FAREWELL: Duration = Duration::from_secs(10);
 
@@ -139,11 +136,7 @@ impl<'o> Monitor<'o> {
             std::thread::sleep(RETRY_EVERY);
             match Link::connect(&self.options.address, self.options.patience) {
                 Ok((link, _)) => {
-                    let seconds = lost.elapsed().as_secs_f32();
-                    note(&format!(
-                        "hivtac: connected again to {} after {seconds:.1} s",
-                        link.name
-                    ));
+                    note_connected_again(&link.name, lost);
                     self.tally.connected_again();
                     self.just_back = true;
                     return Ok(Some(link));

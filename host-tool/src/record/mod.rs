@@ -6,6 +6,7 @@ mod table;
 
 pub use listen::Heard;
 
+use crate::clock::now_ns;
 use crate::output::{note, print};
 use crate::tally::Tally;
 use bag::Bag;
@@ -23,7 +24,7 @@ use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 use table::Table;
 
 /// Time between two flushes, and two lines of progress.
@@ -216,10 +217,7 @@ impl Recording {
             .create_new(true)
             .open(&partial);
         let open = open.map_err(|error| input(&partial, error))?;
-        let since = SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .unwrap_or_default();
-        let begun_ns = since.as_nanos() as u64;
+        let begun_ns = now_ns();
         let sink = match kind {
             Format::Mcap => Bag::create(open, hellos, begun_ns).map(|bag| Sink::Bag(Box::new(bag))),
             Format::Csv => Table::create(open).map(Sink::Table).map_err(Into::into),

@@ -2,9 +2,9 @@
 //! when that is asked for.
 
 use super::diagnosis::diagnose;
-use crate::clock::Clock;
-use crate::command::{TARE_FRAMES, TARE_PATIENCE};
-use crate::follow::Follower;
+use crate::clock::{Clock, now_ns};
+use crate::command::usual_tare;
+use crate::follow::{Follower, note_connected_again};
 use crate::output::note;
 use crate::ros::Diagnosis;
 use crate::view::state::State;
@@ -12,11 +12,11 @@ use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_terms::status::Status;
 use hivtac_wire::decoder::Rejected;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, Request, Sample};
+use hivtac_wire::message::{DeviceHello, DeviceMessage, Sample};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Time between two diagnoses.
 const DIAGNOSE_EVERY: Duration = Duration::from_secs(1);
@@ -121,12 +121,9 @@ impl Sensor {
     }
 
     fn tare(&mut self, link: &mut Link) -> Result<String, Failure> {
-        let frames = TARE_FRAMES;
-        let patience = self.patience.max(TARE_PATIENCE);
-        link.request(Request::Tare { frames }, patience, |message| {
-            self.take(message, now_ns());
-        })?;
-        Ok(format!("tare taken over {frames} frames"))
+        let (request, patience, done) = usual_tare(self.patience);
+        link.request(request, patience, |message| self.take(message, now_ns()))?;
+        Ok(done)
     }
 
     /// Does what is ordered; a refusal is an answer, a lost connection an end, too.
@@ -158,15 +155,10 @@ impl Follower for Sensor {
     }
 
     fn connected_again(&mut self, hello: DeviceHello) {
-        self.state.tally.connected_again();
-        self.state.hello = hello;
+        self.state.connected_again(hello);
         self.clock = Clock::default();
         if let Some(lost) = self.lost.take() {
-            let seconds = lost.elapsed().as_secs_f32();
-            let port = &self.state.port;
-            note(&format!(
-                "hivtac: connected again to {port} after {seconds:.1} s"
-            ));
+            note_connected_again(&self.state.port, lost);
         }
     }
 
@@ -195,10 +187,4 @@ impl Follower for Sensor {
         }
         Ok(is_asked)
     }
-}
-
-/// This computer's time, ns since 1970.
-fn now_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.unwrap_or_default().as_nanos() as u64
 }

@@ -5,7 +5,7 @@ use super::feed::Feed;
 use super::order::{Answer, Order, Posted};
 use super::recorder::Recorder;
 use super::state::State;
-use crate::command::{TARE_FRAMES, TARE_PATIENCE};
+use crate::command::usual_tare;
 use crate::follow::{Follower, follow};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::take;
@@ -132,15 +132,7 @@ impl Owner {
                 self.request(link, Request::GetInfo, self.patience)?;
                 return Ok(Answer::Done(self.watched.recorder.end(Ok(()))));
             }
-            Order::Tare => {
-                let frames = TARE_FRAMES;
-                let done = format!("tare taken over {frames} frames");
-                (
-                    Request::Tare { frames },
-                    self.patience.max(TARE_PATIENCE),
-                    done,
-                )
-            }
+            Order::Tare => usual_tare(self.patience),
             Order::Expose => {
                 let done = "exposure and gain found; take a new tare".to_owned();
                 (Request::Expose, self.patience, done)
@@ -198,8 +190,7 @@ impl Follower for Owner {
     }
 
     fn connected_again(&mut self, hello: DeviceHello) {
-        self.watched.state.tally.connected_again();
-        self.watched.state.hello = hello;
+        self.watched.state.connected_again(hello);
     }
 
     fn trouble(&mut self, why: String) {

@@ -87,6 +87,12 @@ impl State {
         self.times_us.clear();
     }
 
+    /// The device is there again.
+    pub fn connected_again(&mut self, hello: DeviceHello) {
+        self.tally.connected_again();
+        self.hello = hello;
+    }
+
     /// Samples a second, by the device's clock.
     pub fn rate_hz(&self) -> Option<f64> {
         let (first, last) = self.times_us.front().zip(self.times_us.back())?;
