@@ -48,7 +48,7 @@ impl Picture {
                 pixels: pixels(raw.format, raw.bytes),
             });
         }
-        let image = decode(file).map_err(|error| unreadable(&error))?;
+        let image = decode(path, file)?;
         let (width, height) = size(path, image.width, image.height)?;
         Ok(Picture {
             width,
@@ -82,23 +82,28 @@ struct Rgb {
 /// The largest file that is read: a picture of the largest frame has a fiftieth of it.
 const LARGEST_FILE: u64 = 100 << 20;
 
-/// Turned as its EXIF data say it was taken.
+/// Turned as its EXIF data say it was taken. A file may claim any size: it is held against a
+/// frame's before there is memory for it.
 #[cfg(feature = "pictures")]
-fn decode(bytes: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {
+fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
     use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
     use std::io::Cursor;
 
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+    let damaged = |error: image::ImageError| unreadable(path, &error);
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let reader = reader.map_err(|error| unreadable(path, &error))?;
     match reader.format() {
-        None => return Err("it is no PNG, JPEG or PPM file".into()),
+        None => return Err(unreadable(path, &"it is no PNG, JPEG or PPM file")),
         Some(ImageFormat::Jpeg) if !is_whole_jpeg(bytes) => {
-            return Err("it is cut: a JPEG file without its end".into());
+            return Err(unreadable(path, &"it is cut: a JPEG file without its end"));
         }
         Some(_) => (),
     }
-    let mut decoder = reader.into_decoder()?;
-    let orientation = decoder.orientation()?;
-    let mut image = DynamicImage::from_decoder(decoder)?;
+    let mut decoder = reader.into_decoder().map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    size(path, width, height)?;
+    let orientation = decoder.orientation().map_err(damaged)?;
+    let mut image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     image.apply_orientation(orientation);
     let image = image.into_rgb8();
     Ok(Rgb {
@@ -109,8 +114,8 @@ fn decode(bytes: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {
 }
 
 #[cfg(not(feature = "pictures"))]
-fn decode(_: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {
-    Err(WITHOUT_PICTURES.into())
+fn decode(path: &str, _: &[u8]) -> Result<Rgb, Failure> {
+    Err(unreadable(path, &WITHOUT_PICTURES))
 }
 
 /// Whether a JPEG file goes on to its end-of-image marker: decoders paint what is missing grey.
@@ -208,6 +213,15 @@ mod tests {
             ];
             assert_eq!(rgb565(replicated.map(|level| level as u8)), pixel);
         }
+    }
+
+    /// 8 columns and 4,194,303,749 rows: 100 GB of pixels, of a file of 239 bytes.
+    #[cfg(feature = "pictures")]
+    #[test]
+    fn a_picture_that_claims_to_be_huge_takes_no_memory() {
+        let file = include_bytes!("../../fuzz/corpus/picture/claims_100_gb");
+        let error = Picture::parse("it.png", file).err().unwrap().to_string();
+        assert!(error.contains("it.png has 8 × 4194303749 px"), "{error}");
     }
 
     #[test]
