@@ -10,7 +10,7 @@
 //!
 //! ```sh
 //! cd target/xtask/fuzz
-//! x86_64-unknown-linux-gnu/release/model found/model ../../../fuzz/corpus/model \
+//! x86_64-unknown-linux-gnu/tools/model found/model ../../../fuzz/corpus/model \
 //!     -artifact_prefix=found/model/ -max_total_time=1800
 //! cargo run -p hivtac-fuzz --bin model -- found/model/crash-*
 //! ```

@@ -18,7 +18,7 @@ pub const SEEDED_BUGS: [&str; 5] = [
 ];
 
 /// The profile of programs that run here, which is quick to build.
-const TOOLS: &str = "tools";
+pub const TOOLS: &str = "tools";
 
 /// The boards that there is firmware for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]

@@ -8,7 +8,7 @@ use std::thread;
 use anyhow::{Context, Result, bail};
 
 use crate::toolchain::{self, cargo};
-use crate::{process, workspace};
+use crate::{artifacts, process, workspace};
 
 /// Seconds of each attack.
 const SECONDS: u32 = 10;
@@ -17,10 +17,8 @@ const LIMITS: [&str; 2] = ["-timeout=10", "-rss_limit_mb=2048"];
 /// What has the compiler tell libFuzzer which parts of a program an input reaches, and what it
 /// compares: as cargo-fuzz does it without a sanitizer, which only a nightly compiler has; no
 /// attacked code is `unsafe`.
-const COVERAGE: [&str; 8] = [
+const COVERAGE: [&str; 6] = [
     "--cfg=fuzzing",
-    "-Cdebug-assertions",
-    "-Ccodegen-units=1",
     "-Cpasses=sancov-module",
     "-Cllvm-args=-sanitizer-coverage-level=4",
     "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
@@ -67,12 +65,18 @@ fn build() -> Result<PathBuf> {
     let host = toolchain::host()?;
     let folder = workspace::work_folder("fuzz")?;
     let mut command = cargo("build", workspace::root());
-    command.args(["--release", "--package", "hivtac-fuzz", "--bins"]);
+    command.args([
+        "--profile",
+        artifacts::TOOLS,
+        "--package",
+        "hivtac-fuzz",
+        "--bins",
+    ]);
     command
         .args(["--target", &host, "--target-dir"])
         .arg(&folder);
     process::run(command.env("RUSTFLAGS", COVERAGE.join(" ")))?;
-    Ok(folder.join(host).join("release"))
+    Ok(folder.join(host).join(artifacts::TOOLS))
 }
 
 /// Names of the targets.
