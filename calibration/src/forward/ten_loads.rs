@@ -73,7 +73,7 @@ const SETTLED: f64 = 1e-4;
 /// Nothing is taken farther than so many standard deviations.
 const AT_MOST: f64 = 3.0;
 /// χ² of what is seen, over its degrees of freedom, of a fit that can be trusted.
-const TRUSTED: f64 = 3.0;
+const TRUSTED: f64 = 4.0;
 
 /// What a fit found.
 #[derive(Clone, Debug)]
