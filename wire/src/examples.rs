@@ -7,6 +7,7 @@ use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -160,7 +161,7 @@ pub fn longest_rest() -> RestPosition {
         centroid: CentroidEstimator::RednessWeighted,
         markers: longest_sample().markers.unwrap(),
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
-        rect_area: i64::MIN,
+        rect_area: Q::from_bits(i64::MIN),
     }
 }
 
@@ -689,7 +690,7 @@ pub fn any_rest() -> impl Strategy<Value = RestPosition> {
             },
             markers,
             rect_center: (Px(x), Px(y)),
-            rect_area,
+            rect_area: Q::from_bits(rect_area),
         },
     )
 }
