@@ -5,6 +5,8 @@ use crate::cordic::sin_cos;
 use crate::division::Divisor;
 use crate::fixed::Q;
 use crate::units::{Micrometres, MilliDegrees, Px};
+use core::fmt;
+use core::str::FromStr;
 
 /// Lens, frame and marker geometry (`docs/architecture.md`, presets).
 ///
@@ -55,6 +57,33 @@ impl Preset {
         Preset::ALL.into_iter().find(|preset| preset.name() == name)
     }
 }
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Preset {
+    type Err = UnknownPreset;
+
+    fn from_str(name: &str) -> Result<Preset, UnknownPreset> {
+        Preset::from_name(name).ok_or(UnknownPreset)
+    }
+}
+
+/// No preset has such a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct UnknownPreset;
+
+impl fmt::Display for UnknownPreset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [first, second, third] = Preset::ALL;
+        write!(f, "unknown preset: use {first}, {second} or {third}")
+    }
+}
+
+impl core::error::Error for UnknownPreset {}
 
 /// 6/(5π): a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6) wide.
 const DIAGONAL_TO_FOCAL: Q<32, u64> = Q::from_bits(1_640_556_661);
@@ -167,6 +196,7 @@ const fn half_span(pixels: u16) -> Px {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn presets_have_the_documented_focal_lengths() {
@@ -250,9 +280,11 @@ mod tests {
     #[test]
     fn names_round_trip() {
         for preset in Preset::ALL {
-            assert_eq!(Preset::from_name(preset.name()), Some(preset));
+            assert_eq!(preset.to_string().parse(), Ok(preset));
         }
-        assert_eq!(Preset::from_name("Paper"), None);
+        let error = "Paper".parse::<Preset>().unwrap_err();
+        let text = "unknown preset: use paper, ov7725 or mt9v034";
+        assert_eq!(error.to_string(), text);
     }
 
     #[test]

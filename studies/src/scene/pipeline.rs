@@ -2,12 +2,12 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_calibration::dataset::reasons;
-use hivtac_scene::{Camera, Frame, Load, Preset as ScenePreset, Scene, Truth};
+use hivtac_scene::{Camera, Frame, Load, Scene, Truth};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;
 
@@ -41,13 +41,8 @@ impl Pipeline {
     /// When the default model cannot be read, or the pipeline does not take such frames.
     pub fn new(camera: &Camera) -> Result<Pipeline> {
         let size = |count: u32| u16::try_from(count).context("the frame is too large");
-        let preset = match camera.preset() {
-            ScenePreset::Paper => Preset::Paper,
-            ScenePreset::Ov7725 => Preset::Ov7725,
-            ScenePreset::Mt9v034 => Preset::Mt9v034,
-        };
         let (width, height) = (size(camera.width())?, size(camera.height())?);
-        let geometry = Geometry::preset(preset, width, height);
+        let geometry = Geometry::preset(camera.preset(), width, height);
         let model = Model::parse(MODEL).map_err(|error| anyhow!("the default model: {error}"))?;
         let model = (model.conditions.geometry == geometry).then_some(model);
         let settings = match &model {
