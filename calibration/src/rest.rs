@@ -18,7 +18,7 @@ pub struct Rest {
 impl Rest {
     /// The features in px (px²).
     pub fn features_px(&self) -> [f64; FEATURES] {
-        self.features_q16.map(Q::to_f64)
+        self.features_q16.map(|number| number.to_f64())
     }
 }
 

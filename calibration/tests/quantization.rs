@@ -138,7 +138,7 @@ proptest! {
         let rows = rows(&network, &unit);
         let px: Vec<[f64; INPUTS]> = rows
             .iter()
-            .map(|row| row.map(Q::to_f64))
+            .map(|row| row.map(|number| number.to_f64()))
             .collect();
         network.activation_max = network.activation_maxima(&px);
         let weights = weights(network);

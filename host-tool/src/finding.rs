@@ -6,7 +6,6 @@ use crate::lines::{contact_text, status_text, to_json};
 use hivtac_sensing::blob::Blob;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::settings::Settings;
-use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use serde::Serialize;
@@ -98,7 +97,7 @@ impl<'a> Finding<'a> {
         let markers = measurement.markers.as_ref().map(MarkerJson::all);
         let features = measurement
             .features
-            .map(|features| features.to_array().map(Q::to_f64).to_vec());
+            .map(|features| features.to_array().map(|number| number.to_f64()).to_vec());
         Finding {
             image,
             width: settings.geometry.width,

@@ -220,11 +220,11 @@ mod tests {
 
     const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
 
-    /// Markers of a film at rest, moved to the right by 1/65,536 px.
-    fn frame(right: i32, area: u32) -> ([Marker; 4], Features) {
+    /// Markers of a film at rest, moved to the right.
+    fn frame(right: Px, area: u32) -> ([Marker; 4], Features) {
         let half = (f64::from(GEOMETRY.rest_distance().0) / 2.0_f64.sqrt()) as i32;
         let at = |x: i32, y: i32| Marker {
-            x: Px((160 << 16) + x * half + right),
+            x: Px((160 << 16) + x * half) + right,
             y: Px((120 << 16) + y * half),
             area,
         };
@@ -232,8 +232,8 @@ mod tests {
         (markers, Features::of_markers(&markers))
     }
 
-    /// What a tare makes of frames that are so far to the right of the first one, 1/65,536 px.
-    fn tare_of(frames: impl Iterator<Item = i32> + Clone) -> Result<Rest, Refusal> {
+    /// What a tare makes of frames that are so far to the right.
+    fn tare_of(frames: impl Iterator<Item = Px> + Clone) -> Result<Rest, Refusal> {
         let mut builder = TareBuilder::new(frames.clone().count() as u16).unwrap();
         let mut outcome = None;
         for right in frames {
@@ -244,21 +244,21 @@ mod tests {
         outcome.unwrap()
     }
 
-    fn left_of(rest: &Rest) -> i32 {
-        rest.features.centroids[0].0.0 - frame(0, 1).0[0].x.0
+    fn left_of(rest: &Rest) -> Px {
+        rest.features.centroids[0].0 - frame(Px(0), 1).0[0].x
     }
 
     #[test]
     fn the_mean_is_rounded_once() {
         let mut builder = TareBuilder::new(3).unwrap();
         for (x, area, remaining) in [(10, 100, 2), (10, 101, 1)] {
-            let (markers, features) = frame(x, area);
+            let (markers, features) = frame(Px(x), area);
             assert_eq!(builder.add(&markers, &features, &GEOMETRY), None);
             assert_eq!(builder.remaining(), remaining);
         }
-        let (markers, features) = frame(12, 101);
+        let (markers, features) = frame(Px(12), 101);
         let rest = builder.add(&markers, &features, &GEOMETRY).unwrap();
-        assert_eq!(left_of(&rest.unwrap()), 11, "32/3 = 10.67");
+        assert_eq!(left_of(&rest.unwrap()), Px(11), "32/3 = 10.67");
         assert_eq!(rest.unwrap().areas, [101; 4], "302/3 = 100.67");
         assert_eq!(
             builder.add(&markers, &features, &GEOMETRY),
@@ -270,14 +270,14 @@ mod tests {
     #[test]
     fn halves_round_up_on_both_sides_of_zero() {
         for (first, second, mean) in [(1, 2, 2), (-1, -2, -1), (-1, 0, 0)] {
-            let rest = tare_of([first, second].into_iter()).unwrap();
-            assert_eq!(left_of(&rest), mean);
+            let rest = tare_of([first, second].map(Px).into_iter()).unwrap();
+            assert_eq!(left_of(&rest), Px(mean));
         }
     }
 
     #[test]
     fn one_frame_is_its_own_mean() {
-        let (markers, features) = frame(123_456, 7);
+        let (markers, features) = frame(Px(123_456), 7);
         let rest = TareBuilder::new(1)
             .unwrap()
             .add(&markers, &features, &GEOMETRY)
@@ -296,11 +296,11 @@ mod tests {
     /// A square wave's standard deviation is half of what it jumps.
     #[test]
     fn markers_that_move_are_refused_whether_they_jump_or_drift() {
-        let jumping = |px: f64| (0..64).map(move |i| (px * 65_536.0) as i32 * (i % 2));
+        let jumping = |px: f64| (0..64).map(move |i| Px((px * 65_536.0) as i32 * (i % 2)));
         assert!(tare_of(jumping(0.49)).is_ok());
         assert_eq!(tare_of(jumping(0.51)), Err(Refusal::Unsteady));
         assert_eq!(tare_of(jumping(400.0)), Err(Refusal::Unsteady));
-        let drifting = (0..256).map(|i| i * 260);
+        let drifting = (0..256).map(|i| Px(i * 260));
         assert_eq!(tare_of(drifting), Err(Refusal::Unsteady), "1 px in all");
     }
 
@@ -314,20 +314,22 @@ mod tests {
             }
             let mut outcome = None;
             for nth in 0..64 {
-                let (markers, features) = frame((jump * 65_536.0) as i32 * (nth % 2), 100);
+                let right = Px((jump * 65_536.0) as i32 * (nth % 2));
+                let (markers, features) = frame(right, 100);
                 outcome = builder.add(&markers, &features, &GEOMETRY);
             }
             (
-                builder.spread().0,
+                builder.spread(),
                 outcome.unwrap().map(|rest| left_of(&rest)),
             )
         };
         let (small, taken) = spread(0.2, false);
-        assert!((small - 6_554).abs() <= 256, "{small}: 0.1 px");
+        assert!((small.0 - 6_554).abs() <= 256, "{small:?}: 0.1 px");
         assert!(taken.is_ok());
         let (large, refused) = spread(4.0, false);
-        assert_eq!((large, refused), (2 << 16, Err(Refusal::Unsteady)));
-        assert_eq!(spread(4.0, true), (2 << 16, Ok(2 << 16)));
+        let two = Px::from_int(2);
+        assert_eq!((large, refused), (two, Err(Refusal::Unsteady)));
+        assert_eq!(spread(4.0, true), (two, Ok(two)));
     }
 
     #[test]
@@ -340,7 +342,7 @@ mod tests {
 
     #[test]
     fn a_pressed_film_is_not_at_rest() {
-        let (markers, _) = frame(0, 100);
+        let (markers, _) = frame(Px(0), 100);
         let pressed = markers.map(|marker| Marker {
             x: Px((marker.x.0 - (160 << 16)) / 5 * 6 + (160 << 16)),
             y: Px((marker.y.0 - (120 << 16)) / 5 * 6 + (120 << 16)),

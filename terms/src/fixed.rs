@@ -32,7 +32,7 @@ impl<const F: u32, T: Copy> Q<F, T> {
     }
 }
 
-macro_rules! roundings {
+macro_rules! integers {
     ($($integer:ty)*) => {$(
         impl<const F: u32> Q<F, $integer> {
             /// The largest whole number that is not above it.
@@ -44,11 +44,16 @@ macro_rules! roundings {
             pub const fn rounded(self) -> $integer {
                 (self.0 + const { 1 << (F - 1) }) >> F
             }
+
+            /// As floating point, for display, files and tests: exact up to 2⁵³ bits.
+            pub fn to_f64(self) -> f64 {
+                self.0 as f64 / (1_u64 << F) as f64
+            }
         }
     )*};
 }
 
-roundings! { i16 i32 u32 i64 i128 }
+integers! { i16 u16 i32 u32 i64 i128 }
 
 impl<const F: u32> Q<F, i64> {
     /// A whole number, |`whole`| < 2^(63 − `F`).
@@ -79,11 +84,6 @@ impl<const F: u32> Q<F, i64> {
     /// The difference, or the limit that it is beyond.
     pub const fn saturating_sub(self, other: Self) -> Self {
         Q(self.0.saturating_sub(other.0))
-    }
-
-    /// As floating point, for display, files and tests: exact up to 2⁵³ bits.
-    pub fn to_f64(self) -> f64 {
-        self.0 as f64 / (1_u64 << F) as f64
     }
 }
 

@@ -224,7 +224,7 @@ fn inspection() -> DeviceMessage {
         frame_time_us: 6_405,
         exposure_us: 5_922,
         longest_exposure_us: 6_405,
-        gain_sixteenths: 24,
+        gain_sixteenths: Q::from_bits(24),
     })
 }
 

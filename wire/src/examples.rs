@@ -221,7 +221,7 @@ fn longest_inspection() -> Inspection {
         frame_time_us: u32::MAX,
         exposure_us: u32::MAX,
         longest_exposure_us: u32::MAX,
-        gain_sixteenths: u16::MAX,
+        gain_sixteenths: Q::from_bits(u16::MAX),
     }
 }
 
@@ -534,7 +534,7 @@ fn any_inspection() -> impl Strategy<Value = Inspection> {
             frame_time_us: frame,
             exposure_us: exposure,
             longest_exposure_us: longest,
-            gain_sixteenths: gain,
+            gain_sixteenths: Q::from_bits(gain),
         },
     )
 }

@@ -109,7 +109,7 @@ pub struct Observation {
 impl Observation {
     /// The features in px (px²); exact, because they are below 2⁵³ steps.
     pub fn features_px(&self) -> [f64; FEATURES] {
-        self.features_q16.map(Q::to_f64)
+        self.features_q16.map(|number| number.to_f64())
     }
 }
 

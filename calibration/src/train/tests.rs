@@ -50,7 +50,10 @@ fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let q16: Vec<_> = (0..ROWS).map(|_| features(&mut random)).collect();
     let samples = Samples {
-        features: q16.iter().map(|row| row.map(Q::to_f64)).collect(),
+        features: q16
+            .iter()
+            .map(|row| row.map(|number| number.to_f64()))
+            .collect(),
         answers: vec![[0.01, 0.02, -0.1]; ROWS],
         ..Samples::default()
     };
@@ -114,7 +117,7 @@ fn training_rounds_as_the_chip_does() {
 fn easy(rows: usize, seed: u64) -> Samples {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let features: Vec<[f64; INPUTS]> = (0..rows)
-        .map(|_| features(&mut random).map(Q::to_f64))
+        .map(|_| features(&mut random).map(|number| number.to_f64()))
         .collect();
     let answer = |f: &[f64; INPUTS]| [f[0] - f[1], (f[2] - 100.0).abs(), f[3] * f[4] / 100.0];
     Samples {

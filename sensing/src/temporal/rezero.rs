@@ -207,16 +207,16 @@ mod tests {
         total: MilliPx(100),
     };
 
-    /// Markers that rest, all shifted to the right, 1/65,536 px.
-    fn shifted(right: i32) -> [Marker; 4] {
+    /// Markers that rest, all shifted to the right.
+    fn shifted(right: Px) -> [Marker; 4] {
         [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
-            x: Px((x << 16) + right),
-            y: Px(y << 16),
+            x: Px::from_int(x) + right,
+            y: Px::from_int(y),
             area: 130,
         })
     }
 
-    fn features(right: i32) -> Features {
+    fn features(right: Px) -> Features {
         Features::of_markers(&shifted(right))
     }
 
@@ -229,7 +229,7 @@ mod tests {
 
     impl Followed {
         fn new() -> Self {
-            let rest = Rest::of_markers(&shifted(0));
+            let rest = Rest::of_markers(&shifted(Px(0)));
             let mut state = Rezeroing::NONE;
             state.set(Some(rest));
             Self {
@@ -255,13 +255,13 @@ mod tests {
 
         /// How far to the right it is, px.
         fn right(&self) -> f64 {
-            (self.rest.features.centroids[0].0.0 - (100 << 16)) as f64 / 65_536.0
+            (self.rest.features.centroids[0].0 - Px::from_int(100)).to_f64()
         }
     }
 
     #[test]
     fn it_waits_goes_by_its_rate_and_stops_at_its_total() {
-        let drifted = features(1 << 16);
+        let drifted = features(Px::ONE);
         let mut film = Followed::new();
         film.for_ms(2_900, Some(&drifted));
         assert!(
@@ -283,15 +283,15 @@ mod tests {
     #[test]
     fn what_drifts_back_is_followed_back() {
         let mut film = Followed::new();
-        film.for_ms(20_000, Some(&features(3_000)));
+        film.for_ms(20_000, Some(&features(Px(3_000))));
         assert!((film.right() - 3_000.0 / 65_536.0).abs() < 1e-4);
-        film.for_ms(20_000, Some(&features(0)));
+        film.for_ms(20_000, Some(&features(Px(0))));
         assert_eq!(film.right(), 0.0);
     }
 
     #[test]
     fn nothing_is_followed_while_something_touches_nor_soon_after() {
-        let drifted = features(1 << 16);
+        let drifted = features(Px::ONE);
         let mut film = Followed::new();
         film.for_ms(10_000, None);
         film.for_ms(1_900, Some(&drifted));
@@ -308,7 +308,7 @@ mod tests {
     fn without_a_rest_position_that_was_taken_nothing_moves() {
         let mut film = Followed::new();
         film.state.set(None);
-        film.for_ms(20_000, Some(&features(1 << 16)));
+        film.for_ms(20_000, Some(&features(Px::ONE)));
         assert_eq!(film.right(), 0.0);
     }
 
@@ -324,7 +324,7 @@ mod tests {
             let mut film = Followed::new();
             let mut before = film.right();
             for (shift, ms) in shifts {
-                film.with(&limits, ms, Some(&features(shift)));
+                film.with(&limits, ms, Some(&features(Px(shift))));
                 let fastest = f64::from(rate) * 1e-3 * (ms / 1_000 + 1) as f64;
                 prop_assert!((film.right() - before).abs() <= fastest + 1e-4);
                 prop_assert!(film.right().abs() <= f64::from(total) * 1e-3 + 1e-4);
