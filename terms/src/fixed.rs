@@ -55,6 +55,12 @@ macro_rules! integers {
 
 integers! { i16 u16 i32 u32 i64 i128 }
 
+impl<const F: u32> From<Q<F, i16>> for Q<F> {
+    fn from(narrow: Q<F, i16>) -> Self {
+        Q(narrow.0.into())
+    }
+}
+
 impl<const F: u32> Q<F, i64> {
     /// A whole number, |`whole`| < 2^(63 − `F`).
     pub const fn from_int(whole: i64) -> Self {
