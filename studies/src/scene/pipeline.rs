@@ -15,8 +15,6 @@ use hivtac_terms::threshold::ByteOrder;
 static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 16;
-/// A pixel in Q16.16.
-const PX: f64 = 65_536.0;
 
 /// The pipeline of a sensor.
 pub struct Pipeline {
@@ -95,7 +93,7 @@ impl Pipeline {
 }
 
 fn centroid_px(marker: Marker) -> [f64; 2] {
-    [marker.x, marker.y].map(|part| f64::from(part.0) / PX)
+    [marker.x, marker.y].map(|part| part.to_f64())
 }
 
 /// The largest distance of a found marker from the truth, px; endless when the truth has no such

@@ -50,9 +50,9 @@ fn report(folder: &Path, name: &str, size: [u16; 2], pixels: &[u16]) -> Result<(
         .collect();
     fs::write(&file, bytes).with_context(|| format!("writing {}", file.display()))?;
     let (fastest, measurement) = time(size, pixels)?;
-    let markers = measurement.markers.map(|markers| {
-        markers.map(|marker| [marker.x, marker.y].map(|px| f64::from(px.0) / 65_536.0))
-    });
+    let markers = measurement
+        .markers
+        .map(|markers| markers.map(|marker| [marker.x, marker.y].map(|px| px.to_f64())));
     println!(
         "{}",
         json!({
