@@ -594,6 +594,7 @@ mod tests {
         refused("\n0,0.500000,", "\n0,NaN,", "line 2: host_s is NaN");
         refused(",25600,", ",18446744073709551615,", "line 2: device_us");
         refused(",131072,", ",9131072000,", "line 2: marker 1");
+        refused(",131072,-2,190,", ",131072,-2,-190,", "line 2: marker 1");
         refused(",4,-3.5,", ",NaN,-3.5,", "line 2: `NaN");
         refused(",4,-3.5,", ",4,-93.5,", "angles are within");
         refused(",0.5,-2\n", ",1e9,-2\n", "places within");
