@@ -2,15 +2,17 @@
 //! which takes any bytes. It panics when something is wrong, and tells otherwise whether the bytes
 //! came as far as what is attacked.
 //!
-//! `cargo xtask test --all attacks` runs each for some seconds where cargo-fuzz is installed; its
-//! corpus is run by the tests here, on any compiler. [`ATTACKS`] is the list.
+//! `cargo xtask test --all attacks` runs each for some seconds where there is a C++ compiler; its
+//! corpus is run by the tests here without. [`ATTACKS`] is the list.
 //!
-//! To attack longer, and to try an input that was found:
+//! To attack longer (`-help=1` has libFuzzer's options; cargo-fuzz can run the targets, too), and
+//! to try an input that was found:
 //!
 //! ```sh
-//! cargo install cargo-fuzz
-//! cargo fuzz run --sanitizer none model /tmp/found fuzz/corpus/model -- -max_total_time=1800
-//! cargo run -p hivtac-fuzz --bin model -- fuzz/artifacts/model/*
+//! cd target/xtask/fuzz
+//! x86_64-unknown-linux-gnu/release/model found/model ../../../fuzz/corpus/model \
+//!     -artifact_prefix=found/model/ -max_total_time=1800
+//! cargo run -p hivtac-fuzz --bin model -- found/model/crash-*
 //! ```
 #![forbid(unsafe_code)]
 
@@ -21,6 +23,7 @@ mod corpus;
 mod frames;
 mod markers;
 mod model;
+mod picture;
 mod scene_file;
 mod storage;
 mod wire;
@@ -29,7 +32,7 @@ mod wire;
 pub type Attack = fn(&[u8]) -> bool;
 
 /// Every attack by the name of its target, which is that of its folder in `fuzz/corpus`, too.
-pub const ATTACKS: [(&str, Attack); 10] = [
+pub const ATTACKS: [(&str, Attack); 11] = [
     ("from_device", wire::from_device),
     ("from_host", wire::from_host),
     ("model", model::attack),
@@ -37,6 +40,7 @@ pub const ATTACKS: [(&str, Attack); 10] = [
     ("capture", capture::attack),
     ("storage", storage::attack),
     ("scene_file", scene_file::attack),
+    ("picture", picture::attack),
     ("dataset", calibration::dataset),
     ("recording", calibration::recording),
     ("network", calibration::network),
@@ -51,7 +55,7 @@ pub fn attack(name: &str) -> Attack {
     found.expect("every target is listed").1
 }
 
-/// Runs an attack on the files that the command line names; without cargo-fuzz that is all that a
+/// Runs an attack on the files that the command line names; without libFuzzer that is all that a
 /// target does.
 ///
 /// # Panics

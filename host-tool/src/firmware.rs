@@ -1,9 +1,9 @@
 //! `hivtac update firmware`: the device into its own loader, and what came back.
 
 use crate::command::send;
-use crate::files::read_at_most;
 use crate::output::{note, tell};
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;

@@ -1,15 +1,18 @@
 //! A conversation with a HiVTac sensor, for programs on the host: where it is ([`port`]), what is
 //! said ([`link`]), which sensor a name means ([`named`]), how it fails ([`failure`]), its pictures
-//! ([`frame`], [`look`]), what its thresholds say ([`threshold`]), how its texts are shown
-//! ([`shown`]), what was recorded of it ([`recording`]), and how a program is interrupted
-//! ([`stop`]).
+//! ([`frame`], [`look`]) and those in files ([`picture`], [`raw`], [`files`]), what its thresholds
+//! say ([`threshold`]), how its texts are shown ([`shown`]), what was recorded of it
+//! ([`recording`]), and how a program is interrupted ([`stop`]).
 
 pub mod failure;
+pub mod files;
 pub mod frame;
 pub mod link;
 pub mod look;
 pub mod named;
+pub mod picture;
 pub mod port;
+pub mod raw;
 pub mod recording;
 pub mod shown;
 pub mod stop;

@@ -1,9 +1,9 @@
 //! Pictures as a camera would deliver them: rows of pixels.
 
+use crate::failure::Failure;
 use crate::files::read_at_most;
+use crate::frame::pixels;
 use crate::raw;
-use hivtac_host::failure::Failure;
-use hivtac_host::frame::pixels;
 use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use hivtac_terms::threshold::PixelFormat;
 
@@ -26,14 +26,20 @@ impl Picture {
     /// # Errors
     /// When the file cannot be read, is no such picture, or is larger than a frame can be.
     pub fn load(path: &str) -> Result<Picture, Failure> {
-        let unreadable = |why: &dyn std::fmt::Display| {
-            Failure::input(format!("cannot read the picture {path}: {why}"))
-        };
+        let unreadable = |why: &dyn std::fmt::Display| unreadable(path, why);
         let file = read_at_most(path, LARGEST_FILE).map_err(|error| unreadable(&error))?;
         let too_long = || unreadable(&format_args!("it has more than {LARGEST_FILE} bytes"));
-        let file = file.ok_or_else(too_long)?;
-        if raw::is_one(&file) {
-            let raw = raw::parse(&file).map_err(|error| unreadable(&error))?;
+        Picture::parse(path, &file.ok_or_else(too_long)?)
+    }
+
+    /// What such a file has in it; errors call it by its path.
+    ///
+    /// # Errors
+    /// When it is no such picture, or is larger than a frame can be.
+    pub fn parse(path: &str, file: &[u8]) -> Result<Picture, Failure> {
+        let unreadable = |why: &dyn std::fmt::Display| unreadable(path, why);
+        if raw::is_one(file) {
+            let raw = raw::parse(file).map_err(|error| unreadable(&error))?;
             let (width, height) = size(path, raw.width.into(), raw.height.into())?;
             return Ok(Picture {
                 width,
@@ -42,7 +48,7 @@ impl Picture {
                 pixels: pixels(raw.format, raw.bytes),
             });
         }
-        let image = decode(&file).map_err(|error| unreadable(&error))?;
+        let image = decode(file).map_err(|error| unreadable(&error))?;
         let (width, height) = size(path, image.width, image.height)?;
         Ok(Picture {
             width,
@@ -51,6 +57,10 @@ impl Picture {
             pixels: image.pixels.into_iter().map(rgb565).collect(),
         })
     }
+}
+
+fn unreadable(path: &str, why: &dyn std::fmt::Display) -> Failure {
+    Failure::input(format!("cannot read the picture {path}: {why}"))
 }
 
 /// Channels of a picture that is written.
@@ -72,7 +82,6 @@ struct Rgb {
 /// The largest file that is read: a picture of the largest frame has a fiftieth of it.
 const LARGEST_FILE: u64 = 100 << 20;
 
-/// A file's bytes, as far as one is read.
 /// Turned as its EXIF data say it was taken.
 #[cfg(feature = "pictures")]
 fn decode(bytes: &[u8]) -> Result<Rgb, Box<dyn std::error::Error>> {

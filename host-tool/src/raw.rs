@@ -1,7 +1,7 @@
 //! Frames in files as the camera sent them: PAM (`P7` of Netpbm) with two bytes a pixel and a tuple
 //! type of our own, so that size and format travel with the bytes.
 
-use hivtac_host::frame::Frame;
+use crate::frame::Frame;
 use hivtac_terms::threshold::PixelFormat;
 
 /// What every PAM begins with.

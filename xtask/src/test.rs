@@ -1,9 +1,12 @@
 //! `cargo xtask test`: every check and every test of the project.
 
+use std::fs::File;
 use std::path::PathBuf;
 use std::process::Command;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 
 use crate::artifacts::Board;
@@ -46,6 +49,7 @@ pub struct Test {
 const TIMED: [&str; 4] = ["camera::", "faults::", "firmware::", "threshold::"];
 
 /// The programs that the tests of the rig and those across rooms run.
+#[derive(Clone)]
 struct Programs {
     firmware: PathBuf,
     /// One ELF per seeded bug or feature, named by it, those with the model for YUV422, and those
@@ -54,19 +58,46 @@ struct Programs {
 }
 
 impl Test {
-    /// Runs every step, past those that fail, and prints the table.
+    /// Runs every step, past those that fail, and prints the table. The rig's tests run beside the
+    /// others, so that no core waits while one of both builds or tests with the other alone; what
+    /// they print comes when the others are done.
     ///
     /// # Errors
     /// When a step failed.
     pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
+        let log = workspace::work_folder("test")?.join("rig.txt");
+        let printed = File::create(&log).with_context(|| format!("writing {}", log.display()))?;
+        let (built, programs) = mpsc::channel();
         let mut report = Report::default();
-        self.checks(&mut report, toolchain);
-        self.host_tests(&mut report);
+        let rig = thread::scope(|scope| {
+            let rig = scope.spawn(|| process::aside(printed, || self.with_rig(toolchain, built)));
+            self.others(&mut report, toolchain, &programs);
+            rig.join()
+        });
+        process::print_through(&String::from_utf8_lossy(&std::fs::read(&log)?));
+        report.append(rig.map_err(|_| anyhow!("the rig's tests panicked"))?);
+        report.finish()
+    }
+
+    /// The rig's tests, and before them the programs that those across rooms run, too.
+    fn with_rig(&self, toolchain: &Toolchain, built: Sender<Programs>) -> Report {
+        let mut report = Report::default();
         if self.wants_one_of(&["tests: rig at half speed", "tests: across rooms"]) {
             let programs = report.step("build: firmware", |_| Programs::build(toolchain));
+            if let Some(programs) = &programs {
+                // Nobody waits for them where no step across rooms is wanted.
+                let _ = built.send(programs.clone());
+            }
+            drop(built);
             self.rig_tests(&mut report, programs.as_ref());
-            self.cross_room_tests(&mut report, toolchain, programs.as_ref());
         }
+        report
+    }
+
+    fn others(&self, report: &mut Report, toolchain: &Toolchain, programs: &Receiver<Programs>) {
+        self.checks(report, toolchain);
+        self.host_tests(report);
+        self.cross_room_tests(report, toolchain, programs);
         if self.wants("benchmark") {
             report.step("benchmark", |_| bench::Bench::default().run(toolchain));
         }
@@ -77,9 +108,8 @@ impl Test {
             });
         }
         if self.all {
-            self.optional(&mut report, toolchain);
+            self.optional(report, toolchain);
         }
-        report.finish()
     }
 
     /// What needs programs that nothing else here does.
@@ -172,12 +202,13 @@ impl Test {
         &self,
         report: &mut Report,
         toolchain: &Toolchain,
-        programs: Option<&Programs>,
+        programs: &Receiver<Programs>,
     ) {
         if self.wants("tests: across rooms") {
             report.step("tests: across rooms", |tally| {
+                let programs = programs.recv();
                 let programs = programs.context("not run: the firmware could not be built")?;
-                let mut command = cross_room_tests(toolchain, programs)?;
+                let mut command = cross_room_tests(toolchain, &programs)?;
                 if self.all {
                     // Only slow tests run these.
                     command

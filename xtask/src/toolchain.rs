@@ -135,6 +135,19 @@ pub fn ensure_components(folder: &Path) -> Result<()> {
     Ok(())
 }
 
+/// What the toolchain in use calls this computer: `x86_64-unknown-linux-gnu`.
+///
+/// # Errors
+/// When its compiler cannot be run, or does not say.
+pub fn host() -> Result<String> {
+    let version = process::output(Command::new(own_rustc()).arg("-vV"))?;
+    let mut lines = version.lines();
+    let host = lines.find_map(|line| line.strip_prefix("host: "));
+    Ok(host
+        .context("the compiler does not say for which computer it is")?
+        .to_owned())
+}
+
 fn own_rustc() -> OsString {
     std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into())
 }

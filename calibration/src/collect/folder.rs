@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use super::poses::{self, Pose};
 use crate::conditions::{Conditions, OriginName};
+use crate::dataset::LARGEST_AREA;
 
 const SAMPLES: &str = "samples.csv";
 const GAUGE: &str = "gauge.csv";
@@ -36,8 +37,9 @@ x3_q16,y3_q16,area3_px,x_mm,y_mm";
 const GAUGE_COLUMNS: &str = "run,host_s,line";
 const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
 
-/// No marker has a larger number: 2¹⁰ px in 1/65,536 px, and more than a frame's area.
-const LARGEST_MARKER: i64 = 1 << 26;
+/// No marker lies beyond it along either side of a frame: 2¹⁰ px in 1/65,536 px. Then a pattern is
+/// no larger than a data set can hold.
+const FARTHEST_MARKER: i64 = 1 << 26;
 /// The longest that a sensor runs, µs: most of a century, exact in seconds as `f64`.
 const LARGEST_US: u64 = 1 << 51;
 
@@ -351,9 +353,9 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
             for (m, marker) in markers.iter_mut().enumerate() {
                 let first = 8 + 3 * m;
                 let (x, y, area) = (number(first)?, number(first + 1)?, number(first + 2)?);
-                let within = |value, least| (least..=LARGEST_MARKER).contains(&value);
                 ensure!(
-                    within(x, -LARGEST_MARKER) && within(y, -LARGEST_MARKER) && within(area, 0),
+                    [x, y].iter().all(|at| (0..=FARTHEST_MARKER).contains(at))
+                        && (0..=i64::from(LARGEST_AREA)).contains(&area),
                     "marker {m} is beyond every frame: {:?}",
                     [x, y, area]
                 );
@@ -432,7 +434,7 @@ mod tests {
     fn sample(frame: u32, found: bool) -> Sample {
         let marker = |i: i32| Marker {
             x: Px(65_536 * i),
-            y: Px(-i),
+            y: Px(i),
             area: 190,
         };
         Sample {
@@ -488,7 +490,7 @@ mod tests {
         assert_eq!((kept.pose, kept.device_us), (None, 25_600));
         let expected = Marker {
             x: Px::from_int(2),
-            y: Px(-2),
+            y: Px(2),
             area: 190,
         };
         assert_eq!(kept.seen.as_ref().unwrap()[1], expected);
@@ -507,7 +509,7 @@ mod tests {
         let recording = Recording::read(directory.path()).unwrap();
         assert_eq!(recording.samples[0].seen, Err("markers_implausible".into()));
         let text = fs::read_to_string(directory.path().join(SAMPLES)).unwrap();
-        assert!(text.contains(",131072,-2,190,"), "{text}");
+        assert!(text.contains(",131072,2,190,"), "{text}");
     }
 
     #[test]
@@ -594,7 +596,9 @@ mod tests {
         refused("\n0,0.500000,", "\n0,NaN,", "line 2: host_s is NaN");
         refused(",25600,", ",18446744073709551615,", "line 2: device_us");
         refused(",131072,", ",9131072000,", "line 2: marker 1");
-        refused(",131072,-2,190,", ",131072,-2,-190,", "line 2: marker 1");
+        refused(",131072,", ",-131072,", "line 2: marker 1");
+        refused(",190,", ",59182190,", "line 2: marker 0");
+        refused(",190,", ",-190,", "line 2: marker 0");
         refused(",4,-3.5,", ",NaN,-3.5,", "line 2: `NaN");
         refused(",4,-3.5,", ",4,-93.5,", "angles are within");
         refused(",0.5,-2\n", ",1e9,-2\n", "places within");

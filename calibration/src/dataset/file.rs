@@ -42,11 +42,12 @@ const LAST_COLUMNS: [&str; 16] = [
     "status",
 ];
 /// Beyond these there are no numbers, ±: a force's component, N; a tip's coordinate, mm; a feature,
-/// px or px²; an area, px. Sums and differences of such stay far inside their types.
+/// px or px². Sums and differences of such stay far inside their types.
 const LARGEST_N: f64 = 1e3;
 const LARGEST_MM: f64 = 1e3;
 const LARGEST_FEATURE: f64 = 1048576.0;
-const LARGEST_AREA: u32 = 1 << 20;
+/// No marker has a larger area, px.
+pub const LARGEST_AREA: u32 = 1 << 20;
 
 const FORCE_AT: usize = 2;
 const PLACE_AT: usize = FORCE_AT + 3;

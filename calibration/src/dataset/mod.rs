@@ -20,6 +20,7 @@ use crate::range::Range;
 use crate::rest::Rest;
 
 pub use detector::{Detection, Detectors, MarkerDetector, Sensing, measure, reasons};
+pub use file::LARGEST_AREA;
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};

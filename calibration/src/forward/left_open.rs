@@ -21,7 +21,7 @@ pub const STEP: f64 = 0.25;
 /// still has to hold the same force.
 const TRIED: [f64; 2] = [0.15, 0.95];
 /// How far beside a knot the chip's tables are held against the film: in parts of the distance of
-/// knots along x and y, and tilts, rad.
+/// knots along x and y, inwards from a knot at an end, and tilts, rad.
 const BESIDE: [[f64; 4]; 4] = [
     [0.25, 0.25, 0.1, 0.0],
     [-0.25, 0.25, 0.0, 0.1],
@@ -144,10 +144,18 @@ impl Compared<'_> {
 
     /// How much more the markers move than the chip's tables say, px, so far beside a pose.
     fn left_out(&self, pose: &Pose, [x, y, a, b]: [f64; 4]) -> Result<[f64; 8]> {
+        let inwards = |at_mm: f64, aside: f64| {
+            let there = at_mm + APART_MM * aside;
+            if there.abs() > END_MM {
+                at_mm - APART_MM * aside
+            } else {
+                there
+            }
+        };
         let [px, py] = pose.place_mm;
         let pose = Pose {
             tilt: [a, b],
-            place_mm: [px + APART_MM * x, py + APART_MM * y],
+            place_mm: [inwards(px, x), inwards(py, y)],
             ..*pose
         };
         let mut more = self.here.moved(&pose)?;

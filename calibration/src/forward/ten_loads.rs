@@ -157,6 +157,15 @@ pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Resul
         "no unit explains these loads (χ² {chi_square:.1} over its degrees of freedom): check the \
          forces, their directions and the tip's places"
     );
+    // What is seen scatters more than it should: what the loads tell is known so much less.
+    let noisier = Bench {
+        noise_px: bench.noise_px * chi_square.max(1.0).sqrt(),
+        ..*bench
+    };
+    let problem = Problem {
+        bench: &noisier,
+        ..problem
+    };
     problem.fitted(&found, chi_square)
 }
 

@@ -3,9 +3,9 @@
 use super::camera::{CameraJson, InUse};
 use super::temporal::TemporalJson;
 use super::{name, unusable};
-use crate::files::read_at_most;
 use crate::lines::to_json;
 use hivtac_host::failure::Failure;
+use hivtac_host::files::read_at_most;
 use hivtac_host::shown::unit_number;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;

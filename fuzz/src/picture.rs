@@ -1,0 +1,23 @@
+//! Pictures in files: an error names the file, or there are all pixels of a frame.
+
+use hivtac_host::picture::Picture;
+use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
+
+/// Reads the input as a PNG, JPEG or PPM file, or as a raw frame.
+pub fn attack(input: &[u8]) -> bool {
+    match Picture::parse("it.png", input) {
+        Ok(picture) => {
+            let Picture { width, height, .. } = picture;
+            assert!((1..=MAX_WIDTH).contains(&width) && (1..=MAX_HEIGHT).contains(&height));
+            assert_eq!(
+                picture.pixels.len(),
+                usize::from(width) * usize::from(height)
+            );
+            true
+        }
+        Err(error) => {
+            assert!(error.to_string().contains("it.png"), "{error}");
+            false
+        }
+    }
+}
