@@ -110,7 +110,7 @@ impl Conditions {
     /// # Errors
     /// When there is no such camera.
     pub fn camera(&self) -> Result<Camera> {
-        let preset = preset(&self.preset)?.name().parse()?;
+        let preset = preset(&self.preset)?;
         Ok(Camera::new(preset, self.width.into(), self.height.into())?)
     }
 

@@ -15,7 +15,7 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::forward::FilmModel;
 use crate::network::{Layer, Meaning, Network, Standardization};
-use crate::weights::{Range, Rest, Uncertainty, Weights, features_from_q16};
+use crate::weights::{Range, Rest, Uncertainty, Weights, features_from_q16, q16};
 
 /// Steps of the network's input in one standard deviation of a feature.
 const INPUT_STEPS: f64 = 4096.0;
@@ -102,16 +102,14 @@ fn uncertainty(uncertainty: &Uncertainty) -> model::Uncertainty {
 
 /// How the chip standardizes features.
 pub(crate) fn input_scaling(input: &Standardization) -> Result<InputScaling> {
-    let mut mean_q16 = [0; FEATURES];
     let (mut multipliers, mut shifts) = ([0; FEATURES], [0; FEATURES]);
     for i in 0..FEATURES {
-        mean_q16[i] = (input.mean[i] * PX).round() as i64;
         let factor = INPUT_STEPS / (input.sigma[i] * PX);
         (multipliers[i], shifts[i]) = multiplier_and_shift(factor, INPUT_MULTIPLIER_BITS)
             .with_context(|| format!("scaling of feature {i}"))?;
     }
     Ok(InputScaling {
-        mean: features_from_q16(&mean_q16)?,
+        mean: features_from_q16(&std::array::from_fn(|i| q16(input.mean[i])))?,
         multipliers,
         shifts,
     })

@@ -10,7 +10,7 @@ use crate::conditions::Conditions;
 use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
 pub use crate::range::Range;
-pub use crate::rest::{Rest, features_from_q16};
+pub use crate::rest::{Rest, features_from_q16, q16};
 pub use crate::uncertainty::Uncertainty;
 
 /// What the file calls itself.

@@ -9,7 +9,9 @@ use hivtac_calibration::import::parse;
 use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
-use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
+use hivtac_calibration::weights::{
+    Range, Rest, Training, Uncertainty, Weights, features_from_q16, q16,
+};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::{Network as ChipNetwork, Output};
 use hivtac_terms::geometry::Preset;
@@ -22,16 +24,12 @@ const REST: [f64; INPUTS] = [
     100.0, 60.0, 220.0, 60.0, 220.0, 180.0, 100.0, 180.0, 160.0, 120.0, 14_400.0,
 ];
 
-fn q16(features: &[f64; INPUTS]) -> [i64; INPUTS] {
-    features.map(|px| (px * 65_536.0).round() as i64)
-}
-
 fn weights(network: Network) -> Weights {
     Weights {
         format: Weights::format(),
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
-            features_q16: q16(&REST),
+            features_q16: REST.map(q16),
             areas_px: [190; 4],
         },
         range: Range::default(),
@@ -46,7 +44,7 @@ fn weights(network: Network) -> Weights {
 fn on_the_chip(network: &Network, features: &[f64; INPUTS]) -> ([f64; 3], Output) {
     let bytes = export(&weights(network.clone())).unwrap();
     let model = Model::parse(&bytes).unwrap();
-    let features = features_from_q16(&q16(features)).unwrap();
+    let features = features_from_q16(&features.map(q16)).unwrap();
     let rest = model.rest.features;
     let output = ChipNetwork::new().run(&model, &features, &rest);
     (output.values.map(|micro| f64::from(micro) / 1e6), output)

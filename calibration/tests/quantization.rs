@@ -6,9 +6,12 @@ use hivtac_calibration::network::{
     Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization,
 };
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
+use hivtac_calibration::weights::{
+    Range, Rest, Training, Uncertainty, Weights, features_from_q16, q16,
+};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 use proptest::collection::vec;
@@ -53,7 +56,7 @@ fn weights(network: Network) -> Weights {
         format: Weights::format(),
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
-            features_q16: [1 << 20; INPUTS],
+            features_q16: [q16(16.0); INPUTS],
             areas_px: [200; 4],
         },
         range: Range::default(),
@@ -65,11 +68,11 @@ fn weights(network: Network) -> Weights {
 }
 
 /// Features within two deviations of the means, on the 1/65,536 px grid.
-fn rows(network: &Network, unit: &[[f64; INPUTS]]) -> Vec<[i64; INPUTS]> {
+fn rows(network: &Network, unit: &[[f64; INPUTS]]) -> Vec<[Q<16, i64>; INPUTS]> {
     let (mean, sigma) = (&network.input.mean, &network.input.sigma);
     let px = |row: &[f64; INPUTS], i: usize| (mean[i] + 2.0 * sigma[i] * row[i]).max(0.0);
     unit.iter()
-        .map(|row| std::array::from_fn(|i| (px(row, i) * 65_536.0).round() as i64))
+        .map(|row| std::array::from_fn(|i| q16(px(row, i))))
         .collect()
 }
 
@@ -135,7 +138,7 @@ proptest! {
         let rows = rows(&network, &unit);
         let px: Vec<[f64; INPUTS]> = rows
             .iter()
-            .map(|row| row.map(|q16| q16 as f64 / 65_536.0))
+            .map(|row| row.map(|number| number.to_f64()))
             .collect();
         network.activation_max = network.activation_maxima(&px);
         let weights = weights(network);

@@ -13,6 +13,7 @@ use embassy_futures::select::{Either4, select4};
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::fixed::Q;
 use hivtac_wire::message::{DeviceMessage, Inspection, LogLevel, Outcome};
 
 /// So many frame times without a band or the end of a frame are a silence. Bands come all the
@@ -272,6 +273,6 @@ fn inspection(setting: Setting, frame_time: Duration) -> Inspection {
         frame_time_us: frame_time.as_micros() as u32,
         exposure_us: setting.exposure.0,
         longest_exposure_us: setting.longest_exposure.0,
-        gain_sixteenths: setting.gain.0,
+        gain_sixteenths: Q::from_bits(setting.gain.0),
     }
 }

@@ -1,5 +1,6 @@
 //! The paper's eleven features (Section 5).
 
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
@@ -15,8 +16,8 @@ pub struct Features {
     pub centroids: [(Px, Px); 4],
     /// Centre of their bounding rectangle over the real-valued centroids, (x, y).
     pub rect_center: (Px, Px),
-    /// Its area in px², Q16.16 in 64 bits (it overflows 32 bits from VGA up).
-    pub rect_area: i64,
+    /// Its area, px² (it overflows 32 bits from VGA up).
+    pub rect_area: Q<16, i64>,
 }
 
 impl Features {
@@ -26,11 +27,12 @@ impl Features {
         let centroids = markers.map(|marker| (marker.x, marker.y));
         let (left, right) = extent(centroids.map(|c| c.0));
         let (top, bottom) = extent(centroids.map(|c| c.1));
-        let area_q32 = (right - left) * (bottom - top);
+        let span = |low: Px, high: Px| i64::from(high.0) - i64::from(low.0);
+        let area: Q<32, i64> = Q::from_bits(span(left, right) * span(top, bottom));
         Features {
             centroids,
             rect_center: (middle(left, right), middle(top, bottom)),
-            rect_area: (area_q32 + (1 << (Px::FRACTION_BITS - 1))) >> Px::FRACTION_BITS,
+            rect_area: area.rounded_to(),
         }
     }
 
@@ -41,22 +43,18 @@ impl Features {
         [x0, y0, x1, y1, x2, y2, x3, y3, x, y]
     }
 
-    /// The eleven numbers in the paper's order, each with 16 fractional bits.
-    pub fn to_array(&self) -> [i64; FEATURES] {
-        let mut numbers = [0; FEATURES];
-        for (pair, &(x, y)) in numbers.chunks_exact_mut(2).zip(&self.centroids) {
-            pair[0] = i64::from(x.0);
-            pair[1] = i64::from(y.0);
+    /// The eleven numbers in the paper's order, px and at last px².
+    pub fn to_array(&self) -> [Q<16, i64>; FEATURES] {
+        let mut numbers = [self.rect_area; FEATURES];
+        for (number, coordinate) in numbers.iter_mut().zip(self.coordinates()) {
+            *number = coordinate.into();
         }
-        numbers[8] = i64::from(self.rect_center.0.0);
-        numbers[9] = i64::from(self.rect_center.1.0);
-        numbers[10] = self.rect_area;
         numbers
     }
 
     /// The other way round; centroids and centre must fit 32 bits.
-    pub fn from_array(numbers: [i64; FEATURES]) -> Features {
-        let px = |i: usize| Px(numbers[i] as i32);
+    pub fn from_array(numbers: [Q<16, i64>; FEATURES]) -> Features {
+        let px = |i: usize| Px(numbers[i].narrowed().bits());
         Features {
             centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
             rect_center: (px(8), px(9)),
@@ -65,15 +63,16 @@ impl Features {
     }
 }
 
-fn extent(values: [Px; 4]) -> (i64, i64) {
-    let low = values.iter().min().map_or(0, |v| i64::from(v.0));
-    let high = values.iter().max().map_or(0, |v| i64::from(v.0));
-    (low, high)
+/// The least and the largest.
+fn extent(values: [Px; 4]) -> (Px, Px) {
+    let low = values.iter().min().copied();
+    let high = values.iter().max().copied();
+    (low.unwrap_or_default(), high.unwrap_or_default())
 }
 
 /// Half the sum, rounded half up. The sum of two `i32` halved fits `i32`.
-fn middle(low: i64, high: i64) -> Px {
-    Px(((low + high + 1) >> 1) as i32)
+fn middle(Px(low): Px, Px(high): Px) -> Px {
+    Px(((i64::from(low) + i64::from(high) + 1) >> 1) as i32)
 }
 
 #[cfg(test)]
@@ -100,7 +99,7 @@ mod tests {
         let features = Features::of_markers(&turned);
         assert_eq!(features.rect_center.0.to_f64(), 16.0);
         assert_eq!(features.rect_center.1.to_f64(), 16.0);
-        assert_eq!(features.rect_area, (11 * 12) << 16);
+        assert_eq!(features.rect_area, Q::from_int(11 * 12));
         assert_eq!(features.centroids[2], (turned[2].x, turned[2].y));
     }
 
@@ -113,7 +112,7 @@ mod tests {
             marker(0.0, 599.0),
         ];
         let features = Features::of_markers(&corners);
-        assert_eq!(features.rect_area, (799 * 599) << 16);
+        assert_eq!(features.rect_area, Q::from_int(799 * 599));
         assert_eq!(features.rect_center.0.to_f64(), 399.5);
         assert_eq!(features.rect_center.1.to_f64(), 299.5);
     }
@@ -128,7 +127,7 @@ mod tests {
         };
         let features = Features::of_markers(&markers);
         assert_eq!(features.rect_center, (Px(2), Px(1 << 14)), "1.5 rounds up");
-        assert_eq!(features.rect_area, 2, "1.5 rounds up");
+        assert_eq!(features.rect_area.bits(), 2, "1.5 rounds up");
     }
 
     #[test]
@@ -140,7 +139,7 @@ mod tests {
             marker(7.0, 8.0),
         ];
         let features = Features::of_markers(&markers);
-        let array = features.to_array().map(|value| value >> 16);
+        let array = features.to_array().map(|number| number.floor());
         assert_eq!(array, [1, 2, 3, 4, 5, 6, 7, 8, 4, 5, 36]);
         assert_eq!(Features::from_array(features.to_array()), features);
     }

@@ -17,6 +17,7 @@ use crate::kernels::{Inputs, Sums, activate, multiply};
 use crate::layer::{Layer, MAX_WIDTH};
 use crate::model::{InputScaling, Model, OUTPUTS, PLACE_OUTPUTS};
 use crate::rescale::{rescale_input, rescale_small_input, rescale_sum};
+use hivtac_terms::fixed::Q;
 
 /// Room for the numbers of one layer.
 #[derive(Clone, Debug)]
@@ -50,7 +51,8 @@ impl Network {
     /// Runs `model` on `features`, measured from the rest position `tare`.
     pub fn run(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
         let scaled = scale_inputs(&model.input, features, tare, &model.rest.features);
-        self.inputs.values_mut()[..FEATURES].copy_from_slice(&scaled);
+        let inputs = self.inputs.values_mut().iter_mut().zip(&scaled);
+        inputs.for_each(|(input, scaled)| *input = scaled.bits());
         let mut outputs = [0; OUTPUTS + PLACE_OUTPUTS];
         // A parsed model has at least one layer.
         if let Some((last, hidden)) = model.layers().split_last() {
@@ -65,7 +67,9 @@ impl Network {
         Output {
             values: [x, y, z],
             place,
-            input_saturated: scaled.iter().any(|&x| x == i16::MIN || x == i16::MAX),
+            input_saturated: scaled
+                .iter()
+                .any(|x| x.bits() == i16::MIN || x.bits() == i16::MAX),
         }
     }
 }
@@ -76,15 +80,15 @@ impl Default for Network {
     }
 }
 
-/// Step 1: standardized inputs in units of σ / 4096.
+/// Step 1: standardized inputs, σ.
 pub fn scale_inputs(
     scaling: &InputScaling,
     features: &Features,
     tare: &Features,
     rest: &Features,
-) -> [i16; FEATURES] {
+) -> [Q<12, i16>; FEATURES] {
     let mean = &scaling.mean;
-    let mut inputs = [0; FEATURES];
+    let mut inputs = [Q::default(); FEATURES];
     let all = [features, tare, rest, mean].map(Features::coordinates);
     for i in 0..COORDINATES {
         let [feature, tare, rest, mean] =
@@ -93,13 +97,14 @@ pub fn scale_inputs(
         let difference = feature
             .checked_sub(tare)
             .and_then(|moved| moved.checked_add(rest));
-        inputs[i] = match difference.and_then(|now| now.checked_sub(mean)) {
+        let scaled = match difference.and_then(|now| now.checked_sub(mean)) {
             Some(difference) => rescale_small_input(difference, multiplier, shift),
             None => {
                 let [feature, tare, rest, mean] = [feature, tare, rest, mean].map(i64::from);
                 rescale_input(feature - tare + rest - mean, multiplier, shift)
             }
         };
+        inputs[i] = Q::from_bits(scaled);
     }
     let moved = features.rect_area.saturating_sub(tare.rect_area);
     let difference = moved
@@ -109,7 +114,7 @@ pub fn scale_inputs(
         scaling.multipliers[COORDINATES],
         scaling.shifts[COORDINATES],
     );
-    inputs[COORDINATES] = rescale_input(difference, multiplier, shift);
+    inputs[COORDINATES] = Q::from_bits(rescale_input(difference.bits(), multiplier, shift));
     inputs
 }
 
@@ -140,10 +145,11 @@ mod tests {
         };
         let (rest, mean) = (spec.rest.features.to_array(), spec.input.mean.to_array());
         let (features, tare) = (features.to_array(), tare.to_array());
+        let number = |feature: Q<16, i64>| i128::from(feature.bits());
         let mut values: Vec<i128> = (0..FEATURES)
             .map(|i| {
-                let moved = i128::from(features[i]) - i128::from(tare[i]);
-                let difference = moved + i128::from(rest[i]) - i128::from(mean[i]);
+                let moved = number(features[i]) - number(tare[i]);
+                let difference = moved + number(rest[i]) - number(mean[i]);
                 let limited = difference.clamp(-(1 << 38) + 1, (1 << 38) - 1);
                 rescale(limited, spec.input.multipliers[i], spec.input.shifts[i])
                     .clamp(-32_768, 32_767)
@@ -209,7 +215,7 @@ mod tests {
             (*x, *y) = (next(), next());
         }
         features.rect_center = (next(), next());
-        features.rect_area = i64::from(next().0) * 400;
+        features.rect_area = Q::from(next()) * 400;
         features
     }
 
@@ -292,7 +298,7 @@ mod tests {
                 let far = 800 << 16;
                 let extreme = Features {
                     centroids: [(Px(sign * far), Px(sign * far)); 4],
-                    rect_area: i64::from(sign) * (640_000 << 16),
+                    rect_area: Q::from_int(i64::from(sign) * 640_000),
                     ..Features::default()
                 };
                 let output = check(&spec, &extreme, &Features::default());
@@ -310,7 +316,7 @@ mod tests {
         let extreme = |value: i32, area: i64| Features {
             centroids: [(Px(value), Px(value)); 4],
             rect_center: (Px(value), Px(value)),
-            rect_area: area,
+            rect_area: Q::from_bits(area),
         };
         let values = [(i32::MIN, i64::MIN), (i32::MAX, i64::MAX), (0, 0)];
         for (a, area_a) in values {

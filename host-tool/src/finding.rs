@@ -95,11 +95,9 @@ impl<'a> Finding<'a> {
         measurement: Measurement,
     ) -> Finding<'a> {
         let markers = measurement.markers.as_ref().map(MarkerJson::all);
-        // 2¹⁶ steps a pixel; an area has at most 20 bits more, far below the 53 of an f64.
-        let exact = |number: i64| number as f64 / 65_536.0;
         let features = measurement
             .features
-            .map(|features| features.to_array().map(exact).to_vec());
+            .map(|features| features.to_array().map(|number| number.to_f64()).to_vec());
         Finding {
             image,
             width: settings.geometry.width,

@@ -298,7 +298,7 @@ enum Command {
         #[arg(value_name = "FILE.svg")]
         file: String,
         /// Whose markers
-        #[arg(long, value_name = "paper|ov7725", default_value = "ov7725", value_parser = preset)]
+        #[arg(long, value_name = "paper|ov7725", default_value = "ov7725")]
         preset: Preset,
         /// One JSON object instead of a line
         #[arg(long)]
@@ -990,7 +990,7 @@ struct SenseArguments {
     images: Vec<String>,
     /// Lens and pixels; the model's when not given. Other sizes than the preset's scale its focal
     /// length
-    #[arg(long, value_name = "paper|ov7725", value_parser = preset)]
+    #[arg(long, value_name = "paper|ov7725")]
     preset: Option<Preset>,
     /// Colours of a marker, as in `hivtac threshold --hsv`; the model's when not given
     #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
@@ -1021,13 +1021,6 @@ impl SenseArguments {
             json: self.json,
         }
     }
-}
-
-fn preset(name: &str) -> Result<Preset, String> {
-    Preset::from_name(name).ok_or_else(|| {
-        let names = Preset::ALL.map(Preset::name).join(" or ");
-        format!("no preset has this name; use {names}")
-    })
 }
 
 impl MonitorArguments {

@@ -3,6 +3,7 @@
 use crate::kernels::{threshold_cr, threshold_luma, weigh_luma};
 use crate::runs::Run;
 use crate::tables::{FULL_WEIGHT, Pixels, Table, Weights};
+use hivtac_terms::fixed::Q;
 use hivtac_terms::threshold::{
     ByteOrder, HsvBox, Mono, PixelFormat, Threshold, ThresholdError, Yuv422,
 };
@@ -112,9 +113,14 @@ impl<T: Table> Pixels for Formats<T> {
     }
 }
 
-/// The weight of a pixel that lies so far inside a threshold, in quarters of a step.
-fn weight_inside(quarters: i16) -> u8 {
-    (AT_THRESHOLD + (quarters >> 2)).clamp(0, i16::from(FULL_WEIGHT)) as u8
+/// More weight for each level of Cr that a pixel lies inside a threshold: 2.
+const PER_CR: Q<2, i16> = Q::from_bits(8);
+/// More weight for each level of luma: 5/4.
+const PER_LUMA: Q<2, i16> = Q::from_bits(5);
+
+/// The weight of a pixel that lies inside a threshold, so much more than that of one at it.
+fn weight_inside(more: Q<2, i16>) -> u8 {
+    (AT_THRESHOLD + more.floor()).clamp(0, i16::from(FULL_WEIGHT)) as u8
 }
 
 impl Pixels for Yuv422 {
@@ -130,7 +136,7 @@ impl Pixels for Yuv422 {
     fn weight(&self, row: &[u16], column: u16) -> u8 {
         let pixel = row.get(usize::from(column | 1));
         pixel.map_or(0, |pixel| {
-            weight_inside(8 * ((pixel >> 8) as i16 - i16::from(self.cr_low)))
+            weight_inside(PER_CR * ((pixel >> 8) as i16 - i16::from(self.cr_low)))
         })
     }
 
@@ -147,7 +153,7 @@ impl Pixels for Yuv422 {
 
 /// The weight of a pixel of a luma.
 fn weight_of(mono: &Mono, luma: u8) -> u8 {
-    weight_inside(5 * depth(mono, luma))
+    weight_inside(PER_LUMA * depth(mono, luma))
 }
 
 /// How far a luma lies inside the nearer limit, in levels; below 0 outside.

@@ -9,6 +9,7 @@ use proptest::test_runner::{Config, TestRunner};
 use crate::blob::Blob;
 use crate::runs::Run;
 use crate::tables::Weights;
+use hivtac_terms::units::Px;
 
 /// Columns and rows of the largest frame.
 const SIDE: u16 = 800;
@@ -62,8 +63,8 @@ fn the_largest_frames_moments_are_exact() {
 }
 
 /// Off in steps of 1/65,536 px.
-fn error(mean: i32, sum: u64, count: u64) -> f64 {
-    let off = i128::from(mean) * i128::from(count) - (i128::from(sum) << 16);
+fn error(mean: Px, sum: u64, count: u64) -> f64 {
+    let off = i128::from(mean.0) * i128::from(count) - (i128::from(sum) << Px::FRACTION_BITS);
     (off as f64 / count as f64).abs()
 }
 
@@ -97,12 +98,12 @@ fn a_centroid_is_the_nearest_step() {
         let blob = blob.unwrap_or_else(full);
         let area = u64::from(blob.area);
         let (x, y) = blob.centroid();
-        let mut errors = std::vec![error(x.0, blob.sum_x, area), error(y.0, blob.sum_y, area)];
+        let mut errors = std::vec![error(x, blob.sum_x, area), error(y, blob.sum_y, area)];
         if let Some((x, y)) = blob.weighted_centroid() {
             let weight = u64::from(blob.weight);
             errors.extend([
-                error(x.0, blob.weight_x, weight),
-                error(y.0, blob.weight_y, weight),
+                error(x, blob.weight_x, weight),
+                error(y, blob.weight_y, weight),
             ]);
         }
         for off in errors {

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::camera::part::Kind;
 use crate::truth::Exposed;
 use anyhow::{Context, bail};
-use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
+use hivtac_scene::{Format, Options, Preset, PresetCamera, Scene, Shutter};
 use serde_json::{Value, json};
 
 /// How a picture's pixels are coded.
@@ -154,7 +154,9 @@ impl SceneSource {
     pub fn new(name: &str, preset: Option<&str>, seed: u64, camera: Kind) -> anyhow::Result<Self> {
         let array = Array::of(camera);
         let preset = match preset {
-            Some(preset) => preset.parse().context("--preset")?,
+            Some(preset) => preset
+                .parse()
+                .with_context(|| format!("--preset {preset}"))?,
             None => array.preset,
         };
         let (width, height) = array.size;

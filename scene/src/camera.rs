@@ -1,7 +1,6 @@
-//! Presets, and where a point in space is seen.
+//! The cameras of the presets, and where a point in space is seen.
 
-use std::fmt;
-use std::str::FromStr;
+use hivtac_terms::geometry::Preset;
 
 use crate::{Format, Lens, Mounting, Paint, Projection, SceneError};
 
@@ -20,104 +19,72 @@ const MT9V034_PITCH_MM: f64 = 0.012;
 /// Its whole array of binned pixels: columns and rows.
 const MT9V034_ARRAY: [u32; 2] = [376, 240];
 
-/// A named geometry (`docs/architecture.md`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "file", derive(serde::Deserialize))]
-#[cfg_attr(feature = "file", serde(rename_all = "lowercase"))]
-pub enum Preset {
-    /// The paper's lens and picture: 150° across the diagonal at every size.
-    Paper,
-    /// The same lens on an OV7725's 6 µm pixels (QVGA by 2×2 binning: 12 µm).
-    Ov7725,
-    /// A lens of 1.2 mm on an MT9V034's pixels of 6 µm, binned 2 × 2, and any window of them about
-    /// the axis.
-    Mt9v034,
+/// The simulated camera of a preset.
+pub trait PresetCamera {
+    /// Columns and rows of its usual frame.
+    fn usual_size(self) -> [u32; 2];
+
+    /// How it codes pixels by default.
+    fn usual_format(self) -> Format;
+
+    /// What its markers are by default: black where it sees no colours.
+    fn usual_markers(self) -> Paint;
+
+    /// Focal length of its lens, mm.
+    fn focal_length_mm(self) -> f64;
 }
 
-impl Preset {
-    /// Every preset.
-    pub const ALL: [Preset; 3] = [Preset::Paper, Preset::Ov7725, Preset::Mt9v034];
-
-    /// Its name in files and on the command line: `paper`, `ov7725` or `mt9v034`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Preset::Paper => "paper",
-            Preset::Ov7725 => "ov7725",
-            Preset::Mt9v034 => "mt9v034",
-        }
-    }
-
-    /// Columns and rows of its usual frame.
-    pub fn usual_size(self) -> [u32; 2] {
+impl PresetCamera for Preset {
+    fn usual_size(self) -> [u32; 2] {
         match self {
             Preset::Paper | Preset::Ov7725 => [320, 240],
             Preset::Mt9v034 => [160, 152],
         }
     }
 
-    /// How its camera codes pixels by default.
-    pub fn usual_format(self) -> Format {
+    fn usual_format(self) -> Format {
         match self {
             Preset::Paper | Preset::Ov7725 => Format::Rgb565,
             Preset::Mt9v034 => Format::Mono,
         }
     }
 
-    /// What its markers are by default: black where the camera sees no colours.
-    pub fn usual_markers(self) -> Paint {
+    fn usual_markers(self) -> Paint {
         match self {
             Preset::Paper | Preset::Ov7725 => Paint::Red,
             Preset::Mt9v034 => Paint::Black,
         }
     }
 
-    /// Focal length of its lens, mm.
-    pub fn focal_length_mm(self) -> f64 {
+    fn focal_length_mm(self) -> f64 {
         match self {
             Preset::Paper | Preset::Ov7725 => FOCAL_LENGTH_MM,
             Preset::Mt9v034 => MT9V034_FOCAL_LENGTH_MM,
         }
     }
+}
 
-    /// Whether its frames may have this size.
-    fn has_size(self, width: u32, height: u32) -> bool {
-        match self {
-            Preset::Paper | Preset::Ov7725 => {
-                (160..=800).contains(&width) && width * 3 == height.saturating_mul(4)
-            }
-            Preset::Mt9v034 => {
-                let [columns, rows] = MT9V034_ARRAY;
-                let even = width.is_multiple_of(2) && height.is_multiple_of(2);
-                even && (80..=columns).contains(&width) && (80..=rows).contains(&height)
-            }
+/// Whether frames of a preset may have this size.
+fn has_size(preset: Preset, width: u32, height: u32) -> bool {
+    match preset {
+        Preset::Paper | Preset::Ov7725 => {
+            (160..=800).contains(&width) && width * 3 == height.saturating_mul(4)
         }
-    }
-
-    /// Pixel pitch at this frame size, mm: 13.744 µm (`paper`) and 12 µm (`ov7725`) at 320×240.
-    fn pitch_mm(self, width: u32, height: u32) -> f64 {
-        let (w, h) = (f64::from(width), f64::from(height));
-        match self {
-            Preset::Paper => FOCAL_LENGTH_MM * radians(PAPER_VIEW_DEG) / (w * w + h * h).sqrt(),
-            Preset::Ov7725 => OV7725_WIDTH_MM / w,
-            Preset::Mt9v034 => MT9V034_PITCH_MM,
+        Preset::Mt9v034 => {
+            let [columns, rows] = MT9V034_ARRAY;
+            let even = width.is_multiple_of(2) && height.is_multiple_of(2);
+            even && (80..=columns).contains(&width) && (80..=rows).contains(&height)
         }
     }
 }
 
-impl fmt::Display for Preset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Preset {
-    type Err = SceneError;
-
-    fn from_str(name: &str) -> Result<Preset, SceneError> {
-        Preset::ALL
-            .into_iter()
-            .find(|preset| preset.name() == name)
-            .ok_or_else(|| SceneError::UnknownPreset(name.to_owned()))
+/// Pixel pitch at this frame size, mm: 13.744 µm (`paper`) and 12 µm (`ov7725`) at 320×240.
+fn pitch_mm(preset: Preset, width: u32, height: u32) -> f64 {
+    let (w, h) = (f64::from(width), f64::from(height));
+    match preset {
+        Preset::Paper => FOCAL_LENGTH_MM * radians(PAPER_VIEW_DEG) / (w * w + h * h).sqrt(),
+        Preset::Ov7725 => OV7725_WIDTH_MM / w,
+        Preset::Mt9v034 => MT9V034_PITCH_MM,
     }
 }
 
@@ -148,7 +115,7 @@ impl Camera {
     /// # Errors
     /// When the size is another.
     pub fn new(preset: Preset, width: u32, height: u32) -> Result<Camera, SceneError> {
-        if !preset.has_size(width, height) {
+        if !has_size(preset, width, height) {
             return Err(SceneError::Size {
                 preset,
                 width,
@@ -159,7 +126,7 @@ impl Camera {
             preset,
             width,
             height,
-            focal_px: preset.focal_length_mm() / preset.pitch_mm(width, height),
+            focal_px: preset.focal_length_mm() / pitch_mm(preset, width, height),
             projection: Projection::Equidistant,
             axis_px: [centre(width), centre(height)],
             roll: (0.0, 1.0),
@@ -168,7 +135,7 @@ impl Camera {
 
     /// The same camera with another lens, mounted a little off.
     pub(crate) fn fitted(mut self, lens: &Lens, mounting: &Mounting) -> Camera {
-        let preset_mm = self.preset.pitch_mm(self.width, self.height);
+        let preset_mm = pitch_mm(self.preset, self.width, self.height);
         let pitch_mm = lens.pitch_um.map_or(preset_mm, |um| um / 1000.0);
         self.focal_px = self.preset.focal_length_mm() / pitch_mm;
         self.projection = lens.projection;
@@ -323,13 +290,5 @@ mod tests {
                 "{width} × {height}"
             );
         }
-    }
-
-    #[test]
-    fn names_parse_back() {
-        for preset in Preset::ALL {
-            assert_eq!(preset.to_string().parse(), Ok(preset));
-        }
-        assert!("ov7670".parse::<Preset>().is_err());
     }
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use hivtac_film::FilmError;
 
-use crate::{Motion, Preset};
+use crate::{Motion, Preset, PresetCamera};
 
 /// A scene, size, load or option that cannot be simulated. The message says what, where and what is
 /// possible.
@@ -12,8 +12,6 @@ use crate::{Motion, Preset};
 pub enum SceneError {
     /// No scene of this name.
     UnknownScene(String),
-    /// No geometry preset of this name.
-    UnknownPreset(String),
     /// No pixel format of this name.
     UnknownFormat(String),
     /// A frame size that the simulated camera does not have.
@@ -60,9 +58,6 @@ impl fmt::Display for SceneError {
             SceneError::UnknownScene(name) => {
                 let names = Motion::NAMES.join(", ");
                 write!(f, "unknown scene `{name}`: use one of {names}")
-            }
-            SceneError::UnknownPreset(name) => {
-                write!(f, "unknown preset `{name}`: use paper, ov7725 or mt9v034")
             }
             SceneError::UnknownFormat(name) => {
                 write!(f, "unknown pixel format `{name}`: use {FORMATS}")

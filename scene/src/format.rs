@@ -13,7 +13,8 @@ use std::str::FromStr;
 
 use crate::SceneError;
 use crate::frame::Raster;
-use crate::light::WHITE;
+use crate::light::{Channel, WHITE};
+use hivtac_terms::fixed::Q;
 
 /// How a frame's pixels are coded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -53,10 +54,11 @@ impl Format {
         }
     }
 
-    /// Codes a picture of a width, row by row, its channels in steps and not yet clipped.
+    /// Codes a picture of a width, row by row, its channels not yet clipped.
     #[cfg_attr(not(feature = "jpeg"), expect(unused_variables))]
-    pub(crate) fn code(self, width: u32, picture: impl Iterator<Item = [i32; 3]>) -> Raster {
-        let picture = picture.map(|pixel| pixel.map(|steps| steps.clamp(0, WHITE)));
+    pub(crate) fn code(self, width: u32, picture: impl Iterator<Item = [Channel; 3]>) -> Raster {
+        let clipped = |channel: Channel| channel.clamp(Channel::default(), WHITE);
+        let picture = picture.map(|pixel| pixel.map(clipped));
         match self {
             Format::Rgb565 => Raster::words(picture.map(rgb565).collect()),
             Format::Yuv422 => Raster::words(yuyv(picture)),
@@ -99,20 +101,26 @@ impl FromStr for Format {
 }
 
 /// The nearest 8-bit level.
-fn level(steps: i32) -> u8 {
-    ((steps + 32) / 64) as u8
+fn level(channel: Channel) -> u8 {
+    channel.rounded() as u8
 }
 
-/// RGB565 from channels in steps, 0 to white, rounded to the nearest code.
-fn rgb565([red, green, blue]: [i32; 3]) -> u16 {
+/// A channel of a whole level.
+fn of_level(level: u8) -> Channel {
+    Q::from_bits(i32::from(level) << 6)
+}
+
+/// RGB565 from channels, 0 to white, rounded to the nearest code.
+fn rgb565([red, green, blue]: [Channel; 3]) -> u16 {
+    let white = WHITE.bits() as u32;
     let code =
-        |value: i32, highest: u32| (value as u32 * highest + WHITE as u32 / 2) / WHITE as u32;
+        |channel: Channel, highest: u32| (channel.bits() as u32 * highest + white / 2) / white;
     (code(red, 31) << 11 | code(green, 63) << 5 | code(blue, 31)) as u16
 }
 
 /// RGB565 from 8-bit levels, rounded to the nearest code.
 pub(crate) fn rgb565_of_levels(levels: [u8; 3]) -> u16 {
-    rgb565(levels.map(|level| i32::from(level) * 64))
+    rgb565(levels.map(of_level))
 }
 
 /// RGB565 to 8-bit levels, its upper bits repeated below.
@@ -123,10 +131,10 @@ pub(crate) fn levels_of_rgb565(pixel: u16) -> [u8; 3] {
 }
 
 /// Pairs of pixels as Y₀ Cb, Y₁ Cr. Rows have an even number of pixels.
-fn yuyv(mut picture: impl Iterator<Item = [i32; 3]>) -> Vec<u16> {
+fn yuyv(mut picture: impl Iterator<Item = [Channel; 3]>) -> Vec<u16> {
     let mut words = Vec::with_capacity(picture.size_hint().0);
     while let (Some(even), Some(odd)) = (picture.next(), picture.next()) {
-        let mean = std::array::from_fn(|c| (even[c] + odd[c]) / 2);
+        let mean = std::array::from_fn(|c| Q::from_bits((even[c] + odd[c]).bits() / 2));
         let [cb, cr] = chroma(mean);
         words.extend([word(luma(even), cb), word(luma(odd), cr)]);
     }
@@ -137,26 +145,36 @@ fn word(low: u8, high: u8) -> u16 {
     u16::from_le_bytes([low, high])
 }
 
-/// Weights of the channels in 1/65,536; they add up to one.
-const LUMA: [i32; 3] = [19_595, 38_470, 7_471];
-/// 0.564 and 0.713 in 1/65,536.
-const CB_SCALE: i32 = 36_984;
-const CR_SCALE: i32 = 46_745;
+/// Weights of the channels; they add up to one.
+const LUMA: [Q<16>; 3] = [
+    Q::from_bits(19_595),
+    Q::from_bits(38_470),
+    Q::from_bits(7_471),
+];
+/// 0.564.
+const CB_SCALE: Q<16> = Q::from_bits(36_984);
+/// 0.713.
+const CR_SCALE: Q<16> = Q::from_bits(46_745);
 
-fn luma_steps(pixel: [i32; 3]) -> i32 {
-    let sum: i32 = LUMA.iter().zip(pixel).map(|(w, c)| w * c).sum();
-    (sum + (1 << 15)) >> 16
+fn luma_channel(pixel: [Channel; 3]) -> Channel {
+    let products = LUMA.into_iter().zip(pixel).map(|(w, c)| w * c.bits());
+    Q::from_bits(
+        products
+            .fold(Q::default(), |sum, product| sum + product)
+            .rounded(),
+    )
 }
 
-fn luma(pixel: [i32; 3]) -> u8 {
-    level(luma_steps(pixel))
+fn luma(pixel: [Channel; 3]) -> u8 {
+    level(luma_channel(pixel))
 }
 
 /// Cb and Cr.
-fn chroma(pixel: [i32; 3]) -> [u8; 2] {
-    let luma = luma_steps(pixel);
-    let scaled = |channel: i32, scale: i32| {
-        level((128 * 64 + (((channel - luma) * scale) >> 16)).clamp(0, WHITE))
+fn chroma(pixel: [Channel; 3]) -> [u8; 2] {
+    let luma = luma_channel(pixel);
+    let scaled = |channel: Channel, scale: Q<16>| {
+        let off = Q::from_bits((scale * (channel - luma).bits()).floor());
+        level((of_level(128) + off).clamp(Channel::default(), WHITE))
     };
     [scaled(pixel[2], CB_SCALE), scaled(pixel[0], CR_SCALE)]
 }
@@ -177,12 +195,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn steps(levels: [u8; 3]) -> [i32; 3] {
-        levels.map(|level| i32::from(level) * 64)
+    fn channels(levels: [u8; 3]) -> [Channel; 3] {
+        levels.map(of_level)
     }
 
     fn pair(levels: [u8; 3]) -> [u16; 2] {
-        let words = yuyv([steps(levels); 2].into_iter());
+        let words = yuyv([channels(levels); 2].into_iter());
         [words[0], words[1]]
     }
 
@@ -202,7 +220,7 @@ mod tests {
 
     #[test]
     fn a_pair_shares_its_chroma_and_has_cr_on_top() {
-        let red_and_black = yuyv([steps([255, 0, 0]), steps([0, 0, 0])].into_iter());
+        let red_and_black = yuyv([channels([255, 0, 0]), channels([0, 0, 0])].into_iter());
         assert_eq!(red_and_black, [word(76, 106), word(0, 192)]);
         let bytes: Vec<u8> = red_and_black.iter().flat_map(|w| w.to_le_bytes()).collect();
         let read = u32::from_le_bytes(bytes.try_into().unwrap());
@@ -223,7 +241,8 @@ mod tests {
 
     #[test]
     fn what_is_out_of_range_is_clipped() {
-        let coded = |format: Format| format.code(2, [[-500; 3], [WHITE + 900; 3]].into_iter());
+        let [below, above] = [-500, WHITE.bits() + 900].map(|bits| [Q::from_bits(bits); 3]);
+        let coded = |format: Format| format.code(2, [below, above].into_iter());
         assert_eq!(coded(Format::Rgb565).words, [0, 0xffff]);
         assert_eq!(coded(Format::Yuv422).words, [word(0, 128), word(255, 128)]);
         assert_eq!(coded(Format::Mono).bytes, [0, 255]);
@@ -242,7 +261,7 @@ mod tests {
 
         #[test]
         fn rgb565_is_the_nearest_code(levels: [u8; 3]) {
-            let back = levels_of_rgb565(rgb565(steps(levels)));
+            let back = levels_of_rgb565(rgb565(channels(levels)));
             for c in 0..3 {
                 let half_step = if c == 1 { 3 } else { 5 };
                 prop_assert!(back[c].abs_diff(levels[c]) <= half_step);

@@ -55,7 +55,7 @@ mod patch;
 mod scene;
 mod surface;
 
-pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Preset};
+pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, PresetCamera};
 pub use disc::{Disc, MARKERS};
 pub use error::SceneError;
 pub use format::Format;
@@ -63,6 +63,7 @@ pub use format::Format;
 pub use format::JPEG_QUALITY;
 pub use frame::{Frame, MarkerTruth, Truth};
 pub use hivtac_film::{Contact, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM};
+pub use hivtac_terms::geometry::Preset;
 pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
 pub use mechanics::{Mechanics, Stiffness};
 pub use motion::{Catch, Drag, Grasp, Motion, Press, Vibration};

@@ -6,11 +6,14 @@
 use crate::camera::centre;
 use crate::camera::radians;
 use crate::{Camera, Options, Paint, noise};
+use hivtac_terms::fixed::Q;
 
-/// Steps of one 8-bit level: channels are whole numbers of 1/64 level until they become pixels.
+/// A channel, in 8-bit levels, until it becomes one of a pixel.
+pub(crate) type Channel<T = i32> = Q<6, T>;
+/// Steps of one level.
 pub(crate) const STEPS: f64 = 64.0;
-/// The brightest channel, in steps.
-pub(crate) const WHITE: i32 = 255 * 64;
+/// The brightest channel.
+pub(crate) const WHITE: Channel = Q::from_bits(255 << 6);
 /// The film, a translucent, slightly warm grey: saturation 37 of 255, far below the red
 /// threshold's 100.
 const FILM_COLOUR: [f64; 3] = [150.0, 141.0, 128.0];
@@ -54,8 +57,8 @@ pub(crate) struct Light {
     haze: f64,
     /// Gain of red, green and blue.
     balance: [f64; 3],
-    /// The film without markers, in steps.
-    film: Vec<[i16; 3]>,
+    /// The film without markers.
+    film: Vec<[Channel<i16>; 3]>,
 }
 
 impl Light {
@@ -70,13 +73,13 @@ impl Light {
         let paint = |pixel: usize| board(options.checkerboard_px, pixel % width, pixel / width);
         let pixels = light.brightness.iter().enumerate();
         light.film = pixels
-            .map(|(pixel, &brightness)| light.seen(paint(pixel), brightness).map(steps))
+            .map(|(pixel, &brightness)| light.seen(paint(pixel), brightness).map(channel))
             .collect();
         light
     }
 
-    /// The film without markers: three channels per pixel, in steps.
-    pub(crate) fn bare_film(&self) -> Vec<[i16; 3]> {
+    /// The film without markers.
+    pub(crate) fn bare_film(&self) -> Vec<[Channel<i16>; 3]> {
         self.film.clone()
     }
 
@@ -84,14 +87,14 @@ impl Light {
     pub(crate) fn painted(
         &self,
         pixel: usize,
-        below: [i16; 3],
+        below: [Channel<i16>; 3],
         paint: Paint,
         part: f64,
-    ) -> [i16; 3] {
+    ) -> [Channel<i16>; 3] {
         let above = self.seen(paint, self.brightness[pixel]);
         std::array::from_fn(|c| {
-            let below = f64::from(below[c]);
-            steps(below + (above[c] - below) * part)
+            let below = f64::from(below[c].bits());
+            channel(below + (above[c] - below) * part)
         })
     }
 
@@ -101,15 +104,14 @@ impl Light {
         let colour = paint.colour();
         std::array::from_fn(|c| {
             let level = (colour[c] * brightness + self.haze) * self.balance[c];
-            (level * STEPS).min(f64::from(WHITE))
+            (level * STEPS).min(f64::from(WHITE.bits()))
         })
     }
 
-    /// A paint in the light of the picture's middle, in steps.
-    pub(crate) fn in_the_middle(&self, paint: Paint) -> [i32; 3] {
+    /// A paint in the light of the picture's middle.
+    pub(crate) fn in_the_middle(&self, paint: Paint) -> [Channel; 3] {
         let middle = self.brightness[self.brightness.len() / 2];
-        self.seen(paint, middle)
-            .map(|value| i32::from(steps(value)))
+        self.seen(paint, middle).map(|steps| channel(steps).into())
     }
 }
 
@@ -146,6 +148,7 @@ fn brightness_at(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
     options.gain * (1.0 + slope).max(0.0) * falloff.max(0.0)
 }
 
-fn steps(value: f64) -> i16 {
-    value.round() as i16
+/// The nearest to so many steps.
+fn channel(steps: f64) -> Channel<i16> {
+    Q::from_bits(steps.round() as i16)
 }

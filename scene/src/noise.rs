@@ -7,6 +7,8 @@
 
 use std::sync::LazyLock;
 
+use crate::light::Channel;
+
 /// Quantiles in the table.
 const QUANTILES: usize = 4096;
 /// SplitMix64's increment, the odd number nearest to 2⁶⁴ / golden ratio.
@@ -22,33 +24,34 @@ static UNIT: LazyLock<Vec<f64>> = LazyLock::new(|| {
     (0..QUANTILES).map(|i| normal_quantile(middle(i))).collect()
 });
 
-/// A table of noise, in steps of 1/64 level.
+/// A table of noise.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Noise {
-    table: Vec<i16>,
+    table: Vec<Channel<i16>>,
     seed: u64,
 }
 
 impl Noise {
     /// Noise of a standard deviation in steps, at most 4096.
     pub(crate) fn new(deviation: f64, seed: u64) -> Noise {
-        let scaled = |quantile: &f64| (deviation * quantile).round() as i16;
+        let scaled = |quantile: &f64| Channel::from_bits((deviation * quantile).round() as i16);
         Noise {
             table: UNIT.iter().map(scaled).collect(),
             seed,
         }
     }
 
-    /// The noise of one frame, pixel by pixel: three channels each, in steps, and a number below
-    /// [`LOTS`] that is independent of them.
-    pub(crate) fn of_frame(&self, number: u64) -> impl Iterator<Item = ([i32; 3], u32)> {
+    /// The noise of one frame, pixel by pixel: three channels each, and a number below [`LOTS`]
+    /// that is independent of them.
+    pub(crate) fn of_frame(&self, number: u64) -> impl Iterator<Item = ([Channel; 3], u32)> {
         let mut state = mix(mix(self.seed).wrapping_add(number.wrapping_mul(WEYL)));
-        let table: &[i16; QUANTILES] = self.table[..].try_into().expect("built with this length");
+        let table: &[Channel<i16>; QUANTILES] =
+            self.table[..].try_into().expect("built with this length");
         std::iter::repeat_with(move || {
             state = state.wrapping_add(WEYL);
             let bits = mix(state);
             let channels = [bits >> 52, bits >> 40, bits >> 28];
-            let noise = channels.map(|b| i32::from(table[b as usize % QUANTILES]));
+            let noise = channels.map(|b| table[b as usize % QUANTILES].into());
             (noise, bits as u32 % LOTS)
         })
     }
@@ -103,7 +106,8 @@ mod tests {
 
     fn samples(noise: &Noise, number: u64) -> Vec<[f64; 3]> {
         let frame = noise.of_frame(number).take(PIXELS);
-        frame.map(|(pixel, _)| pixel.map(f64::from)).collect()
+        let steps = |channel: Channel| f64::from(channel.bits());
+        frame.map(|(pixel, _)| pixel.map(steps)).collect()
     }
 
     /// Mean of the product of two series of deviation 160, as a correlation.
@@ -122,11 +126,9 @@ mod tests {
     #[test]
     fn mean_and_deviation_are_those_asked_for() {
         let noise = Noise::new(160.0, 1);
-        let (mean, square) = noise.table.iter().fold((0.0, 0.0), |(mean, square), &z| {
-            (
-                mean + f64::from(z) / 4096.0,
-                square + f64::from(z) * f64::from(z) / 4096.0,
-            )
+        let steps = noise.table.iter().map(|z| f64::from(z.bits()));
+        let (mean, square) = steps.fold((0.0, 0.0), |(mean, square), z| {
+            (mean + z / 4096.0, square + z * z / 4096.0)
         });
         assert_eq!(mean, 0.0);
         assert!(
@@ -168,7 +170,7 @@ mod tests {
         let noise = Noise::new(160.0, 1);
         let drawn: Vec<_> = noise.of_frame(3).take(PIXELS).collect();
         let low = drawn.iter().filter(|(_, lot)| *lot < LOTS / 10);
-        let low_and_bright = low.clone().filter(|(noise, _)| noise[2] > 0);
+        let low_and_bright = low.clone().filter(|(noise, _)| noise[2].bits() > 0);
         let share = |count: usize| count as f64 / PIXELS as f64;
         assert!((share(low.count()) - 0.1).abs() < 0.003);
         assert!((share(low_and_bright.count()) - 0.05).abs() < 0.002);
@@ -181,7 +183,7 @@ mod tests {
             noise
                 .of_frame(0)
                 .take(100)
-                .all(|(pixel, _)| pixel == [0; 3])
+                .all(|(pixel, _)| pixel == [Channel::default(); 3])
         );
     }
 }

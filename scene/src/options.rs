@@ -1,6 +1,6 @@
 //! What makes a frame harder or easier than the default.
 
-use crate::{Format, Lens, Mechanics, Mounting, Patch, Preset, SceneError, Shutter};
+use crate::{Format, Lens, Mechanics, Mounting, Patch, Preset, PresetCamera, SceneError, Shutter};
 use crate::{Paint, Specks};
 
 /// How a scene is lit, mounted, exposed and disturbed. The default is the nominal sensor.

@@ -3,7 +3,7 @@
 use crate::coverage::Coverage;
 use crate::exposure::{Exposure, Image};
 use crate::frame::Raster;
-use crate::light::{Light, STEPS};
+use crate::light::{Channel, Light, STEPS};
 use crate::motion::Motion;
 use crate::noise::{LOTS, Noise};
 use crate::{
@@ -215,12 +215,12 @@ impl Scene {
         })
     }
 
-    /// Film, specks, markers and patches in their light, in steps, before any noise.
+    /// Film, specks, markers and patches in their light, before any noise.
     fn picture<L: Fn(f64) -> Load>(
         &self,
         exposure: &Exposure<'_, L>,
         markers: &[Option<Image>; 4],
-    ) -> Vec<[i16; 3]> {
+    ) -> Vec<[Channel<i16>; 3]> {
         let mut picture = self.light.bare_film();
         for speck in &self.specks {
             self.paint(&mut picture, &exposure.image(speck), Paint::Red);
@@ -234,14 +234,14 @@ impl Scene {
         picture
     }
 
-    fn paint(&self, picture: &mut [[i16; 3]], image: &Image, paint: Paint) {
+    fn paint(&self, picture: &mut [[Channel<i16>; 3]], image: &Image, paint: Paint) {
         let (width, height) = (self.camera.width(), self.camera.height());
         for (pixel, part) in Coverage::of(image, width, height).pixels(width, height) {
             picture[pixel] = self.light.painted(pixel, picture[pixel], paint, part);
         }
     }
 
-    fn digitize(&self, picture: &[[i16; 3]], number: u64) -> Raster {
+    fn digitize(&self, picture: &[[Channel<i16>; 3]], number: u64) -> Raster {
         let salt = self.light.in_the_middle(self.options.salt.paint);
         let salted = (self.options.salt.fraction * f64::from(LOTS)) as u32;
         let noise = self.noise.of_frame(number);
@@ -249,7 +249,7 @@ impl Scene {
             let clean = if lot < salted {
                 salt
             } else {
-                clean.map(i32::from)
+                clean.map(Channel::from)
             };
             let clean = self.as_seen(clean);
             std::array::from_fn(|channel| clean[channel] + noise[channel])
@@ -258,12 +258,12 @@ impl Scene {
     }
 
     /// Red, green and blue as the camera tells them apart: one that sees no colours not at all.
-    fn as_seen(&self, colour: [i32; 3]) -> [i32; 3] {
+    fn as_seen(&self, colour: [Channel; 3]) -> [Channel; 3] {
         if self.options.format != Format::Mono {
             return colour;
         }
-        let weighed = (self.options.mono.iter().zip(colour)).map(|(w, c)| w * f64::from(c));
-        [weighed.sum::<f64>().round() as i32; 3]
+        let weighed = (self.options.mono.iter().zip(colour)).map(|(w, c)| w * f64::from(c.bits()));
+        [Channel::from_bits(weighed.sum::<f64>().round() as i32); 3]
     }
 
     fn truth_of<L: Fn(f64) -> Load>(

@@ -13,6 +13,7 @@
 
 use hivtac_force::features::{FEATURES, Features};
 use hivtac_force::rest::Rest;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::root::rounded_root;
@@ -21,11 +22,13 @@ use hivtac_terms::units::Px;
 /// Most frames in a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
 
-/// Largest standard deviation of a marker's coordinate over the frames: 0.25 px, in px with 8
-/// fractional bits.
-const LARGEST_SCATTER: i64 = 64;
+/// Coordinates and distances whose squares are summed up, px.
+type Coarse = Q<8, i64>;
+
+/// Largest standard deviation of a marker's coordinate over the frames: 0.25 px.
+const LARGEST_SCATTER: Coarse = Q::from_bits(64);
 /// What moved farther from where it was first is not steady, however far: 32 px.
-const FAR: i64 = 32 << 8;
+const FAR: Coarse = Q::from_int(32);
 
 /// Why there is no rest position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -50,13 +53,12 @@ pub struct TareBuilder {
     taken: u16,
     implausible: u16,
     touched: u16,
-    features: [i64; FEATURES],
+    features: [Q<16, i64>; FEATURES],
     areas: [u64; 4],
-    /// Coordinates of the first frame, px with 8 fractional bits; sums of what the others differ
-    /// by, and of its squares.
-    first: [i64; 8],
-    differences: [i64; 8],
-    squares: [i64; 8],
+    /// Coordinates of the first frame; sums of what the others differ by, and of its squares, px².
+    first: [Coarse; 8],
+    differences: [Coarse; 8],
+    squares: [Q<16, i64>; 8],
 }
 
 impl TareBuilder {
@@ -69,11 +71,11 @@ impl TareBuilder {
             taken: 0,
             implausible: 0,
             touched: 0,
-            features: [0; FEATURES],
+            features: [Q::default(); FEATURES],
             areas: [0; 4],
-            first: [0; 8],
-            differences: [0; 8],
-            squares: [0; 8],
+            first: [Q::default(); 8],
+            differences: [Q::default(); 8],
+            squares: [Q::default(); 8],
         };
         (1..=MAX_FRAMES).contains(&frames).then_some(empty)
     }
@@ -129,11 +131,9 @@ impl TareBuilder {
     /// 1/256 px.
     pub fn spread(&self) -> Px {
         let frames = i64::from(self.taken.max(1));
-        let variance = |(sum, square): (&i64, &i64)| square * frames - sum * sum;
-        let sums = self.differences.iter().zip(&self.squares);
-        let largest = sums.map(variance).max().unwrap_or(0);
-        // Below 2⁴² · 2¹⁶; a frame's fractional bits are half of the sixteen.
-        let scaled = rounded_root((largest.max(0) as u64) << 16) as i64;
+        let largest = self.variances().max().unwrap_or_default();
+        // Below 2⁴² · 2¹⁶; a root has half as many fractional bits.
+        let scaled = rounded_root((largest.bits().max(0) as u64) << 16) as i64;
         Px((scaled / frames) as i32)
     }
 
@@ -157,13 +157,13 @@ impl TareBuilder {
         }
         let sums = self.differences.iter_mut().zip(&mut self.squares);
         for ((first, feature), (sum, square)) in self.first.iter_mut().zip(numbers).zip(sums) {
-            let coordinate = feature >> 8;
+            let coordinate = feature.floor_to();
             if self.taken == 0 {
                 *first = coordinate;
             }
             let difference = (coordinate - *first).clamp(-FAR, FAR);
             *sum += difference;
-            *square += difference * difference;
+            *square += squared(difference);
         }
         self.taken += 1;
     }
@@ -179,11 +179,17 @@ impl TareBuilder {
         }
     }
 
-    /// Whether no coordinate's variance, ΣΔ²/n − (ΣΔ/n)², is too large. All terms are below 2⁴².
+    /// Whether no coordinate's variance is too large.
     fn is_steady(&self) -> bool {
-        let frames = i64::from(self.taken);
-        let mut sums = self.differences.iter().zip(&self.squares);
-        sums.all(|(sum, square)| square * frames - sum * sum <= (frames * LARGEST_SCATTER).pow(2))
+        let largest = squared(LARGEST_SCATTER * i64::from(self.taken));
+        self.variances().all(|variance| variance <= largest)
+    }
+
+    /// n² times each coordinate's variance, ΣΔ²/n − (ΣΔ/n)², px². All terms are below 2⁴² steps.
+    fn variances(&self) -> impl Iterator<Item = Q<16, i64>> {
+        let frames = i64::from(self.taken.max(1));
+        let sums = self.differences.iter().zip(&self.squares);
+        sums.map(move |(sum, square)| *square * frames - squared(*sum))
     }
 
     fn mean(&self) -> Rest {
@@ -194,11 +200,17 @@ impl TareBuilder {
                 .checked_div_euclid(2 * frames)
                 .unwrap_or(0)
         };
+        let features = self.features.map(|sum| Q::from_bits(mean(sum.bits())));
         Rest {
-            features: Features::from_array(self.features.map(mean)),
+            features: Features::from_array(features),
             areas: self.areas.map(|sum| mean(sum as i64) as u32),
         }
     }
+}
+
+/// The square of a distance, px².
+fn squared(distance: Coarse) -> Q<16, i64> {
+    Q::from_bits(distance.bits() * distance.bits())
 }
 
 #[cfg(test)]
@@ -208,11 +220,11 @@ mod tests {
 
     const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
 
-    /// Markers of a film at rest, moved to the right by 1/65,536 px.
-    fn frame(right: i32, area: u32) -> ([Marker; 4], Features) {
+    /// Markers of a film at rest, moved to the right.
+    fn frame(right: Px, area: u32) -> ([Marker; 4], Features) {
         let half = (f64::from(GEOMETRY.rest_distance().0) / 2.0_f64.sqrt()) as i32;
         let at = |x: i32, y: i32| Marker {
-            x: Px((160 << 16) + x * half + right),
+            x: Px((160 << 16) + x * half) + right,
             y: Px((120 << 16) + y * half),
             area,
         };
@@ -220,8 +232,8 @@ mod tests {
         (markers, Features::of_markers(&markers))
     }
 
-    /// What a tare makes of frames that are so far to the right of the first one, 1/65,536 px.
-    fn tare_of(frames: impl Iterator<Item = i32> + Clone) -> Result<Rest, Refusal> {
+    /// What a tare makes of frames that are so far to the right.
+    fn tare_of(frames: impl Iterator<Item = Px> + Clone) -> Result<Rest, Refusal> {
         let mut builder = TareBuilder::new(frames.clone().count() as u16).unwrap();
         let mut outcome = None;
         for right in frames {
@@ -232,21 +244,21 @@ mod tests {
         outcome.unwrap()
     }
 
-    fn left_of(rest: &Rest) -> i32 {
-        rest.features.centroids[0].0.0 - frame(0, 1).0[0].x.0
+    fn left_of(rest: &Rest) -> Px {
+        rest.features.centroids[0].0 - frame(Px(0), 1).0[0].x
     }
 
     #[test]
     fn the_mean_is_rounded_once() {
         let mut builder = TareBuilder::new(3).unwrap();
         for (x, area, remaining) in [(10, 100, 2), (10, 101, 1)] {
-            let (markers, features) = frame(x, area);
+            let (markers, features) = frame(Px(x), area);
             assert_eq!(builder.add(&markers, &features, &GEOMETRY), None);
             assert_eq!(builder.remaining(), remaining);
         }
-        let (markers, features) = frame(12, 101);
+        let (markers, features) = frame(Px(12), 101);
         let rest = builder.add(&markers, &features, &GEOMETRY).unwrap();
-        assert_eq!(left_of(&rest.unwrap()), 11, "32/3 = 10.67");
+        assert_eq!(left_of(&rest.unwrap()), Px(11), "32/3 = 10.67");
         assert_eq!(rest.unwrap().areas, [101; 4], "302/3 = 100.67");
         assert_eq!(
             builder.add(&markers, &features, &GEOMETRY),
@@ -258,14 +270,14 @@ mod tests {
     #[test]
     fn halves_round_up_on_both_sides_of_zero() {
         for (first, second, mean) in [(1, 2, 2), (-1, -2, -1), (-1, 0, 0)] {
-            let rest = tare_of([first, second].into_iter()).unwrap();
-            assert_eq!(left_of(&rest), mean);
+            let rest = tare_of([first, second].map(Px).into_iter()).unwrap();
+            assert_eq!(left_of(&rest), Px(mean));
         }
     }
 
     #[test]
     fn one_frame_is_its_own_mean() {
-        let (markers, features) = frame(123_456, 7);
+        let (markers, features) = frame(Px(123_456), 7);
         let rest = TareBuilder::new(1)
             .unwrap()
             .add(&markers, &features, &GEOMETRY)
@@ -284,11 +296,11 @@ mod tests {
     /// A square wave's standard deviation is half of what it jumps.
     #[test]
     fn markers_that_move_are_refused_whether_they_jump_or_drift() {
-        let jumping = |px: f64| (0..64).map(move |i| (px * 65_536.0) as i32 * (i % 2));
+        let jumping = |px: f64| (0..64).map(move |i| Px((px * 65_536.0) as i32 * (i % 2)));
         assert!(tare_of(jumping(0.49)).is_ok());
         assert_eq!(tare_of(jumping(0.51)), Err(Refusal::Unsteady));
         assert_eq!(tare_of(jumping(400.0)), Err(Refusal::Unsteady));
-        let drifting = (0..256).map(|i| i * 260);
+        let drifting = (0..256).map(|i| Px(i * 260));
         assert_eq!(tare_of(drifting), Err(Refusal::Unsteady), "1 px in all");
     }
 
@@ -302,20 +314,22 @@ mod tests {
             }
             let mut outcome = None;
             for nth in 0..64 {
-                let (markers, features) = frame((jump * 65_536.0) as i32 * (nth % 2), 100);
+                let right = Px((jump * 65_536.0) as i32 * (nth % 2));
+                let (markers, features) = frame(right, 100);
                 outcome = builder.add(&markers, &features, &GEOMETRY);
             }
             (
-                builder.spread().0,
+                builder.spread(),
                 outcome.unwrap().map(|rest| left_of(&rest)),
             )
         };
         let (small, taken) = spread(0.2, false);
-        assert!((small - 6_554).abs() <= 256, "{small}: 0.1 px");
+        assert!((small.0 - 6_554).abs() <= 256, "{small:?}: 0.1 px");
         assert!(taken.is_ok());
         let (large, refused) = spread(4.0, false);
-        assert_eq!((large, refused), (2 << 16, Err(Refusal::Unsteady)));
-        assert_eq!(spread(4.0, true), (2 << 16, Ok(2 << 16)));
+        let two = Px::from_int(2);
+        assert_eq!((large, refused), (two, Err(Refusal::Unsteady)));
+        assert_eq!(spread(4.0, true), (two, Ok(two)));
     }
 
     #[test]
@@ -328,7 +342,7 @@ mod tests {
 
     #[test]
     fn a_pressed_film_is_not_at_rest() {
-        let (markers, _) = frame(0, 100);
+        let (markers, _) = frame(Px(0), 100);
         let pressed = markers.map(|marker| Marker {
             x: Px((marker.x.0 - (160 << 16)) / 5 * 6 + (160 << 16)),
             y: Px((marker.y.0 - (120 << 16)) / 5 * 6 + (120 << 16)),
@@ -356,7 +370,7 @@ mod tests {
         let largest = Features {
             centroids: [(Px(i32::MAX), Px(i32::MAX)); 4],
             rect_center: (Px(i32::MAX), Px(i32::MAX)),
-            rect_area: (800 * 800) << 16,
+            rect_area: Q::from_int(800 * 800),
         };
         let markers = [Marker {
             x: Px(0),
@@ -368,7 +382,7 @@ mod tests {
         let rest = builder.mean();
         assert_eq!((rest.features, rest.areas), (largest, [u32::MAX; 4]));
         let mut builder = TareBuilder::new(MAX_FRAMES).unwrap();
-        let least = Features::from_array([i64::from(i32::MIN); FEATURES]);
+        let least = Features::from_array([Q::from_bits(i64::from(i32::MIN)); FEATURES]);
         builder.take(&markers, &least);
         (1..MAX_FRAMES).for_each(|_| builder.take(&markers, &largest));
         assert!(!builder.is_steady());

@@ -8,7 +8,7 @@ use clap::Args;
 use hivtac_calibration::dataset::{Recipe, measure};
 use hivtac_calibration::loads::RandomLoads;
 use hivtac_calibration::weights::Range;
-use hivtac_scene::{Lens, Load, MarkerTruth, Options, Paint, Preset as ScenePreset, Scene};
+use hivtac_scene::{Lens, Load, MarkerTruth, Options, Paint, PresetCamera, Scene};
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::conditions::CentroidEstimator;
@@ -127,7 +127,7 @@ impl MonoStudy {
         let mut options = Options {
             markers: paint,
             mono,
-            ..Options::of(ScenePreset::Mt9v034)
+            ..Options::of(Preset::Mt9v034)
         };
         options.gain = FILM / Paint::Film.level(mono);
         let level = paint.level(mono) * options.gain;
@@ -152,7 +152,7 @@ impl MonoStudy {
     fn errors(&self, options: Options, threshold: u8) -> Result<(Option<f64>, usize)> {
         let Recipe { width, height, .. } = Recipe::of(Preset::Mt9v034);
         let (columns, rows) = (width.into(), height.into());
-        let scene = Scene::preset("rest", ScenePreset::Mt9v034, columns, rows, 3)?;
+        let scene = Scene::preset("rest", Preset::Mt9v034, columns, rows, 3)?;
         let scene = scene.with_options(options)?;
         let geometry = Geometry::preset(Preset::Mt9v034, width, height);
         let settings = Settings {
@@ -195,13 +195,13 @@ impl MonoStudy {
 /// How many rows the markers reach, about the axis.
 fn reach(focal_mm: f64) -> Result<Reach> {
     // Half as large as on its own pixels: nothing leaves the picture.
-    let pitch_um = 2.0 * 12.0 * ScenePreset::Mt9v034.focal_length_mm() / focal_mm;
-    let mut options = Options::of(ScenePreset::Mt9v034);
+    let pitch_um = 2.0 * 12.0 * Preset::Mt9v034.focal_length_mm() / focal_mm;
+    let mut options = Options::of(Preset::Mt9v034);
     options.lens = Lens {
         pitch_um: Some(pitch_um),
         ..Lens::default()
     };
-    let scene = Scene::preset("rest", ScenePreset::Mt9v034, 376, 240, 1)?.with_options(options)?;
+    let scene = Scene::preset("rest", Preset::Mt9v034, 376, 240, 1)?.with_options(options)?;
     let weak = Load::from_angles(WEAK_N, 0.0, 0.0)?;
     let weak_rows = rows(&scene, &[weak])?;
     let rows = rows(&scene, &corners()?)?;

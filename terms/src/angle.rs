@@ -8,14 +8,18 @@
 //! < 10⁻¹¹. Numbers of 31 bits lose less than 10⁻⁹.
 
 use crate::division::Divisor;
+use crate::fixed::Q;
 use crate::units::MilliDegrees;
 
 /// Fractional bits of m° on the way.
 const BITS: u32 = 14;
-const QUARTER_TURN: u32 = 90_000 << BITS;
-const HALF_TURN: u32 = 180_000 << BITS;
-/// A radian in m° · 2⁸.
-const RADIAN_Q8: u64 = 14_667_720;
+/// m° on the way, at most half a turn.
+type Angle = Q<BITS, u32>;
+
+const QUARTER_TURN: Angle = Q::from_bits(90_000 << BITS);
+const HALF_TURN: Angle = Q::from_bits(180_000 << BITS);
+/// m°.
+const RADIAN: Q<8, u64> = Q::from_bits(14_667_720);
 
 /// atan(k/64) in m° · 2¹⁴, rounded.
 const STEPS: [u32; 65] = [
@@ -95,7 +99,7 @@ pub fn atan2(y: i64, x: i64) -> MilliDegrees {
         QUARTER_TURN - first_octant(along, across)
     };
     let turned = if x < 0 { HALF_TURN - acute } else { acute };
-    let rounded = ((turned + (1 << (BITS - 1))) >> BITS) as i32;
+    let rounded = turned.rounded() as i32;
     MilliDegrees(if y < 0 && rounded < 180_000 {
         -rounded
     } else {
@@ -113,9 +117,8 @@ fn normalized(parts: [u64; 2]) -> [u32; 2] {
     })
 }
 
-/// atan(`small` / `large`) in m° · 2¹⁴, for 2³⁰ ≤ `large` < 2³¹ and `small` ≤ `large`; 0 for (0,
-/// 0).
-fn first_octant(small: u32, large: u32) -> u32 {
+/// atan(`small` / `large`), for 2³⁰ ≤ `large` < 2³¹ and `small` ≤ `large`; 0 for (0, 0).
+fn first_octant(small: u32, large: u32) -> Angle {
     let step = ((small + (large >> 7)) / (large >> 6).max(1)).min(64);
     let ahead = 64 * i64::from(small) - i64::from(step) * i64::from(large);
     let beneath = (64 * u64::from(large) + u64::from(step) * u64::from(small)) >> 6;
@@ -124,13 +127,13 @@ fn first_octant(small: u32, large: u32) -> u32 {
     // z² with 44, and z³/3 with 38.
     let square = (z >> 16) * (z >> 16);
     let bent = z - ((z * (square / 3)) >> 44);
-    let beyond = ((bent * RADIAN_Q8) >> 32) as u32;
+    let beyond = ((bent * RADIAN.bits()) >> 32) as u32;
     let at_step = STEPS.get(step as usize).copied().unwrap_or(0);
-    if ahead < 0 {
+    Q::from_bits(if ahead < 0 {
         at_step - beyond
     } else {
         at_step + beyond
-    }
+    })
 }
 
 #[cfg(test)]
@@ -145,7 +148,7 @@ mod tests {
             let exact = (step as f64 / 64.0).atan().to_degrees() * 1e3 * f64::from(1 << BITS);
             assert!((f64::from(*angle) - exact).abs() < 0.51, "step {step}");
         }
-        assert!((RADIAN_Q8 as f64 / 256.0 - 1f64.to_degrees() * 1e3).abs() < 2e-3);
+        assert!((RADIAN.bits() as f64 / 256.0 - 1f64.to_degrees() * 1e3).abs() < 2e-3);
     }
 
     /// Error in m°, the short way round the circle.
@@ -160,6 +163,7 @@ mod tests {
         for angle in -180_000..=180_000 {
             let (sin, cos) = sin_cos(MilliDegrees(angle));
             let expected = if angle == -180_000 { 180_000 } else { angle };
+            let [sin, cos] = [sin, cos].map(|part| i64::from(part.bits()));
             assert_eq!(atan2(sin, cos).0, expected);
         }
     }

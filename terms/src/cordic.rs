@@ -3,10 +3,8 @@
 //! Against exact arithmetic, over every input, [`sin_cos`] is off by at most 4 · 2⁻³⁰; the tests
 //! assert it.
 
+use crate::fixed::Q;
 use crate::units::MilliDegrees;
-
-/// One in the results of [`sin_cos`].
-pub const ONE_BITS: u32 = 30;
 
 /// Rotations. The last turns by 2⁻³¹ rad = 2.7 · 10⁻⁵ m°.
 const STEPS: usize = 32;
@@ -52,8 +50,8 @@ const STEP_ANGLES: [i64; STEPS] = [
 /// Π cos(atan(2⁻ⁱ)) · 2⁶⁰: what every rotation by all steps divides a length by.
 const GAIN_INVERSE: i64 = 700_114_967_507_363_239;
 
-/// (sin, cos) of an angle, with [`ONE_BITS`] fractional bits.
-pub fn sin_cos(angle: MilliDegrees) -> (i64, i64) {
+/// (sin, cos) of an angle.
+pub fn sin_cos(angle: MilliDegrees) -> (Q<30>, Q<30>) {
     let turns = i64::from(angle.0).rem_euclid(360_000) << ANGLE_BITS;
     // The steps reach ±99°: fold the other half of the circle onto this one.
     let (mut left, flipped) = match turns {
@@ -71,9 +69,10 @@ pub fn sin_cos(angle: MilliDegrees) -> (i64, i64) {
             left += step_angle;
         }
     }
-    let round = |value: i64| (value + (1 << 29)) >> (60 - ONE_BITS);
+    // Sizes of at most one, and a few steps more.
+    let rounded = |value| Q::<60, i64>::from_bits(value).rounded_to().narrowed();
     let sign = if flipped { -1 } else { 1 };
-    (sign * round(y), sign * round(x))
+    (rounded(y) * sign, rounded(x) * sign)
 }
 
 #[cfg(test)]
@@ -98,7 +97,7 @@ mod tests {
             let radians = (f64::from(angle) * 1e-3).to_radians();
             let (sin, cos) = sin_cos(MilliDegrees(angle));
             for (found, exact) in [(sin, radians.sin()), (cos, radians.cos())] {
-                let error = found as f64 - exact * f64::from(1 << ONE_BITS);
+                let error = f64::from(found.bits()) - exact * f64::from(1 << 30);
                 assert!(error.abs() <= 4.0, "{angle} m°: {error}");
             }
         }
@@ -108,6 +107,7 @@ mod tests {
     fn extreme_arguments() {
         for angle in [i32::MIN, i32::MAX] {
             let (sin, cos) = sin_cos(MilliDegrees(angle));
+            let [sin, cos] = [sin, cos].map(|part| i64::from(part.bits()));
             assert_eq!((sin * sin + cos * cos + (1 << 59)) >> 60, 1);
         }
     }

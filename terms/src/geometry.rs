@@ -1,9 +1,12 @@
 //! What the sensing needs to know of lens and markers to tell a marker from another red thing.
 
 use crate::angle::atan2;
-use crate::cordic::{ONE_BITS, sin_cos};
+use crate::cordic::sin_cos;
 use crate::division::Divisor;
+use crate::fixed::Q;
 use crate::units::{Micrometres, MilliDegrees, Px};
+use core::fmt;
+use core::str::FromStr;
 
 /// Lens, frame and marker geometry (`docs/architecture.md`, presets).
 ///
@@ -55,21 +58,46 @@ impl Preset {
     }
 }
 
-/// 6/(5π) in Q32: a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6)
-/// wide.
-const DIAGONAL_TO_FOCAL_Q32: u64 = 1_640_556_661;
-/// 2.1 mm / (640 · 6 µm) in Q16: an OV7725 frame's width to its focal length, both in pixels.
-/// Exact.
-const OV7725_WIDTH_TO_FOCAL_Q16: i32 = 35_840;
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Preset {
+    type Err = UnknownPreset;
+
+    fn from_str(name: &str) -> Result<Preset, UnknownPreset> {
+        Preset::from_name(name).ok_or(UnknownPreset)
+    }
+}
+
+/// No preset has such a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct UnknownPreset;
+
+impl fmt::Display for UnknownPreset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [first, second, third] = Preset::ALL;
+        write!(f, "unknown preset: use {first}, {second} or {third}")
+    }
+}
+
+impl core::error::Error for UnknownPreset {}
+
+/// 6/(5π): a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6) wide.
+const DIAGONAL_TO_FOCAL: Q<32, u64> = Q::from_bits(1_640_556_661);
+/// 2.1 mm / (640 · 6 µm): an OV7725 frame's width to its focal length, both in pixels. Exact.
+const OV7725_WIDTH_TO_FOCAL: Q<16> = Q::from_bits(35_840);
 /// 1.2 mm / 12 µm.
-const MT9V034_FOCAL: Px = Px(100 << Px::FRACTION_BITS);
+const MT9V034_FOCAL: Px = Px::from_int(100);
 
 /// A metre: nothing here is larger.
 const LARGEST_MEASURE: Micrometres = Micrometres(1_000_000);
 /// A radian in m°, to 4 · 10⁻⁶ of itself.
 const RADIAN: i64 = 57_296;
-/// π/4 in Q30.
-const QUARTER_PI_Q30: i64 = 843_314_857;
+/// π/4.
+const QUARTER_PI: Q<30> = Q::from_bits(843_314_857);
 
 impl Geometry {
     /// Markers 1 mm across at (±3.717, ±3.717) mm on a film 10 mm away, seen by `preset` in frames
@@ -77,7 +105,7 @@ impl Geometry {
     pub const fn preset(preset: Preset, width: u16, height: u16) -> Geometry {
         let focal = match preset {
             Preset::Paper => paper_focal(width as u64, height as u64),
-            Preset::Ov7725 => Px(OV7725_WIDTH_TO_FOCAL_Q16 * width as i32),
+            Preset::Ov7725 => Px(OV7725_WIDTH_TO_FOCAL.bits() * width as i32),
             Preset::Mt9v034 => MT9V034_FOCAL,
         };
         Geometry {
@@ -114,8 +142,9 @@ impl Geometry {
         let across = self.across(self.rest_distance());
         let along = self.along_flat(self.rest_distance());
         let grow = |diameter: Px| i128::from(diameter.0) + i128::from(edge.0);
-        let area_q62 = grow(across) * grow(along) * i128::from(QUARTER_PI_Q30);
-        u32::try_from(area_q62 >> (2 * Px::FRACTION_BITS + ONE_BITS)).unwrap_or(0)
+        let area: Q<62, i128> =
+            Q::from_bits(grow(across) * grow(along) * i128::from(QUARTER_PI.bits()));
+        u32::try_from(area.floor()).unwrap_or(0)
     }
 
     /// Distance of a marker's image from the axis at rest: f·θ.
@@ -124,7 +153,9 @@ impl Geometry {
             i64::from(self.marker_radius.0),
             i64::from(self.film_distance.0),
         );
-        saturated(i64::from(self.focal.0) * i64::from(theta.0) / RADIAN)
+        Px::saturated(Q::from_bits(
+            i64::from(self.focal.0) * i64::from(theta.0) / RADIAN,
+        ))
     }
 
     /// Diameter, across the radius, of the image of a marker at `distance` from the axis:
@@ -132,7 +163,9 @@ impl Geometry {
     /// circle, so this holds for any lens and any height or tilt of the film.
     pub fn across(&self, distance: Px) -> Px {
         let product = i64::from(distance.0) * i64::from(self.marker_diameter.0);
-        saturated(Divisor::new(self.marker_radius.0).signed_quotient(product))
+        Px::saturated(Q::from_bits(
+            Divisor::new(self.marker_radius.0).signed_quotient(product),
+        ))
     }
 
     /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with
@@ -141,20 +174,18 @@ impl Geometry {
         let theta = i64::from(distance.0) * RADIAN / i64::from(self.focal.0.max(1));
         let theta = theta.clamp(1, 90_000);
         let (sin, cos) = sin_cos(MilliDegrees(theta as i32));
-        let factor_q30 = ((sin * cos) >> ONE_BITS) * RADIAN / theta;
-        saturated((i64::from(self.across(distance).0) * factor_q30) >> ONE_BITS)
+        let product: Q<60, i64> = Q::from_bits(i64::from(sin.bits()) * i64::from(cos.bits()));
+        let factor: Q<30, i64> = Q::from_bits(product.floor_to::<30>().bits() * RADIAN / theta);
+        let along: Q<46, i64> = Q::from_bits(i64::from(self.across(distance).0) * factor.bits());
+        Px::saturated(along.floor_to())
     }
-}
-
-/// As a length, at most ± 32,768 px.
-fn saturated(length_q16: i64) -> Px {
-    Px(length_q16.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32)
 }
 
 /// 2.1 mm over a pitch that makes the diagonal 150°: the pitch cancels out.
 const fn paper_focal(width: u64, height: u64) -> Px {
-    let diagonal_q16 = ((width * width + height * height) << 32).isqrt();
-    Px(((diagonal_q16 * DIAGONAL_TO_FOCAL_Q32 + (1 << 31)) >> 32) as i32)
+    // In 1/65,536 px, as the root of 2³² times a square.
+    let diagonal = ((width * width + height * height) << 32).isqrt();
+    Px(((diagonal * DIAGONAL_TO_FOCAL.bits() + (1 << 31)) >> 32) as i32)
 }
 
 /// (`pixels` − 1)/2.
@@ -165,6 +196,7 @@ const fn half_span(pixels: u16) -> Px {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString;
 
     #[test]
     fn presets_have_the_documented_focal_lengths() {
@@ -248,9 +280,11 @@ mod tests {
     #[test]
     fn names_round_trip() {
         for preset in Preset::ALL {
-            assert_eq!(Preset::from_name(preset.name()), Some(preset));
+            assert_eq!(preset.to_string().parse(), Ok(preset));
         }
-        assert_eq!(Preset::from_name("Paper"), None);
+        let error = "Paper".parse::<Preset>().unwrap_err();
+        let text = "unknown preset: use paper, ov7725 or mt9v034";
+        assert_eq!(error.to_string(), text);
     }
 
     #[test]

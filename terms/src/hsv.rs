@@ -4,10 +4,10 @@
 //! with twelve fractional bits. The same products are made here, so that the result is the same for
 //! every pixel; `tests/opencv.rs` holds all 65,536 of them against OpenCV's own output.
 
+use crate::fixed::Q;
+
 /// Fractional bits of OpenCV's reciprocals.
 const SHIFT: u32 = 12;
-/// Half a step, for rounding.
-const HALF: i32 = 1 << (SHIFT - 1);
 
 /// A colour in OpenCV's 8-bit HSV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -46,7 +46,7 @@ impl Hsv {
         Hsv {
             hue: hue([red, green, blue], value, chroma),
             // Below 255.5 before rounding, since chroma ≤ value.
-            saturation: rounded(chroma * reciprocal(255, i32::from(value))) as u8,
+            saturation: (reciprocal(255, i32::from(value)) * chroma).rounded() as u8,
             value,
         }
     }
@@ -61,23 +61,18 @@ fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
         v if v == green => b - r + 2 * chroma,
         _ => r - g + 4 * chroma,
     };
-    let hue = rounded(sixths * reciprocal(30, chroma));
+    let hue = (reciprocal(30, chroma) * sixths).rounded();
     // Between −30 and 150 before a turn is added, and never so little below 0 that it becomes 180.
     (if hue < 0 { hue + 180 } else { hue }) as u8
 }
 
-/// `scale / divisor` with [`SHIFT`] fractional bits, rounded to nearest (no quotient with a divisor
-/// below 256 is a tie); 0 for a divisor of 0.
-const fn reciprocal(scale: i32, divisor: i32) -> i32 {
-    if divisor == 0 {
-        return 0;
-    }
-    ((scale << (SHIFT + 1)) + divisor) / (2 * divisor)
-}
-
-/// A product with [`SHIFT`] fractional bits as a whole number; halves round up.
-const fn rounded(product: i32) -> i32 {
-    (product + HALF) >> SHIFT
+/// `scale / divisor`, rounded to nearest (no quotient with a divisor below 256 is a tie); 0 for a
+/// divisor of 0.
+const fn reciprocal(scale: i32, divisor: i32) -> Q<SHIFT> {
+    Q::from_bits(match divisor {
+        0 => 0,
+        _ => ((scale << (SHIFT + 1)) + divisor) / (2 * divisor),
+    })
 }
 
 #[cfg(test)]

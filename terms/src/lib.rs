@@ -22,4 +22,5 @@ pub mod units;
 pub mod angle;
 pub mod cordic;
 pub mod division;
+pub mod fixed;
 pub mod root;

@@ -1,5 +1,6 @@
 //! The units that cross module borders. Each is a transparent newtype: no bare integer does.
 
+use crate::fixed::Q;
 use core::fmt;
 use core::ops::{Add, Sub};
 
@@ -23,6 +24,11 @@ impl Px {
         Px(pixels << Self::FRACTION_BITS)
     }
 
+    /// Of a length in pixels; one beyond ± 32,768 px is as long.
+    pub fn saturated(length: Q<16, i64>) -> Px {
+        Px(length.bits().clamp(i32::MIN.into(), i32::MAX.into()) as i32)
+    }
+
     /// The value in pixels, to 2⁻²⁴ of it.
     pub fn to_f32(self) -> f32 {
         self.0 as f32 / 65_536.0
@@ -31,6 +37,12 @@ impl Px {
     /// The value in pixels, for display and for tests; exact.
     pub fn to_f64(self) -> f64 {
         f64::from(self.0) / 65_536.0
+    }
+}
+
+impl From<Px> for Q<16, i64> {
+    fn from(length: Px) -> Self {
+        Q::from_bits(i64::from(length.0))
     }
 }
 

@@ -12,7 +12,7 @@ use hivtac_sensing::scanner::{ScanSettings, Scanner};
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tables::Table;
-use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::{ByteOrder, HsvBox};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures;
@@ -106,7 +106,7 @@ fn frame(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("frame");
     for frame in Frame::all() {
         let [width, height] = frame.size;
-        let geometry = Geometry::preset(geometry::Preset::Ov7725, width, height);
+        let geometry = Geometry::preset(Preset::Ov7725, width, height);
         sensor
             .configure(Settings::usual(geometry, ByteOrder::Native), None)
             .expect("usual settings");

@@ -12,11 +12,11 @@ use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
-use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
+use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
 
 use crate::pictures::Random;
-use crate::script::features;
 
 /// Where the weights of a layer come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,14 +45,10 @@ const REST_AREA: u32 = 245;
 
 /// The rest position of the sensor with the default preset, in whole pixels.
 pub fn rest() -> Features {
-    let px = |number: i64| number << 16;
-    let [left, right, top, bottom] = [99, 220, 59, 180].map(px);
-    let area = (right - left) * ((bottom - top) >> 16);
-    let corners = [left, top, right, top, right, bottom, left, bottom];
-    let middle = [(left + right) / 2, (top + bottom) / 2, area];
-    features(std::array::from_fn(|i| {
-        *corners.iter().chain(&middle).nth(i).unwrap_or(&0)
-    }))
+    let [left, right, top, bottom] = [99, 220, 59, 180].map(Px::from_int);
+    let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+    let area = REST_AREA;
+    Features::of_markers(&corners.map(|(x, y)| Marker { x, y, area }))
 }
 
 /// The file of a model with these layer widths (first 11, last as many as there are outputs), for

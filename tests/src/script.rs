@@ -2,7 +2,7 @@
 
 use std::vec::Vec;
 
-use hivtac_sensing::features::{FEATURES, Features};
+use hivtac_sensing::features::Features;
 use hivtac_sensing::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
@@ -109,7 +109,7 @@ impl Script {
     pub fn network(&mut self, features: &Features, tare: &Features) -> &mut Script {
         self.bytes.push(Kind::Network as u8);
         for number in features.to_array().into_iter().chain(tare.to_array()) {
-            self.bytes.extend(number.to_le_bytes());
+            self.bytes.extend(number.bits().to_le_bytes());
         }
         self
     }
@@ -123,7 +123,7 @@ impl Script {
             self.bytes.extend(area.to_le_bytes());
         }
         for number in rest.features.to_array() {
-            self.bytes.extend(number.to_le_bytes());
+            self.bytes.extend(number.bits().to_le_bytes());
         }
         self.bytes
             .extend(rest.areas.iter().flat_map(|area| area.to_le_bytes()));
@@ -168,16 +168,5 @@ impl Script {
 impl Default for Script {
     fn default() -> Self {
         Script::new()
-    }
-}
-
-/// The eleven numbers as features; all but the last must fit 32 bits.
-pub fn features(numbers: [i64; FEATURES]) -> Features {
-    use hivtac_terms::units::Px;
-    let px = |i: usize| Px(i32::try_from(numbers[i]).expect("a coordinate fits 32 bits"));
-    Features {
-        centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
-        rect_center: (px(8), px(9)),
-        rect_area: numbers[10],
     }
 }

@@ -12,7 +12,7 @@ use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
-use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 
@@ -173,13 +173,8 @@ impl View {
     }
 
     fn sensor_with(&self, output: OutputKind) -> Result<TaredSensor> {
-        let lens = match self.preset {
-            Preset::Paper => geometry::Preset::Paper,
-            Preset::Ov7725 => geometry::Preset::Ov7725,
-            Preset::Mt9v034 => geometry::Preset::Mt9v034,
-        };
         let [width, height] = self.size;
-        let geometry = Geometry::preset(lens, width as u16, height as u16);
+        let geometry = Geometry::preset(self.preset, width as u16, height as u16);
         let settings = Settings {
             threshold: Threshold::red(self.format),
             centroid: self.estimator,
@@ -210,7 +205,7 @@ impl TaredSensor {
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let geometry = &model.conditions.geometry;
         let (width, height) = (geometry.width.into(), geometry.height.into());
-        let preset = model.conditions.preset.name().parse()?;
+        let preset = model.conditions.preset;
         let mut sensor = Box::new(Sensor::new());
         let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(model));

@@ -1,10 +1,12 @@
 //! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
 
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_sensing::features::Features;
 use hivtac_sensing::forward::MOST_STEPS;
 use hivtac_sensing::layer::MAX_WIDTH;
 use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::rest::Rest;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
@@ -12,7 +14,7 @@ use hivtac_terms::units::Px;
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu;
-use hivtac_tests::script::{Script, features};
+use hivtac_tests::script::Script;
 
 /// Runs a script on both and compares what they print, byte for byte. Gives the text for further
 /// checks.
@@ -369,8 +371,11 @@ fn force_conversions_are_the_same() {
 }
 
 /// Features that differ from the rest position by up to `distance`, in 1/65,536 px.
-fn moved(random: &mut Random, distance: i64) -> hivtac_sensing::features::Features {
+fn moved(random: &mut Random, distance: i64) -> Features {
     let rest = models::rest().to_array();
-    let limit = |number: i64| number.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
-    features(rest.map(|number| limit(number + random.between(-distance, distance))))
+    let limit = |bits: i64| bits.clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    Features::from_array(rest.map(|number| {
+        let bits = number.bits() + random.between(-distance, distance);
+        Q::from_bits(limit(bits))
+    }))
 }

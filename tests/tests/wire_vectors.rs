@@ -4,6 +4,7 @@
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -223,7 +224,7 @@ fn inspection() -> DeviceMessage {
         frame_time_us: 6_405,
         exposure_us: 5_922,
         longest_exposure_us: 6_405,
-        gain_sixteenths: 24,
+        gain_sixteenths: Q::from_bits(24),
     })
 }
 
@@ -244,7 +245,7 @@ fn rest() -> RestPosition {
             marker(6_553_600, 11_796_480),
         ],
         rect_center: (Px(10_485_760), Px(7_864_320)),
-        rect_area: 943_718_400,
+        rect_area: Q::from_int(14_400),
     }
 }
 

@@ -7,6 +7,7 @@ use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -160,7 +161,7 @@ pub fn longest_rest() -> RestPosition {
         centroid: CentroidEstimator::RednessWeighted,
         markers: longest_sample().markers.unwrap(),
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
-        rect_area: i64::MIN,
+        rect_area: Q::from_bits(i64::MIN),
     }
 }
 
@@ -220,7 +221,7 @@ fn longest_inspection() -> Inspection {
         frame_time_us: u32::MAX,
         exposure_us: u32::MAX,
         longest_exposure_us: u32::MAX,
-        gain_sixteenths: u16::MAX,
+        gain_sixteenths: Q::from_bits(u16::MAX),
     }
 }
 
@@ -533,7 +534,7 @@ fn any_inspection() -> impl Strategy<Value = Inspection> {
             frame_time_us: frame,
             exposure_us: exposure,
             longest_exposure_us: longest,
-            gain_sixteenths: gain,
+            gain_sixteenths: Q::from_bits(gain),
         },
     )
 }
@@ -689,7 +690,7 @@ pub fn any_rest() -> impl Strategy<Value = RestPosition> {
             },
             markers,
             rect_center: (Px(x), Px(y)),
-            rect_area,
+            rect_area: Q::from_bits(rect_area),
         },
     )
 }

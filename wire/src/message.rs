@@ -5,6 +5,7 @@ use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport}
 use heapless::{String, Vec};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -248,8 +249,8 @@ pub struct Inspection {
     pub exposure_us: u32,
     /// The longest that it can be, µs.
     pub longest_exposure_us: u32,
-    /// The camera's gain, sixteenths.
-    pub gain_sixteenths: u16,
+    /// The camera's gain.
+    pub gain_sixteenths: Q<4, u16>,
 }
 
 /// A register of the camera that does not hold what was written.

@@ -3,6 +3,7 @@
 use heapless::String;
 use hivtac_terms::camera::{CameraLimits, CameraSettings};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
@@ -30,8 +31,8 @@ pub struct RestPosition {
     pub markers: [Marker; 4],
     /// The mean centre of their bounding rectangle, (x, y).
     pub rect_center: (Px, Px),
-    /// Its mean area, 1/65,536 px².
-    pub rect_area: i64,
+    /// Its mean area, px².
+    pub rect_area: Q<16, i64>,
 }
 
 /// Answer to [`GetSettings`](crate::message::Request::GetSettings).

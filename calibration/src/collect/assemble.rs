@@ -3,7 +3,6 @@
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::Features;
 use hivtac_terms::marker::Marker;
-use hivtac_terms::units::Px;
 
 use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};
@@ -198,8 +197,8 @@ fn radius_samples(kept: &[&Kept], times: &[f64]) -> Result<Vec<RadiusSample>> {
 }
 
 /// Mean distance of the markers from their middle, px.
-fn mean_radius_px(markers: &[[i64; 3]; 4]) -> f64 {
-    let px = |m: usize, axis: usize| markers[m][axis] as f64 / 65_536.0;
+fn mean_radius_px(markers: &[Marker; 4]) -> f64 {
+    let px = |m: usize, axis: usize| [markers[m].x, markers[m].y][axis].to_f64();
     let middle = [0, 1].map(|axis| (0..4).map(|m| px(m, axis)).sum::<f64>() / 4.0);
     let distance = |m: usize| (px(m, 0) - middle[0]).hypot(px(m, 1) - middle[1]);
     (0..4).map(distance).sum::<f64>() / 4.0
@@ -283,7 +282,7 @@ fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
         },
         tip_mm: (kept.pose.filter(|_| force_n != 0.0)).map(|pose| pose.place_mm),
         seen: match &kept.seen {
-            Ok(markers) => Ok(observation(markers)?),
+            Ok(markers) => Ok(observation(markers)),
             Err(why) => Err(why.clone()),
         },
     })
@@ -296,19 +295,11 @@ fn reach_mm(recording: &Recording) -> f64 {
     far.fold(0.0, f64::max)
 }
 
-fn observation(markers: &[[i64; 3]; 4]) -> Result<Observation> {
-    let mut found = [Marker::default(); 4];
-    for (marker, [x, y, area]) in found.iter_mut().zip(markers) {
-        *marker = Marker {
-            x: Px(i32::try_from(*x)?),
-            y: Px(i32::try_from(*y)?),
-            area: u32::try_from(*area)?,
-        };
+fn observation(markers: &[Marker; 4]) -> Observation {
+    Observation {
+        features_q16: Features::of_markers(markers).to_array(),
+        areas_px: markers.map(|marker| marker.area),
     }
-    Ok(Observation {
-        features_q16: Features::of_markers(&found).to_array(),
-        areas_px: found.map(|marker| marker.area),
-    })
 }
 
 fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {

@@ -16,7 +16,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_scene::Contact;
+use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, Sample};
 use serde::{Deserialize, Serialize};
 
@@ -253,9 +255,8 @@ pub struct Kept {
     pub device_us: u64,
     /// The pose, or nothing for the untouched film.
     pub pose: Option<Pose>,
-    /// The markers' (x, y) in 1/65,536 px and area in px, or the status names that say why there
-    /// are none, or none to trust.
-    pub seen: Result<[[i64; 3]; 4], String>,
+    /// The markers, or the status names that say why there are none, or none to trust.
+    pub seen: Result<[Marker; 4], String>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -348,17 +349,21 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
     let number = |i: usize| -> Result<i64> { Ok(record[i].parse()?) };
     let seen = match &record[7] {
         "" => {
-            let mut markers = [[0; 3]; 4];
+            let mut markers = [Marker::default(); 4];
             for (m, marker) in markers.iter_mut().enumerate() {
-                for (part, value) in marker.iter_mut().enumerate() {
-                    *value = number(8 + 3 * m + part)?;
-                }
-                let [x, y, area] = marker;
+                let first = 8 + 3 * m;
+                let (x, y, area) = (number(first)?, number(first + 1)?, number(first + 2)?);
                 ensure!(
-                    [x, y].iter().all(|at| (0..=FARTHEST_MARKER).contains(*at))
-                        && (0..=i64::from(LARGEST_AREA)).contains(area),
-                    "marker {m} is beyond every frame: {marker:?}"
+                    [x, y].iter().all(|at| (0..=FARTHEST_MARKER).contains(at))
+                        && (0..=i64::from(LARGEST_AREA)).contains(&area),
+                    "marker {m} is beyond every frame: {:?}",
+                    [x, y, area]
                 );
+                *marker = Marker {
+                    x: Px(x as i32),
+                    y: Px(y as i32),
+                    area: area as u32,
+                };
             }
             Ok(markers)
         }
@@ -410,11 +415,9 @@ pub fn done(folder: &Path) -> Result<Vec<Pose>> {
 mod tests {
     use super::*;
     use hivtac_terms::conditions::CentroidEstimator;
-    use hivtac_terms::marker::Marker;
     use hivtac_terms::threshold::PixelFormat;
     use hivtac_terms::threshold::Yuv422;
     use hivtac_terms::threshold::{HsvBox, Threshold};
-    use hivtac_terms::units::Px;
 
     fn conditions() -> Conditions {
         Conditions {
@@ -485,7 +488,12 @@ mod tests {
         assert_eq!((recording.runs(), recording.samples.len()), (2, 3));
         let kept = &recording.samples[0];
         assert_eq!((kept.pose, kept.device_us), (None, 25_600));
-        assert_eq!(kept.seen.as_ref().unwrap()[1], [131_072, 2, 190]);
+        let expected = Marker {
+            x: Px::from_int(2),
+            y: Px(2),
+            area: 190,
+        };
+        assert_eq!(kept.seen.as_ref().unwrap()[1], expected);
         assert_eq!(recording.samples[1].pose, Some(tilted()));
         assert_eq!(recording.samples[1].seen, Err("markers_missing".into()));
         assert_eq!(recording.gauge_lines, [(0, 0.55, "+0.1\u{fffd}2,N".into())]);
@@ -590,6 +598,7 @@ mod tests {
         refused(",131072,", ",9131072000,", "line 2: marker 1");
         refused(",131072,", ",-131072,", "line 2: marker 1");
         refused(",190,", ",59182190,", "line 2: marker 0");
+        refused(",190,", ",-190,", "line 2: marker 0");
         refused(",4,-3.5,", ",NaN,-3.5,", "line 2: `NaN");
         refused(",4,-3.5,", ",4,-93.5,", "angles are within");
         refused(",0.5,-2\n", ",1e9,-2\n", "places within");

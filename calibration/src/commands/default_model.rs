@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_calibration::conditions::{pixel_format, preset};
+use hivtac_calibration::conditions::pixel_format;
 use hivtac_calibration::dataset::{Loads, Recipe};
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::train::Options;
@@ -22,7 +22,7 @@ const STEPS: u8 = 1;
 #[derive(Args)]
 pub struct DefaultModelArgs {
     /// Lens and camera: ov7725 (320 × 240), or mt9v034 (160 × 152, mono, black markers).
-    #[arg(long, value_parser = preset, default_value = "ov7725")]
+    #[arg(long, default_value = "ov7725")]
     preset: Preset,
     /// Pixel format: rgb565, yuv422 or mono; the preset's own unless told.
     #[arg(long, value_parser = pixel_format)]

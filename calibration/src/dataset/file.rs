@@ -12,8 +12,10 @@ use std::str::FromStr;
 use anyhow::{Context, Result, bail, ensure};
 use csv::StringRecord;
 use hivtac_sensing::features::FEATURES;
+use hivtac_terms::fixed::Q;
 
-use super::{About, Dataset, Observation, PX, Place, Row};
+use super::{About, Dataset, Observation, Place, Row};
+use crate::rest::q16;
 
 const FORMAT: &str =
     "# hivtac-dataset 2; forces in N in the film frame, features in px (area in px²), areas in px";
@@ -239,12 +241,12 @@ impl Record<'_> {
 
     fn observation(&self) -> Result<Observation> {
         let mut seen = Observation {
-            features_q16: [0; FEATURES],
+            features_q16: [Q::default(); FEATURES],
             areas_px: [0; 4],
         };
         for (i, feature) in seen.features_q16.iter_mut().enumerate() {
             let number = self.number(self.columns.features_at() + i, LARGEST_FEATURE)?;
-            *feature = (number * PX).round() as i64;
+            *feature = q16(number);
         }
         for (i, area) in seen.areas_px.iter_mut().enumerate() {
             let column = self.columns.areas_at() + i;
@@ -362,7 +364,7 @@ mod tests {
             assert!(error.contains(words), "{error}");
         };
         let feature = |row: &mut Row, i: usize| {
-            row.seen.as_mut().unwrap().features_q16[i] = i64::MAX / 2;
+            row.seen.as_mut().unwrap().features_q16[i] = Q::from_bits(i64::MAX / 2);
         };
         refused(&|row| feature(row, 0), "column x0_px");
         refused(&|row| feature(row, 10), "column rect_area_px2");

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result};
 use hivtac_sensing::features::FEATURES;
+use hivtac_terms::fixed::Q;
 use serde::{Deserialize, Serialize};
 
 use crate::conditions::Conditions;
@@ -23,9 +24,6 @@ pub use file::LARGEST_AREA;
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};
-
-/// A pixel in Q16.16.
-const PX: f64 = 65_536.0;
 
 /// A data set.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,8 +101,8 @@ impl<'a> Sample<'a> {
 /// What the pipeline saw in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
-    /// The eleven features in 1/65,536 px (the rectangle's area in 1/65,536 px²).
-    pub features_q16: [i64; FEATURES],
+    /// The eleven features, px and at last px².
+    pub features_q16: [Q<16, i64>; FEATURES],
     /// Areas of markers 0–3 in the mask, px.
     pub areas_px: [u32; 4],
 }
@@ -112,7 +110,7 @@ pub struct Observation {
 impl Observation {
     /// The features in px (px²); exact, because they are below 2⁵³ steps.
     pub fn features_px(&self) -> [f64; FEATURES] {
-        self.features_q16.map(|q16| q16 as f64 / PX)
+        self.features_q16.map(|number| number.to_f64())
     }
 }
 
@@ -196,7 +194,8 @@ impl Dataset {
         let mean = |sum: i64| (2 * sum + count).div_euclid(2 * count);
         Ok(Rest {
             features_q16: std::array::from_fn(|i| {
-                mean(seen.iter().map(|s| s.features_q16[i]).sum())
+                let sum = seen.iter().map(|s| s.features_q16[i].bits()).sum();
+                Q::from_bits(mean(sum))
             }),
             areas_px: std::array::from_fn(|i| {
                 mean(seen.iter().map(|s| i64::from(s.areas_px[i])).sum()) as u32
@@ -213,7 +212,7 @@ mod tests {
 
     pub(super) fn example() -> Dataset {
         let seen = |x: i64| Observation {
-            features_q16: std::array::from_fn(|i| x + i as i64),
+            features_q16: std::array::from_fn(|i| Q::from_bits(x + i as i64)),
             areas_px: [200; 4],
         };
         let about = About {
@@ -261,7 +260,9 @@ mod tests {
             force_n: [0.0, 0.0, pose.map_or(0.0, |_| -0.01 * (i + 1) as f64)],
             tip_mm: None,
             seen: Ok(Observation {
-                features_q16: std::array::from_fn(|f| (1000 * session + 10 * i + f) as i64),
+                features_q16: std::array::from_fn(|f| {
+                    Q::from_bits((1000 * session + 10 * i + f) as i64)
+                }),
                 areas_px: [200; 4],
             }),
         };
@@ -296,7 +297,7 @@ mod tests {
         let rest = example().rest().unwrap();
         assert_eq!(
             rest.features_q16,
-            std::array::from_fn(|i| 11 + i as i64),
+            std::array::from_fn(|i| Q::from_bits(11 + i as i64)),
             "10.5 rounds up"
         );
         assert_eq!(rest.areas_px, [200; 4]);

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use hivtac_scene::{Contact, Format, Load, Options, Preset as ScenePreset, Scene};
+use hivtac_scene::{Contact, Format, Load, Options, PresetCamera, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
@@ -189,23 +189,18 @@ impl Recipe {
     /// The scene of a session.
     ///
     /// # Errors
-    /// When the scene has no such preset or frame size.
+    /// When the scene has no such frame size.
     pub fn scene(&self, session: usize) -> Result<Scene> {
-        let preset = match self.preset {
-            Preset::Paper => ScenePreset::Paper,
-            Preset::Ov7725 => ScenePreset::Ov7725,
-            Preset::Mt9v034 => ScenePreset::Mt9v034,
-        };
         let scene = Scene::preset(
             "rest",
-            preset,
+            self.preset,
             self.width.into(),
             self.height.into(),
             self.seed,
         )?;
         let session = Session::numbered(session, self.seed);
         let mut options = session.options(self.width);
-        options.markers = preset.usual_markers();
+        options.markers = self.preset.usual_markers();
         options.film.contact = self.contact;
         options.format = match self.format {
             PixelFormat::Rgb565 => Format::Rgb565,
@@ -248,7 +243,7 @@ impl Recipe {
     /// What the file of its data set says about it.
     ///
     /// # Errors
-    /// When the scene has no such preset or frame size.
+    /// When the scene has no such frame size.
     pub fn about(&self) -> Result<About> {
         let scene = self.scene(0)?;
         let options: &Options = scene.options();

@@ -1,7 +1,9 @@
 //! A training as it goes on: weights, optimizer, data and the best weights so far.
 
 use anyhow::Result;
+use hivtac_sensing::features::Features;
 use hivtac_sensing::network::scale_inputs;
+use hivtac_terms::fixed::Q;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 
@@ -12,7 +14,7 @@ use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
 use crate::network::{Arithmetic, INPUTS, Layer, Network, Standardization};
 use crate::quantize::input_scaling;
-use crate::weights::features_from_q16;
+use crate::weights::{features_from_q16, q16};
 
 /// Rows that are measured at a time.
 const MEASURED_ROWS: usize = 256;
@@ -69,13 +71,14 @@ impl Rows {
     ) -> Result<Self> {
         let scaling = input_scaling(&network.input)?;
         let steps = samples.features.iter().map(|row| {
-            let features = features_from_q16(&row.map(|px| (px * 65_536.0).round() as i64))?;
+            let features = features_from_q16(&row.map(q16))?;
             Ok(scale_inputs(
                 &scaling,
                 &features,
-                &features_from_q16(&[0; INPUTS])?,
-                &features_from_q16(&[0; INPUTS])?,
-            ))
+                &Features::default(),
+                &Features::default(),
+            )
+            .map(Q::bits))
         });
         let floats = standardized(&samples.features, &network.input);
         let answer = |row: usize| -> Vec<f32> {

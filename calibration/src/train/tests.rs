@@ -9,10 +9,10 @@ use crate::conditions::Conditions;
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
 use crate::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 
-const PX: f64 = 65_536.0;
 const ROWS: usize = 200;
 
 fn weights(network: Network) -> Weights {
@@ -20,7 +20,7 @@ fn weights(network: Network) -> Weights {
         format: Weights::format(),
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
-            features_q16: [1 << 20; INPUTS],
+            features_q16: [Q::from_int(16); INPUTS],
             areas_px: [200; 4],
         },
         range: Range::default(),
@@ -40,8 +40,8 @@ fn plain() -> Options {
 }
 
 /// Features on the chip's grid.
-fn features(random: &mut ChaCha8Rng) -> [i64; INPUTS] {
-    std::array::from_fn(|_| random.random_range(90 << 16..110_i64 << 16))
+fn features(random: &mut ChaCha8Rng) -> [Q<16, i64>; INPUTS] {
+    std::array::from_fn(|_| Q::from_bits(random.random_range(90 << 16..110_i64 << 16)))
 }
 
 /// Training's forward pass and the exported model on the chip give the same integers, every one of
@@ -50,7 +50,10 @@ fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let q16: Vec<_> = (0..ROWS).map(|_| features(&mut random)).collect();
     let samples = Samples {
-        features: q16.iter().map(|row| row.map(|q| q as f64 / PX)).collect(),
+        features: q16
+            .iter()
+            .map(|row| row.map(|number| number.to_f64()))
+            .collect(),
         answers: vec![[0.01, 0.02, -0.1]; ROWS],
         ..Samples::default()
     };
@@ -114,7 +117,7 @@ fn training_rounds_as_the_chip_does() {
 fn easy(rows: usize, seed: u64) -> Samples {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let features: Vec<[f64; INPUTS]> = (0..rows)
-        .map(|_| features(&mut random).map(|q| q as f64 / PX))
+        .map(|_| features(&mut random).map(|number| number.to_f64()))
         .collect();
     let answer = |f: &[f64; INPUTS]| [f[0] - f[1], (f[2] - 100.0).abs(), f[3] * f[4] / 100.0];
     Samples {

@@ -109,7 +109,7 @@ fn from_a_recording_to_a_model_for_the_unit() {
     let mut pressed = 0;
     for (seen, force) in data.accepted().filter(|(_, force)| *force != [0.0; 3]) {
         let expected = markers(force);
-        let off_px = (seen.features_q16[4] - i64::from(expected[2].x.0)) as f64 / 65_536.0;
+        let off_px = (seen.features_q16[4] - expected[2].x.into()).to_f64();
         assert!(off_px.abs() < 0.5, "{force:?}: {off_px} px");
         assert!(seen.features_q16[4] >= rest.features_q16[4]);
         pressed += 1;

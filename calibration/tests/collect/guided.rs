@@ -6,13 +6,12 @@ use std::sync::{Arc, Mutex};
 use hivtac_calibration::collect::simulated::SimulatedGauge;
 use hivtac_calibration::dataset::{MarkerDetector, Recipe, Sensing};
 use hivtac_scene::Load;
+use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::units::{
-    MicroNewtons, MilliDegrees, Px, UnsignedMicroNewtons, UnsignedMilliDegrees,
-};
+use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
 use hivtac_wire::message::Sample;
 
 use crate::fake::*;
@@ -78,9 +77,10 @@ fn film(pressed: Pressed) -> Film {
         };
         let rendered = scene.render_load(&load, frame.into()).unwrap();
         let seen = sensing.detect(&rendered).unwrap().unwrap();
+        let centroids = Features::from_array(seen.features_q16).centroids;
         let marker = |k: usize| Marker {
-            x: Px(seen.features_q16[2 * k] as i32),
-            y: Px(seen.features_q16[2 * k + 1] as i32),
+            x: centroids[k].0,
+            y: centroids[k].1,
             area: seen.areas_px[k],
         };
         Sample {

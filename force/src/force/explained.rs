@@ -11,7 +11,7 @@ use crate::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before there is a frame.
@@ -25,9 +25,9 @@ pub struct Resting {
     areas: [f32; 4],
 }
 
-/// A marker that rests this far from where it rested when the model was made, px in Q16.16, is
-/// another unit's: half a pixel.
-const LARGEST_DRIFT: u32 = 1 << 15;
+/// A marker that rests this far from where it rested when the model was made is another unit's:
+/// half a pixel.
+const LARGEST_DRIFT: Px = Px(Px::ONE.0 / 2);
 /// What is left over of markers that are known less well, in parts of its variance, is seldom more
 /// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
 /// the light: in 1 of 1,000 frames).
@@ -185,9 +185,10 @@ impl Resting {
 /// since.
 fn is_near(rest: &Rest, own: &Rest) -> bool {
     let pairs = rest.features.centroids.iter().zip(&own.features.centroids);
-    pairs.into_iter().all(|(a, b)| {
-        a.0.0.abs_diff(b.0.0) <= LARGEST_DRIFT && a.1.0.abs_diff(b.1.0) <= LARGEST_DRIFT
-    })
+    let near = |a: Px, b: Px| a.0.abs_diff(b.0) <= LARGEST_DRIFT.0.unsigned_abs();
+    pairs
+        .into_iter()
+        .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
 }
 
 fn force(forward: &Forward<'_>, estimate: &Estimate, unit: &Systematic) -> Force {

@@ -25,7 +25,8 @@ pub use noise::{FrameNoise, NoiseLevel};
 use crate::model::{CalibratedRange, Model, OutputKind};
 use crate::network::Output;
 use hivtac_terms::angle::atan2;
-use hivtac_terms::cordic::{ONE_BITS, sin_cos};
+use hivtac_terms::cordic::sin_cos;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::root::rounded_root;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
@@ -75,16 +76,17 @@ impl Polar {
     pub fn to_vector(self) -> [MicroNewtons; 3] {
         let (sin_alpha, cos_alpha) = sin_cos(self.alpha);
         let (sin_beta, cos_beta) = sin_cos(self.beta);
-        let product = |a: i64, b: i64| (a * b + (1 << (ONE_BITS - 1))) >> ONE_BITS;
         let unit = [
             product(sin_alpha, cos_beta),
             sin_beta,
             -product(cos_alpha, cos_beta),
         ];
         unit.map(|part| {
-            let component = product(part, i64::from(self.magnitude.0));
+            let component: Q<30, i64> =
+                Q::from_bits(i64::from(part.bits()) * i64::from(self.magnitude.0));
             // A sine may exceed one in its last place.
-            MicroNewtons(component.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32)
+            let limits = (i64::from(-i32::MAX), i64::from(i32::MAX));
+            MicroNewtons(component.rounded().clamp(limits.0, limits.1) as i32)
         })
     }
 }
@@ -165,6 +167,12 @@ fn of_angles([alpha, beta, magnitude]: [i32; 3]) -> Polar {
         beta: MilliDegrees(beta.clamp(-90_000, 90_000)),
         magnitude: MicroNewtons(magnitude.max(0)),
     }
+}
+
+/// The product of two numbers within ±1 and a few steps.
+fn product(a: Q<30>, b: Q<30>) -> Q<30> {
+    let product: Q<60, i64> = Q::from_bits(i64::from(a.bits()) * i64::from(b.bits()));
+    product.rounded_to().narrowed()
 }
 
 /// Of a component: at most 2⁶², so that three fit 64 bits, unsigned.

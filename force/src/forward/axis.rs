@@ -1,10 +1,12 @@
 //! Cubic splines along one axis of the film.
 
+use hivtac_terms::fixed::Q;
+
 /// How many coefficients a spline's value at a point is made of.
 pub const SPAN: usize = 4;
 /// The least and the most nodes of an axis.
 pub const NODES: core::ops::RangeInclusive<usize> = 6..=16;
-/// What weights are parts of: the largest i16.
+/// What weights add up to, in steps of 2⁻¹⁵: the largest i16, as one itself does not fit.
 pub const ONE: f32 = 32_767.0;
 /// 3·2²²: what is added to it is rounded to whole numbers, as f32 has no smaller steps there, and
 /// those of 16 bits are then the low half of its bits.
@@ -33,9 +35,9 @@ pub struct Weights {
     /// The first coefficient.
     pub first: usize,
     /// Parts of the value, [`ONE`] in all; their sizes add up to at most that and four roundings.
-    pub values: [i16; SPAN],
+    pub values: [Q<15, i16>; SPAN],
     /// Parts of the slope in units of [`Axis::slope_unit`], likewise.
-    pub slopes: [i16; SPAN],
+    pub slopes: [Q<15, i16>; SPAN],
 }
 
 impl Axis {
@@ -127,9 +129,9 @@ impl Axis {
     }
 }
 
-/// To nearest, of at most 2¹⁵.
-fn rounded(value: f32) -> i16 {
-    (value + WHOLE).to_bits() as i16
+/// The nearest, of so many steps of 2⁻¹⁵, at most 2¹⁵.
+fn rounded(steps: f32) -> Q<15, i16> {
+    Q::from_bits((steps + WHOLE).to_bits() as i16)
 }
 
 #[cfg(test)]
@@ -140,9 +142,12 @@ mod tests {
 
     const NODES_MM: [f32; 8] = [-5.0, -2.0, 0.0, 1.0, 2.5, 3.0, 4.0, 5.0];
 
-    fn value(parts: &[i16; SPAN], coefficients: &[f64]) -> f64 {
+    fn value(parts: &[Q<15, i16>; SPAN], coefficients: &[f64]) -> f64 {
         let pairs = parts.iter().zip(coefficients);
-        pairs.map(|(part, c)| f64::from(*part) * c).sum::<f64>() / f64::from(ONE)
+        pairs
+            .map(|(part, c)| f64::from(part.bits()) * c)
+            .sum::<f64>()
+            / f64::from(ONE)
     }
 
     /// Greville's points are the coefficients of x itself: its slope is one.
@@ -196,7 +201,7 @@ mod tests {
             let weights = axis.at(from + x * (to - from));
             prop_assert!(weights.first + SPAN <= axis.count());
             for parts in [weights.values, weights.slopes] {
-                let sum: i32 = parts.iter().map(|part| i32::from(*part).abs()).sum();
+                let sum: i32 = parts.iter().map(|part| i32::from(part.bits()).abs()).sum();
                 prop_assert!(sum <= 32_767 + 4, "{parts:?}");
             }
         }

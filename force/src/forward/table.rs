@@ -264,15 +264,14 @@ mod tests {
         let along_y = |k: usize| k / (2 * 16 * 6);
         let sign = |k: usize| {
             let (i, j) = (k % 6, along_y(k));
-            let part = |parts: &Weights, k: usize| {
-                parts
-                    .slopes
-                    .get(k.wrapping_sub(parts.first))
-                    .copied()
-                    .unwrap_or(1)
+            let is_negative = |parts: &Weights, k: usize| {
+                let part = parts.slopes.get(k.wrapping_sub(parts.first));
+                part.is_some_and(|part| part.bits() < 0)
             };
-            let negative = (part(&place.x, i) < 0) != (part(&place.y, j) < 0);
-            if negative { i16::MIN } else { i16::MAX }
+            match is_negative(&place.x, i) != is_negative(&place.y, j) {
+                true => i16::MIN,
+                false => i16::MAX,
+            }
         };
         with(sign, |table| {
             let answer = answer(table, 0, &place, [0.6, 0.6, 0.6]);

@@ -12,6 +12,7 @@ mod portable;
 pub use hivtac_markers::sqrt;
 
 use crate::layer::{Layer, MAX_WIDTH};
+use hivtac_terms::fixed::Q;
 
 /// What a kernel may read beyond the inputs of the widest layer: it loads ahead.
 const LOADED_AHEAD: usize = 4;
@@ -58,15 +59,15 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
     portable::activate(layer, sums, inputs.values_mut(), done);
 }
 
-/// Parts of coefficients at four by four nodes, Q15: those of the value and of the slope along each
-/// axis, whose sizes each add up to at most 2¹⁵ and four roundings.
+/// Parts of coefficients at four by four nodes: those of the value and of the slope along each
+/// axis, whose sizes each add up to at most one and four roundings.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(4))]
 pub struct Parts {
     /// Along y, for each line: of the value and of the slope.
-    pub y: [[i16; 2]; 4],
+    pub y: [[Q<15, i16>; 2]; 4],
     /// Along x: of the value, of the slope.
-    pub x: [[i16; 4]; 2],
+    pub x: [[Q<15, i16>; 4]; 2],
 }
 
 /// What a term's coefficient counts in an output, and in its slopes by size and by tilt along x and

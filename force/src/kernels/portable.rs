@@ -4,6 +4,7 @@ use super::{Factors, Parts, Sums};
 use crate::layer::{Layer, MAX_WIDTH};
 use crate::packing::{ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 use crate::rescale::rescale_sum;
+use hivtac_terms::fixed::Q;
 
 /// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::model::Model::parse) has proven
 /// that it fits, in any order of summation.
@@ -17,10 +18,10 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
 /// The sum of all terms times their factors, its slopes by size and tilt, by their own factors, and
 /// its slopes along x and y.
 ///
-/// A term is the sum of its coefficients at four by four nodes, in parts of some 2¹⁴ to a step: its
-/// value, its slope along x and its slope along y. A coefficient is an i16; those of a term that
-/// lie beside each other along x follow each other, the next term's are `node` bytes farther, and
-/// those beside each other along y `line` bytes. What lies beyond the end counts as zero.
+/// A term is the sum of its coefficients at four by four nodes, 2¹⁴ times as large: its value, its
+/// slope along x and its slope along y. A coefficient is an i16; those of a term that lie beside
+/// each other along x follow each other, the next term's are `node` bytes farther, and those beside
+/// each other along y `line` bytes. What lies beyond the end counts as zero.
 ///
 /// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
 /// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
@@ -34,7 +35,7 @@ pub fn spline(
     let mut sums = [0.0; 6];
     for (term, [whole, by_size, by_a, by_b]) in factors.iter().enumerate() {
         let [here, along_x, along_y] =
-            around(steps, term * node, line, parts).map(|sum| sum as f32);
+            around(steps, term * node, line, parts).map(|sum| sum.bits() as f32);
         let products = [
             here * whole,
             here * by_size,
@@ -51,15 +52,18 @@ pub fn spline(
 }
 
 /// A term whose coefficients begin there: its value, its slope along x and its slope along y.
-fn around(steps: &[u8], at: usize, line: usize, parts: &Parts) -> [i32; 3] {
-    let times = |sum: i32, part: i16| ((i64::from(sum) * i64::from(part)) >> 16) as i32;
-    let mut sums = [0; 3];
+fn around(steps: &[u8], at: usize, line: usize, parts: &Parts) -> [Q<14>; 3] {
+    let times = |sum: Q<15>, part: Q<15, i16>| {
+        let product: Q<30, i64> = Q::from_bits(i64::from(sum.bits()) * i64::from(part.bits()));
+        product.floor_to().narrowed()
+    };
+    let mut sums = [Q::default(); 3];
     for (j, [value, slope]) in parts.y.into_iter().enumerate() {
         let row = four(steps, at + j * line);
         let [here, along_x] = parts.x.map(|parts| {
             let products = row.iter().zip(parts);
-            products.fold(0, |sum, (step, part)| {
-                sum + i32::from(*step) * i32::from(part)
+            products.fold(Q::default(), |sum, (step, part)| {
+                sum + Q::from_bits(i32::from(*step) * i32::from(part.bits()))
             })
         });
         sums[0] += times(here, value);

@@ -230,7 +230,7 @@ fn push_features(bytes: &mut Vec<u8>, features: &Features) {
         bytes.extend(x.0.to_le_bytes());
         bytes.extend(y.0.to_le_bytes());
     }
-    bytes.extend(features.rect_area.to_le_bytes());
+    bytes.extend(features.rect_area.bits().to_le_bytes());
 }
 
 fn push_input(bytes: &mut Vec<u8>, input: &InputScaling) {

@@ -8,6 +8,7 @@ use crate::features::{FEATURES, Features};
 use crate::rest::Rest;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
@@ -29,8 +30,8 @@ pub(super) const NAME_LENGTH: usize = 16;
 pub(super) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 const LARGEST_SIDE: u16 = 800;
-/// The rectangle of four centroids in the largest frame, px² in Q16.16.
-const LARGEST_RECT: i64 = (LARGEST_SIDE as i64 * LARGEST_SIDE as i64) << 16;
+/// The rectangle of four centroids in the largest frame, px².
+const LARGEST_RECT: Q<16, i64> = Q::from_int(LARGEST_SIDE as i64 * LARGEST_SIDE as i64);
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
     let (body, crc, version) = frame(bytes)?;
@@ -299,8 +300,8 @@ fn features(reader: &mut Reader<'_>) -> Result<Features, ModelError> {
         *pair = (Px(reader.u32()? as i32), Px(reader.u32()? as i32));
     }
     let offset = reader.offset;
-    let rect_area = i64::from_le_bytes(reader.array()?);
-    if !(0..=LARGEST_RECT).contains(&rect_area) {
+    let rect_area = Q::from_bits(i64::from_le_bytes(reader.array()?));
+    if !(Q::from_bits(0)..=LARGEST_RECT).contains(&rect_area) {
         let allowed = "0 to 640000 px² in Q16.16";
         return Err(ModelError::Field {
             name: "rectangle area",

@@ -4,6 +4,7 @@ use super::encode::{LayerSpec, ModelSpec};
 use super::*;
 use crate::packing::WeightWidth;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::HsvBox;
 #[cfg(test)]
@@ -20,7 +21,7 @@ pub fn spec(widths: &[u16]) -> ModelSpec {
             (Px(7), Px(8)),
         ],
         rect_center: (Px(9), Px(10)),
-        rect_area: 11,
+        rect_area: Q::from_bits(11),
     };
     ModelSpec {
         conditions: Conditions {
@@ -171,7 +172,7 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
     for (x, y) in &mut spec.rest.features.centroids {
         (*x, *y) = (Px((next() >> 7) as i32), Px((next() >> 7) as i32));
     }
-    spec.input.mean.rect_area = i64::from(next());
+    spec.input.mean.rect_area = Q::from_bits(i64::from(next()));
     spec.rest.areas = [0; 4].map(|_: u32| 1 + next() % 640_000);
     spec.input.multipliers = [0; 11].map(|_: u32| 1 + (next() >> 9));
     spec.input.shifts = [0; 11].map(|_: u8| 1 + (next() % 62) as u8);

@@ -5,6 +5,7 @@ use super::hear;
 use super::report::Step;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
+use hivtac_terms::fixed::Q;
 use hivtac_wire::message::{DeviceMessage, Inspection, Request};
 use serde_json::{Value, json};
 use std::time::Duration;
@@ -15,8 +16,8 @@ const INSPECTION: Duration = Duration::from_secs(3);
 /// Exposure beyond this part of the longest, with gain beyond [`HIGH_GAIN`], is all that the camera
 /// can do.
 const LONG_EXPOSURE: f64 = 0.95;
-/// Sixteenths: 3.9 of the 4 that the firmware allows.
-const HIGH_GAIN: u16 = 62;
+/// 3.9 of the 4 that the firmware allows.
+const HIGH_GAIN: Q<4, u16> = Q::from_bits(62);
 
 /// Has the camera's registers read back.
 ///
@@ -74,7 +75,7 @@ pub fn judge(it: &Inspection) -> Step {
         it.registers,
         f64::from(it.exposure_us) / 1e3,
         f64::from(it.longest_exposure_us) / 1e3,
-        f64::from(it.gain_sixteenths) / 16.0,
+        it.gain_sixteenths.to_f64(),
     );
     Step::new("camera", found, wrong, json!(it))
 }

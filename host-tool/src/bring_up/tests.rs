@@ -3,6 +3,7 @@
 use super::report::{Report, Step};
 use super::{camera, clocks, colours, noise, press};
 use hivtac_host::frame::Frame;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
@@ -28,7 +29,7 @@ fn inspection() -> Inspection {
         frame_time_us: 6_405,
         exposure_us: 4_000,
         longest_exposure_us: 6_405,
-        gain_sixteenths: 16,
+        gain_sixteenths: Q::from_bits(16),
     }
 }
 
@@ -52,12 +53,12 @@ fn a_register_that_lost_its_value_is_named() {
 fn light_that_asks_for_everything_the_camera_has_is_too_little() {
     let dim = Inspection {
         exposure_us: 6_382,
-        gain_sixteenths: 63,
+        gain_sixteenths: Q::from_bits(63),
         ..inspection()
     };
     says(&camera::judge(&dim), &["more light"]);
     let at_low_gain = Inspection {
-        gain_sixteenths: 32,
+        gain_sixteenths: Q::from_bits(32),
         ..dim
     };
     says(&camera::judge(&at_low_gain), &[]);

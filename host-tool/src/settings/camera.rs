@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct CameraJson {
     exposure_us: Option<u32>,
-    gain_sixteenths: Option<u16>,
+    gain_sixteenths: Option<Sixteenths>,
     rate: RateJson,
 }
 
@@ -29,7 +29,7 @@ enum RateJson {
 #[derive(Serialize)]
 pub struct InUse {
     exposure_us: u32,
-    gain_sixteenths: u16,
+    gain_sixteenths: Sixteenths,
     frames_per_second: u16,
 }
 
@@ -38,7 +38,7 @@ impl CameraJson {
     pub fn new(settings: &CameraSettings) -> CameraJson {
         CameraJson {
             exposure_us: settings.exposure.map(|exposure| exposure.0),
-            gain_sixteenths: settings.gain.map(|gain| gain.0),
+            gain_sixteenths: settings.gain,
             rate: match settings.rate {
                 Rate::Full => RateJson::Full,
                 Rate::Half => RateJson::Half,
@@ -51,7 +51,7 @@ impl CameraJson {
     pub fn settings(&self) -> CameraSettings {
         CameraSettings {
             exposure: self.exposure_us.map(Microseconds),
-            gain: self.gain_sixteenths.map(Sixteenths),
+            gain: self.gain_sixteenths,
             rate: match self.rate {
                 RateJson::Full => Rate::Full,
                 RateJson::Half => Rate::Half,
@@ -66,7 +66,7 @@ impl InUse {
     pub fn new(report: &CameraReport) -> InUse {
         InUse {
             exposure_us: report.exposure.0,
-            gain_sixteenths: report.gain.0,
+            gain_sixteenths: report.gain,
             frames_per_second: frames_per_second(report),
         }
     }

@@ -9,6 +9,7 @@ use hivtac_host::files::read_at_most;
 use hivtac_host::shown::unit_number;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
@@ -66,15 +67,15 @@ pub struct Rest {
     dilations: u8,
     centroid: CentroidEstimator,
     markers: [Seen; 4],
-    rect_center_q16: [i32; 2],
-    rect_area_q16: i64,
+    rect_center_q16: [Px; 2],
+    rect_area_q16: Q<16, i64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Seen {
-    x_q16: i32,
-    y_q16: i32,
+    x_q16: Px,
+    y_q16: Px,
     area_px: u32,
 }
 
@@ -90,7 +91,7 @@ pub struct Kept {
     erases: u32,
     failures: u32,
     camera_in_use: InUse,
-    drift_q16: Option<i32>,
+    drift_q16: Option<Px>,
 }
 
 #[derive(Serialize)]
@@ -130,7 +131,7 @@ impl Kept {
             erases: report.erases,
             failures: report.failures,
             camera_in_use: InUse::new(&report.camera),
-            drift_q16: report.drift.map(|drift| drift.0),
+            drift_q16: report.drift,
         }
     }
 }
@@ -231,27 +232,26 @@ impl Rest {
             dilations: position.dilations,
             centroid: position.centroid,
             markers: position.markers.map(|marker| Seen {
-                x_q16: marker.x.0,
-                y_q16: marker.y.0,
+                x_q16: marker.x,
+                y_q16: marker.y,
                 area_px: marker.area,
             }),
-            rect_center_q16: [position.rect_center.0.0, position.rect_center.1.0],
+            rect_center_q16: position.rect_center.into(),
             rect_area_q16: position.rect_area,
         }
     }
 
     fn position(&self) -> RestPosition {
-        let [x, y] = self.rect_center_q16;
         RestPosition {
             format: self.format,
             dilations: self.dilations,
             centroid: self.centroid,
             markers: self.markers.map(|marker| Marker {
-                x: Px(marker.x_q16),
-                y: Px(marker.y_q16),
+                x: marker.x_q16,
+                y: marker.y_q16,
                 area: marker.area_px,
             }),
-            rect_center: (Px(x), Px(y)),
+            rect_center: self.rect_center_q16.into(),
             rect_area: self.rect_area_q16,
         }
     }
@@ -334,7 +334,7 @@ mod tests {
                 centroid: CentroidEstimator::RednessWeighted,
                 markers: [0, 1, 2, 3].map(marker),
                 rect_center: (Px(7), Px(8)),
-                rect_area: 1 << 40,
+                rect_area: Q::from_bits(1 << 40),
             }),
             kept: Selection::ALL,
             found: Found::Settings,

@@ -3,6 +3,7 @@
 use crate::fake::*;
 use crate::run::*;
 use crate::snapshot::at_rest;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::force::Place;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{Micrometres, SignedMicrometres};
@@ -22,7 +23,7 @@ fn inspection() -> DeviceMessage {
         frame_time_us: FRAME_US,
         exposure_us: 4_000,
         longest_exposure_us: FRAME_US,
-        gain_sixteenths: 16,
+        gain_sixteenths: Q::from_bits(16),
     })
 }
 

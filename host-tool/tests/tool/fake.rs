@@ -2,6 +2,7 @@
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -231,7 +232,7 @@ pub fn settings() -> SettingsReport {
                 marker(100, 180),
             ],
             rect_center: (Px(160 << 16), Px(120 << 16)),
-            rect_area: 14_400 << 16,
+            rect_area: Q::from_int(14_400),
         }),
         kept: Selection {
             name: true,

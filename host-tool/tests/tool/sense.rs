@@ -175,7 +175,7 @@ fn the_force_is_that_of_the_sensing_code() {
         .unwrap()
         .to_array()
         .iter()
-        .map(|n| json!(*n as f64 / 65_536.0))
+        .map(|n| json!(n.to_f64()))
         .collect();
     assert_eq!(found["features"], Value::from(features));
     assert_eq!(found["markers"][2]["id"], 2);

@@ -59,14 +59,14 @@ const FOUR_PI: f32 = 4.0 * core::f32::consts::PI;
 /// No blob's ellipse is smaller: it has at least a pixel. And no variance of one.
 const LEAST_AREA: f32 = 1.0;
 const LEAST_VARIANCE: f32 = 1.0 / 4_096.0;
-/// What soft edges add to a diameter (0.8 px: a pixel half covered by red passes), and a dilation
-/// (2 px).
-const SOFT_EDGE: i32 = 52_429;
-const DILATION_EDGE: i32 = 131_072;
+/// What soft edges add to a diameter: 0.8 px, as a pixel half covered by red passes.
+const SOFT_EDGE: Px = Px(52_429);
+/// What a dilation adds to it, px.
+const DILATION_EDGE: i32 = 2;
 
 /// What the mask adds to a marker's diameter before more is known, px.
 pub fn nominal_edge(dilations: u8) -> Px {
-    Px(SOFT_EDGE + i32::from(dilations) * DILATION_EDGE)
+    SOFT_EDGE + Px::from_int(i32::from(dilations) * DILATION_EDGE)
 }
 
 impl Shape {
@@ -85,7 +85,7 @@ impl Shape {
         let fill = area / larger(FOUR_PI * sqrt(determinant), LEAST_AREA);
         let lopsided = |low: u16, high: u16, mean: Px| {
             let middle = (i32::from(low) + i32::from(high)) << (Px::FRACTION_BITS - 1);
-            (middle - mean.0).abs()
+            Px((middle - mean.0).abs())
         };
         let lopsided = lopsided(blob.x0, blob.x1, x).max(lopsided(blob.y0, blob.y1, y));
         Some(Shape {
@@ -95,7 +95,7 @@ impl Shape {
             passed: blob.passed,
             fill,
             hollow: (1.0 - fill) * 0.5 * (xx + yy),
-            lopsided: Px(lopsided).to_f32(),
+            lopsided: lopsided.to_f32(),
             density: blob.weight as f32 * by_area,
             central,
         })

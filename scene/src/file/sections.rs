@@ -1,10 +1,11 @@
 //! The sections of a scene file, each with its defaults. `docs/scene-file.md` lists every key.
 
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
 use crate::{
     Catch, Drag, Format, Grasp, JPEG_QUALITY, Lens, Load, Mechanics, Motion, Mounting, Options,
-    Paint, Patch, Preset, Press, Salt, Scene, SceneError, Shutter, Specks, Vibration,
+    Paint, Patch, Preset, PresetCamera, Press, Salt, Scene, SceneError, Shutter, Specks, Vibration,
 };
 
 /// A whole file.
@@ -26,11 +27,22 @@ pub(super) struct SceneFile {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct CameraSection {
+    #[serde(deserialize_with = "preset")]
     preset: Preset,
     width: Option<u32>,
     height: Option<u32>,
     format: Option<FormatName>,
     jpeg_quality: Option<u8>,
+}
+
+/// A preset by its name.
+fn preset<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Preset, D::Error> {
+    const NAMES: &[&str] = &{
+        let [first, second, third] = Preset::ALL;
+        [first.name(), second.name(), third.name()]
+    };
+    let name = String::deserialize(deserializer)?;
+    Preset::from_name(&name).ok_or_else(|| D::Error::unknown_variant(&name, NAMES))
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]

@@ -17,14 +17,13 @@ use super::{Filter, Moment};
 use hivtac_force::force::{Force, Place, Polar};
 use hivtac_terms::angle::atan2;
 use hivtac_terms::division::Divisor;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::root::{root, rounded_root};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, Milliseconds, SignedMicrometres, UnsignedMicroNewtons,
     UnsignedMilliDegrees,
 };
 
-/// Fractional bits of what a low-pass remembers.
-const BITS: u32 = 8;
 /// Frames farther apart than this count as so far apart, µs: products then fit 64 bits.
 const LONGEST_US: u64 = 1 << 20;
 /// So does a time constant, ms.
@@ -36,15 +35,15 @@ struct Smoother<const N: usize> {
     /// The frames before, newest first, and how many of them there are.
     before: [[i32; N]; 2],
     count: u8,
-    /// A low-pass' output, with [`BITS`] fractional bits.
-    smooth: [i64; N],
+    /// A low-pass' output.
+    smooth: [Q<8, i64>; N],
 }
 
 impl<const N: usize> Smoother<N> {
     const EMPTY: Self = Self {
         before: [[0; N]; 2],
         count: 0,
-        smooth: [0; N],
+        smooth: [Q::from_bits(0); N],
     };
 
     /// Takes the next values, so many µs after those before.
@@ -57,7 +56,7 @@ impl<const N: usize> Smoother<N> {
             Filter::MedianOfThree => self.medians(&now),
         };
         if self.count == 0 {
-            self.smooth = now.map(|value| i64::from(value) << BITS);
+            self.smooth = now.map(|value| Q::from_int(value.into()));
         }
         self.before = [now, self.before[0]];
         self.count = self.count.saturating_add(1);
@@ -70,11 +69,11 @@ impl<const N: usize> Smoother<N> {
         let constant_us = time_constant.0.min(LARGEST_MS) * 1_000;
         let divisor = Divisor::new(constant_us + after_us as u32);
         for (smooth, now) in self.smooth.iter_mut().zip(now) {
-            let off = (i64::from(*now) << BITS) - *smooth;
-            *smooth += divisor.signed_quotient(off * after_us as i64);
+            let off = Q::from_int(i64::from(*now)) - *smooth;
+            let product = off * after_us as i64;
+            *smooth += Q::from_bits(divisor.signed_quotient(product.bits()));
         }
-        let half = 1 << (BITS - 1);
-        self.smooth.map(|smooth| ((smooth + half) >> BITS) as i32)
+        self.smooth.map(|smooth| smooth.rounded() as i32)
     }
 
     fn medians(&self, now: &[i32; N]) -> [i32; N] {

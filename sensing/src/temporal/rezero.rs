@@ -16,6 +16,7 @@
 
 use hivtac_force::features::Features;
 use hivtac_force::rest::Rest;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::temporal::Rezero;
 use hivtac_terms::units::{MilliPx, Px};
 
@@ -30,8 +31,8 @@ const MOST_FRAMES: u32 = 1 << 16;
 pub(super) struct Rezeroing {
     /// As it was taken.
     taken: Option<Rest>,
-    /// How far it is from there: x and y of markers 0–3, 1/65,536 px.
-    moved: [i32; 8],
+    /// How far it is from there: x and y of markers 0–3.
+    moved: [Px; 8],
     quiet: Option<Quiet>,
 }
 
@@ -48,7 +49,8 @@ struct Quiet {
 struct Mean {
     begun_us: u64,
     frames: u32,
-    sums: [i64; 8],
+    /// x and y of markers 0–3, px.
+    sums: [Q<16, i64>; 8],
 }
 
 impl Mean {
@@ -56,7 +58,7 @@ impl Mean {
         Mean {
             begun_us,
             frames: 0,
-            sums: [0; 8],
+            sums: [Q::default(); 8],
         }
     }
 }
@@ -65,7 +67,7 @@ impl Rezeroing {
     /// No rest position was taken.
     pub const NONE: Rezeroing = Rezeroing {
         taken: None,
-        moved: [0; 8],
+        moved: [Px(0); 8],
         quiet: None,
     };
 
@@ -89,10 +91,8 @@ impl Rezeroing {
 
     /// How far the coordinate moved that moved farthest.
     pub fn farthest(&self) -> Px {
-        Px(self
-            .moved
-            .iter()
-            .fold(0, |most, moved| most.max(moved.abs())))
+        let far = self.moved.iter().map(|moved| Px(moved.0.abs()));
+        far.max().unwrap_or_default()
     }
 
     /// Takes the features of a frame that nothing touched, or none of any other frame. Gives the
@@ -141,41 +141,42 @@ impl Rezeroing {
         let frames = i64::from(mean.frames);
         let before = self.moved;
         for ((moved, sum), rest) in self.moved.iter_mut().zip(mean.sums).zip(coordinates(taken)) {
-            let there = sum.checked_div(frames).unwrap_or(0) - i64::from(rest);
-            let farther = (there - i64::from(*moved)).clamp(-rate, rate);
+            let mean = Q::from_bits(sum.bits().checked_div(frames).unwrap_or(0));
+            let there = mean - Q::from(rest);
+            let farther = (there - Q::from(*moved)).clamp(-rate, rate);
             // A total that was lowered is kept, too.
-            *moved = (i64::from(*moved) + farther).clamp(-total, total) as i32;
+            *moved = Px::saturated((Q::from(*moved) + farther).clamp(-total, total));
         }
         (self.moved != before).then(|| displaced(taken, &self.moved))
     }
 }
 
-/// 1/65,536 px.
-fn steps(distance: MilliPx) -> i64 {
-    i64::from(distance.0) * i64::from(Px::ONE.0) / 1_000
+/// px.
+fn steps(distance: MilliPx) -> Q<16, i64> {
+    Q::from_bits(Q::<16, i64>::from_int(distance.0.into()).bits() / 1_000)
 }
 
 fn take(mean: &mut Mean, features: &Features) {
     mean.frames += 1;
-    let all = features.centroids.iter().flat_map(|(x, y)| [x.0, y.0]);
+    let all = features.centroids.iter().flat_map(|(x, y)| [*x, *y]);
     for (sum, coordinate) in mean.sums.iter_mut().zip(all) {
-        *sum += i64::from(coordinate);
+        *sum += Q::from(coordinate);
     }
 }
 
-fn coordinates(rest: &Rest) -> impl Iterator<Item = i32> {
+fn coordinates(rest: &Rest) -> impl Iterator<Item = Px> {
     let centroids = rest.features.centroids;
-    centroids.into_iter().flat_map(|(x, y)| [x.0, y.0])
+    centroids.into_iter().flat_map(|(x, y)| [x, y])
 }
 
-/// A rest position whose markers lie so much farther, 1/65,536 px. The bounding rectangle of a mean
-/// is not the mean of rectangles: what it changes by is added.
-fn displaced(rest: &Rest, moved: &[i32; 8]) -> Rest {
+/// A rest position whose markers lie so much farther. The bounding rectangle of a mean is not the
+/// mean of rectangles: what it changes by is added.
+fn displaced(rest: &Rest, moved: &[Px; 8]) -> Rest {
     let mut markers = rest.markers();
     let before = Features::of_markers(&markers);
     for (marker, by) in markers.iter_mut().zip(moved.chunks_exact(2)) {
-        marker.x.0 = marker.x.0.saturating_add(by[0]);
-        marker.y.0 = marker.y.0.saturating_add(by[1]);
+        marker.x.0 = marker.x.0.saturating_add(by[0].0);
+        marker.y.0 = marker.y.0.saturating_add(by[1].0);
     }
     let after = Features::of_markers(&markers);
     let (center, area) = (rest.features.rect_center, rest.features.rect_area);
@@ -206,16 +207,16 @@ mod tests {
         total: MilliPx(100),
     };
 
-    /// Markers that rest, all shifted to the right, 1/65,536 px.
-    fn shifted(right: i32) -> [Marker; 4] {
+    /// Markers that rest, all shifted to the right.
+    fn shifted(right: Px) -> [Marker; 4] {
         [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
-            x: Px((x << 16) + right),
-            y: Px(y << 16),
+            x: Px::from_int(x) + right,
+            y: Px::from_int(y),
             area: 130,
         })
     }
 
-    fn features(right: i32) -> Features {
+    fn features(right: Px) -> Features {
         Features::of_markers(&shifted(right))
     }
 
@@ -228,7 +229,7 @@ mod tests {
 
     impl Followed {
         fn new() -> Self {
-            let rest = Rest::of_markers(&shifted(0));
+            let rest = Rest::of_markers(&shifted(Px(0)));
             let mut state = Rezeroing::NONE;
             state.set(Some(rest));
             Self {
@@ -254,13 +255,13 @@ mod tests {
 
         /// How far to the right it is, px.
         fn right(&self) -> f64 {
-            (self.rest.features.centroids[0].0.0 - (100 << 16)) as f64 / 65_536.0
+            (self.rest.features.centroids[0].0 - Px::from_int(100)).to_f64()
         }
     }
 
     #[test]
     fn it_waits_goes_by_its_rate_and_stops_at_its_total() {
-        let drifted = features(1 << 16);
+        let drifted = features(Px::ONE);
         let mut film = Followed::new();
         film.for_ms(2_900, Some(&drifted));
         assert!(
@@ -282,15 +283,15 @@ mod tests {
     #[test]
     fn what_drifts_back_is_followed_back() {
         let mut film = Followed::new();
-        film.for_ms(20_000, Some(&features(3_000)));
+        film.for_ms(20_000, Some(&features(Px(3_000))));
         assert!((film.right() - 3_000.0 / 65_536.0).abs() < 1e-4);
-        film.for_ms(20_000, Some(&features(0)));
+        film.for_ms(20_000, Some(&features(Px(0))));
         assert_eq!(film.right(), 0.0);
     }
 
     #[test]
     fn nothing_is_followed_while_something_touches_nor_soon_after() {
-        let drifted = features(1 << 16);
+        let drifted = features(Px::ONE);
         let mut film = Followed::new();
         film.for_ms(10_000, None);
         film.for_ms(1_900, Some(&drifted));
@@ -307,7 +308,7 @@ mod tests {
     fn without_a_rest_position_that_was_taken_nothing_moves() {
         let mut film = Followed::new();
         film.state.set(None);
-        film.for_ms(20_000, Some(&features(1 << 16)));
+        film.for_ms(20_000, Some(&features(Px::ONE)));
         assert_eq!(film.right(), 0.0);
     }
 
@@ -323,7 +324,7 @@ mod tests {
             let mut film = Followed::new();
             let mut before = film.right();
             for (shift, ms) in shifts {
-                film.with(&limits, ms, Some(&features(shift)));
+                film.with(&limits, ms, Some(&features(Px(shift))));
                 let fastest = f64::from(rate) * 1e-3 * (ms / 1_000 + 1) as f64;
                 prop_assert!((film.right() - before).abs() <= fastest + 1e-4);
                 prop_assert!(film.right().abs() <= f64::from(total) * 1e-3 + 1e-4);

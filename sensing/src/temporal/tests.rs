@@ -45,8 +45,8 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, Rezero, TemporalError, TemporalSettings};
 use hivtac_terms::units::{Milliseconds, Px};
 
-/// A frame with a force, of markers that stand so far to the right, 1/65,536 px.
-fn frame(force: Option<Force>, right: i32) -> Measurement {
+/// A frame with a force, of markers that stand so far to the right.
+fn frame(force: Option<Force>, right: Px) -> Measurement {
     let markers = rest(right).markers();
     Measurement {
         status: Status::NOT_CALIBRATED | Status::CONTACT,
@@ -56,10 +56,10 @@ fn frame(force: Option<Force>, right: i32) -> Measurement {
     }
 }
 
-fn rest(right: i32) -> Rest {
+fn rest(right: Px) -> Rest {
     let markers = [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
-        x: Px((x << 16) + right),
-        y: Px(y << 16),
+        x: Px::from_int(x) + right,
+        y: Px::from_int(y),
         area: 130,
     });
     Rest::of_markers(&markers)
@@ -90,7 +90,7 @@ fn contact_and_slip_do_not_know_of_the_filter() {
             x: SignedMicrometres(moved),
             ..place
         });
-        let seen = frame(Some(force), 0);
+        let seen = frame(Some(force), Px(0));
         let [a, b] = [&mut unfiltered, &mut filtered].map(|t| t.follow(moment(number), &seen));
         assert_eq!(a.status, b.status);
         assert_eq!(a.force, Some(force));
@@ -104,10 +104,10 @@ fn contact_and_slip_do_not_know_of_the_filter() {
 #[test]
 fn a_frame_without_a_force_has_neither_contact_nor_slip() {
     let mut temporal = Temporal::new();
-    let pressed = frame(Some(pressed(50_000, 100)), 0);
+    let pressed = frame(Some(pressed(50_000, 100)), Px(0));
     let followed = temporal.follow(moment(1), &pressed);
     assert!(followed.status.contains(Status::CONTACT));
-    let followed = temporal.follow(moment(2), &frame(None, 0));
+    let followed = temporal.follow(moment(2), &frame(None, Px(0)));
     assert_eq!(followed.status, Status::NOT_CALIBRATED);
     assert_eq!(followed.force, None);
 }
@@ -115,8 +115,8 @@ fn a_frame_without_a_force_has_neither_contact_nor_slip() {
 #[test]
 fn settings_that_are_none_change_nothing_and_others_begin_anew() {
     let mut temporal = Temporal::new();
-    let between = frame(Some(pressed(1_500, 100)), 0);
-    temporal.follow(moment(1), &frame(Some(pressed(50_000, 100)), 0));
+    let between = frame(Some(pressed(1_500, 100)), Px(0));
+    temporal.follow(moment(1), &frame(Some(pressed(50_000, 100)), Px(0)));
     let mut bad = TemporalSettings::default();
     bad.contact.ends.0 = 0;
     assert_eq!(temporal.set(bad), Err(TemporalError::ContactEnds));
@@ -129,7 +129,7 @@ fn settings_that_are_none_change_nothing_and_others_begin_anew() {
 
 #[test]
 fn re_zeroing_is_off_at_first_and_told_when_it_moved() {
-    let at_rest = frame(Some(pressed(500, 100)), 3_000);
+    let at_rest = frame(Some(pressed(500, 100)), Px(3_000));
     let rezeroing = TemporalSettings {
         rezero: Some(Rezero {
             after: Milliseconds(1_000),
@@ -140,15 +140,15 @@ fn re_zeroing_is_off_at_first_and_told_when_it_moved() {
     for (settings, moves) in [(TemporalSettings::default(), false), (rezeroing, true)] {
         let mut temporal = Temporal::new();
         temporal.set(settings).unwrap();
-        temporal.set_tare(Some(rest(0)));
+        temporal.set_tare(Some(rest(Px(0))));
         let followed: std::vec::Vec<_> = (0..700)
             .map(|number| temporal.follow(moment(number), &at_rest))
             .collect();
         assert_eq!(followed.iter().any(|f| f.rest.is_some()), moves);
         let last = followed.last().unwrap();
         assert_eq!(last.status.contains(Status::REZEROED), moves);
-        assert_eq!(temporal.tare(), Some(&rest(0)), "as it was taken");
-        temporal.set_tare(Some(rest(0)));
+        assert_eq!(temporal.tare(), Some(&rest(Px(0))), "as it was taken");
+        temporal.set_tare(Some(rest(Px(0))));
         let followed = temporal.follow(moment(700), &at_rest);
         assert!(!followed.status.contains(Status::REZEROED));
     }

@@ -38,7 +38,7 @@ pub struct PeersArgs {
     #[arg(long, value_delimiter = ',', default_values = ["800x600", "320x240"])]
     sizes: Vec<Size>,
     /// Geometry preset: paper or ov7725.
-    #[arg(long, default_value = "paper", value_parser = preset)]
+    #[arg(long, default_value = "paper")]
     preset: Preset,
     /// Frames to train on for each of 286 poses.
     #[arg(long, default_value_t = 42)]
@@ -71,10 +71,6 @@ pub struct PeersArgs {
     /// `<!-- peers: end -->`.
     #[arg(long)]
     document: Option<PathBuf>,
-}
-
-fn preset(name: &str) -> Result<Preset, String> {
-    hivtac_calibration::conditions::preset(name).map_err(|error| error.to_string())
 }
 
 impl PeersArgs {

@@ -2,12 +2,12 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_calibration::dataset::reasons;
-use hivtac_scene::{Camera, Frame, Load, Preset as ScenePreset, Scene, Truth};
+use hivtac_scene::{Camera, Frame, Load, Scene, Truth};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::TareBuilder;
-use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;
 
@@ -15,8 +15,6 @@ use hivtac_terms::threshold::ByteOrder;
 static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 16;
-/// A pixel in Q16.16.
-const PX: f64 = 65_536.0;
 
 /// The pipeline of a sensor.
 pub struct Pipeline {
@@ -41,13 +39,8 @@ impl Pipeline {
     /// When the default model cannot be read, or the pipeline does not take such frames.
     pub fn new(camera: &Camera) -> Result<Pipeline> {
         let size = |count: u32| u16::try_from(count).context("the frame is too large");
-        let preset = match camera.preset() {
-            ScenePreset::Paper => Preset::Paper,
-            ScenePreset::Ov7725 => Preset::Ov7725,
-            ScenePreset::Mt9v034 => Preset::Mt9v034,
-        };
         let (width, height) = (size(camera.width())?, size(camera.height())?);
-        let geometry = Geometry::preset(preset, width, height);
+        let geometry = Geometry::preset(camera.preset(), width, height);
         let model = Model::parse(MODEL).map_err(|error| anyhow!("the default model: {error}"))?;
         let model = (model.conditions.geometry == geometry).then_some(model);
         let settings = match &model {
@@ -100,7 +93,7 @@ impl Pipeline {
 }
 
 fn centroid_px(marker: Marker) -> [f64; 2] {
-    [marker.x, marker.y].map(|part| f64::from(part.0) / PX)
+    [marker.x, marker.y].map(|part| part.to_f64())
 }
 
 /// The largest distance of a found marker from the truth, px; endless when the truth has no such

@@ -15,6 +15,7 @@ use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::ByteOrder;
 use rayon::prelude::*;
@@ -240,9 +241,12 @@ fn add(datasets: &mut [Dataset; 2], recipe: &Recipe, looked: Vec<Looked>) -> Res
 /// FNV-1a over all features.
 fn fingerprint(datasets: &[Dataset; 2]) -> u64 {
     let rows = datasets.iter().flat_map(|dataset| &dataset.rows);
-    let numbers = rows.flat_map(|row| row.seen.as_ref().map_or([0; 11], |seen| seen.features_q16));
+    let numbers = rows.flat_map(|row| {
+        let seen = row.seen.as_ref();
+        seen.map_or([Q::default(); 11], |seen| seen.features_q16)
+    });
     numbers
-        .flat_map(i64::to_le_bytes)
+        .flat_map(|number| number.bits().to_le_bytes())
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
         })

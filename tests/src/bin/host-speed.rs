@@ -14,7 +14,7 @@ use hivtac_scene::{Preset, Scene};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::screen::ScreenedTable;
 use hivtac_sensing::settings::Settings;
-use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::pictures;
 use serde_json::json;
@@ -50,9 +50,9 @@ fn report(folder: &Path, name: &str, size: [u16; 2], pixels: &[u16]) -> Result<(
         .collect();
     fs::write(&file, bytes).with_context(|| format!("writing {}", file.display()))?;
     let (fastest, measurement) = time(size, pixels)?;
-    let markers = measurement.markers.map(|markers| {
-        markers.map(|marker| [marker.x, marker.y].map(|px| f64::from(px.0) / 65_536.0))
-    });
+    let markers = measurement
+        .markers
+        .map(|markers| markers.map(|marker| [marker.x, marker.y].map(|px| px.to_f64())));
     println!(
         "{}",
         json!({
@@ -67,7 +67,7 @@ fn report(folder: &Path, name: &str, size: [u16; 2], pixels: &[u16]) -> Result<(
 }
 
 fn time([width, height]: [u16; 2], pixels: &[u16]) -> Result<(Duration, Measurement)> {
-    let geometry = Geometry::preset(geometry::Preset::Ov7725, width, height);
+    let geometry = Geometry::preset(Preset::Ov7725, width, height);
     let mut sensor = Box::new(Sensor::<64, ScreenedTable>::new());
     sensor.configure(Settings::usual(geometry, ByteOrder::Native), None)?;
     let (start, mut fastest) = (Instant::now(), Duration::MAX);

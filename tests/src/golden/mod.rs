@@ -22,6 +22,7 @@ use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tables::{ByteTable, Pixels};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
@@ -377,14 +378,9 @@ fn for_each_row(
 }
 
 fn features(source: &mut impl Source) -> Result<Features, ScriptError> {
-    let mut numbers = [0; FEATURES];
+    let mut numbers = [Q::default(); FEATURES];
     for value in &mut numbers {
-        *value = i64::from_le_bytes(bytes(source)?);
+        *value = Q::from_bits(i64::from_le_bytes(bytes(source)?));
     }
-    let px = |i: usize| Px(numbers[i] as i32);
-    Ok(Features {
-        centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
-        rect_center: (px(8), px(9)),
-        rect_area: numbers[10],
-    })
+    Ok(Features::from_array(numbers))
 }

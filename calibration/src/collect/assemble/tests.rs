@@ -1,5 +1,6 @@
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
+use hivtac_terms::units::Px;
 
 use super::*;
 use crate::collect::gauge::Unit;
@@ -21,11 +22,15 @@ fn force_n(time_s: f64) -> f64 {
     TIMES_S.iter().zip(&WEIGHTS_G).map(hangs).sum()
 }
 
-fn markers(force_n: f64) -> [[i64; 3]; 4] {
+fn markers(force_n: f64) -> [Marker; 4] {
     let reach = 44.0 + 40.0 * force_n.sqrt();
     [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| {
-        let q16 = |px: f64| (px * 65_536.0) as i64;
-        [q16(160.0 + x * reach), q16(120.0 + y * reach), 190]
+        let px = |px: f64| Px((px * 65_536.0) as i32);
+        Marker {
+            x: px(160.0 + x * reach),
+            y: px(120.0 + y * reach),
+            area: 190,
+        }
     })
 }
 

@@ -21,7 +21,7 @@ use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::conditions::CentroidEstimator::{self, BinaryMask, RednessWeighted};
-use hivtac_terms::geometry::{self, Geometry};
+use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_tests::models::{self, Weights};
@@ -182,7 +182,7 @@ fn stepping(steps: u8) -> Result<Case> {
         .rest;
     let load = Load::from_angles(0.1, 4.0, -3.0)?.with_offset_mm([1.5, -2.25])?;
     let pressed = scene("rest", format, size)?.render_load(&load, 1)?;
-    let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
+    let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
     let markers = seen(geometry, format, RednessWeighted, &pressed.words())?.1;
     Ok(Case {
         work: Work::Steps(steps, markers, rest),
@@ -314,7 +314,7 @@ fn frame(scene: &Scene, number: u64, seconds: f64) -> Vec<u16> {
 
 /// The small model, for frames of a size.
 fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Result<Vec<u8>> {
-    let geometry = Geometry::preset(geometry::Preset::Ov7725, size[0], size[1]);
+    let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
     let pixels = frame(&scene("rest", format, size)?, 0, 0.0);
     let rest = position(geometry, format, centroid, &pixels)?;
     Ok(models::file_for(geometry, format, (centroid, rest), &SMALL))

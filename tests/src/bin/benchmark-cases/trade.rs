@@ -96,10 +96,10 @@ pub fn write_cases(folder: &Path) -> Result<()> {
 }
 
 /// Lens and camera: the sensor's, or the paper's for its size, which no supported camera has.
-fn preset(size: [u16; 2]) -> (Preset, hivtac_scene::Preset) {
+fn preset(size: [u16; 2]) -> Preset {
     match size {
-        [800, 600] => (Preset::Paper, hivtac_scene::Preset::Paper),
-        _ => (Preset::Ov7725, hivtac_scene::Preset::Ov7725),
+        [800, 600] => Preset::Paper,
+        _ => Preset::Ov7725,
     }
 }
 
@@ -137,10 +137,10 @@ fn made() -> Vec<Made> {
 
 impl Frames {
     fn of(size: [u16; 2], centroid: (&'static str, CentroidEstimator)) -> Result<Frames> {
-        let (here, there) = preset(size);
-        let geometry = Geometry::preset(here, size[0], size[1]);
+        let preset = preset(size);
+        let geometry = Geometry::preset(preset, size[0], size[1]);
         let (width, height) = (size[0].into(), size[1].into());
-        let scene = |name: &str| Scene::preset(name, there, width, height, 1);
+        let scene = |name: &str| Scene::preset(name, preset, width, height, 1);
         let rest = position(
             geometry,
             FORMAT,
