@@ -11,6 +11,7 @@ use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{PixelFormat, Threshold, Yuv422};
 use hivtac_wire::frame::CRC32;
+use hivtac_wire::health::Problem;
 use hivtac_wire::message::{
     DeviceMessage, MODEL_PART_BYTES, ModelIdentity, ModelPart, ModelSource, Outcome, Request,
     Sample,
@@ -481,7 +482,16 @@ fn a_kept_model_that_is_spoilt_is_replaced_by_the_built_in_one() {
     let built_in = (crc_of(BUILT_IN), ModelSource::Fallback);
     for contents in [torn, other] {
         let device = Device::new(Some(&contents));
-        assert_eq!(restarted(&device.flash), built_in);
+        let run = setup(&device.flash, RESTART_MS)
+            .at(RESTART_MS - 15, send(LATER, Request::GetHealth))
+            .run();
+        assert_eq!(has(&run), built_in);
+        let fallback = Problem::ModelFallback.bit();
+        let health = run.messages.iter().find_map(|message| match message {
+            DeviceMessage::Health(health) => Some((health.problems, health.at_start)),
+            _ => None,
+        });
+        assert_eq!(health, Some((fallback, fallback)));
         assert!(Contents::load(&device.flash).is_ok());
     }
 }
