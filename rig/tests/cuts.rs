@@ -25,7 +25,7 @@ pub fn left(before: &Contents, whole: &[Operation], cut: Cut) -> Contents {
     contents
 }
 
-/// What each cut of a whole run leaves, in turn. A cut after one operation is a cut before the next.
+/// What each cut of a whole run leaves, in turn. A cut after one operation is one before the next.
 pub fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (Cut, Contents)> {
     let mut contents = before.clone();
     let last = whole.len() - 1;

@@ -105,7 +105,7 @@ impl Light {
     }
 }
 
-/// Silicon that is too old: two flashes, and a pause of seven times as long. How long one is depends
+/// Silicon that is too old: two flashes, and a pause of seven times that. How long one is depends
 /// on the core's clock, which the rig does not follow there.
 pub fn assert_flashes_twice(report: &Report) {
     let light = Light::of(report, 0.0);
