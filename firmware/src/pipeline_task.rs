@@ -220,7 +220,7 @@ impl PipelineTask {
             self.sensor.push_rows_below(band.above, band.rows);
         }
         self.follower.scanned(fetched.is_some());
-        self.busy_us += begun.elapsed().as_micros() as u32;
+        self.busy_us += stats::since(begun).as_micros() as u32;
     }
 
     fn obey(&mut self, order: Order) {
@@ -350,7 +350,7 @@ impl PipelineTask {
         let followed = self.temporal.follow(moment(delivery), &measurement);
         let sample = self.sample(delivery, &measurement, &followed);
         let (frame, time_us) = (sample.frame, sample.time_us);
-        self.busy_us += begun.elapsed().as_micros() as u32;
+        self.busy_us += stats::since(begun).as_micros() as u32;
         stats::PROCESSING_US.set(self.busy_us);
         let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
         stats::LATENCY_US.set(latency_us as u32);

@@ -6,6 +6,11 @@
 //! known of them, and the arithmetic by one answer of the built-in model. Whether the camera is the
 //! right one, its registers hold what was written and its frames take the time that they should,
 //! its set-up finds out anyhow. Only the temperature is left out, whose converter needs time.
+//!
+//! # Limitations
+//! A model that is kept is not asked the question: its checksum says that its bytes are those that
+//! were sent, and the built-in model that kernels and arithmetic work. `docs/firmware.md` has the
+//! argument.
 
 use crate::health::{self, Condition};
 use crate::model;

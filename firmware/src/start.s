@@ -21,7 +21,13 @@ __pre_init:
     bne     7f
     movs    r1, #0                  // once
     str     r1, [r0]
-    ldr     r0, =0x1FF09800         // the loader's vectors (AN2606, STM32H743)
+    ldr     r0, =0x580244D0         // RCC_RSR: the loader starts the program by a jump (AN3156),
+    ldr     r1, [r0]                // which then is not to take this reset for its own
+    orr     r1, #0x00010000         // RMVF
+    str     r1, [r0]
+    ldr     r0, =0x1FF09800         // the loader's vectors: AN2606 has the ROM from 0x1FF00000 on,
+                                    // ST's "Jump to bootloader from application on STM32H7
+                                    // devices" where to enter it
     ldr     r1, =0xE000ED08         // VTOR
     str     r0, [r1]
     dsb

@@ -3,8 +3,14 @@
 use crate::shared::PASSING_OVER;
 use crate::vsync;
 use core::sync::atomic::{AtomicU32, Ordering};
-use embassy_time::Instant;
+use embassy_time::{Duration, Instant};
 use hivtac_wire::message::Stats;
+
+/// The time since then; none when the clock is behind that, which a difference of times would panic
+/// at. It goes back when its interrupt is late by more than half a turn of its timer.
+pub fn since(begun: Instant) -> Duration {
+    Instant::now().saturating_duration_since(begun)
+}
 
 /// A counter that stops at its largest value.
 pub struct Counter(AtomicU32);

@@ -196,7 +196,7 @@ impl Link {
         patience: Duration,
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<(), Failure> {
-        let what = name_of(&request);
+        let (what, advice) = (name_of(&request), after_silence(&request));
         let id = self.command(request)?;
         let end = Instant::now() + patience;
         while let Some(message) = self.receive(end)? {
@@ -207,7 +207,7 @@ impl Link {
         }
         let seconds = patience.as_secs_f32();
         Err(refused(format!(
-            "the device did not answer \"{what}\" within {seconds} s"
+            "the device did not answer \"{what}\" within {seconds} s; {advice}"
         )))
     }
 
@@ -253,6 +253,24 @@ fn name_of(request: &Request) -> &'static str {
     }
 }
 
+/// What to do when nothing was answered. The device may carry the command out all the same.
+fn after_silence(request: &Request) -> &'static str {
+    match request {
+        Request::Keep(_) => {
+            "it may be writing still and keep them all the same: wait 10 s, see what is kept with \
+             `hivtac settings get`, and try again if it is not"
+        }
+        Request::UseModel | Request::UseBuiltInModel | Request::Reset => {
+            "it may be writing still and do it all the same: wait 10 s, see with `hivtac info` \
+             which model it uses, and try again if it is another one"
+        }
+        _ => {
+            "it may do it all the same: wait 10 s and try again; when it repeats, `hivtac info` \
+             tells whether it restarts"
+        }
+    }
+}
+
 fn refused(message: String) -> Failure {
     Failure::new(Kind::Refused, message)
 }
@@ -266,7 +284,10 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::Done => return Ok(()),
         Outcome::InvalidArgument => "an argument is outside its range",
         Outcome::Unsupported => "its camera does not send that pixel format; choose another",
-        Outcome::Busy => "it is busy with the same thing; try again later",
+        Outcome::Busy => {
+            "it is still busy with an earlier command, perhaps one that was not answered or of \
+             another program: wait 10 s and try again"
+        }
         Outcome::NotRead => "this computer took no bytes for 0.1 s; is it busy? try again",
         Outcome::NoCamera => {
             "its camera does not answer, or is another one; `hivtac bring-up` says what to do"

@@ -79,7 +79,7 @@ pub struct Chip {
     rules: Rules,
     board: board::Kind,
     revision: Revision,
-    led_flashes_ns: Vec<u64>,
+    led_edges_ns: Vec<u64>,
     camera: SharedCamera,
     otg: Blocks,
     core: SharedCore,
@@ -144,7 +144,7 @@ impl Chip {
             rules,
             board,
             revision,
-            led_flashes_ns: Vec::new(),
+            led_edges_ns: Vec::new(),
             late: LateLine::default(),
             late_flags,
             crs: Crs::default(),
@@ -176,9 +176,17 @@ impl Chip {
         self.board
     }
 
-    /// When the LED went on, ns.
-    pub fn led_flashes_ns(&self) -> &[u64] {
-        &self.led_flashes_ns
+    /// When the LED went on and off, in turn, ns.
+    pub fn led_edges_ns(&self) -> &[u64] {
+        &self.led_edges_ns
+    }
+
+    /// The LED is on or off; it begins off.
+    fn drive_led(&mut self, is_on: bool, at: VirtualNanos) {
+        let was_on = !self.led_edges_ns.len().is_multiple_of(2);
+        if is_on != was_on {
+            self.led_edges_ns.push(at.0);
+        }
     }
 
     /// Words that the firmware wrote into full USB FIFOs.
@@ -189,6 +197,7 @@ impl Chip {
     /// Looks at the pins and clocks again, and passes on what changed.
     pub fn rewire(&mut self, at: VirtualNanos) {
         let wiring = self.slots.wiring(&self.part);
+        self.drive_led(wiring.led, at);
         if wiring != self.wiring {
             if wiring.hclk_hz > self.revision.fastest_bus_hz() {
                 let (hclk, revision) = (wiring.hclk_hz, self.revision);
@@ -198,9 +207,6 @@ impl Chip {
                     revision {revision:?} (DS12110)"
                     )
                 });
-            }
-            if wiring.led && !self.wiring.led {
-                self.led_flashes_ns.push(at.0);
             }
             self.wiring = wiring;
             self.dcmi.wire(wiring.pins, wiring.hclk_hz);

@@ -1,5 +1,6 @@
 //! What a run did, for people and as JSON.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use rigless::machine::Board;
@@ -9,7 +10,7 @@ use serde_json::{Value, json};
 use crate::camera::SharedCamera;
 use crate::chip::Chip;
 use crate::dcmi;
-use crate::flash::Bank;
+use crate::flash::{Bank, Operation};
 use crate::usb_host::{self, Port, SharedHost};
 
 /// Counters of a run.
@@ -19,8 +20,8 @@ pub struct Report {
     pub virtual_ns: u64,
     /// Wall time.
     pub wall: Duration,
-    /// When the LED went on, ns.
-    pub led_flashes_ns: Vec<u64>,
+    /// When the LED went on and off, in turn, ns.
+    pub led_edges_ns: Vec<u64>,
     /// Resets of the microcontroller.
     pub resets: usize,
     /// VSYNC pulses of the sensor.
@@ -36,7 +37,9 @@ pub struct Report {
     /// The camera interface.
     pub dcmi: dcmi::Counters,
     /// Operations of the flash's second bank.
-    pub flash_operations: u64,
+    pub flash_operations: Vec<Operation>,
+    /// Addresses of its words that were read or programmed.
+    pub flash_words: BTreeSet<u32>,
     /// Whether the power was cut in one of them.
     pub power_was_cut: bool,
     /// Bytes that the MDMA moved out of memories.
@@ -79,7 +82,7 @@ impl Report {
             virtual_ns,
             wall,
             resets: session.resets().len(),
-            led_flashes_ns: chip.led_flashes_ns().to_vec(),
+            led_edges_ns: chip.led_edges_ns().to_vec(),
             exposures: camera.exposures(),
             sccb_writes: camera.sccb_writes(),
             camera_fault: camera.faulty_output().map(str::to_owned),
@@ -87,6 +90,7 @@ impl Report {
             arrivals_failure: host.arrivals_failure().map(str::to_owned),
             dcmi: chip.dcmi.counters(),
             flash_operations: bank.operations(),
+            flash_words: bank.touched(),
             power_was_cut: bank.was_cut(),
             mdma_bytes: chip.mdma.memory_bytes(),
             port: host.port(),
@@ -126,7 +130,7 @@ impl Report {
                 "waits": self.dcmi.waits,
             },
             "flash": {
-                "operations": self.flash_operations,
+                "operations": self.flash_operations.len(),
                 "power_was_cut": self.power_was_cut,
             },
             "mdma": { "bytes": self.mdma_bytes },

@@ -20,6 +20,9 @@ const STACK: u32 = 0x2000_1000;
 /// ldr r0, flash; ldr r1, [r0]; msr msp, r1; ldr r1, [r0, #4]; bx r1; flash: .word; trap: b trap
 const JUMP: [u16; 6] = [0x4802, 0x6801, 0xF381, 0x8808, 0x6841, 0x4708];
 const TRAP: u16 = 0xE7FE;
+/// mov.w r2, #0x0400_0000; again: subs r2, #1; bne again: 134 million instructions. An even number
+/// of halfwords, as the jump reads its address at a multiple of four.
+const WAIT: [u16; 4] = [0xF04F, 0x6280, 0x3A01, 0xD1FD];
 
 /// The 96-bit number that every part is made with, at its address in system memory (RM0433 chapter
 /// 61).
@@ -38,13 +41,17 @@ pub fn temperature_calibration() -> Image {
     image("temperature-calibration", bytes, 0x1FF1_E820)
 }
 
-/// Where the loader's vectors are for a program that starts it (AN2606, STM32H743). What takes new
-/// firmware over USB is not here: it stands still, and the part is gone from USB.
+/// Where the loader's vectors are for a program that starts it (ST, "Jump to bootloader from
+/// application on STM32H7 devices"). What takes new firmware over USB is not here: the part is gone
+/// from USB for a while, and then the program in flash is started, as `dfu-util …:leave` has it, by
+/// a jump and not by a reset.
 pub fn firmware_loader() -> Image {
     const VECTORS: u32 = 0x1FF0_9800;
     let words = [STACK, VECTORS + 9];
     let mut bytes: Vec<u8> = words.into_iter().flat_map(u32::to_le_bytes).collect();
-    bytes.extend(TRAP.to_le_bytes());
+    bytes.extend(WAIT.into_iter().flat_map(u16::to_le_bytes));
+    bytes.extend(JUMP.into_iter().flat_map(u16::to_le_bytes));
+    bytes.extend(FLASH.to_le_bytes());
     image("firmware-loader", bytes, VECTORS)
 }
 

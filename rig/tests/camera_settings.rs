@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use crate::common::{Run, Setup, command, firmware, openmv};
+use crate::cuts;
 use crate::settings::Device;
-use hivtac_rig::flash::{Cut, Leaves};
+use hivtac_rig::flash::Contents;
 use hivtac_rig::script::Action;
 use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::status::Status;
@@ -252,35 +253,36 @@ fn the_rate_is_changed_while_forces_are_read_and_kept() {
     assert!(after.len() >= 8, "{after:?}");
 }
 
-/// Power is cut at each operation of keeping an exposure: the device has that or the one before.
+/// Power is cut at each operation of keeping an exposure, in each way: the device has that or the
+/// one before.
 #[test]
 fn after_a_power_cut_the_old_exposure_or_the_new_is_there() {
     let device = Device::new();
     let [old, new] = [exposed(2_000, Some(32)), exposed(4_000, Some(16))];
     let run = keeping(&device.flash, old, KEPT_MS).run();
     assert_eq!(run.outcome(KEEP), Outcome::Done);
-    let run = keeping(&device.copy("whole"), new, KEPT_MS).run();
+    let before = Contents::load(&device.flash).unwrap();
+    let run = keeping(&device.flash, new, KEPT_MS).run();
     assert_eq!(run.outcome(KEEP), Outcome::Done);
-    let operations = run.report.flash_operations;
-    assert!((2..10).contains(&operations), "{operations}");
-    let mut found = Vec::new();
-    for operation in 0..operations {
-        let flash = device.copy("cut");
-        let cut = Some(Cut {
-            operation,
-            leaves: Leaves::Torn,
-        });
-        let setup = keeping(&flash, new, KEPT_MS);
-        let run = Setup { cut, ..setup }.run();
-        assert!(run.report.power_was_cut, "{operation}");
-        let run = started(&flash);
-        let report = run.settings();
-        assert!(report.kept.camera, "{operation}");
+    let start = |flash: &Path| {
+        let run = started(flash);
         assert!(run.samples().iter().all(|sample| sample.force.is_some()));
-        found.push(report.camera.settings);
-    }
-    assert!(found.iter().all(|it| [old, new].contains(it)), "{found:?}");
-    assert_eq!((found[0], found.last()), (old, Some(&new)));
+        let report = run.settings();
+        let found = (report.kept.camera, report.camera.settings);
+        (found, run.report.flash_words.clone())
+    };
+    let mut found = Vec::new();
+    let judge = |cut, _: &Contents, (is_kept, settings): &(bool, CameraSettings)| {
+        assert!(
+            *is_kept && [old, new].contains(settings),
+            "{cut:?}: {settings:?}"
+        );
+        found.push(*settings);
+    };
+    let whole = run.report.flash_operations;
+    let (cuts, _) = cuts::start_each(cuts::images(&before, &whole), start, judge);
+    assert_eq!(cuts, 2 * whole.len() + 1);
+    assert_eq!((found.first(), found.last()), (Some(&old), Some(&new)));
 }
 
 /// The other camera: its registers are others, what they do is the same.

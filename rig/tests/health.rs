@@ -147,14 +147,32 @@ fn of_another_answer(file: &[u8]) -> Vec<u8> {
     others.next().expect("some bit matters")
 }
 
-/// The loader's stand-in does nothing: the part leaves USB and does not come back, as firmware
-/// that only restarts would.
+/// The loader's stand-in is gone from USB for a third of a second, and then starts the program by a
+/// jump. What was reset for it is no fault of the program: one that only restarts says so.
 #[test]
-fn the_parts_own_loader_is_started_on_request() {
-    let run = ask(Request::StartLoader, 900).fault("camera-absent").run();
+fn the_parts_own_loader_is_started_on_request_and_leaves_no_trace() {
+    const AGAIN: u16 = 41;
+    let hello = Action::Send(crate::common::hello());
+    let asked = Action::Send(command(AGAIN, Request::GetHealth));
+    let run = ask(Request::StartLoader, 1_100)
+        .fault("camera-absent")
+        .at(1_060, hello)
+        .at(1_070, asked)
+        .run();
     assert_eq!(run.outcome(ASKED), Outcome::Done);
     let report = &run.report;
     assert_eq!(report.resets, 1, "{:?}", report.usb_log);
-    assert_eq!(report.usb.enumerations, 1, "{:?}", report.usb_log);
+    assert_eq!(report.usb.enumerations, 2, "{:?}", report.usb_log);
     assert!(report.refused.is_empty(), "{:?}", report.refused);
+    assert_eq!(run.outcome(AGAIN), Outcome::Done);
+    let health = run.messages.iter().find_map(|message| match message {
+        DeviceMessage::Health(health) => Some(*health),
+        _ => None,
+    });
+    let health = health.expect("it tells");
+    let silent = Problem::CameraSilent.bit();
+    assert_eq!(
+        (health.reset, health.problems),
+        (ResetReason::Other, silent)
+    );
 }

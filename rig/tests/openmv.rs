@@ -1,6 +1,7 @@
 //! The second board, an OpenMV Cam H7 with an MT9V034: what holds for the first one holds for it.
 
 use crate::common::{Run, Setup, bug, command, firmware, openmv, set_threshold};
+use crate::led;
 use hivtac_rig::board;
 use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
@@ -191,8 +192,7 @@ fn an_old_revision_is_refused_with_a_flashing_led() {
     let directory = tempfile::tempdir().unwrap();
     let outcome = setup.try_run(&directory.path().join("truth")).unwrap();
     assert_eq!((outcome.report.exposures, outcome.report.resets), (0, 0));
-    let flashes = outcome.report.led_flashes_ns;
-    assert!(flashes.len() >= 4, "{flashes:?}");
+    led::assert_flashes_twice(&outcome.report);
 }
 
 /// On the first board, whose crystal is twice as fast, this firmware sets clocks that are too fast.

@@ -11,7 +11,7 @@ use hivtac_rig::board;
 use hivtac_rig::camera::part;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::faults::Faults;
-use hivtac_rig::flash::{Contents, Cut};
+use hivtac_rig::flash::{Contents, Cut, Operation};
 use hivtac_rig::frame_source::TestPicture;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
@@ -182,7 +182,11 @@ fn what_is_programmed_is_there_in_the_next_run() {
     let folder = tempfile::tempdir().unwrap();
     let flash = folder.path().join("flash");
     let (outcome, contents) = with_flash(&program_word(1, BANK_2 + 64), &flash, None);
-    assert_eq!(outcome.report.flash_operations, 1);
+    let expected = Operation::Program {
+        word: BANK_2 + 64,
+        bytes: contents.word(BANK_2 + 64).unwrap().try_into().unwrap(),
+    };
+    assert_eq!(outcome.report.flash_operations, [expected]);
     assert_eq!(
         contents.array[60..72],
         [255, 255, 255, 255, 0, 0, 0, 0, 0x11, 0x11, 0x11, 0x11]

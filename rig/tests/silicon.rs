@@ -1,6 +1,7 @@
 //! The chip as it may be met: an old revision, and a program that the ROM's loader starts.
 
 use crate::common::{Setup, firmware};
+use crate::led;
 use hivtac_rig::chip::Revision;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::usb_host::Port;
@@ -22,13 +23,7 @@ fn an_old_revision_is_refused_with_a_flashing_led() {
         (report.port, report.exposures, report.resets),
         (Port::Empty, 0, 0)
     );
-    let flashes = report.led_flashes_ns;
-    assert!(flashes.len() >= 4, "{flashes:?}");
-    let [short, long] = [flashes[1] - flashes[0], flashes[2] - flashes[1]];
-    assert!(
-        (long - short).abs_diff(3 * short) < short / 2,
-        "{flashes:?}"
-    );
+    led::assert_flashes_twice(&report);
 }
 
 /// `dfu-util …:leave` enters the program with the ROM's vector table in use.

@@ -190,7 +190,9 @@ impl Test {
                 });
             }
         };
-        test("tests: rig", &|_| {});
+        test("tests: rig", &|command| {
+            self.slow_ones(command);
+        });
         test("tests: rig at half speed", &|command| {
             command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");
             command.env("HIVTAC_BUSY_BUS", "1");

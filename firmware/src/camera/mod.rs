@@ -23,7 +23,7 @@ mod ov7725_registers;
 pub use {ov7725::*, ov7725_registers::Format};
 
 use crate::shared::{CAMERA, EXPOSURE_MIDDLE_US};
-use crate::vsync;
+use crate::{stats, vsync};
 use core::sync::atomic::Ordering;
 use embassy_time::{Duration, Instant};
 use hivtac_capture::Edge;
@@ -105,7 +105,7 @@ impl<F: PartialEq> Search<F> {
     }
 
     fn is_over(&self) -> bool {
-        self.steady >= self.frames || self.begun.elapsed() >= PATIENCE
+        self.steady >= self.frames || stats::since(self.begun) >= PATIENCE
     }
 
     /// What they are a frame later.

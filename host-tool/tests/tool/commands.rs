@@ -255,7 +255,8 @@ fn a_tare_is_taken_refused_or_not_answered() {
     assert_eq!(mute.code, Some(6));
     assert_eq!(
         mute.stderr,
-        "hivtac: the device did not answer \"tare\" within 10.5 s\n"
+        "hivtac: the device did not answer \"tare\" within 10.5 s; it may do it all the same: wait \
+         10 s and try again; when it repeats, `hivtac info` tells whether it restarts\n"
     );
 }
 

@@ -29,6 +29,31 @@ fn a_pulled_cable_is_an_error_after_the_summary() {
     }
 }
 
+/// Two programs on one port: the second is told why it cannot have it, and the first goes on.
+#[test]
+fn a_second_program_on_a_port_is_refused() {
+    let (go_on, told) = std::sync::mpsc::channel();
+    let device = FakeDevice::on_pty(Box::new(move |device| {
+        device.until_start();
+        device.send(sample(1, 1));
+        told.recv().unwrap();
+        device.send(sample(2, 2));
+        device.serve();
+    }));
+    let mut first = start(&["monitor", "--json", "--port", &device.port]);
+    let shown = first.child().stdout.take().unwrap();
+    let mut shown = BufReader::new(shown).lines();
+    shown.next().expect("it has the port").unwrap();
+    let second = run(&["info", "--port", &device.port]);
+    assert_eq!(second.code, Some(3), "{second:?}");
+    let advice = "close the other program that uses it";
+    assert!(second.stderr.contains(advice), "{}", second.stderr);
+    go_on.send(()).unwrap();
+    shown.next().expect("it goes on").unwrap();
+    signal(first.child().id(), "INT");
+    assert_eq!(first.finish().code, Some(130));
+}
+
 #[test]
 fn a_cable_pulled_and_put_back_is_survived() {
     let first: Script = Box::new(|device| {

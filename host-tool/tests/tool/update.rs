@@ -2,8 +2,12 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_host::link::Link;
+use hivtac_host::port::Address;
 use hivtac_wire::message::*;
+use hivtac_wire::settings::Selection;
 use serde_json::Value;
+use std::time::Duration;
 
 const MODEL: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -96,6 +100,36 @@ fn a_model_that_the_device_refuses_is_told_with_its_reason() {
     assert_eq!(run.code, Some(6));
     for part in ["calibrated on another unit", "for another sensor"] {
         assert!(run.stderr.contains(part), "{}", run.stderr);
+    }
+}
+
+/// The tool gave up on an update that the device goes on with: it says how to see what came of it,
+/// and who tries again meanwhile is told to wait.
+#[test]
+fn an_update_that_is_not_answered_may_be_done_all_the_same() {
+    let script: Script = Box::new(|device| {
+        device.answer_one();
+        while let Some(message) = device.next() {
+            if let HostMessage::Command(Command { id, request }) = message
+                && matches!(request, Request::BeginModel { .. })
+            {
+                device.reply(id, Outcome::Busy);
+            }
+        }
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let patience = Duration::from_secs(2);
+    let (mut link, _) = Link::connect(&Address::parse(&device.port), patience).unwrap();
+    for (request, hint) in [
+        (Request::UseModel, "`hivtac info` which model it uses"),
+        (Request::UseBuiltInModel, "`hivtac info` which model"),
+        (Request::Reset, "wait 10 s"),
+        (Request::Keep(Selection::ALL), "`hivtac settings get`"),
+        (Request::BeginModel { bytes: 4 }, "wait 10 s and try again"),
+    ] {
+        let failure = link.request(request, Duration::from_millis(50), |_| ());
+        let message = failure.unwrap_err().to_string();
+        assert!(message.contains(hint), "{message}");
     }
 }
 

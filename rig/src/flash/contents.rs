@@ -54,6 +54,23 @@ impl FromStr for Cut {
     }
 }
 
+/// An operation of the bank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Operation {
+    /// A word is programmed.
+    Program {
+        /// Its address.
+        word: u32,
+        /// What it becomes.
+        bytes: [u8; WORD_BYTES as usize],
+    },
+    /// A sector is erased.
+    Erase {
+        /// Where it begins.
+        sector: u32,
+    },
+}
+
 /// The bank's bytes, and which of its words do not read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contents {
@@ -120,6 +137,32 @@ impl Contents {
         self.torn.len()
     }
 
+    /// What the word at an address reads as; `None` when it does not read.
+    pub fn word(&self, address: u32) -> Option<&[u8]> {
+        let at = (address - BANK.start) as usize;
+        let bytes = &self.array[at..at + WORD_BYTES as usize];
+        (!self.torn.contains(&address)).then_some(bytes)
+    }
+
+    /// Does an operation, or what a cut of the power leaves of it.
+    pub fn operate(&mut self, operation: &Operation, leaves: Leaves) {
+        match (*operation, leaves) {
+            (_, Leaves::Before) => {}
+            (Operation::Program { word, .. }, Leaves::Torn) => self.tear_word(word),
+            (Operation::Erase { sector }, Leaves::Torn) => self.tear_sector(sector),
+            (Operation::Program { word, bytes }, Leaves::After) => {
+                let at = (word - BANK.start) as usize;
+                self.array[at..at + bytes.len()].copy_from_slice(&bytes);
+                self.programmed(word);
+            }
+            (Operation::Erase { sector }, Leaves::After) => {
+                let at = (sector - BANK.start) as usize;
+                self.array[at..at + SECTOR_BYTES as usize].fill(0xFF);
+                self.erased(sector);
+            }
+        }
+    }
+
     pub(super) fn is_torn(&self, range: Range<u64>) -> bool {
         let from = range.start as u32 / WORD_BYTES * WORD_BYTES;
         self.torn.range(from..range.end as u32).next().is_some()
@@ -136,12 +179,12 @@ impl Contents {
         self.written.retain(|word| !words.contains(word));
     }
 
-    pub(super) fn tear_word(&mut self, word: u32) {
+    fn tear_word(&mut self, word: u32) {
         self.torn.insert(word);
     }
 
     /// Of three words one is blank, one does not read, and one is as it was.
-    pub(super) fn tear_sector(&mut self, sector: u32) {
+    fn tear_sector(&mut self, sector: u32) {
         let words = (sector..sector + SECTOR_BYTES).step_by(WORD_BYTES as usize);
         for (nth, word) in words.enumerate() {
             let at = (word - BANK.start) as usize;
@@ -187,6 +230,32 @@ mod tests {
         assert_eq!((contents.array[0], contents.array[64]), (0xFF, 0));
         contents.erased(BANK.start);
         assert_eq!(contents.torn(), 0);
+    }
+
+    #[test]
+    fn an_operation_leaves_what_was_there_something_torn_or_what_was_to_be() {
+        let word = BANK.start + 64;
+        let bytes = [7; WORD_BYTES as usize];
+        let program = Operation::Program { word, bytes };
+        let sector = BANK.start;
+        let erase = Operation::Erase { sector };
+        let mut contents = Contents::default();
+        contents.operate(&program, Leaves::Before);
+        assert_eq!(contents, Contents::default());
+        contents.operate(&program, Leaves::Torn);
+        assert_eq!((contents.word(word), contents.torn()), (None, 1));
+        contents.operate(&erase, Leaves::After);
+        assert_eq!(contents, Contents::default());
+        contents.operate(&program, Leaves::After);
+        assert_eq!(contents.word(word), Some(&bytes[..]));
+        assert!(!contents.programmed(word), "it is not blank");
+        contents.operate(&erase, Leaves::Torn);
+        assert_eq!(
+            (contents.word(word), contents.torn()),
+            (Some(&bytes[..]), 1365)
+        );
+        contents.operate(&erase, Leaves::After);
+        assert_eq!(contents, Contents::default());
     }
 
     #[test]

@@ -9,6 +9,8 @@
 
 mod contents;
 
+use std::collections::BTreeSet;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -21,8 +23,7 @@ use rigless::soc::stm32h743::peripherals::flash;
 use rigless::time::EventId;
 
 use crate::rules::Rules;
-pub use contents::{BANK, Contents, Cut, Leaves};
-use contents::{SECTOR_BYTES, WORD_BYTES};
+pub use contents::{BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES};
 
 /// SR bits: an operation runs, or waits.
 const BUSY: u64 = 1 << 0 | 1 << 2;
@@ -45,15 +46,6 @@ pub fn read_array(host: &mut dyn Host) -> Vec<u8> {
     words.flat_map(u64::to_le_bytes).collect()
 }
 
-/// An operation of the bank.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Operation {
-    /// Of the word at this address.
-    Program(u32),
-    /// Of the sector that begins at this address.
-    Erase(u32),
-}
-
 /// The bank, as the interface, the MDMA and the run share it.
 #[derive(Clone, Debug)]
 pub struct Bank(Arc<Mutex<State>>);
@@ -62,7 +54,9 @@ pub struct Bank(Arc<Mutex<State>>);
 struct State {
     contents: Contents,
     cut: Option<Cut>,
-    operations: u64,
+    operations: Vec<Operation>,
+    /// Words that were read or programmed, by their addresses.
+    touched: BTreeSet<u32>,
     under_way: bool,
     /// The power is cut when the operation under way has ended.
     cut_at_its_end: Option<Operation>,
@@ -76,7 +70,8 @@ impl Bank {
         Self(Arc::new(Mutex::new(State {
             contents,
             cut,
-            operations: 0,
+            operations: Vec::new(),
+            touched: BTreeSet::new(),
             under_way: false,
             cut_at_its_end: None,
             was_cut: None,
@@ -88,8 +83,14 @@ impl Bank {
     }
 
     /// Programming and erasing operations so far, the one that was cut, too.
-    pub fn operations(&self) -> u64 {
-        self.lock().operations
+    pub fn operations(&self) -> Vec<Operation> {
+        self.lock().operations.clone()
+    }
+
+    /// Addresses of the words that were read or programmed so far. What the program makes of the
+    /// bank depends on no other word.
+    pub fn touched(&self) -> BTreeSet<u32> {
+        self.lock().touched.clone()
     }
 
     /// Whether the power was cut.
@@ -104,7 +105,8 @@ impl Bank {
         if range.end <= u64::from(BANK.start) || range.start >= u64::from(BANK.end) {
             return false;
         }
-        let state = self.lock();
+        let mut state = self.lock();
+        state.touched.extend(words(&range));
         if state.under_way {
             rules.broken(|| {
                 format!(
@@ -121,20 +123,29 @@ impl Bank {
         let state = self.lock();
         let mut contents = state.contents.clone();
         contents.array = array;
-        match state.was_cut {
-            Some((Operation::Program(word), Leaves::Torn)) => contents.tear_word(word),
-            Some((Operation::Erase(sector), Leaves::Torn)) => contents.tear_sector(sector),
-            _ => {}
+        if let Some((operation, Leaves::Torn)) = &state.was_cut {
+            contents.operate(operation, Leaves::Torn);
         }
         contents
     }
 }
 
+/// The words of the bank that a range of addresses has a part in.
+fn words(range: &Range<u64>) -> impl Iterator<Item = u32> + use<> {
+    let from = range.start.max(BANK.start.into()) as u32 / WORD_BYTES * WORD_BYTES;
+    let to = range.end.min(BANK.end.into()) as u32;
+    (from..to).step_by(WORD_BYTES as usize)
+}
+
 impl State {
     /// An operation begins.
     fn begin(&mut self, operation: Operation, rules: &Rules) {
-        let leaves = self.cut.filter(|cut| cut.operation == self.operations);
-        self.operations += 1;
+        let number = self.operations.len() as u64;
+        let leaves = self.cut.filter(|cut| cut.operation == number);
+        self.operations.push(operation);
+        if let Operation::Program { word, .. } = operation {
+            self.touched.insert(word);
+        }
         self.under_way = true;
         match leaves.map(|cut| cut.leaves) {
             None => {}
@@ -145,7 +156,7 @@ impl State {
             }
         }
         match operation {
-            Operation::Program(word) => {
+            Operation::Program { word, .. } => {
                 if !self.contents.programmed(word) {
                     rules.broken(|| {
                         format!(
@@ -155,7 +166,7 @@ impl State {
                     });
                 }
             }
-            Operation::Erase(sector) => self.contents.erased(sector),
+            Operation::Erase { sector } => self.contents.erased(sector),
         }
     }
 
@@ -173,8 +184,9 @@ pub struct Flash {
     interface: flash::Flash,
     bank: Bank,
     rules: Rules,
-    /// The word that was stored to last.
+    /// The word that was stored to last, and what was stored.
     word: u32,
+    bytes: [u8; WORD_BYTES as usize],
 }
 
 impl Flash {
@@ -185,6 +197,7 @@ impl Flash {
             bank,
             rules,
             word: 0,
+            bytes: [0xFF; WORD_BYTES as usize],
         }
     }
 
@@ -220,7 +233,7 @@ impl Device for Flash {
         self.interface.write(register, value, registers, context);
         let number = (registers.get(Register::Cr2) >> SECTOR_BIT) as u32 & 7;
         let sector = BANK.start + number * SECTOR_BYTES;
-        self.look(registers, Some(Operation::Erase(sector)));
+        self.look(registers, Some(Operation::Erase { sector }));
     }
 
     fn write_region(
@@ -231,9 +244,17 @@ impl Device for Flash {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> bool {
-        self.word = address as u32 / WORD_BYTES * WORD_BYTES;
+        let (word, at) = (address as u32 / WORD_BYTES * WORD_BYTES, address as usize);
+        if word != self.word {
+            (self.word, self.bytes) = (word, [0xFF; WORD_BYTES as usize]);
+        }
+        let stored = self.bytes[at % WORD_BYTES as usize..].iter_mut();
+        let value_bytes = value.to_le_bytes();
+        (stored.zip(value_bytes).take(width.bytes() as usize))
+            .for_each(|(byte, value)| *byte = value);
         let taken = (self.interface).write_region(address, width, value, registers, context);
-        self.look(registers, Some(Operation::Program(self.word)));
+        let (word, bytes) = (self.word, self.bytes);
+        self.look(registers, Some(Operation::Program { word, bytes }));
         taken
     }
 

@@ -1,0 +1,113 @@
+//! The power is cut at every operation of what writes the flash, in every way: of one run that goes
+//! to its end the rig tells the operations, from which follows what each cut leaves.
+//!
+//! Images that a start cannot tell apart are started once. A run of the rig depends on nothing but
+//! what it is given, and the rig tells which words of the flash a run read or programmed: with
+//! another image that agrees in all of these words it goes the same way, bit for bit.
+//! `models::a_start_depends_on_no_word_that_the_rig_does_not_tell` shows that nothing else counts.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use hivtac_rig::flash::{BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES};
+
+/// What is found in a device at its start, and the words of its flash that decided that.
+pub type Start<T> = (T, BTreeSet<u32>);
+
+/// What a cut leaves of the flash that was there before a whole run.
+pub fn left(before: &Contents, whole: &[Operation], cut: Cut) -> Contents {
+    let (done, rest) = whole.split_at(cut.operation as usize);
+    let mut contents = before.clone();
+    for operation in done {
+        contents.operate(operation, Leaves::After);
+    }
+    contents.operate(&rest[0], cut.leaves);
+    contents
+}
+
+/// What each cut of a whole run leaves, in turn. A cut after one operation is one before the next.
+pub fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (Cut, Contents)> {
+    let mut contents = before.clone();
+    let last = whole.len() - 1;
+    let each = (0..).zip(whole.to_vec());
+    each.flat_map(move |(operation, done)| {
+        let after = (operation as usize == last).then_some(Leaves::After);
+        let ways = [Leaves::Before, Leaves::Torn].into_iter().chain(after);
+        let left = ways.map(|leaves| {
+            let mut left = contents.clone();
+            left.operate(&done, leaves);
+            (Cut { operation, leaves }, left)
+        });
+        let left: Vec<_> = left.collect();
+        contents.operate(&done, Leaves::After);
+        left
+    })
+}
+
+/// Starts a device with each of these images, those that a start cannot tell apart once; gives what
+/// was found with each to `judge`. Returns how many images there were, and how many starts.
+pub fn start_each<T>(
+    images: impl Iterator<Item = (Cut, Contents)>,
+    start: impl Fn(&Path) -> Start<T>,
+    mut judge: impl FnMut(Cut, &Contents, &T),
+) -> (usize, usize) {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("flash");
+    let mut started: Vec<(Contents, Start<T>)> = Vec::new();
+    let mut count = 0;
+    for (cut, image) in images {
+        let is_alike = |(other, (_, words)): &(Contents, Start<T>)| {
+            words
+                .iter()
+                .all(|word| other.word(*word) == image.word(*word))
+        };
+        let known = started.iter().rposition(is_alike).unwrap_or_else(|| {
+            image.save(&flash).unwrap();
+            let found = start(&flash);
+            assert!(!found.1.is_empty(), "a start reads the flash");
+            started.push((image.clone(), found));
+            started.len() - 1
+        });
+        judge(cut, &image, &started[known].1.0);
+        count += 1;
+    }
+    println!("{count} cuts leave {} images to a start", started.len());
+    (count, started.len())
+}
+
+/// Whether the flash holds these bytes at the beginning of one of the sectors for models.
+pub fn holds_model(contents: &Contents, file: &[u8]) -> bool {
+    let sectors = (BANK.start..BANK.end).step_by(SECTOR_BYTES as usize);
+    let is_here = |sector: u32| {
+        let words = (sector..).step_by(WORD_BYTES as usize);
+        (words.zip(file.chunks(WORD_BYTES as usize))).all(|(word, part)| {
+            let read = contents.word(word);
+            read.is_some_and(|read| read.starts_with(part))
+        })
+    };
+    sectors.skip(2).take(2).any(is_here)
+}
+
+/// The flash of a device that saved what it keeps as often as its log's first sector has room for,
+/// so that the next time begins with an erase of the other one. It was saved there once.
+pub fn full(mut contents: Contents) -> Contents {
+    let sector = BANK.start..BANK.start + SECTOR_BYTES;
+    let words = |range: std::ops::Range<u32>| range.step_by(WORD_BYTES as usize);
+    let is_blank = |word: &u32| contents.word(*word) == Some(&[0xFF; WORD_BYTES as usize][..]);
+    let end = words(sector.clone()).find(is_blank).expect("some room");
+    let record = (end - sector.start) as usize;
+    assert!(record > 0, "it keeps something");
+    let programs = |contents: &Contents, word: u32, from: u32| Operation::Program {
+        word,
+        bytes: contents.word(from).unwrap().try_into().unwrap(),
+    };
+    let copies = SECTOR_BYTES as usize / record;
+    for nth in 1..copies {
+        for (number, from) in (0..).zip(words(sector.start..end)) {
+            let word = sector.start + (nth * record) as u32 + number * WORD_BYTES;
+            let operation = programs(&contents, word, from);
+            contents.operate(&operation, Leaves::After);
+        }
+    }
+    contents
+}
