@@ -83,7 +83,7 @@ fn a_silent_camera_is_restarted() {
 /// frame is dropped, counted, and the next sample says so.
 #[test]
 fn an_overrun_costs_a_frame_and_is_told() {
-    let run = Setup::new(firmware(), 300).fault("dcmi-overrun@240").run();
+    let run = Setup::new(firmware(), 300).fault("dcmi-overrun@243").run();
     let stats = run.stats();
     assert_eq!(
         (
