@@ -26,9 +26,8 @@ impl Picture {
     /// # Errors
     /// When the file cannot be read, is no such picture, or is larger than a frame can be.
     pub fn load(path: &str) -> Result<Picture, Failure> {
-        let unreadable = |why: &dyn std::fmt::Display| unreadable(path, why);
-        let file = read_at_most(path, LARGEST_FILE).map_err(|error| unreadable(&error))?;
-        let too_long = || unreadable(&format_args!("it has more than {LARGEST_FILE} bytes"));
+        let file = read_at_most(path, LARGEST_FILE).map_err(|error| unreadable(path, &error))?;
+        let too_long = || unreadable(path, &format_args!("it has more than {LARGEST_FILE} bytes"));
         Picture::parse(path, &file.ok_or_else(too_long)?)
     }
 
@@ -37,9 +36,8 @@ impl Picture {
     /// # Errors
     /// When it is no such picture, or is larger than a frame can be.
     pub fn parse(path: &str, file: &[u8]) -> Result<Picture, Failure> {
-        let unreadable = |why: &dyn std::fmt::Display| unreadable(path, why);
         if raw::is_one(file) {
-            let raw = raw::parse(file).map_err(|error| unreadable(&error))?;
+            let raw = raw::parse(file).map_err(|error| unreadable(path, &error))?;
             let (width, height) = size(path, raw.width.into(), raw.height.into())?;
             return Ok(Picture {
                 width,

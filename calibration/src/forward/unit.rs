@@ -159,10 +159,14 @@ mod tests {
     use crate::dataset::{Loads, Recipe, generate};
     use crate::range::Range;
 
+    fn default_weights() -> Weights {
+        let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+        Weights::load(&models.join("default.weights")).unwrap()
+    }
+
     /// The unit's own threshold is the model's: with another one it would give no force.
     #[test]
     fn a_model_has_the_threshold_of_its_unit() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/default.weights");
         let recipe = Recipe {
             loads: Loads::Random(8),
             rest: 4,
@@ -171,14 +175,11 @@ mod tests {
         let mut dataset = generate(&recipe, || ()).unwrap();
         let threshold = [165, 12, 90, 255, 40, 255];
         dataset.about.conditions.threshold = threshold;
-        let (own, _) = Weights::load(&file)
-            .unwrap()
-            .for_unit(&dataset, 1e-3, 0.1)
-            .unwrap();
+        let (own, _) = default_weights().for_unit(&dataset, 1e-3, 0.1).unwrap();
         assert_eq!(own.conditions.threshold, threshold);
         dataset.about.conditions.pixel_format = PixelFormat::Yuv422;
         dataset.about.conditions.threshold = [162, 0, 0, 0, 0, 0];
-        let refused = Weights::load(&file).unwrap().for_unit(&dataset, 1e-3, 0.1);
+        let refused = default_weights().for_unit(&dataset, 1e-3, 0.1);
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("rgb565") && error.contains("yuv422"),
@@ -190,7 +191,6 @@ mod tests {
     /// are some hundredths of a pixel off.
     #[test]
     fn loads_that_scatter_tell_less() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/default.weights");
         let recipe = Recipe {
             loads: Loads::Random(10),
             rest: 4,
@@ -199,8 +199,7 @@ mod tests {
         let dataset = generate(&recipe, || ()).unwrap();
         let mut loads = loads(&dataset).unwrap();
         let fitted = |loads: &[KnownLoad]| {
-            let weights = Weights::load(&file).unwrap();
-            let (_, fit) = weights
+            let (_, fit) = default_weights()
                 .fitted(dataset.rest().unwrap(), loads, 1e-3, 0.1)
                 .unwrap();
             let sigmas = fit.numbers.iter().map(|(_, _, sigma)| sigma);
@@ -223,7 +222,6 @@ mod tests {
     /// A pressing direction is no direction of the force that the film model explains.
     #[test]
     fn loads_of_another_contact_reading_are_refused() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/default.weights");
         let recipe = Recipe {
             contact: Contact::Stick,
             loads: Loads::Random(5),
@@ -232,7 +230,7 @@ mod tests {
             ..Recipe::default()
         };
         let dataset = generate(&recipe, || ()).unwrap();
-        let refused = Weights::load(&file).unwrap().for_unit(&dataset, 1e-3, 0.1);
+        let refused = default_weights().for_unit(&dataset, 1e-3, 0.1);
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("reading `force`") && error.contains("`stick`"),
