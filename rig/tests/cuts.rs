@@ -26,7 +26,7 @@ pub fn left(before: &Contents, whole: &[Operation], cut: Cut) -> Contents {
 }
 
 /// What each cut of a whole run leaves, in turn. A cut after one operation is one before the next.
-pub fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (Cut, Contents)> {
+fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (Cut, Contents)> {
     let mut contents = before.clone();
     let last = whole.len() - 1;
     let each = (0..).zip(whole.to_vec());
@@ -44,18 +44,19 @@ pub fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (C
     })
 }
 
-/// Starts a device with each of these images, those that a start cannot tell apart once; gives what
-/// was found with each to `judge`. Returns how many images there were, and how many starts.
+/// Starts a device with what each cut of a whole run leaves, once with images that a start cannot
+/// tell apart; gives what was found with each to `judge`. Returns how many starts there were.
 pub fn start_each<T>(
-    images: impl Iterator<Item = (Cut, Contents)>,
+    before: &Contents,
+    whole: &[Operation],
     start: impl Fn(&Path) -> Start<T>,
     mut judge: impl FnMut(Cut, &Contents, &T),
-) -> (usize, usize) {
+) -> usize {
     let directory = tempfile::tempdir().unwrap();
     let flash = directory.path().join("flash");
     let mut started: Vec<(Contents, Start<T>)> = Vec::new();
     let mut count = 0;
-    for (cut, image) in images {
+    for (cut, image) in images(before, whole) {
         let is_alike = |(other, (_, words)): &(Contents, Start<T>)| {
             words
                 .iter()
@@ -72,7 +73,8 @@ pub fn start_each<T>(
         count += 1;
     }
     println!("{count} cuts leave {} images to a start", started.len());
-    (count, started.len())
+    assert_eq!(count, 2 * whole.len() + 1);
+    started.len()
 }
 
 /// Whether the flash holds these bytes at the beginning of one of the sectors for models.

@@ -8,7 +8,7 @@ use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network;
 use hivtac_wire::frame::CRC32;
 use hivtac_wire::health::{Health, Problem, ResetReason};
-use hivtac_wire::message::{DeviceMessage, Outcome, Request};
+use hivtac_wire::message::{Outcome, Request};
 
 const ASKED: u16 = 40;
 const ASKED_MS: u64 = 200;
@@ -26,11 +26,7 @@ fn health(setup: Setup) -> Health {
 
 fn told(run: &Run) -> Health {
     assert_eq!(run.outcome(ASKED), Outcome::Done);
-    let mut told = run.messages.iter().filter_map(|message| match message {
-        DeviceMessage::Health(health) => Some(*health),
-        _ => None,
-    });
-    told.next().expect("it tells")
+    *run.health()
 }
 
 #[test]
@@ -165,11 +161,7 @@ fn the_parts_own_loader_is_started_on_request_and_leaves_no_trace() {
     assert_eq!(report.usb.enumerations, 2, "{:?}", report.usb_log);
     assert!(report.refused.is_empty(), "{:?}", report.refused);
     assert_eq!(run.outcome(AGAIN), Outcome::Done);
-    let health = run.messages.iter().find_map(|message| match message {
-        DeviceMessage::Health(health) => Some(*health),
-        _ => None,
-    });
-    let health = health.expect("it tells");
+    let health = run.health();
     let silent = Problem::CameraSilent.bit();
     assert_eq!(
         (health.reset, health.problems),

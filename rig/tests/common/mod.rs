@@ -27,6 +27,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
+use hivtac_wire::health::Health;
 use hivtac_wire::message::{
     self, Command, DeviceHello, DeviceMessage, HostMessage, Reply, Request, Sample, Stats,
 };
@@ -345,6 +346,15 @@ impl Run {
             }
         });
         settings.expect("settings came")
+    }
+
+    /// The first answer about its health.
+    pub fn health(&self) -> &Health {
+        let health = self.messages.iter().find_map(|m| match m {
+            DeviceMessage::Health(health) => Some(health),
+            _ => None,
+        });
+        health.expect("it tells")
     }
 
     /// The last counters.
