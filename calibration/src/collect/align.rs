@@ -49,8 +49,8 @@ pub struct Alignment {
 
 /// Distance of lags on the grid, s.
 const STEP_S: f64 = 0.02;
-/// No recording and its gauge are longer together, s: two days.
-const LONGEST_S: f64 = 172_800.0;
+/// No recording and its gauge are longer together, s: half a day.
+const LONGEST_S: f64 = 43_200.0;
 /// The most frames that are used on the grid; the refinement uses all.
 const GRID_FRAMES: usize = 1000;
 /// This part of the frames must have a reading.

@@ -23,6 +23,7 @@ use hivtac_wire::message::{DeviceHello, Sample};
 use serde::{Deserialize, Serialize};
 
 use super::poses::{self, Pose};
+use super::series::LARGEST_S;
 use crate::conditions::{Conditions, OriginName};
 use crate::dataset::LARGEST_AREA;
 
@@ -299,7 +300,7 @@ impl Recording {
         let samples = rows([SAMPLES, samples], sample, SAMPLE_COLUMNS)?;
         let gauge_line = |record: &csv::StringRecord| {
             let line: GaugeLine = record.deserialize(Some(&GAUGE_COLUMNS.split(',').collect()))?;
-            ensure!(line.host_s.is_finite(), "host_s is {}", line.host_s);
+            on_a_clock(line.host_s)?;
             Ok((line.run, line.host_s, line.line))
         };
         let gauge_lines = rows([GAUGE, gauge], gauge_line, GAUGE_COLUMNS)?;
@@ -370,7 +371,7 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
         why => Err(why.to_owned()),
     };
     let (host_s, device_us): (f64, u64) = (record[1].parse()?, record[2].parse()?);
-    ensure!(host_s.is_finite(), "host_s is {host_s}");
+    on_a_clock(host_s)?;
     ensure!(device_us <= LARGEST_US, "device_us is {device_us}");
     Ok(Kept {
         run: record[0].parse()?,
@@ -379,6 +380,11 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
         pose: pose(record, [5, 20])?,
         seen,
     })
+}
+
+fn on_a_clock(host_s: f64) -> Result<()> {
+    ensure!(host_s.abs() <= LARGEST_S, "host_s is {host_s}");
+    Ok(())
 }
 
 /// The pose whose angles and place begin at these columns.
@@ -594,6 +600,7 @@ mod tests {
         refused("\n0,0.500000,", "\n18446744073709551615,0.5,", "runs");
         refused("\n0,0.500000,", "\n7,0.5,", "runs");
         refused("\n0,0.500000,", "\n0,NaN,", "line 2: host_s is NaN");
+        refused("\n0,0.500000,", "\n0,-1e11,", "line 2: host_s is -1");
         refused(",25600,", ",18446744073709551615,", "line 2: device_us");
         refused(",131072,", ",9131072000,", "line 2: marker 1");
         refused(",131072,", ",-131072,", "line 2: marker 1");

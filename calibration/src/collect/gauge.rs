@@ -12,6 +12,8 @@
 
 use anyhow::{Result, bail};
 
+use crate::dataset;
+
 /// Newtons in one step of a unit; longer names before those that they begin with.
 const UNITS: [(&str, f64); 8] = [
     ("mN", 1e-3),
@@ -24,6 +26,9 @@ const UNITS: [(&str, f64); 8] = [
     ("g", 9.806_65e-3),
 ];
 
+/// No gauge for a fingertip reads more, ± N; a data set holds the difference of any two.
+const LARGEST_N: f64 = dataset::LARGEST_N / 2.0;
+
 /// Why a line is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Bad {
@@ -33,6 +38,8 @@ pub enum Bad {
     Unit,
     /// The gauge says that the force is beyond its range.
     Overload,
+    /// A force that no gauge for a fingertip reads: a wrong unit, or digits run together.
+    TooLarge,
     /// A held peak instead of the present force.
     Peak,
     /// Its time is no number, or not after the one before.
@@ -46,6 +53,7 @@ impl Bad {
             Bad::NoReading => "no reading",
             Bad::Unit => "unknown unit",
             Bad::Overload => "overload",
+            Bad::TooLarge => "more than 500 N",
             Bad::Peak => "held peak",
             Bad::Time => "bad time",
         }
@@ -83,7 +91,11 @@ pub fn reading(line: &str, usual: Unit) -> Result<f64, Bad> {
         .find_map(|(name, scale)| Some((*scale, rest.strip_prefix(name)?)))
         .unwrap_or((usual.0, rest));
     state(letters)?;
-    Ok(sign * value * scale)
+    let force_n = sign * value * scale;
+    if force_n.abs() > LARGEST_N {
+        return Err(Bad::TooLarge);
+    }
+    Ok(force_n)
 }
 
 /// The usual ways of gauges to show that there is more than they can measure.
@@ -155,6 +167,7 @@ mod tests {
             ("+0.123NTH", 0.123),
             ("-0.050NTL", -0.05),
             ("0.002kN", 2.0),
+            ("0.5kN", 500.0),
         ] {
             let found = read(line).unwrap();
             assert!((found - newtons).abs() < 1e-12, "{line}: {found}");
@@ -178,6 +191,10 @@ mod tests {
             ("inf", Bad::NoReading),
             ("NaN", Bad::NoReading),
             (&"9".repeat(400), Bad::NoReading),
+            ("0.501kN", Bad::TooLarge),
+            ("-500.1", Bad::TooLarge),
+            (&"9".repeat(308), Bad::TooLarge),
+            (&format!("{}kN", "9".repeat(308)), Bad::TooLarge),
             ("0.1psi", Bad::Unit),
             ("OL", Bad::Overload),
             ("+OVER", Bad::Overload),

@@ -19,6 +19,9 @@ pub struct Series {
     pub first_bad: Option<(usize, String)>,
 }
 
+/// No clock counts farther, ± s: three centuries, beyond the seconds since 1970 and what a sensor's
+/// counter holds. Sums and differences of such stay exact to microseconds.
+pub const LARGEST_S: f64 = 1e10;
 /// Readings farther apart than this many usual distances are not joined.
 const GAP: f64 = 5.0;
 
@@ -26,7 +29,7 @@ impl Series {
     /// Takes a line that came at `time_s`.
     pub fn push(&mut self, number: usize, time_s: Option<f64>, text: &str, unit: Unit) {
         let last = self.points.last().map_or(f64::NEG_INFINITY, |p| p.0);
-        let time = time_s.filter(|t| t.is_finite() && *t > last);
+        let time = time_s.filter(|t| t.abs() <= LARGEST_S && *t > last);
         let found = match time {
             Some(_) => reading(text, unit),
             None => Err(Bad::Time),

@@ -43,7 +43,7 @@ const LAST_COLUMNS: [&str; 16] = [
 ];
 /// Beyond these there are no numbers, ±: a force's component, N; a tip's coordinate, mm; a feature,
 /// px or px². Sums and differences of such stay far inside their types.
-const LARGEST_N: f64 = 1e3;
+pub const LARGEST_N: f64 = 1e3;
 const LARGEST_MM: f64 = 1e3;
 const LARGEST_FEATURE: f64 = 1048576.0;
 /// No marker has a larger area, px.

@@ -20,7 +20,7 @@ use crate::range::Range;
 use crate::rest::Rest;
 
 pub use detector::{Detection, Detectors, MarkerDetector, Sensing, measure, reasons};
-pub use file::LARGEST_AREA;
+pub use file::{LARGEST_AREA, LARGEST_N};
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};

@@ -55,12 +55,17 @@ fn recording() -> Recording {
     }
 }
 
-fn notes() -> Series {
+fn notes(unit: &str) -> Series {
     let mut series = Series::default();
     let mut note = |time_s: f64, grams: f64| {
         let number = series.readings() + 1;
         let time_s = 100.0 + time_s;
-        series.push(number, Some(time_s), &format!("{grams} g"), Unit::NEWTON);
+        series.push(
+            number,
+            Some(time_s),
+            &format!("{grams} {unit}"),
+            Unit::NEWTON,
+        );
     };
     note(0.0, 0.0);
     for ([on, off], grams) in TIMES_S.into_iter().zip(WEIGHTS_G) {
@@ -82,7 +87,7 @@ fn pressed_n(row: &Row) -> f64 {
 /// Every frame that is kept has the force of the weight that hung on it, to 0.1 mN.
 #[test]
 fn weights_and_a_watch_are_a_gauge() {
-    let gauge = Gauge::Files(vec![notes()]);
+    let gauge = Gauge::Files(vec![notes("g")]);
     let (dataset, report) = assemble(&recording(), &gauge, Unit::NEWTON, true).unwrap();
     assert!(
         (report.runs[0].alignment.lag_s - 100.0).abs() < 0.5,
@@ -98,4 +103,16 @@ fn weights_and_a_watch_are_a_gauge() {
         frames[weight.unwrap()] += 1;
     }
     assert!(frames.iter().all(|&count| count > 39), "{frames:?}");
+}
+
+/// Forces that no data set could hold never get into one.
+#[test]
+fn a_gauge_in_kilonewtons_has_no_readings() {
+    let gauge = Gauge::Files(vec![notes("kN")]);
+    let error = assemble(&recording(), &gauge, Unit::NEWTON, false).unwrap_err();
+    let error = format!("{error:#}");
+    assert!(
+        error.contains("readings for too few of the frames"),
+        "{error}"
+    );
 }
