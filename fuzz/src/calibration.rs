@@ -35,10 +35,10 @@ pub fn dataset(input: &[u8]) -> bool {
 /// The files of a recording's folder and one of a gauge, with zeros between them: refused, or made
 /// into a data set that can be read, or refused with the reason then.
 pub fn recording(input: &[u8]) -> bool {
-    let Some(text) = text(input) else {
+    let Some(recorded) = text(input) else {
         return false;
     };
-    let mut files = text.splitn(4, END);
+    let mut files = recorded.splitn(4, END);
     let mut file = || files.next().unwrap_or_default();
     let Ok(recording) = Recording::parse(file(), file(), file()) else {
         return false;
