@@ -12,8 +12,8 @@ use crate::{artifacts, process, workspace};
 
 /// Seconds of each attack.
 const SECONDS: u32 = 10;
-/// What one input may take: seconds, and MiB of memory. A recording and its gauge may differ by two
-/// days, all of which are searched: that takes seconds, and more beside other tests.
+/// What one input may take: seconds, and MiB of memory. A recording and its gauge may differ by half
+/// a day, all of which is searched: that takes seconds, and more beside other tests.
 const LIMITS: [&str; 2] = ["-timeout=100", "-rss_limit_mb=2048"];
 /// What has the compiler tell libFuzzer which parts of a program an input reaches, and what it
 /// compares: as cargo-fuzz does it without a sanitizer, which only a nightly compiler has; no
