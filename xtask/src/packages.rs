@@ -14,7 +14,7 @@ use crate::process;
 /// Says which packages are missing and why they could not be installed.
 pub fn install(packages: &[&str], why: &str) -> Result<()> {
     let names = packages.join(" ");
-    eprintln!("{why}: installing the Debian packages {names}");
+    process::say(&format!("{why}: installing the Debian packages {names}"));
     let Some(prefix) = root_prefix() else {
         bail!("{why}; as root, install the packages: {names}");
     };
@@ -35,8 +35,10 @@ fn try_install(prefix: &[&str], packages: &[&str]) -> Result<()> {
     process::run(&mut apt_get(prefix, &arguments))
 }
 
+/// Waits while somebody else installs, such as another step or the system itself.
 fn apt_get(prefix: &[&str], arguments: &[&str]) -> Command {
-    let words = [prefix, &["apt-get"], arguments].concat();
+    let waits = ["apt-get", "-o", "DPkg::Lock::Timeout=300"];
+    let words = [prefix, &waits, arguments].concat();
     let mut command = Command::new(words[0]);
     command
         .args(&words[1..])

@@ -58,30 +58,35 @@ struct Programs {
 }
 
 impl Test {
-    /// Runs every step, past those that fail, and prints the table. The rig's tests run beside the
-    /// others, so that no core waits while one of both builds or tests with the other alone; what
-    /// they print comes when the others are done.
+    /// Runs every step, past those that fail, and prints the table. The rig's tests and some steps
+    /// run beside the others, so that no core waits while one of both builds or tests with the other
+    /// alone; what they print comes when the others are done.
     ///
     /// # Errors
     /// When a step failed.
     pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
-        let log = workspace::work_folder("test")?.join("rig.txt");
+        let log = workspace::work_folder("test")?.join("beside.txt");
         let printed = File::create(&log).with_context(|| format!("writing {}", log.display()))?;
         let (built, programs) = mpsc::channel();
         let mut report = Report::default();
-        let rig = thread::scope(|scope| {
-            let rig = scope.spawn(|| process::aside(printed, || self.with_rig(toolchain, built)));
+        let beside = thread::scope(|scope| {
+            let beside = scope.spawn(|| process::aside(printed, || self.beside(toolchain, built)));
             self.others(&mut report, toolchain, &programs);
-            rig.join()
+            beside.join()
         });
         process::print_through(&String::from_utf8_lossy(&std::fs::read(&log)?));
-        report.append(rig.map_err(|_| anyhow!("the rig's tests panicked"))?);
+        report.append(beside.map_err(|_| anyhow!("the steps beside the others panicked"))?);
         report.finish()
     }
 
-    /// The rig's tests, and before them the programs that those across rooms run, too.
-    fn with_rig(&self, toolchain: &Toolchain, built: Sender<Programs>) -> Report {
+    /// About half of the work: the rig's tests, before them the programs that those across rooms
+    /// run, too, and around them what needs nothing of the others. Attacks are first, as they are
+    /// built in a folder of their own while the lints hold the common one.
+    fn beside(&self, toolchain: &Toolchain, built: Sender<Programs>) -> Report {
         let mut report = Report::default();
+        if self.all && self.wants("attacks") {
+            report.optional("attacks", fuzz::obstacle(), |_| fuzz::run());
+        }
         if self.wants_one_of(&["tests: rig at half speed", "tests: across rooms"]) {
             let programs = report.step("build: firmware", |_| Programs::build(toolchain));
             if let Some(programs) = &programs {
@@ -91,6 +96,7 @@ impl Test {
             drop(built);
             self.rig_tests(&mut report, programs.as_ref());
         }
+        self.benchmarks(&mut report, toolchain);
         report
     }
 
@@ -98,6 +104,12 @@ impl Test {
         self.checks(report, toolchain);
         self.host_tests(report);
         self.cross_room_tests(report, toolchain, programs);
+        if self.all {
+            self.optional(report, toolchain);
+        }
+    }
+
+    fn benchmarks(&self, report: &mut Report, toolchain: &Toolchain) {
         if self.wants("benchmark") {
             report.step("benchmark", |_| bench::Bench::default().run(toolchain));
         }
@@ -106,9 +118,6 @@ impl Test {
                 bench::board::build(toolchain)?;
                 bench::board::lint(toolchain)
             });
-        }
-        if self.all {
-            self.optional(report, toolchain);
         }
     }
 
@@ -119,9 +128,6 @@ impl Test {
             report.optional("licences", licences::obstacle(), |_| {
                 licences::check(folders)
             });
-        }
-        if self.wants("attacks") {
-            report.optional("attacks", fuzz::obstacle(), |_| fuzz::run());
         }
         if self.wants("tests: python") {
             report.optional("tests: python", python::obstacle(), |tally| {
