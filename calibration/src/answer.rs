@@ -9,8 +9,8 @@ use hivtac_sensing::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 
-use crate::dataset::Observation;
 use crate::weights::features_from_q16;
+use hivtac_data::dataset::Observation;
 
 /// A model on the chip, with a rest position.
 pub struct Chip<'m> {

@@ -13,10 +13,10 @@ use hivtac_terms::conditions::ContactReading;
 use hivtac_terms::threshold::ByteOrder;
 use rayon::prelude::*;
 
-use crate::conditions::meaning;
-use crate::dataset::{Loads, Recipe, measure, reasons};
 use crate::errors::{Errors, WEAK_N};
-use crate::range::Range;
+use hivtac_data::conditions::meaning;
+use hivtac_data::dataset::{Loads, Recipe, measure, reasons};
+use hivtac_data::range::Range;
 
 /// What a check found.
 #[derive(Clone, Debug)]

@@ -6,12 +6,12 @@ use std::{fs, path::Path};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 
-use crate::conditions::Conditions;
 use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
-pub use crate::range::Range;
-pub use crate::rest::{Rest, features_from_q16, q16};
 pub use crate::uncertainty::Uncertainty;
+use hivtac_data::conditions::Conditions;
+pub use hivtac_data::range::Range;
+pub use hivtac_data::rest::{Rest, features_from_q16, q16};
 
 /// What the file calls itself.
 const FORMAT: &str = "hivtac-weights 2";

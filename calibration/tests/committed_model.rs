@@ -5,10 +5,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use hivtac_calibration::check::check;
-use hivtac_calibration::dataset::{Loads, Recipe, generate};
 use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Range, Weights};
+use hivtac_data::dataset::{Loads, Recipe, generate};
 use hivtac_sensing::model::{Model, Origin, OutputKind};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};

@@ -4,7 +4,6 @@
 
 use std::collections::HashMap;
 
-use hivtac_calibration::conditions::Conditions;
 use hivtac_calibration::import::parse;
 use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
 use hivtac_calibration::quantize::export;
@@ -12,6 +11,7 @@ use hivtac_calibration::train::{Options, Samples, train};
 use hivtac_calibration::weights::{
     Range, Rest, Training, Uncertainty, Weights, features_from_q16, q16,
 };
+use hivtac_data::conditions::Conditions;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::{Network as ChipNetwork, Output};
 use hivtac_terms::geometry::Preset;

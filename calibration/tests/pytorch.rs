@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use hivtac_calibration::dataset::{Loads, Recipe, generate};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::import::{load, parse};
 use hivtac_calibration::network::{INPUTS, Meaning, Network, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::Range;
+use hivtac_data::dataset::{Loads, Recipe, generate};
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensors, serialize};
 

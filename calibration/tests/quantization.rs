@@ -1,7 +1,6 @@
 //! The exported network against the floats that it came from: never further than its roundings add
 //! up to.
 
-use hivtac_calibration::conditions::Conditions;
 use hivtac_calibration::network::{
     Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization,
 };
@@ -9,6 +8,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{
     Range, Rest, Training, Uncertainty, Weights, features_from_q16, q16,
 };
+use hivtac_data::conditions::Conditions;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 use hivtac_terms::fixed::Q;

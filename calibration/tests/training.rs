@@ -1,12 +1,12 @@
 //! Training, small: it learns, it is repeatable, it says what it cannot learn from.
 
-use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::evaluate::{Evaluation, by_place};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
 use hivtac_calibration::weights::Range;
+use hivtac_data::dataset::{Dataset, Loads, Recipe, generate};
 
 /// A tip in the film's middle.
 const MIDDLE: Range = Range {

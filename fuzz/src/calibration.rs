@@ -1,13 +1,13 @@
 //! What calibration reads: data sets, recordings of a unit and a gauge, networks.
 
-use hivtac_calibration::collect::assemble::{Gauge, assemble};
-use hivtac_calibration::collect::folder::Recording;
-use hivtac_calibration::collect::gauge::Unit;
-use hivtac_calibration::collect::series::Series;
-use hivtac_calibration::dataset::Dataset;
 use hivtac_calibration::import;
 use hivtac_calibration::quantize;
 use hivtac_calibration::weights::Weights;
+use hivtac_data::collect::assemble::{Gauge, assemble};
+use hivtac_data::collect::folder::Recording;
+use hivtac_data::collect::gauge::Unit;
+use hivtac_data::collect::series::Series;
+use hivtac_data::dataset::Dataset;
 use hivtac_sensing::model::Model;
 
 /// Ends one of several files in an input.

@@ -4,12 +4,12 @@ use std::fmt::Write;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use hivtac_calibration::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
 use hivtac_calibration::weights::{Range, Weights};
+use hivtac_data::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_scene::Options;
 use hivtac_sensing::model::Model;

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::Judged;
 use super::numbers::errors;
-use crate::loads::PaperPoses;
 use crate::plot::{Axis, COLOURS, Plot, Scale};
+use hivtac_data::loads::PaperPoses;
 
 /// The most points of a scatter plot.
 const MOST_POINTS: usize = 2500;

@@ -10,8 +10,8 @@ use hivtac_sensing::model::Model;
 use hivtac_terms::status::Status;
 
 use crate::answer::Chip;
-use crate::conditions::OriginName;
-use crate::dataset::{Dataset, Row, reasons};
+use hivtac_data::conditions::OriginName;
+use hivtac_data::dataset::{Dataset, Row, reasons};
 
 /// One answer with its truth. Angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]

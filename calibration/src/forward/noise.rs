@@ -6,7 +6,7 @@ use hivtac_film::reduced::{Pose, Unit};
 use hivtac_scene::MARKERS;
 
 use super::UnitSetup;
-use crate::dataset::{Dataset, Sample};
+use hivtac_data::dataset::{Dataset, Sample};
 
 /// The mean of what is normally distributed, without sign, over its standard deviation: √(2/π).
 const MEAN_SIZE: f64 = 0.797_884_560_802_865_4;

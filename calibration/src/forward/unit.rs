@@ -3,9 +3,9 @@
 use anyhow::{Context, Result, ensure};
 
 use super::{Bench, FilmModel, Fit, KnownLoad, fit};
-use crate::conditions::Conditions;
-use crate::dataset::{Dataset, Observation};
 use crate::weights::{Rest, Weights};
+use hivtac_data::conditions::Conditions;
+use hivtac_data::dataset::{Dataset, Observation};
 
 /// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
 /// left of noise. With it χ² of simulated units is 1 over its degrees of freedom, on average.
@@ -156,8 +156,8 @@ mod tests {
     use hivtac_terms::threshold::PixelFormat;
 
     use super::*;
-    use crate::dataset::{Loads, Recipe, generate};
-    use crate::range::Range;
+    use hivtac_data::dataset::{Loads, Recipe, generate};
+    use hivtac_data::range::Range;
 
     fn default_weights() -> Weights {
         let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");

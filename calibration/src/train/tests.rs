@@ -5,10 +5,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::mlp::Mlp;
 use super::*;
-use crate::conditions::Conditions;
 use crate::network::{Arithmetic, Meaning};
 use crate::quantize::export;
 use crate::weights::{Range, Rest, Training, Uncertainty, Weights, features_from_q16};
+use hivtac_data::conditions::Conditions;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;

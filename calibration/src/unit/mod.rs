@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::collect::assemble::{Gauge, assemble};
-use crate::collect::folder::{self, Recording};
-use crate::collect::gauge::Unit;
-use crate::collect::gauge_port::GaugeArgs;
-use crate::collect::poses;
-use crate::collect::record::{self, RecordArgs, seconds};
-use crate::collect::series::Series;
 use crate::quantize::export;
 use crate::weights::Weights;
+use hivtac_data::collect::assemble::{Gauge, assemble};
+use hivtac_data::collect::folder::{self, Recording};
+use hivtac_data::collect::gauge::Unit;
+use hivtac_data::collect::gauge_port::GaugeArgs;
+use hivtac_data::collect::poses;
+use hivtac_data::collect::record::{self, RecordArgs, seconds};
+use hivtac_data::collect::series::Series;
 use plan::{MOST_LOADS, Planned};
 use verdict::Verdict;
 

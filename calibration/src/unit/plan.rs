@@ -1,6 +1,6 @@
 //! The loads that a person puts on, in words.
 
-use crate::collect::poses::{self, Pose, Task};
+use hivtac_data::collect::poses::{self, Pose, Task};
 
 /// More loads tell hardly more of a unit (`docs/results/units.md`).
 pub const MOST_LOADS: usize = 10;

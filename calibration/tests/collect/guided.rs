@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use hivtac_calibration::collect::simulated::SimulatedGauge;
-use hivtac_calibration::dataset::{MarkerDetector, Recipe, Sensing};
+use hivtac_data::collect::simulated::SimulatedGauge;
+use hivtac_data::dataset::{MarkerDetector, Recipe, Sensing};
 use hivtac_scene::Load;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;

@@ -2,12 +2,12 @@
 
 use anyhow::{Context, Result, anyhow};
 use hivtac_calibration::check::vector_n;
-use hivtac_calibration::dataset::Dataset;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
 use hivtac_calibration::weights::{Weights, features_from_q16};
+use hivtac_data::dataset::Dataset;
 use hivtac_scene::Contact;
 use hivtac_sensing::force;
 use hivtac_sensing::model::Model as Chip;
@@ -51,7 +51,7 @@ impl Model {
     }
 
     fn in_floats(&self, sets: &Sets) -> Answers {
-        let answer = |row: &hivtac_calibration::dataset::Row| {
+        let answer = |row: &hivtac_data::dataset::Row| {
             let seen = row.seen.as_ref().ok()?;
             Some([row.force_n, self.weights.force_n(&seen.features_px())])
         };
@@ -62,7 +62,7 @@ impl Model {
         let bytes = export(&self.weights)?;
         let model = Chip::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let mut network = Network::new();
-        let answer = |row: &hivtac_calibration::dataset::Row| {
+        let answer = |row: &hivtac_data::dataset::Row| {
             let Ok(seen) = &row.seen else { return Ok(None) };
             let features = features_from_q16(&seen.features_q16)?;
             let output = network.run(&model, &features, &model.rest.features);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use hivtac_calibration::dataset::{Detection, MarkerDetector, Observation};
+use hivtac_data::dataset::{Detection, MarkerDetector, Observation};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
 use hivtac_terms::marker::Marker;
@@ -148,7 +148,7 @@ fn observation(contours: &[[f64; 3]]) -> Detection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_calibration::dataset::Recipe;
+    use hivtac_data::dataset::Recipe;
 
     #[test]
     fn contours_become_features_whatever_their_order() {

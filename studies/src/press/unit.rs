@@ -1,7 +1,7 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
-use hivtac_calibration::dataset::measure;
+use hivtac_data::dataset::measure;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_scene::{Frame, Load, Options, Scene};
 use hivtac_sensing::force::Force;

@@ -1,7 +1,7 @@
 //! The pipeline on simulated frames, with the default model where that is made for them.
 
 use anyhow::{Context, Result, anyhow, bail};
-use hivtac_calibration::dataset::reasons;
+use hivtac_data::dataset::reasons;
 use hivtac_scene::{Camera, Frame, Load, Scene, Truth};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};

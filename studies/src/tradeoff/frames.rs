@@ -5,10 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow, ensure};
-use hivtac_calibration::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
 use hivtac_calibration::network::{INPUTS, Layer, Meaning, Network, Standardization};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Training, Uncertainty, Weights};
+use hivtac_data::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;

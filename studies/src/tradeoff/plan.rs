@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use hivtac_calibration::dataset::Recipe;
 use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::weights::Range;
+use hivtac_data::dataset::Recipe;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use serde::{Deserialize, Serialize};

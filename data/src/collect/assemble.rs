@@ -325,7 +325,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
         sessions: report.runs.len(),
         seed: 0,
         range: Range {
-            force_n: largest(&|row| crate::errors::norm(row.force_n)),
+            force_n: largest(&Row::magnitude_n),
             alpha_deg: extreme(0),
             beta_deg: extreme(1),
             place_mm: reach_mm(recording),
