@@ -5,15 +5,15 @@ use std::process::Command;
 use std::sync::Mutex;
 use std::thread;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, ensure};
 
 use crate::toolchain::{self, cargo};
 use crate::{artifacts, process, workspace};
 
 /// Seconds of each attack.
 const SECONDS: u32 = 10;
-/// What one input may take: seconds, and MiB of memory. A recording and its gauge may differ by half
-/// a day, all of which is searched: that takes seconds, and more beside other tests.
+/// What one input may take: seconds, and MiB of memory. A recording and its gauge may differ by
+/// half a day, all of which is searched: that takes seconds, and more beside other tests.
 const LIMITS: [&str; 2] = ["-timeout=100", "-rss_limit_mb=2048"];
 /// What has the compiler tell libFuzzer which parts of a program an input reaches, and what it
 /// compares: as cargo-fuzz does it without a sanitizer, which only a nightly compiler has; no
@@ -44,20 +44,28 @@ pub fn run() -> Result<()> {
     let targets = targets()?;
     let waiting = Mutex::new(targets.iter());
     let next = || waiting.lock().ok()?.next();
-    let run_all = || -> Result<()> {
-        while let Some(target) = next() {
-            attack(&programs, target)?;
-        }
-        Ok(())
+    let run_all = || -> Vec<Result<String>> {
+        std::iter::from_fn(next)
+            .map(|target| attack(&programs, target))
+            .collect()
     };
     let cores = thread::available_parallelism().map_or(1, usize::from);
-    thread::scope(|scope| {
+    let ended: Vec<Result<String>> = thread::scope(|scope| {
         let runs: Vec<_> = (0..cores).map(|_| scope.spawn(run_all)).collect();
-        let ended = runs.into_iter().map(thread::ScopedJoinHandle::join);
-        let ended = ended.map(|end| end.unwrap_or_else(|_| bail!("an attack's thread panicked")));
-        // All of them, whatever becomes of one.
-        ended.collect::<Vec<_>>().into_iter().collect()
-    })
+        let panicked = |_| vec![Err(anyhow!("an attack's thread panicked"))];
+        runs.into_iter()
+            .flat_map(|run| run.join().unwrap_or_else(panicked))
+            .collect()
+    });
+    let mut failed = 0;
+    for end in ended {
+        process::say(&end.unwrap_or_else(|error| {
+            failed += 1;
+            format!("{error:#}")
+        }));
+    }
+    ensure!(failed == 0, "{failed} attacks found something: see above");
+    Ok(())
 }
 
 /// Gives the folder of the programs. They are for a named target, so that what is built to run
@@ -93,23 +101,21 @@ fn targets() -> Result<Vec<String>> {
     Ok(names)
 }
 
-fn attack(programs: &Path, target: &str) -> Result<()> {
+/// Runs one; gives how many inputs the target withstood.
+fn attack(programs: &Path, target: &str) -> Result<String> {
     let found = workspace::work_folder(&format!("fuzz/found/{target}"))?;
     let output = command(programs, target, &found)
         .output()
         .with_context(|| format!("attacking {target}"))?;
     let said = String::from_utf8_lossy(&output.stderr);
-    if !output.status.success() {
-        process::say(&said);
-        bail!(
-            "{target} found something: see above, and {}",
-            found.display()
-        );
-    }
+    ensure!(
+        output.status.success(),
+        "{said}\n{target} found something: see above, and {}",
+        found.display()
+    );
     let tried = said.split_once(TRIED).map(|(_, rest)| rest);
     let tried = tried.and_then(|rest| rest.lines().next()).unwrap_or("?");
-    process::say(&format!("{target}: {} inputs withstood", tried.trim()));
-    Ok(())
+    Ok(format!("{target}: {} inputs withstood", tried.trim()))
 }
 
 /// New inputs that reach further go to `found`, not into the corpus, and so does what fails.

@@ -59,8 +59,8 @@ struct Programs {
 
 impl Test {
     /// Runs every step, past those that fail, and prints the table. The rig's tests and some steps
-    /// run beside the others, so that no core waits while one of both builds or tests with the other
-    /// alone; what they print comes when the others are done.
+    /// run beside the others, so that no core waits while one of both builds or tests with the
+    /// other alone; what they print comes when the others are done.
     ///
     /// # Errors
     /// When a step failed.
