@@ -94,8 +94,10 @@ fn an_overrun_costs_a_frame_and_is_told() {
         "no other frame is lost: {stats:?}"
     );
     let samples = run.samples();
-    let telling = |status| samples.iter().filter(move |s| s.status.contains(status));
-    let after: Vec<u32> = telling(Status::CAPTURE_OVERRUN).map(|s| s.frame).collect();
+    let telling = samples
+        .iter()
+        .filter(|sample| sample.status.contains(Status::CAPTURE_OVERRUN));
+    let after: Vec<u32> = telling.map(|sample| sample.frame).collect();
     assert_eq!(after, [missing[0] + lost]);
     assert_eq!(run.frames_after_a_loss(), after);
     assert!(samples.len() >= 5 && samples.last().map(|s| s.frame) > after.last().copied());
