@@ -9,8 +9,8 @@ use hivtac_sensing::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 
-use crate::weights::features_from_q16;
 use hivtac_data::dataset::Observation;
+use hivtac_data::rest::features_from_q16;
 
 /// A model on the chip, with a rest position.
 pub struct Chip<'m> {
@@ -25,7 +25,7 @@ impl<'m> Chip<'m> {
     ///
     /// # Errors
     /// When its features do not fit the chip's numbers.
-    pub fn new(model: Model<'m>, rest: &crate::weights::Rest) -> Result<Self> {
+    pub fn new(model: Model<'m>, rest: &hivtac_data::rest::Rest) -> Result<Self> {
         let tare = features_from_q16(&rest.features_q16)?;
         let rest = Rest {
             features: tare,

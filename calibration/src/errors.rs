@@ -1,5 +1,7 @@
 //! How far forces are from the truth.
 
+use hivtac_data::loads::norm;
+
 /// Below this |F| the direction of a force is told separately (N; the paper's Section 7 does the
 /// same).
 pub const WEAK_N: f64 = 0.05;
@@ -103,11 +105,6 @@ impl Errors {
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
     sum / count
-}
-
-/// |F| in the unit of its components.
-pub fn norm([x, y, z]: [f64; 3]) -> f64 {
-    (x * x + y * y + z * z).sqrt()
 }
 
 /// The angle between two forces in degrees, exact for small ones too; `None` when one has no size.

@@ -10,7 +10,8 @@ use anyhow::{Result, ensure};
 use hivtac_sensing::model::Uncertainty as ChipUncertainty;
 use serde::{Deserialize, Serialize};
 
-use crate::errors::{angle_deg, norm};
+use crate::errors::angle_deg;
+use hivtac_data::loads::norm;
 
 /// The 95 % bound of a direction over its standard uncertainty: √(−ln 0.05), for a root mean square
 /// over two dimensions.

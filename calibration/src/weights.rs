@@ -10,8 +10,8 @@ use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
 pub use crate::uncertainty::Uncertainty;
 use hivtac_data::conditions::Conditions;
-pub use hivtac_data::range::Range;
-pub use hivtac_data::rest::{Rest, features_from_q16, q16};
+use hivtac_data::range::Range;
+use hivtac_data::rest::{Rest, features_from_q16};
 
 /// What the file calls itself.
 const FORMAT: &str = "hivtac-weights 2";

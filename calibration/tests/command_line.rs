@@ -3,8 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use hivtac_calibration::weights::{Range, Weights};
+use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::{Loads, Recipe, generate_file};
+use hivtac_data::range::Range;
 use hivtac_scene::Contact;
 
 fn run(directory: &Path, arguments: &[&str]) -> Output {

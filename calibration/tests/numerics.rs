@@ -8,10 +8,10 @@ use hivtac_calibration::import::parse;
 use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
-use hivtac_calibration::weights::{
-    Range, Rest, Training, Uncertainty, Weights, features_from_q16, q16,
-};
+use hivtac_calibration::weights::{Training, Uncertainty, Weights};
 use hivtac_data::conditions::Conditions;
+use hivtac_data::range::Range;
+use hivtac_data::rest::{Rest, features_from_q16, q16};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::{Network as ChipNetwork, Output};
 use hivtac_terms::geometry::Preset;

@@ -5,10 +5,10 @@ use hivtac_calibration::network::{
     Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization,
 };
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::weights::{
-    Range, Rest, Training, Uncertainty, Weights, features_from_q16, q16,
-};
+use hivtac_calibration::weights::{Training, Uncertainty, Weights};
 use hivtac_data::conditions::Conditions;
+use hivtac_data::range::Range;
+use hivtac_data::rest::{Rest, features_from_q16, q16};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 use hivtac_terms::fixed::Q;

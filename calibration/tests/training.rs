@@ -5,8 +5,8 @@ use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
-use hivtac_calibration::weights::Range;
 use hivtac_data::dataset::{Dataset, Loads, Recipe, generate};
+use hivtac_data::range::Range;
 
 /// A tip in the film's middle.
 const MIDDLE: Range = Range {

@@ -10,6 +10,11 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::range::Range;
 
+/// |F| in the unit of its components.
+pub fn norm([x, y, z]: [f64; 3]) -> f64 {
+    (x * x + y * y + z * z).sqrt()
+}
+
 /// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to
 /// their limits.
 #[derive(Clone, Copy, Debug)]

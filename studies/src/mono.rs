@@ -5,9 +5,9 @@ use std::fmt::Write;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use hivtac_calibration::weights::Range;
 use hivtac_data::dataset::{Recipe, measure};
 use hivtac_data::loads::RandomLoads;
+use hivtac_data::range::Range;
 use hivtac_scene::{Lens, Load, MarkerTruth, Options, Paint, PresetCamera, Scene};
 use hivtac_sensing::pipeline::Sensor;
 use hivtac_sensing::settings::Settings;

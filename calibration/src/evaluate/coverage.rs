@@ -1,8 +1,8 @@
 //! Whether the uncertainties that come with every force are honest.
 
 use super::Judged;
-use crate::errors::norm;
 use crate::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND};
+use hivtac_data::loads::norm;
 
 const PARTS: usize = 10;
 

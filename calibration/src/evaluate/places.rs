@@ -1,8 +1,9 @@
 //! How good answers are where the tip is off the film's middle.
 
 use super::Judged;
-use crate::errors::{WEAK_N, mean, norm};
+use crate::errors::{WEAK_N, mean};
 use crate::uncertainty::PLACE_BOUND;
+use hivtac_data::loads::norm;
 
 /// Distances from the middle that are told apart, mm.
 const RINGS_MM: [f64; 6] = [0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY];

@@ -7,9 +7,10 @@ use super::figures::{error_against_force, found_against_true, histograms, pose_m
 use super::numbers::{PoseNumbers, by_pose, errors};
 use super::places::{PlaceNumbers, by_place};
 use super::{Evaluation, Interval, Judged, Numbers};
-use crate::errors::{WEAK_N, norm};
+use crate::errors::WEAK_N;
 use crate::plot::escaped;
 use hivtac_data::conditions::meaning;
+use hivtac_data::loads::norm;
 
 const STYLE: &str = "body{font-family:sans-serif;max-width:1320px;margin:1em auto;padding:0 1em}\
 table{border-collapse:collapse;margin:1em 0}td,th{border:1px solid #bbb;padding:.3em \

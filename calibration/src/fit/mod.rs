@@ -6,13 +6,16 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 
-use crate::errors::{Errors, norm};
+use crate::errors::Errors;
 use crate::network::Network;
 use crate::quantize::export;
 use crate::train::{Options, Progress, Samples, train};
 use crate::uncertainty::Miss;
-use crate::weights::{Range, Training, Uncertainty, Weights, features_from_q16};
+use crate::weights::{Training, Uncertainty, Weights};
 use hivtac_data::dataset::{About, Dataset, Observation, Sample};
+use hivtac_data::loads::norm;
+use hivtac_data::range::Range;
+use hivtac_data::rest::features_from_q16;
 
 /// What was held out together, in files: single rows, whatever their pose.
 const WITHIN_POSE: &str = "within-pose";

@@ -286,7 +286,7 @@ impl Problem<'_> {
     }
 
     fn pose(&self, load: &KnownLoad, made: &Made, number: usize) -> Result<Load> {
-        let told_n = crate::errors::norm(load.force_n);
+        let told_n = hivtac_data::loads::norm(load.force_n);
         let larger = 1.0 + made.gauge_n[number] / told_n;
         let place_mm = [0, 1].map(|i| load.place_mm[i] + made.stage_mm[i]);
         Ok(Load::from_vector(load.force_n.map(|part| larger * part))?

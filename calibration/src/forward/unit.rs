@@ -3,9 +3,10 @@
 use anyhow::{Context, Result, ensure};
 
 use super::{Bench, FilmModel, Fit, KnownLoad, fit};
-use crate::weights::{Rest, Weights};
+use crate::weights::Weights;
 use hivtac_data::conditions::Conditions;
 use hivtac_data::dataset::{Dataset, Observation};
+use hivtac_data::rest::Rest;
 
 /// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
 /// left of noise. With it χ² of simulated units is 1 over its degrees of freedom, on average.

@@ -2,8 +2,8 @@
 //! asked for, weighed across the force by how much of a direction it is.
 
 use super::Samples;
-use crate::errors::norm;
 use crate::network::OUTPUTS;
+use hivtac_data::loads::norm;
 
 /// Below this |F| (N) no direction counts more.
 const FLOOR_N: f64 = 0.01;

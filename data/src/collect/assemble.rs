@@ -11,7 +11,7 @@ use super::poses::Pose;
 use super::report::{Report, RunReport};
 use super::series::{Joined, Series};
 use crate::dataset::{About, Dataset, Loads, Observation, Place, Row};
-use crate::loads::PaperPoses;
+use crate::loads::{PaperPoses, norm};
 use crate::range::Range;
 
 /// Where the gauge's readings are.
@@ -325,7 +325,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
         sessions: report.runs.len(),
         seed: 0,
         range: Range {
-            force_n: largest(&Row::magnitude_n),
+            force_n: largest(&|row| norm(row.force_n)),
             alpha_deg: extreme(0),
             beta_deg: extreme(1),
             place_mm: reach_mm(recording),

@@ -77,17 +77,6 @@ pub struct Row {
     pub seen: Result<Observation, String>,
 }
 
-impl Row {
-    /// |F| as it is labelled, N.
-    pub fn magnitude_n(&self) -> f64 {
-        self.force_n
-            .iter()
-            .map(|part| part * part)
-            .sum::<f64>()
-            .sqrt()
-    }
-}
-
 /// What is known of a row whose markers were found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<'a> {

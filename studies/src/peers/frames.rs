@@ -6,10 +6,10 @@ use anyhow::{Context, Result, anyhow};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_calibration::weights::Range;
 use hivtac_data::dataset::{
     Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files,
 };
+use hivtac_data::range::Range;
 use hivtac_scene::Contact;
 use hivtac_sensing::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;

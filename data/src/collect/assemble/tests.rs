@@ -95,7 +95,7 @@ fn weights_and_a_watch_are_a_gauge() {
     );
     let mut frames = [0; 4];
     for row in dataset.rows.iter().filter(|row| row.force_n != [0.0; 3]) {
-        let force_n = row.magnitude_n();
+        let force_n = norm(row.force_n);
         assert!((force_n - pressed_n(row)).abs() < 1e-4, "{row:?}");
         let weight = WEIGHTS_G
             .iter()

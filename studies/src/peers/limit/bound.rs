@@ -1,7 +1,7 @@
 //! The Cramér–Rao bound of a force that is read from the centroids of four markers.
 
 use anyhow::{Context, Result};
-use hivtac_calibration::errors::norm;
+use hivtac_data::loads::norm;
 use hivtac_scene::{Contact, Load, Scene};
 
 use super::matrix::{cholesky, dot, forward, inverse};
