@@ -24,6 +24,7 @@ use crate::flash::{Bank, Flash};
 use crate::late_flags::LateFlags;
 use crate::late_line::LateLine;
 use crate::mdma::Mdma;
+use crate::mpu::{Mpu, Protection};
 use crate::otg::{Blocks, SharedCore};
 use crate::request_mux::RequestMux;
 use crate::rules::Rules;
@@ -69,6 +70,8 @@ pub struct Chip {
     pub dcmi: Dcmi,
     /// The controller that reaches DTCM.
     pub mdma: Mdma,
+    /// The registers of an MPU that enforces nothing.
+    pub mpu: Option<Mpu>,
     crs: Crs,
     flash: Flash,
     request_mux: RequestMux,
@@ -107,6 +110,7 @@ impl Chip {
         faults: Faults,
         rules: Rules,
         bank: Bank,
+        protection: Protection,
         board: board::Kind,
         revision: Revision,
         seed: u64,
@@ -115,6 +119,10 @@ impl Chip {
         part.rcc.attach_crystals(board.crystal_hz(), 0);
         part.set_supply(SUPPLY_MV);
         part.set_analog_supply(SUPPLY_MV);
+        let mpu = match protection {
+            Protection::Enforced => None,
+            Protection::Ignored => Some(Mpu::fit(part.bus_mut())?),
+        };
         let kind = camera.lock().kind();
         match kind {
             part::Kind::Ov7725 => part.i2c[0].attach(Sccb::new(camera.clone())),
@@ -148,6 +156,7 @@ impl Chip {
             late: LateLine::default(),
             late_flags,
             crs: Crs::default(),
+            mpu,
             part,
             camera,
             otg,
@@ -268,6 +277,9 @@ impl Mcu for Chip {
             .expect("a part that was fitted once");
         self.otg.wake_host(self.part.bus_mut(), at);
         self.dormant = Dormant::new(self.part.bus());
+        if let Some(mpu) = &mut self.mpu {
+            mpu.reset();
+        }
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crs);
         Device::reset(&mut self.flash);
@@ -297,6 +309,10 @@ impl Mcu for Chip {
         }
         if slot == self.mdma_slot {
             return (self.part.bus_mut(), Some(&mut self.mdma));
+        }
+        if self.mpu.as_ref().is_some_and(|mpu| mpu.slot() == slot) {
+            let mpu = self.mpu.as_mut().map(|mpu| mpu as &mut dyn ErasedDevice);
+            return (self.part.bus_mut(), mpu);
         }
         if self.control_bus.holds(slot) {
             return (self.part.bus_mut(), Some(&mut self.held_bus));

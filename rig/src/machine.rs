@@ -7,7 +7,9 @@ use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::Store;
 
 use crate::chip::Chip;
+use crate::mpu::Mpu;
 use crate::rom;
+use crate::translations;
 
 /// The core's clock, Hz. Only SysTick's reference depends on it.
 const CORE_HZ: u64 = 480_000_000;
@@ -82,6 +84,7 @@ impl Board for Sensor {
             rom::loader(),
             rom::firmware_loader(),
         ];
+        translations::keep(&mut core, self.chip.mpu.as_ref().map(Mpu::is_on));
         vec![Target::new("stm32h743", &mut self.chip, core)]
     }
 }

@@ -18,6 +18,7 @@ use hivtac_rig::flash::Cut;
 use hivtac_rig::frame_source::{FrameSource, SceneSource, TestPicture};
 use hivtac_rig::link::{Endpoint, Link, Pty, Tcp};
 use hivtac_rig::machine::Entry;
+use hivtac_rig::mpu::Protection;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::Script;
 use hivtac_rig::truth::TruthLog;
@@ -159,6 +160,7 @@ fn options(arguments: &Arguments, interrupt: Arc<AtomicBool>) -> anyhow::Result<
         cut: arguments.cut_power,
         seed: arguments.seed,
         revision: arguments.silicon,
+        protection: Protection::Enforced,
         entry: match arguments.by_loader {
             true => Entry::Loader,
             false => Entry::Reset,

@@ -23,6 +23,7 @@ use crate::flash::{self, Bank, Contents, Cut};
 use crate::frame_source::FrameSource;
 use crate::link::Link;
 use crate::machine::{Entry, Sensor};
+use crate::mpu::Protection;
 use crate::report::Report;
 use crate::rules::Rules;
 use crate::script::Script;
@@ -92,6 +93,8 @@ pub struct Options {
     pub revision: Revision,
     /// How the program is entered.
     pub entry: Entry,
+    /// Whether the program's own regions of memory are enforced.
+    pub protection: Protection,
     /// Who uses the port.
     pub program: Program,
     /// When to end.
@@ -138,6 +141,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         options.faults,
         rules.clone(),
         bank.clone(),
+        options.protection,
         options.board,
         options.revision,
         options.seed,

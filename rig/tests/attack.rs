@@ -194,6 +194,7 @@ fn attacked(seed: u64) -> Run {
         .at(PLUGGED_MS + 2, Action::Read)
         .at(GREETED_MS, Action::Send(hello()))
         .at(GREETED_MS + 2, Action::Send(command(3, Request::Start)))
+        .protected()
         .run()
 }
 

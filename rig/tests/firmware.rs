@@ -16,7 +16,7 @@ const PICTURE: Status = Status(
 );
 
 fn undisturbed(setup: Setup) -> crate::common::Run {
-    let run = setup.run();
+    let run = setup.protected().run();
     assert_eq!(run.rejected.frames(), 0, "{:?}", run.rejected);
     assert_eq!((run.report.dcmi.overruns, run.report.resets), (0, 0));
     let hello = run.hellos()[0];
@@ -72,13 +72,18 @@ fn frames_back_to_back_are_all_measured() {
     assert!(dcmi.words.abs_diff(words) <= 4 * 640, "{words} of {dcmi:?}");
 }
 
+/// Whether regions of memory are enforced, and whether an earlier run translated the program.
 #[test]
 fn the_same_seed_gives_the_same_bytes() {
-    let [first, second] = [(); 2].map(|()| Setup::new(firmware(), 240).run());
+    let setup = || Setup::new(firmware(), 240);
+    let first = setup().protected().run();
     assert!(!first.bytes.is_empty());
-    assert_eq!(first.bytes, second.bytes);
-    assert_eq!(first.truth, second.truth);
-    assert_eq!(first.report.virtual_ns, second.report.virtual_ns);
+    for other in [setup().protected(), setup(), setup()] {
+        let other = other.run();
+        assert_eq!(first.bytes, other.bytes);
+        assert_eq!(first.truth, other.truth);
+        assert_eq!(first.report.virtual_ns, other.report.virtual_ns);
+    }
 }
 
 #[test]

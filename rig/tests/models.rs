@@ -358,7 +358,7 @@ fn every_cut_of_an_update(before: &Contents) {
     let (old, new) = (own(), changed(&own(), &[(300, &[1])]));
     let updating = |flash: &Path| update(flash, &new);
     let device = Device::of(before);
-    let run = updating(&device.flash).run();
+    let run = updating(&device.flash).protected().run();
     assert_eq!(run.outcome(USE), Outcome::Done, "{}", run.log());
     let whole = run.report.flash_operations;
     assert!(whole.len() > new.len() / WORD_BYTES, "each word is written");

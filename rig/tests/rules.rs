@@ -14,6 +14,7 @@ use hivtac_rig::faults::Faults;
 use hivtac_rig::flash::{Contents, Cut, Operation};
 use hivtac_rig::frame_source::TestPicture;
 use hivtac_rig::machine::Entry;
+use hivtac_rig::mpu::Protection;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::Script;
 use hivtac_rig::truth::TruthLog;
@@ -54,7 +55,11 @@ fn program(writes: &[(u32, u32)]) -> Vec<u8> {
 }
 
 fn run_program(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> anyhow::Result<Outcome> {
-    run(Options {
+    run(options(elf, flash, cut))
+}
+
+fn options(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> Options {
+    Options {
         flash: flash.map(Path::to_owned),
         cut,
         elf: elf.to_owned(),
@@ -67,6 +72,7 @@ fn run_program(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> anyhow::Re
         seed: 1,
         revision: Revision::V,
         entry: Entry::Reset,
+        protection: Protection::Enforced,
         program: Program::Script(Script::default()),
         limits: Limits {
             frames: None,
@@ -74,7 +80,7 @@ fn run_program(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> anyhow::Re
         },
         instructions_per_second: NonZeroU64::new(INSTRUCTIONS_PER_SECOND).unwrap(),
         interrupt: Arc::new(AtomicBool::new(false)),
-    })
+    }
 }
 
 fn outcome(writes: &[(u32, u32)]) -> Result<Outcome, String> {
@@ -111,6 +117,33 @@ fn a_dma_buffer_in_axi_sram_does_not() {
         "{}",
         outcome.report.line()
     );
+}
+
+/// A program that makes a region read-only, writes to it, and then what ends a run.
+#[test]
+fn a_program_that_breaks_its_own_protection_gets_no_further() {
+    const MPU_CTRL: u32 = 0xE000_ED94;
+    const PRIVILEGED_DEFAULT: u32 = 1 << 2;
+    const READ_ONLY: u32 = 0b110 << 24;
+    let mut writes = vec![
+        (MPU_CTRL + 4, 0),
+        (MPU_CTRL + 8, 0x2400_0000),
+        (MPU_CTRL + 12, READ_ONLY | 15 << 1 | 1),
+        (MPU_CTRL, PRIVILEGED_DEFAULT | 1),
+        (0x2400_0000, 1),
+    ];
+    writes.extend(dma_to(0x2000_1000));
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), program(&writes)).unwrap();
+    let run_with = |protection| {
+        run(Options {
+            protection,
+            ..options(file.path(), None, None)
+        })
+    };
+    run_with(Protection::Enforced).unwrap();
+    let error = run_with(Protection::Ignored).unwrap_err();
+    assert!(format!("{error:#}").contains("DTCM"), "{error:#}");
 }
 
 #[test]

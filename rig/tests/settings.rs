@@ -85,6 +85,7 @@ fn old() -> (Vec<u8>, SettingsReport) {
         .at(SET_MS, send(SET, Request::Tare { frames: 2 }))
         .at(SET_MS, send(SET + 1, Request::SetName(name("old"))))
         .at(KEEP_MS + 20, send(KEEP, Request::Keep(Selection::ALL)))
+        .protected()
         .run();
     assert_eq!(run.outcome(SET), Outcome::Done);
     assert_eq!(run.outcome(KEEP), Outcome::Done);

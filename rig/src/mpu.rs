@@ -1,0 +1,138 @@
+//! The memory protection unit (MPU), enforced or not.
+//!
+//! While the emulator's core enforces it, every access of the program is looked up in its regions,
+//! which takes most of a run's time. Where it is not enforced, its registers are here: they take
+//! what the program sets, and nothing is looked up. A program that keeps to its own regions does
+//! the same either way, bit for bit.
+
+use std::num::NonZeroU64;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rigless::device::{DeviceContext, ErasedDevice, RegisterFile, RequestChange};
+use rigless::soc::{Bus, Error, RegisterSpec, Width, Window};
+use rigless::time::EventId;
+
+/// Where its registers are (ARMv7-M, B3.5.4).
+const BASE: u64 = 0xE000_ED90;
+const BYTES: NonZeroU64 = NonZeroU64::new(0x2C).expect("some");
+/// MPU_TYPE, and what it reads as with 16 regions.
+const TYPE: u64 = 0;
+const SIXTEEN_REGIONS: u64 = 16 << 8;
+/// MPU_CTRL, and its bit that switches the unit on.
+const CTRL: u64 = 4;
+/// MPU_CTRL's address, for who looks at the core's own.
+pub const CTRL_ADDRESS: u64 = BASE + CTRL;
+/// MPU_CTRL.ENABLE.
+pub const ENABLE: u64 = 1;
+
+/// Whether the regions that a program sets are enforced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Protection {
+    /// By the emulator's core.
+    #[default]
+    Enforced,
+    /// Not: several times as fast.
+    Ignored,
+}
+
+/// Registers of a unit that enforces nothing.
+#[derive(Debug)]
+pub struct Mpu {
+    slot: usize,
+    layout: &'static [RegisterSpec],
+    is_on: Arc<AtomicBool>,
+}
+
+impl Mpu {
+    /// Puts the registers in place of the core's own.
+    ///
+    /// # Errors
+    /// When something else is there.
+    pub fn fit(bus: &mut Bus) -> Result<Self, Error> {
+        let slot = bus.add_window(Window::new("MPU", BASE, BYTES))?;
+        Ok(Self {
+            slot,
+            layout: bus.slots()[slot].peripheral().registers,
+            is_on: Arc::default(),
+        })
+    }
+
+    /// Their place on the bus.
+    pub fn slot(&self) -> usize {
+        self.slot
+    }
+
+    /// Whether the program has switched the unit on.
+    pub fn is_on(&self) -> Arc<AtomicBool> {
+        self.is_on.clone()
+    }
+}
+
+impl ErasedDevice for Mpu {
+    fn layout(&self) -> &'static [RegisterSpec] {
+        self.layout
+    }
+
+    fn read_window(&mut self, offset: u64, _width: Width, _context: &mut DeviceContext<'_>) -> u64 {
+        match offset {
+            TYPE => SIXTEEN_REGIONS,
+            CTRL => self.is_on.load(Ordering::Relaxed).into(),
+            _ => 0,
+        }
+    }
+
+    fn write_window(
+        &mut self,
+        offset: u64,
+        _width: Width,
+        value: u64,
+        _context: &mut DeviceContext<'_>,
+    ) {
+        if offset == CTRL {
+            self.is_on.store(value & ENABLE != 0, Ordering::Relaxed);
+        }
+    }
+
+    fn reset(&mut self) {
+        self.is_on.store(false, Ordering::Relaxed);
+    }
+
+    // It has a window and no register of the part's, and waits for nothing.
+    fn read(
+        &mut self,
+        _row: usize,
+        _registers: &mut RegisterFile,
+        _context: &mut DeviceContext<'_>,
+    ) -> Option<u64> {
+        None
+    }
+
+    fn write(
+        &mut self,
+        _row: usize,
+        _value: u64,
+        _registers: &mut RegisterFile,
+        _context: &mut DeviceContext<'_>,
+    ) {
+    }
+
+    fn on_event(&mut self, _: EventId, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+
+    fn on_request(&mut self, _: RequestChange, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+
+    fn on_clock(&mut self, _hz: u64, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+
+    fn poll(&mut self, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+
+    fn on_access(
+        &mut self,
+        _token: u64,
+        _value: u64,
+        _: &mut RegisterFile,
+        _: &mut DeviceContext<'_>,
+    ) {
+    }
+
+    fn on_refused(&mut self, _token: u64, _: &mut RegisterFile, _: &mut DeviceContext<'_>) {}
+}

@@ -1,0 +1,292 @@
+//! What a run translated of its program, kept for the next run of that program in this process.
+//!
+//! The emulator translates instructions as they are first run, which takes more than half of a
+//! short run's time. When a program has copied itself to where it runs and switches on the memory
+//! protection unit (MPU), soon after its start, a core that has run the same program before takes
+//! over, with the state of the one that it replaces. Translations change nothing but how long a run
+//! takes.
+#![expect(
+    unsafe_code,
+    reason = "a core is handed the memory of a run by pointers"
+)]
+
+use std::hash::{DefaultHasher, Hasher};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rigless::emulator::{CoreBus, CoreSpec, DataModel, Error, Exit, HostCall, Processor, Queued};
+use rigless::soc::{Endian, Width};
+use rigless::time::VirtualNanos;
+
+use crate::mpu;
+
+/// Where programs run: ITCM, the flash's first bank, the ROM. Translations of other addresses are
+/// not kept.
+const CODE: [Range<u64>; 3] = [
+    0..0x1_0000,
+    0x0800_0000..0x0810_0000,
+    0x1FF0_0000..0x1FF2_0000,
+];
+/// The most cores kept: some programs, by as many threads as a computer for tests has.
+const MOST_KEPT: usize = 6;
+
+/// Has the cores of a board keep what they translate. `is_on` tells whether a program has switched
+/// the MPU on where the core itself has none to look at.
+pub fn keep(spec: &mut CoreSpec, is_on: Option<Arc<AtomicBool>>) {
+    let make = spec.processor.clone();
+    spec.processor = Arc::new(move |endian| {
+        Ok(Box::new(Core {
+            inner: Some(make(endian)?),
+            mapped: Vec::new(),
+            is_on: is_on.clone(),
+            code: None,
+        }))
+    });
+}
+
+/// A stretch of memory that a run mapped.
+#[derive(Debug)]
+struct Mapped {
+    start: u64,
+    length: u64,
+    host: *mut u8,
+    writable: bool,
+}
+
+// SAFETY: it is read by methods of the core alone, which is used by one thread at a time.
+unsafe impl Send for Mapped {}
+
+impl Mapped {
+    /// The bytes of it that lie in `range`.
+    fn bytes(&self, range: &Range<u64>) -> &[u8] {
+        let start = range.start.max(self.start);
+        let end = range.end.min(self.start + self.length);
+        if start >= end {
+            return &[];
+        }
+        let (offset, length) = ((start - self.start) as usize, (end - start) as usize);
+        // SAFETY: inside the mapped memory, which stays until the core that holds this is dropped,
+        // and which nobody writes while a method of that core reads it.
+        unsafe { std::slice::from_raw_parts(self.host.add(offset), length) }
+    }
+
+    fn place(&self) -> (u64, u64, bool) {
+        (self.start, self.length, self.writable)
+    }
+}
+
+/// A core that no run uses now.
+struct Kept {
+    /// What it is kept for: the bytes of a program, and the memory that was mapped.
+    code: u64,
+    places: Vec<(u64, u64, bool)>,
+    is_enforced: bool,
+    core: Box<dyn Processor>,
+}
+
+static KEPT: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+
+fn kept() -> MutexGuard<'static, Vec<Kept>> {
+    KEPT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[derive(Debug)]
+struct Core {
+    /// There is one until this is dropped.
+    inner: Option<Box<dyn Processor>>,
+    mapped: Vec<Mapped>,
+    is_on: Option<Arc<AtomicBool>>,
+    /// Of the program's bytes when the MPU was switched on, from then on.
+    code: Option<u64>,
+}
+
+impl Core {
+    fn inner(&self) -> &dyn Processor {
+        self.inner.as_deref().expect("a core")
+    }
+
+    fn inner_mut(&mut self) -> &mut dyn Processor {
+        self.inner.as_deref_mut().expect("a core")
+    }
+
+    fn code_now(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for range in &CODE {
+            for mapped in &self.mapped {
+                hasher.write(mapped.bytes(range));
+            }
+        }
+        hasher.finish()
+    }
+
+    fn is_protected(&mut self) -> bool {
+        if let Some(is_on) = &self.is_on {
+            return is_on.load(Ordering::Relaxed);
+        }
+        let core = self.inner_mut();
+        let control = core.debugger_access(None, mpu::CTRL_ADDRESS, Width::W32, VirtualNanos(0));
+        control.is_some_and(|control| control & mpu::ENABLE != 0)
+    }
+
+    fn places(&self) -> Vec<(u64, u64, bool)> {
+        self.mapped.iter().map(Mapped::place).collect()
+    }
+
+    /// A kept core goes on in place of this one, if there is one for this program and memory.
+    fn hand_over(&mut self) {
+        let (code, places) = (self.code_now(), self.places());
+        self.code = Some(code);
+        let is_enforced = self.is_on.is_none();
+        let found = {
+            let mut kept = kept();
+            let is_for_this = |kept: &Kept| {
+                kept.is_enforced == is_enforced && kept.code == code && kept.places == places
+            };
+            let at = kept.iter().position(is_for_this);
+            at.map(|at| kept.swap_remove(at))
+        };
+        let Some(Kept { core: mut next, .. }) = found else {
+            return;
+        };
+        for mapped in &self.mapped {
+            // SAFETY: what the caller of `map` promised this core holds for the one inside it. The
+            // memory that was mapped at the same addresses before is all replaced before it runs.
+            unsafe { next.map(mapped.start, mapped.length, mapped.host, mapped.writable) };
+        }
+        let mut from = 0;
+        for range in CODE {
+            next.ask(Queued::Invalidate(from, range.start));
+            from = range.end;
+        }
+        next.ask(Queued::Invalidate(from, 1 << 32));
+        if next.load(&self.inner().save()).is_ok() {
+            self.inner = Some(next);
+        }
+    }
+}
+
+impl Drop for Core {
+    fn drop(&mut self) {
+        let is_unchanged = self.code.is_some_and(|code| code == self.code_now());
+        let Some(core) = self.inner.take() else {
+            return;
+        };
+        if is_unchanged && !std::thread::panicking() {
+            let mut kept = kept();
+            if kept.len() == MOST_KEPT {
+                kept.remove(0);
+            }
+            kept.push(Kept {
+                code: self.code.expect("there is one"),
+                places: self.places(),
+                is_enforced: self.is_on.is_none(),
+                core,
+            });
+        }
+    }
+}
+
+/// All that a run without a debugger asks of a core.
+impl Processor for Core {
+    fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
+        let ran = self.inner_mut().run(budget, bus);
+        if self.code.is_none() && self.is_protected() {
+            self.hand_over();
+        }
+        ran
+    }
+
+    fn retired(&self) -> u64 {
+        self.inner().retired()
+    }
+
+    fn ask(&mut self, queued: Queued) {
+        debug_assert!(!matches!(queued, Queued::Route(_)), "nothing is watched");
+        self.inner_mut().ask(queued);
+    }
+
+    fn maps(&self, start: u64, length: u64) -> bool {
+        self.inner().maps(start, length)
+    }
+
+    fn page_size(&self) -> u64 {
+        self.inner().page_size()
+    }
+
+    unsafe fn map(&mut self, start: u64, length: u64, host: *mut u8, writable: bool) {
+        self.mapped.push(Mapped {
+            start,
+            length,
+            host,
+            writable,
+        });
+        // SAFETY: the caller's promise.
+        unsafe { self.inner_mut().map(start, length, host, writable) };
+    }
+
+    fn boot(&mut self, table: u64, read: &dyn Fn(u64, Width) -> Option<u64>) {
+        self.inner_mut().boot(table, read);
+    }
+
+    fn reset(&mut self) {
+        self.code = None;
+        self.inner_mut().reset();
+    }
+
+    fn take_reset_request(&mut self) -> bool {
+        self.inner_mut().take_reset_request()
+    }
+
+    fn next_event(&self) -> Option<VirtualNanos> {
+        self.inner().next_event()
+    }
+
+    fn on_event(&mut self, now: VirtualNanos) {
+        self.inner_mut().on_event(now);
+    }
+
+    fn waiting(&self) -> bool {
+        self.inner().waiting()
+    }
+
+    fn pc(&self) -> u64 {
+        self.inner().pc()
+    }
+
+    fn data_model(&self) -> DataModel {
+        self.inner().data_model()
+    }
+
+    fn byte_order(&self, address: u64) -> Endian {
+        self.inner().byte_order(address)
+    }
+
+    fn own_ranges(&self) -> Vec<Range<u64>> {
+        self.inner().own_ranges()
+    }
+
+    fn save(&self) -> Vec<u8> {
+        self.inner().save()
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.inner_mut().load(bytes)
+    }
+
+    fn check_reads(&mut self, every: bool) {
+        self.inner_mut().check_reads(every);
+    }
+
+    fn check_words(&mut self, words: &[u64]) {
+        self.inner_mut().check_words(words);
+    }
+
+    fn host_call(&self, read: &mut dyn FnMut(u64, Width) -> Option<u64>) -> Option<HostCall> {
+        self.inner().host_call(read)
+    }
+
+    fn answer_host_call(&mut self, answer: Option<u64>) {
+        self.inner_mut().answer_host_call(answer);
+    }
+}
