@@ -4,7 +4,7 @@ use hivtac_calibration::evaluate::{Evaluation, by_place};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::train::{Options, Samples, train};
+use hivtac_calibration::train::{DirectionWeight, Options, Samples, train};
 use hivtac_data::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_data::range::Range;
 
@@ -154,16 +154,19 @@ fn constant_data_trains_to_the_constant() {
 }
 
 fn options_that_do_not_fit(refused: &dyn Fn(&Options, &str)) {
+    let weight = |mean, floor_n| Some(DirectionWeight { mean, floor_n });
     let weighed = Options {
-        direction_weight: Some(1.0),
+        direction_weight: weight(1.0, 0.01),
         ..small()
     };
     refused(&weighed, "0 of forces");
-    let nothing = Options {
-        direction_weight: Some(0.0),
-        ..weighed
-    };
-    refused(&nothing, "weight of directions");
+    for weight in [weight(0.0, 0.01), weight(1.0, 0.0), weight(1.0, f64::NAN)] {
+        let nothing = Options {
+            direction_weight: weight,
+            ..weighed.clone()
+        };
+        refused(&nothing, "weight of directions");
+    }
     let decaying = Options {
         weight_decay: -0.1,
         ..small()

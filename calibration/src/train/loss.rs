@@ -1,12 +1,9 @@
 //! What training makes small: the mean square of what is off, standardized; where directions are
 //! asked for, weighed across the force by how much of a direction it is.
 
-use super::Samples;
+use super::{DirectionWeight, Samples};
 use crate::network::OUTPUTS;
 use hivtac_data::loads::norm;
-
-/// Below this |F| (N) no direction counts more.
-const FLOOR_N: f64 = 0.01;
 
 /// How much what is off across each row's force counts; along it, every row counts the same.
 pub(super) struct Across {
@@ -15,14 +12,15 @@ pub(super) struct Across {
 }
 
 impl Across {
-    /// Weights of `samples`, as 1 / √(|F|² + floor²), their mean over `training` being `weight`.
-    pub fn new(samples: &Samples, training: &Samples, weight: f64) -> Self {
+    /// Weights of `samples`, their mean over `training` being that of `weight`.
+    pub fn new(samples: &Samples, training: &Samples, weight: DirectionWeight) -> Self {
+        let DirectionWeight { mean, floor_n } = weight;
         let raw = |force: &[f64; OUTPUTS]| {
             let size = norm(*force);
-            1.0 / (size * size + FLOOR_N * FLOOR_N).sqrt()
+            1.0 / (size * size + floor_n * floor_n).sqrt()
         };
         let sum: f64 = training.forces_n.iter().map(raw).sum();
-        let factor = weight * training.forces_n.len() as f64 / sum;
+        let factor = mean * training.forces_n.len() as f64 / sum;
         let row = |force: &[f64; OUTPUTS]| {
             let size = norm(*force);
             let along = |part: f64| if size > 0.0 { part / size } else { 0.0 };
@@ -71,6 +69,11 @@ pub(super) fn loss(
 mod tests {
     use super::*;
 
+    const WEIGHT: DirectionWeight = DirectionWeight {
+        mean: 3.0,
+        floor_n: 0.01,
+    };
+
     fn samples(forces_n: Vec<[f64; OUTPUTS]>) -> Samples {
         Samples {
             forces_n,
@@ -91,7 +94,7 @@ mod tests {
     #[test]
     fn weak_forces_count_more_across_and_the_same_along() {
         let data = samples(vec![[0.0, 0.0, -0.1], [0.0, 0.0, -0.05], [0.0; 3]]);
-        let across = Across::new(&data, &data, 3.0);
+        let across = Across::new(&data, &data, WEIGHT);
         let of = |row: usize, off: [f32; OUTPUTS]| loss(&off, &[0.0; 3], Some(&across), &[row]).0;
         let ratio = of(1, [0.3, 0.0, 0.0]) / of(0, [0.3, 0.0, 0.0]);
         let expected = ((0.01 + 1e-4_f64) / (0.0025 + 1e-4)).sqrt();
@@ -108,7 +111,7 @@ mod tests {
     #[test]
     fn a_place_counts_the_same_whatever_the_force() {
         let data = samples(vec![[0.0, 0.0, -0.1], [0.0, 0.0, -0.01]]);
-        let across = Across::new(&data, &data, 3.0);
+        let across = Across::new(&data, &data, WEIGHT);
         for row in [0, 1] {
             let off = [0.0, 0.0, 0.0, 0.5, -1.0];
             let (loss, gradient) = loss(&off, &[0.0; 5], Some(&across), &[row]);
@@ -120,7 +123,7 @@ mod tests {
     #[test]
     fn the_gradient_is_that_of_differences() {
         let data = samples(vec![[0.03, -0.02, -0.1], [0.0, 0.001, -0.004]]);
-        let across = Across::new(&data, &data, 3.0);
+        let across = Across::new(&data, &data, WEIGHT);
         let of = |outputs: &[f32]| loss(outputs, &[0.1; 6], Some(&across), &[0, 1]);
         let outputs = [0.5, -0.25, 0.75, 1.0, -0.5, 0.125];
         let (_, gradient) = of(&outputs);

@@ -17,7 +17,7 @@ use anyhow::{Context, Result, ensure};
 use crate::network::{
     CONSTANT_ANSWER, INPUTS, Meaning, Network, OUTPUTS, PLACE_OUTPUTS, Standardization,
 };
-pub use options::Options;
+pub use options::{DirectionWeight, Options};
 use state::{Phase, State};
 
 /// Features with what the network shall answer.

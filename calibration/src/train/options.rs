@@ -43,12 +43,10 @@ pub struct Options {
     /// larger; the network is then folded back to features.
     #[arg(skip = Options::default().whitened)]
     pub whitened: bool,
-    /// Weighs what is off across each row's force by 1 / √(|F|² + (10 mN)²), times what makes the
-    /// mean weight this, so that weak forces' directions count, too; what is off along the force
-    /// counts 1 everywhere. `None` weighs nothing, and nothing is weighed where angles are the
-    /// outputs.
+    /// Has directions count more. `None` weighs nothing, and nothing is weighed where angles are
+    /// the outputs.
     #[arg(skip = Options::default().direction_weight)]
-    pub direction_weight: Option<f64>,
+    pub direction_weight: Option<DirectionWeight>,
     /// Each step takes this times the step size off every weight (AdamW), biases excepted. What no
     /// data ask for goes away, such as the weights of components that never vary, which would make
     /// the chip's rounding of inputs larger.
@@ -68,6 +66,17 @@ pub struct Options {
     pub start: Option<Network>,
 }
 
+/// Weighs what is off across each row's force by 1 / √(|F|² + floor²), times what makes the mean
+/// weight of all rows `mean`, so that weak forces' directions count, too; what is off along the
+/// force counts 1 everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DirectionWeight {
+    /// Mean of the weights, above 0.
+    pub mean: f64,
+    /// Below this |F|, N, above 0, no direction counts more.
+    pub floor_n: f64,
+}
+
 impl Default for Options {
     /// As the default model is trained, but for the place.
     fn default() -> Self {
@@ -75,12 +84,15 @@ impl Default for Options {
             hidden: vec![64, 64],
             meaning: Meaning::ForceVector,
             arithmetic: Arithmetic::Int8PerChannel,
-            epochs: 400,
-            rounded_epochs: 300,
+            epochs: 600,
+            rounded_epochs: 450,
             batch: 256,
             learning_rate: 5e-3,
             whitened: true,
-            direction_weight: Some(3.0),
+            direction_weight: Some(DirectionWeight {
+                mean: 40.0,
+                floor_n: 0.15,
+            }),
             weight_decay: 0.0,
             unit_parts: 1,
             seed: 1,
@@ -105,8 +117,8 @@ impl Options {
         self.start.as_ref().map_or(self.meaning, |it| it.meaning)
     }
 
-    /// The mean weight of directions: none where angles are the outputs.
-    pub(super) fn direction_weight_in_use(&self) -> Option<f64> {
+    /// How directions count: as all else where angles are the outputs.
+    pub(super) fn direction_weight_in_use(&self) -> Option<DirectionWeight> {
         let is_vector = self.meaning_in_use().is_vector();
         self.direction_weight.filter(|_| is_vector)
     }
@@ -140,8 +152,10 @@ impl Options {
             return Ok(());
         };
         ensure!(
-            weight.is_finite() && weight > 0.0,
-            "the weight of directions must be above zero"
+            [weight.mean, weight.floor_n]
+                .iter()
+                .all(|part| part.is_finite() && *part > 0.0),
+            "the weight of directions, and its floor, must be above zero"
         );
         Ok(())
     }

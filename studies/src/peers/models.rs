@@ -5,7 +5,7 @@ use hivtac_calibration::check::vector_n;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::train::Options;
+use hivtac_calibration::train::{DirectionWeight, Options};
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Dataset;
 use hivtac_data::rest::features_from_q16;
@@ -195,7 +195,10 @@ fn fine_tier(args: &PeersArgs) -> Tier {
         hidden: vec![128, 64],
         batch: 128,
         learning_rate: 1e-2,
-        direction_weight: Some(3.0),
+        direction_weight: Some(DirectionWeight {
+            mean: 3.0,
+            floor_n: 0.01,
+        }),
         weight_decay: 0.02,
         ..plain(args)
     };

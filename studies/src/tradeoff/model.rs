@@ -16,11 +16,9 @@ use serde_json::json;
 use super::plan::{RENDERED, preset};
 use super::table::Configuration;
 
-/// Frames that the network is trained on, in so many passes in floats and with rounding, and frames
-/// that tell the markers' noise and their seed: as for the default model.
+/// Frames that the network is trained on, and frames that tell the markers' noise and their seed:
+/// as for the default model.
 const ROWS: usize = 80_000;
-const EPOCHS: [usize; 2] = [400, 300];
-const DIRECTION_WEIGHT: f64 = 3.0;
 const NOISE: (usize, u64) = (6_000, 5);
 /// Frames that are rendered for a model.
 pub const FRAMES: usize = ROWS + NOISE.0;
@@ -46,12 +44,8 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
         ..Recipe::default()
     };
     let dataset = generate(&recipe, &progress)?;
-    let [epochs, rounded_epochs] = EPOCHS;
     let options = Options {
         meaning: Meaning::ForceAndPlace,
-        epochs,
-        rounded_epochs,
-        direction_weight: Some(DIRECTION_WEIGHT),
         hidden: picked.estimator.hidden.clone(),
         arithmetic: picked.numbers.arithmetic().unwrap_or_default(),
         ..Options::default()

@@ -9,7 +9,7 @@ use hivtac_calibration::errors::{WEAK_N, angle_deg};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
-use hivtac_calibration::train::Options;
+use hivtac_calibration::train::{DirectionWeight, Options};
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::{Dataset, Row};
 use hivtac_data::loads::norm;
@@ -25,8 +25,11 @@ use super::results::{Figures, Finished, Results};
 /// Adam's first step and rows that share one, for the paper's network: the paper's.
 const PAPER_RATE: f64 = 1e-3;
 const PAPER_BATCH: usize = 64;
-/// Directions of weak forces count, as for the default model.
-const DIRECTION_WEIGHT: f64 = 3.0;
+/// Directions count, those of weak forces more.
+const DIRECTION_WEIGHT: DirectionWeight = DirectionWeight {
+    mean: 3.0,
+    floor_n: 0.01,
+};
 /// One in so many of the rows to train on tells the noise that a film's file holds.
 const NOISE_ROWS: usize = 4;
 
