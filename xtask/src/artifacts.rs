@@ -72,32 +72,51 @@ fn firmware_command(toolchain: &Toolchain) -> Command {
     command
 }
 
-/// Features of the host tool that the tool of users has only when they ask for it.
-pub const SERVING: &str = "ros2,foxglove";
+/// The packages that run on this computer, as cargo is told them: all of them even where one
+/// program is wanted, so that what it depends on has the features with which tests build it, and is
+/// built once.
+pub const HOST: [&str; 5] = [
+    "--workspace",
+    "--exclude",
+    "hivtac-firmware",
+    "--exclude",
+    "hivtac-board",
+];
 
-/// The host tool `hivtac`, without what reads pictures.
+/// Features of the host tool that the tool of users has only when they ask for it.
+pub const SERVING: [&str; 2] = ["ros2", "foxglove"];
+
+/// The host tool `hivtac`, without what reads pictures: the least that a first demo has to build.
+pub fn host_tool_without_pictures() -> Result<PathBuf> {
+    let mut command = cargo("build", workspace::root());
+    command.args(["--profile", TOOLS, "--package", "hivtac"]);
+    build(command.arg("--no-default-features"), "hivtac")
+}
+
+/// The host tool, as it is installed.
 pub fn host_tool() -> Result<PathBuf> {
-    build(&mut host_tool_command(), "hivtac")
+    build(&mut host_command("hivtac"), "hivtac")
 }
 
 /// The same with all that `hivtac serve` can.
 pub fn serving_tool() -> Result<PathBuf> {
-    build(host_tool_command().args(["--features", SERVING]), "hivtac")
-}
-
-fn host_tool_command() -> Command {
-    let mut command = cargo("build", workspace::root());
-    command.args(["--profile", TOOLS, "--package", "hivtac"]);
-    command.arg("--no-default-features");
-    command
+    let features = SERVING.map(|feature| format!("hivtac/{feature}")).join(",");
+    build(
+        host_command("hivtac").args(["--features", &features]),
+        "hivtac",
+    )
 }
 
 /// The calibration.
 pub fn calibrate() -> Result<PathBuf> {
+    build(&mut host_command("hivtac-calibrate"), "hivtac-calibrate")
+}
+
+fn host_command(program: &str) -> Command {
     let mut command = cargo("build", workspace::root());
-    command.args(["--profile", TOOLS, "--package", "hivtac-calibration"]);
-    command.args(["--bin", "hivtac-calibrate"]);
-    build(&mut command, "hivtac-calibrate")
+    command.args(["--profile", TOOLS]).args(HOST);
+    command.args(["--bin", program]);
+    command
 }
 
 /// The rig.

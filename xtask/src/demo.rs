@@ -126,7 +126,8 @@ impl Stage {
         let folder = workspace::work_folder("demo")?;
         let (firmware, tools) = std::thread::scope(|scope| {
             let firmware = scope.spawn(|| artifacts::firmware_for(toolchain, board, ""));
-            let tools = artifacts::rig().and_then(|rig| Ok((rig, artifacts::host_tool()?)));
+            let tools = artifacts::rig()
+                .and_then(|rig| Ok((rig, artifacts::host_tool_without_pictures()?)));
             (firmware.join(), tools)
         });
         let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))??;

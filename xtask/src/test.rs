@@ -24,17 +24,6 @@ const WORKSPACES: [(&str, bool); 4] = [
     ("xtask/instruction-counter", false),
 ];
 
-/// What runs on this computer without any image.
-const HOST: [&str; 7] = [
-    "--workspace",
-    "--exclude",
-    "hivtac-firmware",
-    "--exclude",
-    "hivtac-board",
-    "--exclude",
-    "hivtac-tests",
-];
-
 /// Options of `cargo xtask test`.
 #[derive(Args)]
 pub struct Test {
@@ -176,7 +165,8 @@ impl Test {
         if self.wants("tests: host") {
             report.step("tests: host", |tally| {
                 let mut command = artifacts::test(workspace::root());
-                command.args(HOST);
+                command.args(artifacts::HOST);
+                command.args(["--exclude", "hivtac-tests"]);
                 run_tests(self.slow_ones(&mut command), tally)
             });
         }
@@ -285,17 +275,11 @@ fn check_format() -> Result<()> {
 
 fn host_lints() -> Result<()> {
     let mut root = artifacts::clippy(workspace::root());
-    root.args([
-        "--workspace",
-        "--exclude",
-        "hivtac-firmware",
-        "--exclude",
-        "hivtac-board",
-        "--all-targets",
-    ]);
+    root.args(artifacts::HOST).arg("--all-targets");
+    // Without what is there by default, which the others have.
     let mut serving = artifacts::clippy(workspace::root());
-    serving.args(["--package", "hivtac", "--bins"]);
-    serving.args(["--features", artifacts::SERVING]);
+    serving.args(["--package", "hivtac", "--bins", "--no-default-features"]);
+    serving.args(["--features", &artifacts::SERVING.join(",")]);
     let mut rig = artifacts::rig_cargo("clippy");
     rig.arg("--all-targets");
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
@@ -322,7 +306,7 @@ fn target_lints(toolchain: &Toolchain) -> Result<()> {
 fn cross_room_tests(toolchain: &Toolchain, programs: &Programs) -> Result<Command> {
     packages::ensure_qemu()?;
     let mut command = artifacts::test(workspace::root());
-    command.args(["--package", "hivtac-tests"]);
+    command.args(artifacts::HOST).args(["--test", "rooms"]);
     programs.name_to(&mut command);
     command
         .env("HIVTAC_TOOL", artifacts::host_tool()?)
