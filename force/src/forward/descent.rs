@@ -160,11 +160,15 @@ impl Linearization {
         }
     }
 
-    /// Whether the load explains the markers, and another step would hardly explain more.
     fn is_done(&self) -> bool {
-        let explained = self.solved.as_ref().map_or(0.0, |solved| solved.explained);
-        self.unexplained <= UNEXPLAINED && explained <= LEFT_TO_EXPLAIN
+        is_done(self.unexplained, self.solved.as_ref())
     }
+}
+
+/// Whether a load explains the markers, and another step would hardly explain more.
+pub fn is_done(unexplained: f32, solved: Option<&Solved>) -> bool {
+    let explained = solved.map_or(0.0, |solved| solved.explained);
+    unexplained <= UNEXPLAINED && explained <= LEFT_TO_EXPLAIN
 }
 
 /// The load after a part of a step. Where that is too steep for the tables, the other unknowns

@@ -1,7 +1,7 @@
 //! Gauss–Newton steps from a first guess to the load that explains the markers best.
 
 use super::Forward;
-use super::descent::Descent;
+use super::descent::{Descent, is_done};
 use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
 use super::solve::{Column, Solved};
@@ -50,12 +50,12 @@ pub struct Estimate {
 }
 
 impl Forward<'_> {
-    /// Takes steps from a guess; if they lead to a load that does not explain the markers, from the
-    /// film's middle, too: from there steps find their way where a guess was bad.
+    /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
+    /// which they find no way on, from the film's middle, too: from there they find theirs where a
+    /// guess was bad.
     pub fn estimate(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
         let found = self.descend(observed, mounting, guess);
-        // What noise explains.
-        if found.unexplained <= UNEXPLAINED {
+        if is_done(found.unexplained, found.solved.as_ref()) {
             return found;
         }
         let middle = Pose {
