@@ -103,7 +103,7 @@ fn labels_of_a_stage_are_the_full_solution() {
 #[ignore = "slow: run by cargo xtask test --all"]
 fn tables_are_the_full_solution_everywhere() {
     let threads = std::thread::available_parallelism().unwrap().get();
-    let check = |radii_mm| check(&Unit::default(), 4.0, radii_mm, 24, threads, |_, _| ()).unwrap();
+    let check = |radii_mm| check(&Unit::default(), 4.0, radii_mm, 40, threads, |_, _| ()).unwrap();
     let nominal = check([NOMINAL_RADIUS_MM; 2]);
     assert!(nominal.worst_px < MOST_PX, "{nominal:?}");
     assert!(nominal.rms_px < 0.2 * MOST_PX, "{nominal:?}");
