@@ -40,7 +40,7 @@ pub fn keep(spec: &mut CoreSpec, is_on: Option<Arc<AtomicBool>>) {
             inner: Some(make(endian)?),
             mapped: Vec::new(),
             is_on: is_on.clone(),
-            code: None,
+            program: None,
         }))
     });
 }
@@ -76,18 +76,23 @@ impl Mapped {
     }
 }
 
-/// A core that no run uses now.
-struct Kept {
-    /// What it is kept for: the bytes of a program, and the memory that was mapped.
-    code: u64,
-    places: Vec<(u64, u64, bool)>,
+/// What translations hold for.
+#[derive(Debug, PartialEq, Eq)]
+struct Program {
+    /// Of its bytes.
+    hash: u64,
+    /// Start, length and whether it is writable of all memory.
+    memory: Vec<(u64, u64, bool)>,
+    /// Whether the core enforces the MPU's regions.
     is_enforced: bool,
-    core: Box<dyn Processor>,
 }
 
-static KEPT: Mutex<Vec<Kept>> = Mutex::new(Vec::new());
+/// Cores that no run uses now, the one that was used last at the end.
+type Kept = Vec<(Program, Box<dyn Processor>)>;
 
-fn kept() -> MutexGuard<'static, Vec<Kept>> {
+static KEPT: Mutex<Kept> = Mutex::new(Vec::new());
+
+fn kept() -> MutexGuard<'static, Kept> {
     KEPT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -97,8 +102,8 @@ struct Core {
     inner: Option<Box<dyn Processor>>,
     mapped: Vec<Mapped>,
     is_on: Option<Arc<AtomicBool>>,
-    /// Of the program's bytes when the MPU was switched on, from then on.
-    code: Option<u64>,
+    /// The program when the MPU was switched on, from then on.
+    program: Option<Program>,
 }
 
 impl Core {
@@ -110,14 +115,18 @@ impl Core {
         self.inner.as_deref_mut().expect("a core")
     }
 
-    fn code_now(&self) -> u64 {
+    fn program_now(&self) -> Program {
         let mut hasher = DefaultHasher::new();
         for range in &CODE {
             for mapped in &self.mapped {
                 hasher.write(mapped.bytes(range));
             }
         }
-        hasher.finish()
+        Program {
+            hash: hasher.finish(),
+            memory: self.mapped.iter().map(Mapped::place).collect(),
+            is_enforced: self.is_on.is_none(),
+        }
     }
 
     fn is_protected(&mut self) -> bool {
@@ -129,24 +138,16 @@ impl Core {
         control.is_some_and(|control| control & mpu::ENABLE != 0)
     }
 
-    fn places(&self) -> Vec<(u64, u64, bool)> {
-        self.mapped.iter().map(Mapped::place).collect()
-    }
-
-    /// A kept core goes on in place of this one, if there is one for this program and memory.
+    /// A kept core goes on in place of this one, if there is one for this program.
     fn hand_over(&mut self) {
-        let (code, places) = (self.code_now(), self.places());
-        self.code = Some(code);
-        let is_enforced = self.is_on.is_none();
+        let program = self.program_now();
         let found = {
             let mut kept = kept();
-            let is_for_this = |kept: &Kept| {
-                kept.is_enforced == is_enforced && kept.code == code && kept.places == places
-            };
-            let at = kept.iter().position(is_for_this);
-            at.map(|at| kept.swap_remove(at))
+            let at = kept.iter().position(|(its, _)| *its == program);
+            at.map(|at| kept.remove(at))
         };
-        let Some(Kept { core: mut next, .. }) = found else {
+        self.program = Some(program);
+        let Some((_, mut next)) = found else {
             return;
         };
         for mapped in &self.mapped {
@@ -168,21 +169,15 @@ impl Core {
 
 impl Drop for Core {
     fn drop(&mut self) {
-        let is_unchanged = self.code.is_some_and(|code| code == self.code_now());
-        let Some(core) = self.inner.take() else {
+        let (Some(program), Some(core)) = (self.program.take(), self.inner.take()) else {
             return;
         };
-        if is_unchanged && !std::thread::panicking() {
+        if program == self.program_now() && !std::thread::panicking() {
             let mut kept = kept();
             if kept.len() == MOST_KEPT {
                 kept.remove(0);
             }
-            kept.push(Kept {
-                code: self.code.expect("there is one"),
-                places: self.places(),
-                is_enforced: self.is_on.is_none(),
-                core,
-            });
+            kept.push((program, core));
         }
     }
 }
@@ -191,7 +186,7 @@ impl Drop for Core {
 impl Processor for Core {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let ran = self.inner_mut().run(budget, bus);
-        if self.code.is_none() && self.is_protected() {
+        if self.program.is_none() && self.is_protected() {
             self.hand_over();
         }
         ran
@@ -230,7 +225,7 @@ impl Processor for Core {
     }
 
     fn reset(&mut self) {
-        self.code = None;
+        self.program = None;
         self.inner_mut().reset();
     }
 

@@ -54,12 +54,13 @@ fn program(writes: &[(u32, u32)]) -> Vec<u8> {
     elf
 }
 
-fn run_program(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> anyhow::Result<Outcome> {
-    run(options(elf, flash, cut))
-}
-
-fn options(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> Options {
-    Options {
+fn run_program(
+    elf: &Path,
+    flash: Option<&Path>,
+    cut: Option<Cut>,
+    protection: Protection,
+) -> anyhow::Result<Outcome> {
+    run(Options {
         flash: flash.map(Path::to_owned),
         cut,
         elf: elf.to_owned(),
@@ -72,7 +73,7 @@ fn options(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> Options {
         seed: 1,
         revision: Revision::V,
         entry: Entry::Reset,
-        protection: Protection::Enforced,
+        protection,
         program: Program::Script(Script::default()),
         limits: Limits {
             frames: None,
@@ -80,13 +81,17 @@ fn options(elf: &Path, flash: Option<&Path>, cut: Option<Cut>) -> Options {
         },
         instructions_per_second: NonZeroU64::new(INSTRUCTIONS_PER_SECOND).unwrap(),
         interrupt: Arc::new(AtomicBool::new(false)),
-    }
+    })
 }
 
 fn outcome(writes: &[(u32, u32)]) -> Result<Outcome, String> {
+    outcome_where(Protection::Enforced, writes)
+}
+
+fn outcome_where(protection: Protection, writes: &[(u32, u32)]) -> Result<Outcome, String> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), program(writes)).unwrap();
-    run_program(file.path(), None, None).map_err(|error| format!("{error:#}"))
+    run_program(file.path(), None, None, protection).map_err(|error| format!("{error:#}"))
 }
 
 /// DMA1 stream 0, peripheral to memory, from DCMI_DR to an address.
@@ -133,17 +138,9 @@ fn a_program_that_breaks_its_own_protection_gets_no_further() {
         (0x2400_0000, 1),
     ];
     writes.extend(dma_to(0x2000_1000));
-    let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), program(&writes)).unwrap();
-    let run_with = |protection| {
-        run(Options {
-            protection,
-            ..options(file.path(), None, None)
-        })
-    };
-    run_with(Protection::Enforced).unwrap();
-    let error = run_with(Protection::Ignored).unwrap_err();
-    assert!(format!("{error:#}").contains("DTCM"), "{error:#}");
+    outcome_where(Protection::Enforced, &writes).unwrap();
+    let error = outcome_where(Protection::Ignored, &writes).unwrap_err();
+    assert!(error.contains("DTCM"), "{error}");
 }
 
 #[test]
@@ -206,7 +203,7 @@ fn pause() -> Vec<(u32, u32)> {
 fn with_flash(writes: &[(u32, u32)], flash: &Path, cut: Option<Cut>) -> (Outcome, Contents) {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), program(writes)).unwrap();
-    let outcome = run_program(file.path(), Some(flash), cut).unwrap();
+    let outcome = run_program(file.path(), Some(flash), cut, Protection::Enforced).unwrap();
     (outcome, Contents::load(flash).unwrap())
 }
 
