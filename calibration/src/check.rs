@@ -86,7 +86,7 @@ pub fn check(
 ///
 /// # Errors
 /// When the model does not hold all that its frames depend on.
-fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
+pub fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
     let geometry = model.conditions.geometry;
     let range = Range {
         force_n: f64::from(model.range.magnitude.0) / 1e6,
@@ -117,7 +117,11 @@ fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
     })
 }
 
-fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
+/// A sensor with a model, for frames as they are rendered.
+///
+/// # Errors
+/// When the model is none for this sensing.
+pub fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
     let mut sensor = Box::new(Sensor::new());
     let settings = model.conditions.settings(ByteOrder::Native);
     sensor

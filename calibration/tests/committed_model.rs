@@ -4,17 +4,16 @@
 use std::fs;
 use std::path::PathBuf;
 
-use hivtac_calibration::check::check;
+use hivtac_calibration::check::{check, recipe, sensor};
 use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::{Loads, Recipe, generate, measure};
 use hivtac_data::range::Range;
 use hivtac_sensing::model::{Model, Origin, OutputKind};
-use hivtac_sensing::pipeline::Sensor;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};
+use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 
 fn models() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("models")
@@ -119,27 +118,13 @@ fn the_model_for_yuv422_is_made_for_the_same_unit_and_measures_its_frames() {
 fn steps_that_find_no_way_on_begin_anew_from_the_middle() {
     let bytes = committed_for_mt9v034();
     let model = Model::parse(&bytes).unwrap();
-    let recipe = Recipe {
-        loads: Loads::Random(4_000),
-        rest: 0,
-        sessions: 1,
-        seed: 1_000_001,
-        range: Range {
-            force_n: f64::from(model.range.magnitude.0) / 1e6,
-            alpha_deg: f64::from(model.range.alpha.0) / 1e3,
-            beta_deg: f64::from(model.range.beta.0) / 1e3,
-            place_mm: f64::from(model.range.place.0) / 1e3,
-        },
-        ..Recipe::of(Preset::Mt9v034)
-    };
+    let recipe = recipe(&model, 4_000, 1_000_001).unwrap();
     let row = 3_782;
     let load = recipe.load(row).unwrap();
     let [x, y] = load.offset_mm();
     assert!((x + 3.940).abs() < 1e-3 && (y - 3.875).abs() < 1e-3);
     let frame = recipe.scene(0).unwrap().render_load(&load, row as u64);
-    let mut sensor = Box::new(Sensor::new());
-    let settings = model.conditions.settings(ByteOrder::Native);
-    sensor.configure(settings, Some(model)).unwrap();
+    let mut sensor = sensor(&model).unwrap();
     let force = measure(&mut sensor, &frame.unwrap()).force.unwrap();
     let off_n = f64::from(force.magnitude.0) / 1e6 - load.magnitude_n();
     assert!(off_n.abs() < 0.5e-3, "{off_n}");
