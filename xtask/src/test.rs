@@ -276,7 +276,7 @@ fn check_format() -> Result<()> {
 fn host_lints() -> Result<()> {
     let mut root = artifacts::clippy(workspace::root());
     root.args(artifacts::HOST).arg("--all-targets");
-    // Without what is there by default, which the others have.
+    // Without the default features: with these it is linted above.
     let mut serving = artifacts::clippy(workspace::root());
     serving.args(["--package", "hivtac", "--bins", "--no-default-features"]);
     serving.args(["--features", &artifacts::SERVING.join(",")]);
