@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::format;
 use std::string::{String, ToString};
+use std::vec;
 use std::vec::Vec;
 
 use anyhow::Result;
@@ -32,6 +33,34 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    fn nothing(case: &HardCase, view: View) -> Outcome {
+        Outcome {
+            case: case.clone(),
+            view,
+            frames: 0,
+            trusted: 0,
+            worst_px: 0.0,
+            reasons: BTreeSet::new(),
+        }
+    }
+
+    fn add(&mut self, detection: Detection) {
+        self.frames += 1;
+        match detection {
+            Detection::Trusted { worst_px, .. } => {
+                self.trusted += 1;
+                self.worst_px = self.worst_px.max(worst_px);
+            }
+            Detection::Refused(status) => {
+                let forbids = |(bit, _): &&(Status, &str)| {
+                    Status::NO_FORCE.contains(*bit) && status.contains(*bit)
+                };
+                let reasons = Status::NAMES.iter().filter(forbids);
+                self.reasons.extend(reasons.map(|(_, name)| *name));
+            }
+        }
+    }
+
     /// How far a marker may be from the truth here, px. Under four-fold noise 1. Beyond QVGA,
     /// compression may move markers by 0.05 px more than usual: what it does to a pattern is no
     /// more than what a press does. Limits are wider for a tip that sticks or slips: 0.15 px more.
@@ -75,47 +104,37 @@ impl Outcome {
     }
 }
 
-/// Looks at every hard case that the view's camera can take, under every load of the catalogue,
-/// `repeats` frames each; at as many moments where things move.
+/// Looks at every hard case that the views' camera can take, under every load of the catalogue,
+/// `repeats` frames each; at as many moments where things move. The views differ in nothing but
+/// their estimators, so that they see the same frames. Gives the outcomes of each.
 ///
 /// # Errors
 /// When the frame size is not one.
-pub fn detect_in_all(view: View, repeats: u64) -> Result<Vec<Outcome>> {
-    let mut sensor = view.sensor()?;
-    let mut outcomes = Vec::new();
+pub fn detect_in_all(views: &[View], repeats: u64) -> Result<Vec<Vec<Outcome>>> {
+    let mut all = vec![Vec::new(); views.len()];
+    let Some(shown) = views.first() else {
+        return Ok(all);
+    };
+    let sensors: Result<Vec<_>> = views.iter().map(View::sensor).collect();
+    let mut sensors = sensors?;
     for case in hard_cases() {
-        let [width, height] = view.size;
-        let scene = view.pressed(case.scene(view.preset, width, height, 7)?)?;
-        if !view.takes(&scene) {
+        let [width, height] = shown.size;
+        let scene = shown.pressed(case.scene(shown.preset, width, height, 7)?)?;
+        if !shown.takes(&scene) {
             continue;
         }
-        let mut outcome = Outcome {
-            case: case.clone(),
-            view,
-            frames: 0,
-            trusted: 0,
-            worst_px: 0.0,
-            reasons: BTreeSet::new(),
-        };
+        let nothing = |view: &View| Outcome::nothing(&case, *view);
+        let mut outcomes: Vec<Outcome> = views.iter().map(nothing).collect();
         for frame in frames(&scene, case.moves(), repeats)? {
-            outcome.frames += 1;
-            match sensor.detect(&frame) {
-                Detection::Trusted { worst_px, .. } => {
-                    outcome.trusted += 1;
-                    outcome.worst_px = outcome.worst_px.max(worst_px);
-                }
-                Detection::Refused(status) => {
-                    let forbids = |(bit, _): &&(Status, &str)| {
-                        Status::NO_FORCE.contains(*bit) && status.contains(*bit)
-                    };
-                    let reasons = Status::NAMES.iter().filter(forbids);
-                    outcome.reasons.extend(reasons.map(|(_, name)| *name));
-                }
+            for (sensor, outcome) in sensors.iter_mut().zip(&mut outcomes) {
+                outcome.add(sensor.detect(&frame));
             }
         }
-        outcomes.push(outcome);
+        for (outcomes, outcome) in all.iter_mut().zip(outcomes) {
+            outcomes.push(outcome);
+        }
     }
-    Ok(outcomes)
+    Ok(all)
 }
 
 /// The frames that show a case, in which something moves or loads press.

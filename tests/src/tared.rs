@@ -63,12 +63,12 @@ pub struct TaredSensor {
     sensor: Box<Sensor<'static>>,
 }
 
-/// RGB565 at these sizes: both cameras with both estimators.
-pub fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<View> {
+/// RGB565 at these sizes, of both cameras: by both estimators, which see the same frames.
+pub fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<[View; 2]> {
     let mut views = Vec::new();
     for &size in sizes {
         for preset in [Preset::Ov7725, Preset::Paper] {
-            views.extend(ESTIMATORS.map(|estimator| View {
+            views.push(ESTIMATORS.map(|estimator| View {
                 preset,
                 size,
                 format: PixelFormat::Rgb565,

@@ -26,9 +26,12 @@ fn main() -> Result<()> {
         contact,
         ..View::YUV422
     };
-    let views = views(contact, &[[320, 240], [800, 600]]);
-    for view in views.into_iter().chain([yuv422]) {
-        println!("{}", table(view, &detect_in_all(view, repeats)?));
+    let rgb565 = views(contact, &[[320, 240], [800, 600]]);
+    let rgb565 = rgb565.iter().map(|views| &views[..]);
+    for views in rgb565.chain([&[yuv422][..]]) {
+        for (view, outcomes) in views.iter().zip(detect_in_all(views, repeats)?) {
+            println!("{}", table(*view, &outcomes));
+        }
     }
     Ok(())
 }
