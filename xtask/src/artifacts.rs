@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Mutex;
 
 use anyhow::{Context, Result};
 
@@ -83,9 +84,6 @@ pub const HOST: [&str; 5] = [
     "hivtac-board",
 ];
 
-/// Features of the host tool that the tool of users has only when they ask for it.
-pub const SERVING: [&str; 2] = ["ros2", "foxglove"];
-
 /// The host tool `hivtac`, without what reads pictures: the least that a first demo has to build.
 pub fn host_tool_without_pictures() -> Result<PathBuf> {
     let mut command = cargo("build", workspace::root());
@@ -95,16 +93,34 @@ pub fn host_tool_without_pictures() -> Result<PathBuf> {
 
 /// The host tool, as it is installed.
 pub fn host_tool() -> Result<PathBuf> {
-    build(&mut host_command("hivtac"), "hivtac")
+    kept(&mut host_command("hivtac"), "tool")
 }
 
-/// The same with all that `hivtac serve` can.
+/// The same with all that `hivtac serve` can, which the tool of users has only when they ask for
+/// it.
 pub fn serving_tool() -> Result<PathBuf> {
-    let features = SERVING.map(|feature| format!("hivtac/{feature}")).join(",");
-    build(
-        host_command("hivtac").args(["--features", &features]),
-        "hivtac",
-    )
+    kept(&mut serving_command(), "serving-tool")
+}
+
+/// What builds it.
+pub fn serving_command() -> Command {
+    let mut command = host_command("hivtac");
+    command.args(["--features", "hivtac/ros2,hivtac/foxglove"]);
+    command
+}
+
+/// The host tool in a folder of its own: cargo puts that with other features in its place, which
+/// another step may be running.
+fn kept(command: &mut Command, folder: &str) -> Result<PathBuf> {
+    static BUILDING: Mutex<()> = Mutex::new(());
+    let one_at_a_time = BUILDING.lock();
+    let kept = workspace::work_folder(folder)?.join("hivtac");
+    // By another name first: a program that runs cannot be written over.
+    let fresh = kept.with_extension("new");
+    copy(&build(command, "hivtac")?, &fresh)?;
+    std::fs::rename(&fresh, &kept).with_context(|| format!("renaming {}", fresh.display()))?;
+    drop(one_at_a_time);
+    Ok(kept)
 }
 
 /// The calibration.
@@ -137,6 +153,14 @@ pub fn test(workspace: &Path) -> Command {
 pub fn clippy(workspace: &Path) -> Command {
     let mut command = cargo("clippy", workspace);
     command.args(["--profile", TOOLS]);
+    command
+}
+
+/// Has a cargo command that builds lint the packages of its workspace. What these depend on is
+/// built as what runs needs it, where `cargo clippy` would check it all for itself.
+pub fn linting(mut command: Command) -> Command {
+    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    command.env("CLIPPY_ARGS", "-Dwarnings");
     command
 }
 

@@ -69,7 +69,7 @@ impl Test {
     }
 
     /// About half of the work: the rig's tests, before them the programs that those across rooms
-    /// run, too, and around them what needs nothing of the others. Attacks are first, as they are
+    /// run, too, and around them what the others need nothing of. Attacks are first, as they are
     /// built in a folder of their own while the lints hold the common one.
     fn beside(&self, toolchain: &Toolchain, built: Sender<Programs>) -> Report {
         let mut report = Report::default();
@@ -86,6 +86,9 @@ impl Test {
             self.rig_tests(&mut report, programs.as_ref());
         }
         self.benchmarks(&mut report, toolchain);
+        if self.all {
+            self.optional(&mut report, toolchain);
+        }
         report
     }
 
@@ -93,9 +96,6 @@ impl Test {
         self.checks(report, toolchain);
         self.host_tests(report);
         self.cross_room_tests(report, toolchain, programs);
-        if self.all {
-            self.optional(report, toolchain);
-        }
     }
 
     fn benchmarks(&self, report: &mut Report, toolchain: &Toolchain) {
@@ -276,16 +276,18 @@ fn check_format() -> Result<()> {
 fn host_lints() -> Result<()> {
     let mut root = artifacts::clippy(workspace::root());
     root.args(artifacts::HOST).arg("--all-targets");
-    // Without the default features: with these it is linted above.
-    let mut serving = artifacts::clippy(workspace::root());
-    serving.args(["--package", "hivtac", "--bins", "--no-default-features"]);
-    serving.args(["--features", &artifacts::SERVING.join(",")]);
-    let mut rig = artifacts::rig_cargo("clippy");
-    rig.arg("--all-targets");
+    let mut without_pictures = artifacts::clippy(workspace::root());
+    without_pictures.args(["--package", "hivtac", "--bins", "--no-default-features"]);
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
     counter.arg("--release");
-    for command in [&mut root, &mut serving, &mut rig, &mut counter] {
+    for command in [&mut root, &mut without_pictures, &mut counter] {
         process::run(command.args(["--", "-D", "warnings"]))?;
+    }
+    // Most of these is other packages, which tests need built.
+    let mut rig = artifacts::rig_cargo("build");
+    rig.arg("--all-targets");
+    for command in [artifacts::serving_command(), rig] {
+        process::run(&mut artifacts::linting(command))?;
     }
     Ok(())
 }
