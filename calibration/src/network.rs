@@ -4,6 +4,7 @@ mod reach;
 
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
+use hivtac_data::loads::{from_polar, polar};
 use serde::{Deserialize, Serialize};
 
 /// Features that enter the network (`force::features`).
@@ -46,15 +47,9 @@ impl Meaning {
     /// The outputs that mean this force (N), but for its place; a force without size has the
     /// angles 0.
     pub fn of_force(self, force_n: [f64; 3]) -> [f64; OUTPUTS] {
-        let [x, y, z] = force_n;
         match self {
             Meaning::ForceVector | Meaning::ForceAndPlace => force_n,
-            Meaning::AnglesMagnitude if force_n == [0.0; 3] => [0.0; 3],
-            Meaning::AnglesMagnitude => {
-                let alpha = libm::atan2(x, -z).to_degrees();
-                let beta = libm::atan2(y, (x * x + z * z).sqrt()).to_degrees();
-                [alpha, beta, (x * x + y * y + z * z).sqrt()]
-            }
+            Meaning::AnglesMagnitude => polar(force_n),
         }
     }
 
@@ -62,11 +57,7 @@ impl Meaning {
     pub fn to_force(self, outputs: [f64; OUTPUTS]) -> [f64; 3] {
         match self {
             Meaning::ForceVector | Meaning::ForceAndPlace => outputs,
-            Meaning::AnglesMagnitude => {
-                let (sin_a, cos_a) = libm::sincos(outputs[0].to_radians());
-                let (sin_b, cos_b) = libm::sincos(outputs[1].to_radians());
-                [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| part * outputs[2])
-            }
+            Meaning::AnglesMagnitude => from_polar(outputs),
         }
     }
 

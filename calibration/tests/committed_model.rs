@@ -4,12 +4,12 @@
 use std::fs;
 use std::path::PathBuf;
 
-use hivtac_calibration::check::{check, recipe, sensor};
-use hivtac_calibration::evaluate::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::{Loads, Recipe, generate, measure};
 use hivtac_data::range::Range;
+use hivtac_evaluation::check::{check, recipe, sensor};
+use hivtac_evaluation::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
 use hivtac_sensing::model::{Model, Origin, OutputKind};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};

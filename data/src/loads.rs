@@ -15,6 +15,24 @@ pub fn norm([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
+/// α and β in degrees (Section 5), and |F|; a force without size has the angles 0.
+pub fn polar(force: [f64; 3]) -> [f64; 3] {
+    if force == [0.0; 3] {
+        return force;
+    }
+    let [x, y, z] = force;
+    let alpha = libm::atan2(x, -z).to_degrees();
+    let beta = libm::atan2(y, (x * x + z * z).sqrt()).to_degrees();
+    [alpha, beta, norm(force)]
+}
+
+/// The force of such a size and direction.
+pub fn from_polar([alpha_deg, beta_deg, magnitude]: [f64; 3]) -> [f64; 3] {
+    let (sin_a, cos_a) = libm::sincos(alpha_deg.to_radians());
+    let (sin_b, cos_b) = libm::sincos(beta_deg.to_radians());
+    [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| part * magnitude)
+}
+
 /// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to
 /// their limits.
 #[derive(Clone, Copy, Debug)]

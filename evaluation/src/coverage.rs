@@ -1,7 +1,7 @@
 //! Whether the uncertainties that come with every force are honest.
 
 use super::Judged;
-use crate::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND};
+use crate::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND};
 use hivtac_data::loads::norm;
 
 const PARTS: usize = 10;

@@ -10,8 +10,10 @@ use hivtac_sensing::model::Model;
 use hivtac_terms::status::Status;
 
 use crate::answer::Chip;
+use crate::errors::angle_deg;
 use hivtac_data::conditions::OriginName;
 use hivtac_data::dataset::{Dataset, Row, reasons};
+use hivtac_data::loads::{from_polar, polar};
 
 /// One answer with its truth. Angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,7 +129,6 @@ fn judge(
 }
 
 fn compare(row: &Row, force: &Force) -> Judged {
-    use crate::network::Meaning::AnglesMagnitude as Polar;
     let (truth, stands) = (row.force_n, row.place);
     let found_polar = [
         f64::from(force.alpha.0) / 1e3,
@@ -135,11 +136,10 @@ fn compare(row: &Row, force: &Force) -> Judged {
         f64::from(force.magnitude.0) / 1e6,
     ];
     // An answer without size has no direction: it is as far off as one can be on average.
-    let direction_deg =
-        crate::errors::angle_deg(Polar.to_force(found_polar), truth).unwrap_or(90.0);
+    let direction_deg = angle_deg(from_polar(found_polar), truth).unwrap_or(90.0);
     Judged {
         truth,
-        truth_polar: Polar.of_force(truth),
+        truth_polar: polar(truth),
         found_polar,
         direction_deg,
         direction_sigma_deg: f64::from(force.direction_sigma.0) / 1e3,

@@ -1,8 +1,8 @@
 //! How good answers are where the tip is off the film's middle.
 
 use super::Judged;
+use crate::bounds::PLACE_BOUND;
 use crate::errors::{WEAK_N, mean};
-use crate::uncertainty::PLACE_BOUND;
 use hivtac_data::loads::norm;
 
 /// Distances from the middle that are told apart, mm.

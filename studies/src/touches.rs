@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use hivtac_calibration::answer::Chip;
-use hivtac_calibration::errors::angle_deg;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Observation;
+use hivtac_evaluation::answer::Chip;
+use hivtac_evaluation::errors::angle_deg;
 use hivtac_scene::Camera;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::force::Force;

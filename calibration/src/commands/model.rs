@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_calibration::check::check;
-use hivtac_calibration::evaluate::Evaluation;
 use hivtac_calibration::progress::bar;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Dataset;
+use hivtac_evaluation::Evaluation;
+use hivtac_evaluation::check::check;
 
 /// Frames that are checked.
 const CHECKED: usize = 4000;

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use clap::Args;
-use hivtac_calibration::errors::{Errors, WEAK_N};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::progress::bar;
@@ -12,6 +11,7 @@ use hivtac_calibration::train::Options;
 use hivtac_calibration::unit::{GuideArgs, Known};
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Dataset;
+use hivtac_evaluation::errors::{Errors, WEAK_N};
 
 /// Options of `train`.
 #[derive(Args)]

@@ -6,7 +6,6 @@ use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::network::Network as ChipNetwork;
 
-use crate::errors::Errors;
 use crate::network::Network;
 use crate::quantize::export;
 use crate::train::{Options, Progress, Samples, train};
@@ -16,6 +15,7 @@ use hivtac_data::dataset::{About, Dataset, Observation, Sample};
 use hivtac_data::loads::norm;
 use hivtac_data::range::Range;
 use hivtac_data::rest::features_from_q16;
+use hivtac_evaluation::errors::Errors;
 
 /// What was held out together, in files: single rows, whatever their pose.
 const WITHIN_POSE: &str = "within-pose";

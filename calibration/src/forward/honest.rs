@@ -6,13 +6,13 @@ use hivtac_sensing::forward::SIZES;
 use hivtac_sensing::model::Model;
 
 use super::{FilmModel, Noise};
-use crate::answer::Chip;
-use crate::errors::angle_deg;
 use crate::quantize::export;
-use crate::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use crate::weights::Weights;
 use hivtac_data::dataset::Dataset;
 use hivtac_data::loads::norm;
+use hivtac_evaluation::answer::Chip;
+use hivtac_evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
+use hivtac_evaluation::errors::angle_deg;
 
 /// The part of the errors that the 95 % bounds hold on the rows that they are made from, a little
 /// more than they promise: by the noise alone, and with what is beside it at a size, which holds

@@ -3,10 +3,10 @@
 use anyhow::Result;
 use rayon::prelude::*;
 
-use crate::evaluate::{Evaluation, Judged};
 use crate::quantize::export;
 use crate::weights::Weights;
 use hivtac_data::dataset::{Dataset, Row};
+use hivtac_evaluation::{Evaluation, Judged};
 
 /// Parts into which the loads are divided; each is left out once.
 const PARTS: usize = 5;

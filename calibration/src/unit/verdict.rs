@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::evaluate::Judged;
+use hivtac_evaluation::Judged;
 
 /// Root mean square errors.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,6 @@
 //! The models that are compared.
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_calibration::check::vector_n;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
@@ -9,6 +8,7 @@ use hivtac_calibration::train::{DirectionWeight, Options};
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Dataset;
 use hivtac_data::rest::features_from_q16;
+use hivtac_evaluation::check::vector_n;
 use hivtac_scene::Contact;
 use hivtac_sensing::force;
 use hivtac_sensing::model::Model as Chip;

@@ -1,8 +1,8 @@
 //! Errors of many answers, by force.
 
 use anyhow::{Context, Result};
-use hivtac_calibration::errors::angle_deg;
-use hivtac_calibration::uncertainty::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
+use hivtac_evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
+use hivtac_evaluation::errors::angle_deg;
 use hivtac_scene::Load;
 use hivtac_sensing::force::Force;
 use serde::Serialize;

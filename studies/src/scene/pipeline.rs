@@ -86,7 +86,7 @@ impl Pipeline {
         } = self.sensor.measure_frame(&frame.to_rgb565());
         FrameMeasurement {
             centroids_px: markers.map(|markers| markers.map(centroid_px)),
-            force_n: force.map(hivtac_calibration::check::vector_n),
+            force_n: force.map(hivtac_evaluation::check::vector_n),
             rejected: reasons(status),
         }
     }

@@ -4,8 +4,6 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
-use hivtac_calibration::answer::Chip;
-use hivtac_calibration::errors::{WEAK_N, angle_deg};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
@@ -13,6 +11,8 @@ use hivtac_calibration::train::{DirectionWeight, Options};
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::{Dataset, Row};
 use hivtac_data::loads::norm;
+use hivtac_evaluation::answer::Chip;
+use hivtac_evaluation::errors::{WEAK_N, angle_deg};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::model::encode::with_steps;
 use hivtac_terms::status::Status;

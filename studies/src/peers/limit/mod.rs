@@ -9,9 +9,9 @@ mod bound;
 pub mod matrix;
 
 use anyhow::{Context, Result};
-use hivtac_calibration::errors::angle_deg;
 use hivtac_data::dataset::{MarkerDetector, Sensing};
 use hivtac_data::loads::norm;
+use hivtac_evaluation::errors::angle_deg;
 use hivtac_scene::{Contact, Load, Scene};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -1,8 +1,8 @@
 //! How far what is found moves when an effect is switched.
 
 use anyhow::Result;
-use hivtac_calibration::errors::{WEAK_N, angle_deg};
 use hivtac_data::loads::norm;
+use hivtac_evaluation::errors::{WEAK_N, angle_deg};
 use hivtac_scene::{Frame, Options, Preset, Scene};
 
 use crate::scene::pipeline::{FrameMeasurement, Pipeline};
