@@ -128,6 +128,11 @@ pub fn calibrate() -> Result<PathBuf> {
     build(&mut host_command("hivtac-calibrate"), "hivtac-calibrate")
 }
 
+/// What writes the scripts of the benchmarks.
+pub fn benchmark_cases() -> Result<PathBuf> {
+    build(&mut host_command("benchmark-cases"), "benchmark-cases")
+}
+
 fn host_command(program: &str) -> Command {
     let mut command = cargo("build", workspace::root());
     command.args(["--profile", TOOLS]).args(HOST);

@@ -1,12 +1,12 @@
 //! What is measured: scripts that `benchmark-cases` (in `tests`) writes.
 
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
-use crate::toolchain::cargo;
-use crate::{process, workspace};
+use crate::{artifacts, process, workspace};
 
 /// One script, as `benchmark-cases` describes it.
 #[derive(Clone, Debug, Deserialize)]
@@ -98,16 +98,8 @@ pub fn write_trade(folder: &Path) -> Result<Vec<Case>> {
 }
 
 fn describe(folder: &Path, which: &[String]) -> Result<Vec<Case>> {
-    let mut command = cargo("run", workspace::root());
-    command.args([
-        "--quiet",
-        "--package",
-        "hivtac-tests",
-        "--bin",
-        "benchmark-cases",
-        "--",
-    ]);
-    command.arg(folder);
+    let mut command = Command::new(artifacts::benchmark_cases()?);
+    command.current_dir(workspace::root()).arg(folder);
     process::show(command.args(which));
     let lines = process::output(&mut command)?;
     lines
