@@ -19,7 +19,7 @@ use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use crate::models;
 
 /// Both ways to take a position from pixels.
-pub const ESTIMATORS: [CentroidEstimator; 2] = [
+const ESTIMATORS: [CentroidEstimator; 2] = [
     CentroidEstimator::BinaryMask,
     CentroidEstimator::RednessWeighted,
 ];

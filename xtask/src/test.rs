@@ -283,7 +283,7 @@ fn host_lints() -> Result<()> {
     for command in [&mut root, &mut without_pictures, &mut counter] {
         process::run(command.args(["--", "-D", "warnings"]))?;
     }
-    // Most of these is other packages, which tests need built.
+    // Most of what these build is other packages, which tests need, too.
     let mut rig = artifacts::rig_cargo("build");
     rig.arg("--all-targets");
     for command in [artifacts::serving_command(), rig] {
