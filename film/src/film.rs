@@ -105,20 +105,36 @@ impl Film {
                 ..Pressed::default()
             };
         }
-        let (pose, force_n) = match load.contact() {
+        let (pose, force_n) = self.reached(load);
+        let disc = |k| self.tables.disc(&pose, load.tip_radius_mm(), &self.unit, k);
+        Pressed {
+            tip_mm: self.tables.tip_mm(&pose, load.tip_radius_mm()),
+            force_n,
+            touches_mm: pose.place_mm,
+            centres_mm: self.markers_mm(),
+            discs: std::array::from_fn(disc),
+        }
+    }
+
+    /// How the film around one marker moves, by its identity 0–3: [`Self::press`] without what it
+    /// says of the others and of the tip.
+    pub fn marker_motion(&self, load: &Load, marker: usize) -> DiscMotion {
+        if load.magnitude_n() == 0.0 {
+            return DiscMotion::default();
+        }
+        let (pose, _) = self.reached(load);
+        (self.tables).disc(&pose, load.tip_radius_mm(), &self.unit, marker)
+    }
+
+    /// The load and the force, N, that a load which presses comes to.
+    fn reached(&self, load: &Load) -> (Pose, [f64; 3]) {
+        match load.contact() {
             Contact::Force => (
                 self.pose(load.vector_n(), load.offset_mm()),
                 load.vector_n(),
             ),
             Contact::Stick => self.on_stage(load, MAX_RATIO),
             Contact::Slip { mu } => self.on_stage(load, mu),
-        };
-        Pressed {
-            tip_mm: self.tables.tip_mm(&pose, load.tip_radius_mm()),
-            force_n,
-            touches_mm: pose.place_mm,
-            centres_mm: self.markers_mm(),
-            discs: self.tables.discs(&pose, load.tip_radius_mm(), &self.unit),
         }
     }
 
@@ -268,6 +284,22 @@ mod tests {
         let depth = |force_n| -Film::default().press(&load(force_n, 0.0, 0.0)).tip_mm[2];
         for (force_n, expected) in [(0.01, 1.96), (0.1, 4.71), (0.2, 6.03)] {
             assert!((depth(force_n) - expected).abs() < 0.006, "{force_n} N");
+        }
+    }
+
+    #[test]
+    fn one_marker_alone_moves_as_with_the_others() {
+        let mut unit = Unit::default();
+        (unit.thickness, unit.posts_mm[1]) = (1.1, [0.2, -0.1]);
+        unit.markers_mm[2] = [0.1, 0.3];
+        let film = Film::of(unit).unwrap();
+        let off = load(0.1, 8.0, -3.0).with_offset_mm([1.0, 2.5]).unwrap();
+        let stuck = load(0.2, 4.0, 0.0).with_contact(Contact::Stick).unwrap();
+        for load in &[Load::REST, off, stuck] {
+            let discs = film.press(load).discs;
+            for (marker, disc) in discs.iter().enumerate() {
+                assert_eq!(film.marker_motion(load, marker), *disc);
+            }
         }
     }
 

@@ -53,8 +53,10 @@ impl UnitSetup<'_> {
     /// The same under a load that says its force.
     pub fn moved_by(&self, film: &Film, load: &Load, marker: usize) -> Result<[f64; 2]> {
         let disc = Disc::marker(film.markers_mm()[marker]);
-        let pressed = film.press(load);
-        let there = disc.centroid_px(|rest| pressed.displacement(rest), self.camera);
+        let motion = film.marker_motion(load, marker);
+        let [x, y] = disc.centre_mm;
+        let moved = |rest: [f64; 2]| motion.at([rest[0] - x, rest[1] - y]);
+        let there = disc.centroid_px(moved, self.camera);
         let here = disc.centroid_px(|_| [0.0; 3], self.camera);
         let focal_px = self.camera.focal_px();
         Ok([0, 1].map(|i| (there[i] - here[i]) / focal_px))

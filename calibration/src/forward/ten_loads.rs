@@ -143,15 +143,14 @@ pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Resul
         numbers: numbers(bench, loads.len()),
         camera: Camera::new(Preset::Ov7725, 320, 240)?,
     };
-    let mut best: Option<(f64, Vec<f64>)> = None;
+    let mut found = At::default();
     for start in problem.starts() {
-        let (square, found) = problem.descend(start)?;
-        if best.as_ref().is_none_or(|(least, _)| square < *least) {
-            best = Some((square, found));
+        let end = problem.descend(start)?;
+        if found.parts.is_empty() || end.square() < found.square() {
+            found = end;
         }
     }
-    let (square, found) = best.unwrap_or_default();
-    let chi_square = square / (8 * loads.len() + 8) as f64;
+    let chi_square = found.square() / (8 * loads.len() + 8) as f64;
     ensure!(
         chi_square <= TRUSTED,
         "no unit explains these loads (χ² {chi_square:.1} over its degrees of freedom): check the \
@@ -166,7 +165,7 @@ pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Resul
         bench: &noisier,
         ..problem
     };
-    problem.fitted(&found, chi_square)
+    problem.fitted(&found.parts, chi_square)
 }
 
 fn numbers(bench: &Bench, loads: usize) -> Vec<(Number, f64)> {
@@ -198,6 +197,27 @@ struct Made {
     middle_px: [f64; 2],
     rest_px: [[f64; 2]; 4],
     gauge_n: Vec<f64>,
+}
+
+/// How markers 0–3 move under a load, focal lengths.
+type Moved = [[f64; 2]; 4];
+
+/// Some values of a unit's numbers, and what they explain.
+#[derive(Default)]
+struct At {
+    /// The values, in parts of the numbers' standard deviations.
+    parts: Vec<f64>,
+    /// How the markers move under each load.
+    moved: Vec<Moved>,
+    residuals: Vec<f64>,
+}
+
+impl At {
+    /// χ²: what is seen, and how far the numbers are from their nominal values.
+    fn square(&self) -> f64 {
+        let all = self.residuals.iter().chain(&self.parts);
+        all.map(|part| part * part).sum()
+    }
 }
 
 impl Problem<'_> {
@@ -249,11 +269,43 @@ impl Problem<'_> {
         }
     }
 
-    /// What is seen less what should be, in parts of the noise: the rest position, then the loads.
-    fn residuals(&self, parts: &[f64]) -> Result<Vec<f64>> {
-        let made = self.made(parts);
-        let setup = self.setup(&made);
+    /// How the markers move under each load, focal lengths.
+    fn moved(&self, made: &Made) -> Result<Vec<Moved>> {
+        (0..self.loads.len())
+            .map(|number| self.moved_by(made, number))
+            .collect()
+    }
+
+    fn moved_by(&self, made: &Made, number: usize) -> Result<Moved> {
+        let setup = self.setup(made);
         let film = Film::of(setup.unit)?;
+        let load = self.load(&self.loads[number], made, number)?;
+        let mut moved = Moved::default();
+        for (k, moved) in moved.iter_mut().enumerate() {
+            *moved = setup.moved_by(&film, &load, k)?;
+        }
+        Ok(moved)
+    }
+
+    /// The same where one number has changed: most of a fit's time is spent on films, and not every
+    /// number changes one.
+    fn moved_again(&self, made: &Made, changed: Number, before: &[Moved]) -> Result<Vec<Moved>> {
+        match changed {
+            Number::Roll | Number::Focal | Number::Middle(_) | Number::Rest(..) => {
+                Ok(before.to_vec())
+            }
+            Number::Gauge(load) => {
+                let mut moved = before.to_vec();
+                moved[load] = self.moved_by(made, load)?;
+                Ok(moved)
+            }
+            _ => self.moved(made),
+        }
+    }
+
+    /// What is seen less what should be, in parts of the noise: the rest position, then the loads.
+    fn residuals(&self, made: &Made, moved: &[Moved]) -> Result<Vec<f64>> {
+        let film = Film::of(self.setup(made).unit)?;
         let to_px = made.unit.to_px();
         let mut residuals = Vec::new();
         let mut add = |seen: [f64; 2], should: [f64; 2]| {
@@ -265,15 +317,25 @@ impl Problem<'_> {
             let should = [0, 1].map(|i| made.middle_px[i] + at[i] + off[i]);
             add(self.rest_px[k], should);
         }
-        for (number, load) in self.loads.iter().enumerate() {
-            let pose = self.pose(load, &made, number)?;
+        for (load, moved) in self.loads.iter().zip(moved) {
             for k in 0..4 {
-                let moved = to_px(setup.moved_by(&film, &pose, k)?);
+                let moved = to_px(moved[k]);
                 let should = [0, 1].map(|i| self.rest_px[k][i] - made.rest_px[k][i] + moved[i]);
                 add(load.seen_px[k], should);
             }
         }
         Ok(residuals)
+    }
+
+    /// Where the numbers are so.
+    fn at(&self, parts: Vec<f64>) -> Result<At> {
+        let made = self.made(&parts);
+        let moved = self.moved(&made)?;
+        Ok(At {
+            residuals: self.residuals(&made, &moved)?,
+            moved,
+            parts,
+        })
     }
 
     /// Where a marker is seen at rest, focal lengths from the axis.
@@ -285,7 +347,7 @@ impl Problem<'_> {
         [x - middle[0], y - middle[1]].map(|part| part / self.camera.focal_px())
     }
 
-    fn pose(&self, load: &KnownLoad, made: &Made, number: usize) -> Result<Load> {
+    fn load(&self, load: &KnownLoad, made: &Made, number: usize) -> Result<Load> {
         let told_n = hivtac_data::loads::norm(load.force_n);
         let larger = 1.0 + made.gauge_n[number] / told_n;
         let place_mm = [0, 1].map(|i| load.place_mm[i] + made.stage_mm[i]);
@@ -310,22 +372,19 @@ impl Problem<'_> {
     }
 
     /// Gauss–Newton steps, each shortened until χ² falls; ends where it falls no more.
-    fn descend(&self, mut parts: Vec<f64>) -> Result<(f64, Vec<f64>)> {
-        let mut residuals = self.residuals(&parts)?;
-        let mut square = self.square(&residuals, &parts);
+    fn descend(&self, parts: Vec<f64>) -> Result<At> {
+        let mut here = self.at(parts)?;
         for _ in 0..ROUNDS {
-            let (_, step) = self.solve(&parts, &residuals)?;
+            let (_, step) = self.solve(&here)?;
             let mut fell = false;
             for length in [1.0, 0.5, 0.2, 0.05] {
-                let there = parts.iter().zip(&step);
+                let there = here.parts.iter().zip(&step);
                 let there =
                     there.map(|(part, step)| (part + length * step).clamp(-AT_MOST, AT_MOST));
-                let there: Vec<f64> = there.collect();
-                let other = self.residuals(&there)?;
-                let other_square = self.square(&other, &there);
-                if other_square < square {
-                    fell = square - other_square > SETTLED;
-                    (parts, residuals, square) = (there, other, other_square);
+                let there = self.at(there.collect())?;
+                if there.square() < here.square() {
+                    fell = here.square() - there.square() > SETTLED;
+                    here = there;
                     break;
                 }
             }
@@ -333,22 +392,22 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok((square, parts))
-    }
-
-    /// χ²: what is seen, and how far the numbers are from their nominal values.
-    fn square(&self, residuals: &[f64], parts: &[f64]) -> f64 {
-        residuals.iter().chain(parts).map(|part| part * part).sum()
+        Ok(here)
     }
 
     /// The covariance of the numbers, in parts of their standard deviations before, and the step to
     /// where they explain most.
-    fn solve(&self, parts: &[f64], residuals: &[f64]) -> Result<(Vec<Vec<f64>>, Vec<f64>)> {
+    fn solve(&self, here: &At) -> Result<(Vec<Vec<f64>>, Vec<f64>)> {
+        let At {
+            parts, residuals, ..
+        } = here;
         let mut columns = Vec::new();
-        for k in 0..parts.len() {
-            let mut there = parts.to_vec();
+        for (k, (number, _)) in self.numbers.iter().enumerate() {
+            let mut there = parts.clone();
             there[k] += STEP;
-            let other = self.residuals(&there)?;
+            let made = self.made(&there);
+            let moved = self.moved_again(&made, *number, &here.moved)?;
+            let other = self.residuals(&made, &moved)?;
             let slope = other.iter().zip(residuals).map(|(a, b)| (a - b) / STEP);
             columns.push(slope.collect::<Vec<f64>>());
         }
@@ -366,8 +425,7 @@ impl Problem<'_> {
     }
 
     fn fitted(&self, parts: &[f64], chi_square: f64) -> Result<Fit> {
-        let residuals = self.residuals(parts)?;
-        let (covariance, _) = self.solve(parts, &residuals)?;
+        let (covariance, _) = self.solve(&self.at(parts.to_vec())?)?;
         let made = self.made(parts);
         let told = self.numbers.iter().zip(parts).enumerate();
         let numbers = told.map(|(k, ((number, sigma), part))| {

@@ -147,21 +147,18 @@ impl Tables {
         [signs[0] * x, signs[1] * y, z]
     }
 
-    /// How the film moves around each marker's place, `markers_mm` beside the nominal one.
-    pub fn discs(&self, pose: &Pose, radius_mm: f64, unit: &Unit) -> [DiscMotion; 4] {
+    /// How the film moves around the place of marker `k`, `markers_mm` beside the nominal one.
+    pub fn disc(&self, pose: &Pose, radius_mm: f64, unit: &Unit, k: usize) -> DiscMotion {
         let parts = unit.parts();
-        let differs = parts != [0.0; UNIT_PARTS];
-        std::array::from_fn(|k| {
-            let signs = MARKER_CENTRES_MM[k].map(f64::signum);
-            let here = pose.mirrored(signs);
-            let own = differs.then(|| mirrored(parts, signs));
-            let [x, y] = unit.markers_mm[k];
-            let disc = match [signs[0] * x, signs[1] * y] {
-                [0.0, 0.0] => self.corner_disc(&here, radius_mm, own.as_ref()),
-                beside_mm => self.beside(&here, radius_mm, own.as_ref(), beside_mm),
-            };
-            mirrored_disc(disc, signs)
-        })
+        let signs = MARKER_CENTRES_MM[k].map(f64::signum);
+        let here = pose.mirrored(signs);
+        let own = (parts != [0.0; UNIT_PARTS]).then(|| mirrored(parts, signs));
+        let [x, y] = unit.markers_mm[k];
+        let disc = match [signs[0] * x, signs[1] * y] {
+            [0.0, 0.0] => self.corner_disc(&here, radius_mm, own.as_ref()),
+            beside_mm => self.beside(&here, radius_mm, own.as_ref(), beside_mm),
+        };
+        mirrored_disc(disc, signs)
     }
 
     /// Marker 2's motion.
