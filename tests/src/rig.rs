@@ -155,18 +155,31 @@ pub struct ToolOutput {
 }
 
 /// Runs a command of the host tool (`HIVTAC_TOOL`), such as `threshold auto`, on a rig's port until
-/// it ends. It waits up to 40 s for an
-/// answer: the emulated board boots slower than a real one.
+/// it ends. It waits up to 40 s for an answer: the emulated board boots slower than a real one.
 ///
 /// # Errors
 /// When it cannot be started, or does not end.
 pub fn tool(rig: &Rig, command: &str, options: &[&str]) -> Result<ToolOutput> {
+    tool_waiting(rig, 40, command, options)
+}
+
+/// The same where a silence is meant, with so many seconds to wait: all the while the rig runs on.
+///
+/// # Errors
+/// As [`tool`].
+pub fn tool_waiting(
+    rig: &Rig,
+    timeout_s: u32,
+    command: &str,
+    options: &[&str],
+) -> Result<ToolOutput> {
     let seconds = PATIENCE.as_secs();
     let output = Command::new("timeout")
         .arg(std::format!("{seconds}"))
         .arg(artifact::named_by("HIVTAC_TOOL"))
         .args(command.split(' '))
-        .args(["--port", rig.port(), "--timeout", "40"])
+        .args(["--port", rig.port()])
+        .args(["--timeout", &std::format!("{timeout_s}")])
         .args(options)
         .stdin(Stdio::null())
         .output()

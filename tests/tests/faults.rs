@@ -1,17 +1,33 @@
 //! Faults of the rig, seen through the host tool: each ends in its documented status or counter,
 //! and passes.
 
-use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
+use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool, tool_waiting};
 use serde_json::Value;
 
 /// A run with faults, watched by `monitor --json`: its output, its lines, and the rig's counters.
 fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
+    watch_with(faults, |rig| {
+        tool(rig, "monitor", &[&["--json"], options].concat()).unwrap()
+    })
+}
+
+/// The same with a cable that is pulled, after which nothing comes.
+fn watch_pulled(options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
+    watch_with(&["cable-pulled@300-700"], |rig| {
+        tool_waiting(rig, 20, "monitor", &[&["--json"], options].concat()).unwrap()
+    })
+}
+
+fn watch_with(
+    faults: &[&str],
+    monitor: impl Fn(&Rig) -> ToolOutput,
+) -> (ToolOutput, Vec<Value>, Value) {
     let mut rig_options = vec!["--scene", "static"];
     for fault in faults {
         rig_options.extend(["--fault", fault]);
     }
     let rig = Rig::start(&rig_options).unwrap();
-    let output = tool(&rig, "monitor", &[&["--json"], options].concat()).unwrap();
+    let output = monitor(&rig);
     let lines = json_lines(&output.out).unwrap();
     let counters = rig.finish().unwrap();
     (output, lines, counters)
@@ -88,8 +104,7 @@ fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
 
 #[test]
 fn a_pulled_cable_is_reported_and_survived() {
-    let options = ["--frames", "60", "--reconnect"];
-    let (output, lines, counters) = watch(&["cable-pulled@300-700"], &options);
+    let (output, lines, counters) = watch_pulled(&["--frames", "60", "--reconnect"]);
     check_recovery(&output, &lines);
     assert_eq!(counters["usb"]["enumerations"], 2, "{counters}");
     assert!(output.err.contains("connected again"), "{}", output.err);
@@ -97,6 +112,6 @@ fn a_pulled_cable_is_reported_and_survived() {
 
 #[test]
 fn a_pulled_cable_ends_a_monitor_that_does_not_reconnect() {
-    let (output, ..) = watch(&["cable-pulled@300-700"], &["--frames", "60"]);
+    let (output, ..) = watch_pulled(&["--frames", "60"]);
     assert_eq!(output.code, Some(5), "{output:?}");
 }
