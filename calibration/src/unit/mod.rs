@@ -134,7 +134,7 @@ impl GuideArgs {
         };
         let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, true)?;
         println!("All loads are recorded.\n{report}");
-        eprintln!("Fitting the unit, and judging it on loads left out: a minute or two.");
+        eprintln!("Fitting the unit, and judging it on loads left out: half a minute or so.");
         let Known { gauge_n, stage_mm } = known;
         let (own, found) = weights.clone().for_unit(&dataset, gauge_n, stage_mm)?;
         print!("{found}");
