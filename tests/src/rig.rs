@@ -17,6 +17,8 @@ use crate::artifact;
 /// How long anything may take here: the emulator runs at about a tenth of real time, and tests
 /// share the processors.
 const PATIENCE: Duration = Duration::from_secs(240);
+/// How long the host tool waits for an answer, s: the emulated board boots slower than a real one.
+pub const TIMEOUT_S: u32 = 40;
 
 /// A running rig with its logs. Killed when it is dropped.
 pub struct Rig {
@@ -155,12 +157,12 @@ pub struct ToolOutput {
 }
 
 /// Runs a command of the host tool (`HIVTAC_TOOL`), such as `threshold auto`, on a rig's port until
-/// it ends. It waits up to 40 s for an answer: the emulated board boots slower than a real one.
+/// it ends. It waits up to [`TIMEOUT_S`] for an answer.
 ///
 /// # Errors
 /// When it cannot be started, or does not end.
 pub fn tool(rig: &Rig, command: &str, options: &[&str]) -> Result<ToolOutput> {
-    tool_waiting(rig, 40, command, options)
+    tool_waiting(rig, TIMEOUT_S, command, options)
 }
 
 /// The same where a silence is meant, with so many seconds to wait: all the while the rig runs on.

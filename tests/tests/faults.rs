@@ -1,33 +1,31 @@
 //! Faults of the rig, seen through the host tool: each ends in its documented status or counter,
 //! and passes.
 
-use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool, tool_waiting};
+use hivtac_tests::rig::{Rig, TIMEOUT_S, ToolOutput, json_lines, tool_waiting};
 use serde_json::Value;
 
 /// A run with faults, watched by `monitor --json`: its output, its lines, and the rig's counters.
 fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
-    watch_with(faults, |rig| {
-        tool(rig, "monitor", &[&["--json"], options].concat()).unwrap()
-    })
+    watch_waiting(TIMEOUT_S, faults, options)
 }
 
 /// The same with a cable that is pulled, after which nothing comes.
 fn watch_pulled(options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
-    watch_with(&["cable-pulled@300-700"], |rig| {
-        tool_waiting(rig, 20, "monitor", &[&["--json"], options].concat()).unwrap()
-    })
+    watch_waiting(20, &["cable-pulled@300-700"], options)
 }
 
-fn watch_with(
+fn watch_waiting(
+    timeout_s: u32,
     faults: &[&str],
-    monitor: impl Fn(&Rig) -> ToolOutput,
+    options: &[&str],
 ) -> (ToolOutput, Vec<Value>, Value) {
     let mut rig_options = vec!["--scene", "static"];
     for fault in faults {
         rig_options.extend(["--fault", fault]);
     }
     let rig = Rig::start(&rig_options).unwrap();
-    let output = monitor(&rig);
+    let options = [&["--json"], options].concat();
+    let output = tool_waiting(&rig, timeout_s, "monitor", &options).unwrap();
     let lines = json_lines(&output.out).unwrap();
     let counters = rig.finish().unwrap();
     (output, lines, counters)

@@ -165,7 +165,7 @@ pub fn fit(bench: &Bench, rest_px: &[[f64; 2]; 4], loads: &[KnownLoad]) -> Resul
         bench: &noisier,
         ..problem
     };
-    problem.fitted(&found.parts, chi_square)
+    problem.fitted(found, chi_square)
 }
 
 fn numbers(bench: &Bench, loads: usize) -> Vec<(Number, f64)> {
@@ -424,10 +424,12 @@ impl Problem<'_> {
         Ok((covariance, step))
     }
 
-    fn fitted(&self, parts: &[f64], chi_square: f64) -> Result<Fit> {
-        let (covariance, _) = self.solve(&self.at(parts.to_vec())?)?;
-        let made = self.made(parts);
-        let told = self.numbers.iter().zip(parts).enumerate();
+    /// What a descent found, in parts of this noise.
+    fn fitted(&self, mut found: At, chi_square: f64) -> Result<Fit> {
+        let made = self.made(&found.parts);
+        found.residuals = self.residuals(&made, &found.moved)?;
+        let (covariance, _) = self.solve(&found)?;
+        let told = self.numbers.iter().zip(&found.parts).enumerate();
         let numbers = told.map(|(k, ((number, sigma), part))| {
             (
                 number.name(),
@@ -442,7 +444,7 @@ impl Problem<'_> {
             rest_px: made.rest_px,
             numbers: numbers.collect(),
             chi_square,
-            open: self.open(parts, &covariance)?,
+            open: self.open(&found.parts, &covariance)?,
         })
     }
 
