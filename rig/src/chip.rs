@@ -1,9 +1,9 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
 //! core that it lacks.
 //!
-//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for eight slots itself:
-//! DCMI, MDMA, DMAMUX1, CRS, the flash, and the three blocks of OTG2; everything else goes to the
-//! part's own models.
+//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for seven slots itself:
+//! DCMI, MDMA, CRS, the flash, and the three blocks of OTG2; everything else goes to the part's own
+//! models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::Access;
@@ -18,7 +18,7 @@ use crate::camera::{Sccb, SharedCamera, TwoWire, part};
 use crate::control_bus::{ControlBus, HeldBus};
 use crate::crs::Crs;
 use crate::dcmi::Dcmi;
-use crate::dormant::Dormant;
+use crate::dma_requests;
 use crate::faults::Faults;
 use crate::flash::{Bank, Flash};
 use crate::late_flags::LateFlags;
@@ -26,7 +26,6 @@ use crate::late_line::LateLine;
 use crate::mdma::Mdma;
 use crate::mpu::{Mpu, Protection};
 use crate::otg::{Blocks, SharedCore};
-use crate::request_mux::RequestMux;
 use crate::rules::Rules;
 use crate::usb_host::SharedHost;
 
@@ -74,7 +73,6 @@ pub struct Chip {
     pub mpu: Option<Mpu>,
     crs: Crs,
     flash: Flash,
-    request_mux: RequestMux,
     control_bus: ControlBus,
     held_bus: HeldBus,
     late: LateLine,
@@ -87,13 +85,11 @@ pub struct Chip {
     otg: Blocks,
     core: SharedCore,
     host: SharedHost,
-    dormant: Dormant,
     slots: board::Slots,
     dcmi_slot: usize,
     mdma_slot: usize,
     crs_slot: usize,
     flash_slot: usize,
-    request_mux_slot: usize,
     vsync: Level,
     wiring: Wiring,
 }
@@ -116,6 +112,7 @@ impl Chip {
         seed: u64,
     ) -> Result<Self, Error> {
         let mut part = Stm32h743::new()?;
+        part.dma = dma_requests::controllers();
         part.rcc.attach_crystals(board.crystal_hz(), 0);
         part.set_supply(SUPPLY_MV);
         part.set_analog_supply(SUPPLY_MV);
@@ -137,18 +134,14 @@ impl Chip {
         let mdma_slot = part.bus().slot("MDMA")?;
         let crs_slot = part.bus().slot("CRS")?;
         let flash_slot = part.bus().slot("Flash")?;
-        let request_mux_slot = part.bus().slot("DMAMUX1")?;
         let i2c_slot = part.bus().slot("I2C1")?;
         let mut chip = Self {
-            dormant: Dormant::new(part.bus()),
             dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone(), seed),
             control_bus: ControlBus::new(faults.clone(), slots.vsync_port(), i2c_slot),
             held_bus: HeldBus,
             mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), seed),
             flash: Flash::new(bank, rules.clone()),
             flash_slot,
-            request_mux: RequestMux::default(),
-            request_mux_slot,
             rules,
             board,
             revision,
@@ -269,6 +262,7 @@ impl Mcu for Chip {
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.otg.exchange(&mut self.part);
         self.part.reset(at, cause);
+        self.part.dma = dma_requests::controllers();
         self.core.lock().reset();
         self.core.line().reset();
         self.late_flags.reset();
@@ -276,14 +270,12 @@ impl Mcu for Chip {
         self.otg = Blocks::fit(&mut self.part, &self.core, &self.host)
             .expect("a part that was fitted once");
         self.otg.wake_host(self.part.bus_mut(), at);
-        self.dormant = Dormant::new(self.part.bus());
         if let Some(mpu) = &mut self.mpu {
             mpu.reset();
         }
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crs);
         Device::reset(&mut self.flash);
-        Device::reset(&mut self.request_mux);
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);
@@ -296,9 +288,6 @@ impl Mcu for Chip {
     fn poll(&mut self, _now: VirtualNanos) {}
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
-        if self.dormant.sleeps(slot, self.part.bus()) {
-            return (self.part.bus_mut(), None);
-        }
         if slot == self.slots.tim1 {
             // It may be the camera's clock, as its registers say (`board`). Its model would count
             // every edge.
@@ -319,9 +308,6 @@ impl Mcu for Chip {
         }
         if slot == self.flash_slot {
             return (self.part.bus_mut(), Some(&mut self.flash));
-        }
-        if slot == self.request_mux_slot {
-            return (self.part.bus_mut(), Some(&mut self.request_mux));
         }
         if slot == self.crs_slot {
             return (self.part.bus_mut(), Some(&mut self.crs));

@@ -9,8 +9,8 @@ use rigless::device::RegisterFile;
 
 use crate::rules::Rules;
 
-/// Memory out of the DMA controllers' reach.
-const UNREACHABLE: [(&str, u64, u64); 2] =
+/// Memory out of the DMA controllers' reach: name, start, bytes.
+pub const UNREACHABLE: [(&str, u64, u64); 2] =
     [("ITCM", 0, 64 << 10), ("DTCM", 0x2000_0000, 128 << 10)];
 /// Bases of DMA1 and DMA2.
 const CONTROLLERS: [(&str, u64); 2] = [("DMA1", 0x4002_0000), ("DMA2", 0x4002_0400)];

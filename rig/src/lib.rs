@@ -12,7 +12,7 @@
 //! | module | subject |
 //! |---|---|
 //! | [`run`], [`report`] | one run from options to outcome |
-//! | [`chip`], [`board`], [`crs`], [`machine`], `rom`, `dormant`, `request_mux`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
+//! | [`chip`], [`board`], [`crs`], [`machine`], `rom`, `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`dcmi`], [`camera`], [`frame_source`], `control_bus` | the camera interface; the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`mdma`], [`flash`] | the DMA controller that reaches DTCM; the flash's second bank, and cuts of the power |
 //! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
@@ -28,7 +28,7 @@ mod control_bus;
 pub mod crs;
 pub mod dcmi;
 pub mod dma_reach;
-mod dormant;
+mod dma_requests;
 pub mod faults;
 pub mod flash;
 pub mod frame_source;
@@ -40,7 +40,6 @@ pub mod mdma;
 pub mod mpu;
 pub mod otg;
 pub mod report;
-mod request_mux;
 mod rom;
 pub mod rules;
 pub mod run;

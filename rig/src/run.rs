@@ -18,6 +18,7 @@ use crate::board;
 use crate::camera::{Camera, SharedCamera, part};
 use crate::chip::{Chip, Revision};
 use crate::dma_reach;
+use crate::dma_requests;
 use crate::faults::Faults;
 use crate::flash::{self, Bank, Contents, Cut};
 use crate::frame_source::FrameSource;
@@ -315,6 +316,9 @@ impl Conductor {
             let registers = session.board().chip.bus().registers(stream.controller);
             let registers = registers.map(dma_reach::values).unwrap_or_default();
             dma_reach::check(stream, value, &registers, &self.rules);
+            if let Some(multiplexer) = session.board().chip.bus().registers("DMAMUX1") {
+                dma_requests::check(stream, multiplexer, &self.rules);
+            }
         }
     }
 

@@ -124,6 +124,16 @@ fn a_dma_buffer_in_axi_sram_does_not() {
     );
 }
 
+#[test]
+fn a_dma_stream_that_a_timer_drives_ends_the_run() {
+    const DMAMUX1_CHANNEL0: u32 = 0x4002_0800;
+    const TIM6_UPDATE: u32 = 69;
+    let mut writes = dma_to(0x2400_0000).to_vec();
+    writes.insert(1, (DMAMUX1_CHANNEL0, TIM6_UPDATE));
+    let error = outcome(&writes).unwrap_err();
+    assert!(error.contains("DMAMUX1 channel 0"), "{error}");
+}
+
 /// A program that makes a region read-only, writes to it, and then what ends a run.
 #[test]
 fn a_program_that_breaks_its_own_protection_gets_no_further() {

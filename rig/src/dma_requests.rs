@@ -1,0 +1,135 @@
+//! DMA1 and DMA2 with DMAMUX1's channels as plain wires, without acknowledgements.
+//!
+//! The emulator's controllers acknowledge each word that they move, and each acknowledgement is
+//! told to some forty peripherals, a quarter of what a frame cost. Only what is released or counted
+//! by it needs it: requests of timers and of DMAMUX1's generators, synchronized channels and those
+//! that generate events (RM0433, chapter 17). A stream that is enabled on such a channel ends the
+//! run with a message; for any other one, DCMI's among them, an acknowledgement changes nothing.
+
+use std::ops::RangeInclusive;
+
+use rigless::device::RegisterFile;
+use rigless::soc::st::dma::{Reach, Requests, STREAMS, Span, Wire};
+use rigless::soc::stm32h743::generated::dmamux1::Register;
+use rigless::soc::stm32h743::peripherals::dma::Dma;
+use rigless::soc::{Access, FieldSpec};
+
+use crate::dma_reach::{Stream, UNREACHABLE};
+use crate::rules::Rules;
+
+/// Fields of a channel's CCR.
+const REQUEST: u64 = 0x7F;
+const EVENTS: u64 = 1 << 9;
+const SYNCHRONIZED: u64 = 1 << 16;
+/// Requests that are served when they are acknowledged: the generators', TIM1 to TIM4, TIM8 and
+/// TIM5, TIM6 and TIM7, TIM15 to TIM17 (RM0433, table 121).
+const ACKNOWLEDGED: [RangeInclusive<u64>; 5] = [1..=8, 11..=32, 47..=60, 69..=70, 105..=112];
+
+/// Reserved bits of a stream's control register, in place of the channel that other parts select
+/// there.
+const NO_SELECTION: FieldSpec = FieldSpec::new("reserved", 25, 3, Access::ReadOnly);
+/// The streams, each a list of its own.
+const EACH: [[usize; 1]; STREAMS] = [[0], [1], [2], [3], [4], [5], [6], [7]];
+const WIRES: [[Wire; STREAMS]; 2] = [wires(0), wires(STREAMS)];
+const OUT_OF_REACH: [Span; 2] = [span(0), span(1)];
+
+/// Of DMAMUX1's channels from `first` on, one to each stream.
+const fn wires(first: usize) -> [Wire; STREAMS] {
+    let mut wires = [Wire {
+        instance: "DMAMUX1",
+        request: first,
+        channel: 0,
+        streams: &EACH[0],
+    }; STREAMS];
+    let mut stream = 1;
+    while stream < STREAMS {
+        wires[stream].request = first + stream;
+        wires[stream].streams = &EACH[stream];
+        stream += 1;
+    }
+    wires
+}
+
+const fn span(number: usize) -> Span {
+    let (_, base, bytes) = UNREACHABLE[number];
+    Span { base, bytes }
+}
+
+/// DMA1 and DMA2, out of reset.
+pub fn controllers() -> [Dma; 2] {
+    WIRES.each_ref().map(|wiring| {
+        let requests = Requests::Channels {
+            wiring,
+            last_data: &[],
+            select: &NO_SELECTION,
+        };
+        let reach = Reach {
+            memory_to_memory: true,
+            unreachable: &OUT_OF_REACH,
+        };
+        Dma::wired(requests, reach)
+    })
+}
+
+/// Notes a breach when a stream that is enabled would need acknowledgements. `multiplexer` are
+/// DMAMUX1's registers.
+pub fn check(stream: Stream, multiplexer: &RegisterFile, rules: &Rules) {
+    let first = if stream.controller == "DMA1" {
+        0
+    } else {
+        STREAMS
+    };
+    let channel = first + stream.number as usize;
+    let control = multiplexer.get(Register::ALL[channel]);
+    let request = control & REQUEST;
+    let counts = control & (EVENTS | SYNCHRONIZED) != 0;
+    if counts || ACKNOWLEDGED.iter().any(|range| range.contains(&request)) {
+        rules.broken(|| {
+            format!(
+                "DMAMUX1 channel {channel} is set to {control:#x}: not simulated: requests of \
+                 timers and generators, synchronization, and events"
+            )
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rigless::mcu::Mcu;
+    use rigless::soc::stm32h743::Stm32h743;
+
+    const DCMI: u64 = 75;
+
+    /// What is noted when a stream is enabled while a channel is set up so.
+    fn breach(controller: &'static str, number: u64, channel: Register, control: u64) -> bool {
+        let mut part = Stm32h743::new().unwrap();
+        let slot = part.bus().slot("DMAMUX1").unwrap();
+        let registers = part.bus_mut().slot_mut(slot).registers_mut();
+        registers.set(channel, control);
+        let rules = Rules::default();
+        check(Stream { controller, number }, registers, &rules);
+        rules.first().is_some()
+    }
+
+    #[test]
+    fn a_stream_of_dcmi_needs_no_acknowledgement() {
+        assert!(!breach("DMA1", 1, Register::DmamuxC1cr, DCMI));
+        assert!(!breach("DMA2", 1, Register::DmamuxC9cr, DCMI));
+        assert!(!breach("DMA2", 1, Register::DmamuxC1cr, DCMI | EVENTS));
+    }
+
+    #[test]
+    fn a_stream_that_would_wait_for_one_is_refused() {
+        for control in [DCMI | EVENTS, DCMI | SYNCHRONIZED, 1, 8, 11, 60, 70, 112] {
+            assert!(
+                breach("DMA1", 1, Register::DmamuxC1cr, control),
+                "{control}"
+            );
+            assert!(
+                breach("DMA2", 7, Register::DmamuxC15cr, control),
+                "{control}"
+            );
+        }
+    }
+}
