@@ -31,6 +31,10 @@ const STRONGLY_ORDERED: u32 = 0;
 const DEVICE: u32 = 1 << 16;
 /// TEX = 1, C = 0, B = 0; shareable, as two bus masters use it.
 const NORMAL_NON_CACHEABLE: u32 = 1 << 19 | 1 << 18;
+/// TEX = 0, C = 1, B = 0.
+const WRITE_THROUGH: u32 = 1 << 17;
+/// TEX = 1, C = 1, B = 1.
+const WRITE_BACK: u32 = 1 << 19 | 1 << 17 | 1 << 16;
 const NEVER_EXECUTE: u32 = 1 << 28;
 
 /// External memory (0x6000_0000 to 0xDFFF_FFFF) is not fitted, but the core may read there
@@ -41,6 +45,16 @@ const EXTERNAL_MEMORY: Region = Region {
     disabled_eighths: 0b1000_0111,
     access: NO_ACCESS,
     memory_type: STRONGLY_ORDERED,
+    execute: false,
+};
+
+/// All SRAM and DTCM, as in the default map, but never run.
+const DATA: Region = Region {
+    base: 0x2000_0000,
+    size_log2: 29,
+    disabled_eighths: 0,
+    access: FULL_ACCESS,
+    memory_type: WRITE_BACK,
     execute: false,
 };
 
@@ -65,6 +79,16 @@ const NEAR_CODE: Region = Region {
     execute: true,
 };
 
+/// The program and its constants, as in the default map, but never written.
+const PROGRAM: Region = Region {
+    base: 0x0800_0000,
+    size_log2: 20,
+    disabled_eighths: 0,
+    access: READ_ONLY,
+    memory_type: WRITE_THROUGH,
+    execute: true,
+};
+
 /// The flash's second bank: nothing is read ahead while it is programmed or erased, and what is
 /// stored arrives at once and in order.
 const KEPT: Region = Region {
@@ -75,6 +99,10 @@ const KEPT: Region = Region {
     memory_type: DEVICE,
     execute: false,
 };
+
+/// Where regions overlap, the later one counts. What is run is never written, and what is written is
+/// never run.
+const REGIONS: [Region; 6] = [EXTERNAL_MEMORY, DATA, DMA_BUFFERS, NEAR_CODE, PROGRAM, KEPT];
 
 /// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA
 /// buffer.
@@ -93,7 +121,7 @@ fn set_regions(mpu: &mut MPU) {
     // default attributes.
     unsafe {
         mpu.ctrl.write(0);
-        for (number, region) in (0..).zip([EXTERNAL_MEMORY, DMA_BUFFERS, NEAR_CODE, KEPT]) {
+        for (number, region) in (0..).zip(REGIONS) {
             mpu.rnr.write(number);
             mpu.rbar.write(region.base);
             mpu.rasr.write(region.attributes());

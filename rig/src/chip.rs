@@ -6,7 +6,7 @@
 //! models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
-use rigless::emulator::Access;
+use rigless::emulator::{Access, Memory};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
 use rigless::soc::stm32h743::generated::dbgmcu;
@@ -223,9 +223,10 @@ impl Chip {
         }
     }
 
-    /// Looks at what an access may have changed on the camera's control bus, and at lines that are
-    /// late to fall.
-    pub fn settle(&mut self, at: VirtualNanos) {
+    /// Looks at what an access may have changed on the camera's control bus, at lines that are late
+    /// to fall, and at blocks of the MDMA that ended.
+    pub fn settle(&mut self, at: VirtualNanos, memory: &mut dyn Memory) {
+        self.mdma.settle(memory);
         self.control_bus.settle(&mut self.part, at);
         self.late.settle(&mut self.part, at);
         self.late_flags.settle(&mut self.part, at);

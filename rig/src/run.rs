@@ -251,7 +251,7 @@ impl Driver<Sensor> for Conductor {
     fn on_settled(
         &mut self,
         session: &mut Session<Sensor>,
-        _host: &mut dyn emulator::Host,
+        host: &mut dyn emulator::Host,
         settled: Settled,
     ) {
         let now = match settled {
@@ -266,7 +266,7 @@ impl Driver<Sensor> for Conductor {
             _ => return,
         };
         self.settled_at_ns = now.0;
-        session.board_mut().chip.settle(now);
+        session.board_mut().chip.settle(now, host);
         if now.0 < self.settling_until || self.camera.lock().restarts() {
             session.board_mut().chip.rewire(now);
         }

@@ -1,5 +1,8 @@
 //! What a channel's registers ask for, and whether that is allowed.
 
+use rigless::emulator::{Error, Memory};
+use rigless::soc::Width;
+
 use super::row;
 
 /// ITCM and DTCM, on the controller's AHB port.
@@ -14,6 +17,17 @@ pub struct Block {
     pub destination: u64,
     /// Size.
     pub bytes: u64,
+}
+
+impl Block {
+    /// Moves its bytes, a multiple of eight.
+    pub fn copy(&self, memory: &mut dyn Memory) -> Result<(), Error> {
+        for offset in (0..self.bytes).step_by(8) {
+            let value = memory.read(self.source + offset, Width::W64)?;
+            memory.write(self.destination + offset, Width::W64, value)?;
+        }
+        Ok(())
+    }
 }
 
 /// What the registers of a channel ask for, or what is wrong with it. `get` reads a register by its
@@ -160,6 +174,47 @@ mod tests {
             bytes: 2560,
         };
         assert_eq!(asked(&[]), Ok(expected));
+    }
+
+    /// 64 bytes from 0x100 on.
+    struct Bytes([u8; 64]);
+
+    impl Bytes {
+        fn place(address: u64, width: Width) -> Result<usize, Error> {
+            let inside = (0x100..=0x138).contains(&address);
+            inside
+                .then(|| address as usize - 0x100)
+                .ok_or(Error::Memory { address, width })
+        }
+    }
+
+    impl Memory for Bytes {
+        fn read(&mut self, address: u64, width: Width) -> Result<u64, Error> {
+            let at = Self::place(address, width)?;
+            let bytes = self.0[at..at + 8].try_into().expect("eight");
+            Ok(u64::from_le_bytes(bytes))
+        }
+
+        fn write(&mut self, address: u64, width: Width, value: u64) -> Result<(), Error> {
+            let at = Self::place(address, width)?;
+            self.0[at..at + 8].copy_from_slice(&value.to_le_bytes());
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_block_is_copied_whole_or_an_address_is_no_memory() {
+        let block = |source, destination| Block {
+            source,
+            destination,
+            bytes: 24,
+        };
+        let mut memory = Bytes(std::array::from_fn(|at| at as u8));
+        block(0x108, 0x120).copy(&mut memory).unwrap();
+        let expected = |at| if (32..56).contains(&at) { at - 24 } else { at };
+        assert_eq!(memory.0, std::array::from_fn(|at| expected(at) as u8));
+        assert!(block(0x130, 0x100).copy(&mut memory).is_err());
+        assert!(block(0x100, 0x130).copy(&mut memory).is_err());
     }
 
     #[test]

@@ -10,8 +10,9 @@
 mod block;
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile};
+use rigless::emulator::Memory;
+use rigless::soc::Layout;
 use rigless::soc::stm32h743::generated::mdma::Register;
-use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 
 use crate::busy_bus::{Chance, InterruptLine};
@@ -63,10 +64,6 @@ struct Channel {
     flags: u32,
     /// The block that is being moved, and the event at its end.
     under_way: Option<(Block, EventId)>,
-    /// Accesses that are not yet answered.
-    open: u64,
-    /// Tells the answers of one block from those of another.
-    generation: u64,
 }
 
 /// The controller.
@@ -79,6 +76,8 @@ pub struct Mdma {
     chance: Chance,
     channels: [Channel; CHANNELS],
     interrupt: InterruptLine,
+    /// Blocks that ended and whose bytes are not yet moved.
+    to_move: Vec<Block>,
     memory_bytes: u64,
 }
 
@@ -93,6 +92,7 @@ impl Mdma {
             bank,
             chance: Chance::new(seed),
             channels: Default::default(),
+            to_move: Vec::new(),
             memory_bytes: 0,
         }
     }
@@ -122,7 +122,6 @@ impl Mdma {
         let channel = &mut self.channels[nth];
         if value & ENABLE == 0 {
             channel.under_way = None;
-            channel.generation += 1;
             return;
         }
         if value & REQUEST == 0 || channel.under_way.is_some() {
@@ -140,33 +139,32 @@ impl Mdma {
         }
     }
 
-    /// Asks for the reads of a block; each answer becomes a write.
-    fn move_block(
+    /// A block's time is over.
+    fn end_block(
         &mut self,
         nth: usize,
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
-        let channel = &mut self.channels[nth];
-        let Some((block, _)) = channel.under_way else {
+        let Some((block, _)) = self.channels[nth].under_way else {
             return;
         };
         if self.bank.refuses(block.source, block.bytes, &self.rules) {
             self.end(nth, flag::ERROR, registers);
-            self.drive(registers, context);
-            return;
+        } else {
+            self.to_move.push(block);
+            self.end(nth, flag::CHANNEL | flag::BLOCK | flag::BUFFER, registers);
         }
-        let channel = &mut self.channels[nth];
-        channel.generation += 1;
-        channel.open = block.bytes / 8;
-        for offset in (0..block.bytes).step_by(8) {
-            let token = Token {
-                nth,
-                generation: channel.generation,
-                offset,
-                written: false,
-            };
-            context.read_from(block.source + offset, Width::W64, token.pack());
+        self.drive(registers, context);
+    }
+
+    /// Moves the bytes of blocks that ended, before the core goes on.
+    pub fn settle(&mut self, memory: &mut dyn Memory) {
+        for block in self.to_move.drain(..) {
+            if block.copy(memory).is_err() {
+                self.rules
+                    .broken(|| format!("MDMA: {block:x?} is not all memory"));
+            }
         }
     }
 
@@ -197,30 +195,6 @@ fn is_flash(address: u64) -> bool {
 
 fn register(nth: usize, row: usize) -> Register {
     Register::from_index(1 + nth * ROWS + row).expect("16 channels of 13 registers")
-}
-
-/// What an access was made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Token {
-    nth: usize,
-    generation: u64,
-    offset: u64,
-    written: bool,
-}
-
-impl Token {
-    fn pack(self) -> u64 {
-        self.generation << 32 | (self.nth as u64) << 24 | self.offset << 1 | u64::from(self.written)
-    }
-
-    fn unpack(token: u64) -> Self {
-        Self {
-            nth: (token >> 24 & 0xF) as usize,
-            generation: token >> 32,
-            offset: token >> 1 & 0x3F_FFFF,
-            written: token & 1 == 1,
-        }
-    }
 }
 
 impl Device for Mdma {
@@ -276,80 +250,14 @@ impl Device for Mdma {
                 .under_way
                 .is_some_and(|(_, end)| end == event)
             {
-                self.move_block(nth, registers, context);
+                self.end_block(nth, registers, context);
             }
         }
     }
 
-    fn on_access(
-        &mut self,
-        token: u64,
-        value: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        let token = Token::unpack(token);
-        let channel = &mut self.channels[token.nth];
-        let Some((block, _)) = channel.under_way else {
-            return;
-        };
-        if token.generation != channel.generation & 0xFFFF_FFFF {
-            return;
-        }
-        if !token.written {
-            let token = Token {
-                written: true,
-                ..token
-            };
-            context.write_to(
-                block.destination + token.offset,
-                Width::W64,
-                value,
-                token.pack(),
-            );
-            return;
-        }
-        channel.open -= 1;
-        if channel.open == 0 {
-            self.end(
-                token.nth,
-                flag::CHANNEL | flag::BLOCK | flag::BUFFER,
-                registers,
-            );
-            self.drive(registers, context);
-        }
-    }
-
-    fn on_refused(
-        &mut self,
-        token: u64,
-        registers: &mut RegisterFile,
-        context: &mut DeviceContext<'_>,
-    ) {
-        let nth = Token::unpack(token).nth;
-        self.channels[nth].generation += 1;
-        self.end(nth, flag::ERROR, registers);
-        self.drive(registers, context);
-    }
-
     fn reset(&mut self) {
         self.channels = Default::default();
+        self.to_move.clear();
         self.interrupt.reset();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tokens_come_back() {
-        let token = Token {
-            nth: 15,
-            generation: 77,
-            offset: 65_528,
-            written: true,
-        };
-        assert_eq!(Token::unpack(token.pack()), token);
     }
 }
