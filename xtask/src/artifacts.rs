@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::toolchain::{Toolchain, cargo};
 use crate::{process, workspace};
@@ -86,8 +87,8 @@ pub const HOST: [&str; 5] = [
 
 /// The host tool `hivtac`, without what reads pictures: the least that a first demo has to build.
 pub fn host_tool_without_pictures() -> Result<PathBuf> {
-    let mut command = cargo("build", workspace::root());
-    command.args(["--profile", TOOLS, "--package", "hivtac"]);
+    let mut command = tools_cargo("build", workspace::root());
+    command.args(["--package", "hivtac"]);
     build(command.arg("--no-default-features"), "hivtac")
 }
 
@@ -134,9 +135,8 @@ pub fn benchmark_cases() -> Result<PathBuf> {
 }
 
 fn host_command(program: &str) -> Command {
-    let mut command = cargo("build", workspace::root());
-    command.args(["--profile", TOOLS]).args(HOST);
-    command.args(["--bin", program]);
+    let mut command = tools_cargo("build", workspace::root());
+    command.args(HOST).args(["--bin", program]);
     command
 }
 
@@ -149,8 +149,8 @@ pub fn rig() -> Result<PathBuf> {
 /// Runs a workspace's tests past those that fail: in the profile of the programs that they run, so
 /// that dependencies are built once.
 pub fn test(workspace: &Path) -> Command {
-    let mut command = cargo("test", workspace);
-    command.args(["--profile", TOOLS, "--no-fail-fast"]);
+    let mut command = tools_cargo("test", workspace);
+    command.arg("--no-fail-fast");
     command
 }
 
@@ -161,19 +161,63 @@ pub fn clippy(workspace: &Path) -> Command {
     command
 }
 
-/// Has a cargo command that builds lint the packages of its workspace. What these depend on is
-/// built as what runs needs it, where `cargo clippy` would check it all for itself.
-pub fn linting(mut command: Command) -> Command {
-    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
-    command.env("CLIPPY_ARGS", "-Dwarnings");
+/// Whether packages of this project are linted as they are built for this computer.
+static LINTING: AtomicBool = AtomicBool::new(false);
+
+/// From here on, what is built for this computer is linted as it is built: it is checked once, and
+/// what its packages depend on not for itself. A lint does not keep anything from being built;
+/// [`without_warnings`] finds it.
+pub fn lint_as_built() {
+    LINTING.store(true, Ordering::Relaxed);
+}
+
+/// A cargo command in the profile of [`TOOLS`].
+fn tools_cargo(verb: &str, folder: &Path) -> Command {
+    let mut command = cargo(verb, folder);
+    if LINTING.load(Ordering::Relaxed) {
+        command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    }
+    command.args(["--profile", TOOLS]);
     command
+}
+
+/// What builds all programs and tests of the workspace that run on this computer.
+pub fn everything() -> Command {
+    let mut command = tools_cargo("build", workspace::root());
+    command.args(HOST).arg("--all-targets");
+    command
+}
+
+/// Runs `cargo build`.
+///
+/// # Errors
+/// When it fails, or warns of something, which it also does of what it built before.
+pub fn without_warnings(mut command: Command) -> Result<()> {
+    command.arg("--message-format=json");
+    let mut warnings = 0;
+    process::for_each_line(&mut command, |line| {
+        if let Some((text, warns)) = said(line) {
+            process::say(&text);
+            warnings += usize::from(warns);
+        }
+    })?;
+    ensure!(warnings == 0, "{warnings} warnings: see above");
+    Ok(())
+}
+
+/// What the compiler says in one of cargo's messages, and whether it is a warning.
+fn said(line: &str) -> Option<(String, bool)> {
+    let message: serde_json::Value = serde_json::from_str(line).ok()?;
+    let message = (message["reason"] == "compiler-message").then(|| &message["message"])?;
+    let text = message["rendered"].as_str()?;
+    Some((text.to_owned(), message["level"] == "warning"))
 }
 
 /// A cargo command for the rig: always in one profile, so that its emulator is built once, and with
 /// an emulator that declares a newer compiler than it needs.
 pub fn rig_cargo(verb: &str) -> Command {
-    let mut command = cargo(verb, &workspace::folder("rig"));
-    command.args(["--profile", TOOLS, "--ignore-rust-version"]);
+    let mut command = tools_cargo(verb, &workspace::folder("rig"));
+    command.arg("--ignore-rust-version");
     command
 }
 
@@ -240,6 +284,17 @@ mod tests {
         );
         assert_eq!(artifact(line, "hivtac"), Some(PathBuf::from("/t/hivtac")));
         assert_eq!(artifact(line, "another"), None);
+    }
+
+    #[test]
+    fn what_the_compiler_says_is_found_in_the_messages_of_cargo() {
+        let line = |level: &str| {
+            let message = format!(r#""message":{{"level":"{level}","rendered":"text"}}"#);
+            format!(r#"{{"reason":"compiler-message",{message}}}"#)
+        };
+        assert_eq!(said(&line("warning")), Some(("text".to_owned(), true)));
+        assert_eq!(said(&line("error")), Some(("text".to_owned(), false)));
+        assert_eq!(said(r#"{"reason":"build-finished"}"#), None);
     }
 
     #[test]

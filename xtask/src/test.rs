@@ -58,9 +58,17 @@ impl Test {
         let printed = File::create(&log).with_context(|| format!("writing {}", log.display()))?;
         let (built, programs) = mpsc::channel();
         let mut report = Report::default();
+        let components = self.components(&mut report);
+        if toolchain::has_clippy() {
+            artifacts::lint_as_built();
+        }
         let beside = thread::scope(|scope| {
             let beside = scope.spawn(|| process::aside(printed, || self.beside(toolchain, built)));
-            self.others(&mut report, toolchain, &programs);
+            if components {
+                self.checks(&mut report, toolchain);
+            }
+            self.host_tests(&mut report);
+            self.cross_room_tests(&mut report, toolchain, &programs);
             beside.join()
         });
         process::print_through(&String::from_utf8_lossy(&std::fs::read(&log)?));
@@ -90,12 +98,6 @@ impl Test {
             self.optional(&mut report, toolchain);
         }
         report
-    }
-
-    fn others(&self, report: &mut Report, toolchain: &Toolchain, programs: &Receiver<Programs>) {
-        self.checks(report, toolchain);
-        self.host_tests(report);
-        self.cross_room_tests(report, toolchain, programs);
     }
 
     fn benchmarks(&self, report: &mut Report, toolchain: &Toolchain) {
@@ -138,18 +140,14 @@ impl Test {
         steps.iter().any(|step| self.wants(step))
     }
 
+    /// Whether the programs are there that format and lint, where they are wanted.
+    fn components(&self, report: &mut Report) -> bool {
+        let wanted = self.wants_one_of(&["format", "lints: host", "lints: microcontroller"]);
+        let ensure = |_: &mut _| toolchain::ensure_components(workspace::root());
+        wanted && report.step("components", ensure).is_some()
+    }
+
     fn checks(&self, report: &mut Report, toolchain: &Toolchain) {
-        if !self.wants_one_of(&["format", "lints: host", "lints: microcontroller"]) {
-            return;
-        }
-        if report
-            .step("components", |_| {
-                toolchain::ensure_components(workspace::root())
-            })
-            .is_none()
-        {
-            return;
-        }
         if self.wants("format") {
             report.step("format", |_| check_format().and_then(|()| columns::check()));
         }
@@ -273,21 +271,19 @@ fn check_format() -> Result<()> {
     Ok(())
 }
 
+/// Of what [`artifacts::lint_as_built`] had linted, and of what is only checked.
 fn host_lints() -> Result<()> {
-    let mut root = artifacts::clippy(workspace::root());
-    root.args(artifacts::HOST).arg("--all-targets");
+    let mut rig = artifacts::rig_cargo("build");
+    rig.arg("--all-targets");
+    for command in [artifacts::everything(), artifacts::serving_command(), rig] {
+        artifacts::without_warnings(command)?;
+    }
     let mut without_pictures = artifacts::clippy(workspace::root());
     without_pictures.args(["--package", "hivtac", "--bins", "--no-default-features"]);
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
     counter.arg("--release");
-    for command in [&mut root, &mut without_pictures, &mut counter] {
+    for command in [&mut without_pictures, &mut counter] {
         process::run(command.args(["--", "-D", "warnings"]))?;
-    }
-    // Most of what these build is other packages, which tests need, too.
-    let mut rig = artifacts::rig_cargo("build");
-    rig.arg("--all-targets");
-    for command in [artifacts::serving_command(), rig] {
-        process::run(&mut artifacts::linting(command))?;
     }
     Ok(())
 }

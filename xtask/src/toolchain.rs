@@ -8,7 +8,7 @@ use std::process::Command;
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
 
-use crate::{packages, process};
+use crate::{packages, process, workspace};
 
 /// The microcontroller's target: Cortex-M7 with a double-precision FPU.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -133,6 +133,11 @@ pub fn ensure_components(folder: &Path) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Whether `cargo clippy` is there.
+pub fn has_clippy() -> bool {
+    process::succeeds(cargo("clippy", workspace::root()).arg("--version"))
 }
 
 /// What the toolchain in use calls this computer: `x86_64-unknown-linux-gnu`.
