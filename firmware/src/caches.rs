@@ -100,8 +100,8 @@ const KEPT: Region = Region {
     execute: false,
 };
 
-/// Where regions overlap, the later one counts. What is run is never written, and what is written is
-/// never run.
+/// Where regions overlap, the later one counts. What is run is never written, and what is written
+/// is never run.
 const REGIONS: [Region; 6] = [EXTERNAL_MEMORY, DATA, DMA_BUFFERS, NEAR_CODE, PROGRAM, KEPT];
 
 /// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA
