@@ -2,9 +2,10 @@
 //!
 //! The emulator's controllers acknowledge each word that they move, and each acknowledgement is
 //! told to some forty peripherals: with them, a frame takes a third longer. Only what is released
-//! or counted by one needs it: requests of timers and of DMAMUX1's generators, synchronized channels and those
-//! that generate events (RM0433, chapter 17). A stream that is enabled on such a channel ends the
-//! run with a message; for any other one, DCMI's among them, an acknowledgement changes nothing.
+//! or counted by one needs it: requests of timers and of DMAMUX1's generators, synchronized
+//! channels and those that generate events (RM0433, chapter 17). A stream that is enabled on such a
+//! channel ends the run with a message; for any other one, DCMI's among them, an acknowledgement
+//! changes nothing.
 
 use std::ops::RangeInclusive;
 
