@@ -117,8 +117,8 @@ fn set_regions(mpu: &mut MPU) {
     /// Everywhere else the architecture's default memory map holds.
     const PRIVILEGED_DEFAULT: u32 = 1 << 2;
     cortex_m::asm::dmb();
-    // SAFETY: the program has not yet written to a region, and everything it does use keeps its
-    // default attributes.
+    // SAFETY: the caches are still off, and memory in use keeps the type of the default map or, as
+    // ITCM, is never cached.
     unsafe {
         mpu.ctrl.write(0);
         for (number, region) in (0..).zip(REGIONS) {

@@ -156,9 +156,7 @@ pub fn test(workspace: &Path) -> Command {
 
 /// Lints a workspace, likewise: what dependencies run to build themselves is built once.
 pub fn clippy(workspace: &Path) -> Command {
-    let mut command = cargo("clippy", workspace);
-    command.args(["--profile", TOOLS]);
-    command
+    tools_cargo("clippy", workspace)
 }
 
 /// Whether packages of this project are linted as they are built for this computer.

@@ -59,7 +59,7 @@ impl Test {
         let (built, programs) = mpsc::channel();
         let mut report = Report::default();
         let components = self.components(&mut report);
-        if toolchain::has_clippy() {
+        if toolchain::has("clippy") {
             artifacts::lint_as_built();
         }
         let beside = thread::scope(|scope| {
@@ -143,7 +143,7 @@ impl Test {
     /// Whether the programs are there that format and lint, where they are wanted.
     fn components(&self, report: &mut Report) -> bool {
         let wanted = self.wants_one_of(&["format", "lints: host", "lints: microcontroller"]);
-        let ensure = |_: &mut _| toolchain::ensure_components(workspace::root());
+        let ensure = |_: &mut _| toolchain::ensure_components();
         wanted && report.step("components", ensure).is_some()
     }
 

@@ -117,15 +117,14 @@ pub fn cargo(verb: &str, folder: &Path) -> Command {
 ///
 /// # Errors
 /// Names the component that is missing.
-pub fn ensure_components(folder: &Path) -> Result<()> {
+pub fn ensure_components() -> Result<()> {
     for (verb, component) in [("fmt", "rustfmt"), ("clippy", "clippy")] {
-        let works = || process::succeeds(cargo(verb, folder).arg("--version"));
-        if works() {
+        if has(verb) {
             continue;
         }
         eprintln!("`cargo {verb}` is missing: asking rustup for it");
         let added = process::run(Command::new("rustup").args(["component", "add", component]));
-        if added.is_err() || !works() {
+        if added.is_err() || !has(verb) {
             bail!(
                 "`cargo {verb}` is missing: `rustup component add {component}`, or your system's \
                  package for it"
@@ -135,9 +134,9 @@ pub fn ensure_components(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether `cargo clippy` is there.
-pub fn has_clippy() -> bool {
-    process::succeeds(cargo("clippy", workspace::root()).arg("--version"))
+/// Whether cargo knows a command, such as `clippy`.
+pub fn has(verb: &str) -> bool {
+    process::succeeds(cargo(verb, workspace::root()).arg("--version"))
 }
 
 /// What the toolchain in use calls this computer: `x86_64-unknown-linux-gnu`.
