@@ -11,8 +11,11 @@ use embassy_stm32::pac::{MDMA, RCC};
 /// Most bytes that the MDMA reads and then writes at once: its whole buffer. Every block is a
 /// multiple of it in size and place, or half or a quarter of it.
 pub const BUFFER_BYTES: u32 = 128;
+/// Core cycles between two looks at a move under way: a band takes twenty times as long, and looks
+/// without a pause would only keep the bus busy.
+const PAUSE_CYCLES: u32 = 128;
 /// Looks at a move under way before it counts as failed: a few milliseconds.
-const PATIENCE: u32 = 100_000;
+const PATIENCE: u32 = 10_000;
 /// TEIF to TCIF of IFCR.
 const ALL_FLAGS: u32 = 0x1F;
 
@@ -73,6 +76,7 @@ impl<const CHANNEL: usize> BlockMove<CHANNEL> {
                 cortex_m::asm::dmb();
                 return true;
             }
+            cortex_m::asm::delay(PAUSE_CYCLES);
         }
         false
     }
