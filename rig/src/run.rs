@@ -40,6 +40,9 @@ const LINGER_NS: u64 = 100_000_000;
 /// How long after a change of clocks or pins they are watched, ns: oscillators and loops take up to
 /// 2.1 ms.
 const SETTLING_NS: u64 = 10_000_000;
+/// How often, ns: the program may ask for every change without a pause, and neither the camera nor
+/// the host cares for less.
+const SETTLING_STEP_NS: u64 = 10_000;
 
 /// Who uses the serial port.
 #[derive(Debug)]
@@ -165,6 +168,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         bytes: Vec::new(),
         client: Client::None,
         settling_until: 0,
+        next_look: 0,
         settled_at_ns: 0,
     };
     let began = Instant::now();
@@ -228,7 +232,10 @@ struct Conductor {
     interrupt: Arc<AtomicBool>,
     bytes: Vec<u8>,
     client: Client,
+    /// Until then clocks or pins may change by themselves, ns.
     settling_until: u64,
+    /// When they are looked at next, ns.
+    next_look: u64,
     settled_at_ns: u64,
 }
 
@@ -267,7 +274,9 @@ impl Driver<Sensor> for Conductor {
         };
         self.settled_at_ns = now.0;
         session.board_mut().chip.settle(now, host);
-        if now.0 < self.settling_until || self.camera.lock().restarts() {
+        let is_settling = now.0 < self.settling_until && now.0 >= self.next_look;
+        if is_settling || self.camera.lock().restarts() {
+            self.next_look = now.0 + SETTLING_STEP_NS;
             session.board_mut().chip.rewire(now);
         }
         if self.rules.are_broken() || self.bank.was_cut() {
