@@ -11,7 +11,7 @@
 //!
 //! | module | subject |
 //! |---|---|
-//! | [`run`], [`report`] | one run from options to outcome |
+//! | [`command`], [`run`], [`report`] | one run from arguments to outcome |
 //! | [`chip`], [`board`], [`crs`], [`machine`], `rom`, `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`dcmi`], [`camera`], [`frame_source`], `control_bus` | the camera interface; the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`mdma`], [`flash`] | the DMA controller that reaches DTCM; the flash's second bank, and cuts of the power |
@@ -24,6 +24,7 @@ pub mod board;
 mod busy_bus;
 pub mod camera;
 pub mod chip;
+pub mod command;
 mod control_bus;
 pub mod crs;
 pub mod dcmi;

@@ -25,8 +25,6 @@ pub mod pictures;
 #[cfg(feature = "host")]
 pub mod qemu;
 #[cfg(feature = "host")]
-pub mod rig;
-#[cfg(feature = "host")]
 pub mod script;
 #[cfg(feature = "host")]
 pub mod tared;

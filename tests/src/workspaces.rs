@@ -10,7 +10,7 @@ use std::vec::Vec;
 use serde_json::Value;
 
 /// Folders of the project's workspaces, from its root.
-pub const WORKSPACES: [&str; 4] = ["", "rig", "tests/qemu", "xtask/instruction-counter"];
+pub const WORKSPACES: [&str; 3] = ["", "tests/qemu", "xtask/instruction-counter"];
 
 /// The project's root folder.
 pub fn root() -> PathBuf {

@@ -1,7 +1,7 @@
 //! `hivtac bring-up` with the firmware in the rig: a good board, and one with each fault.
 
+use crate::rig::{Rig, ToolOutput, tool};
 use hivtac_tests::artifact;
-use hivtac_tests::rig::{Rig, ToolOutput, tool};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -7,8 +7,8 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use crate::rig::Rig;
 use hivtac_tests::artifact;
-use hivtac_tests::rig::Rig;
 
 /// |F| in N, α and β in degrees: one press in each run, held for 0.4 s.
 const PRESSES: [[f64; 3]; 5] = [

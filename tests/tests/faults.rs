@@ -1,7 +1,7 @@
 //! Faults of the rig, seen through the host tool: each ends in its documented status or counter,
 //! and passes.
 
-use hivtac_tests::rig::{Rig, TIMEOUT_S, ToolOutput, json_lines, tool_waiting};
+use crate::rig::{Rig, TIMEOUT_S, ToolOutput, json_lines, tool_waiting};
 use serde_json::Value;
 
 /// A run with faults, watched by `monitor --json`: its output, its lines, and the rig's counters.

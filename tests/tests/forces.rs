@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
+use crate::rig::{Rig, ToolOutput, json_lines, tool};
 use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
 use hivtac_sensing::model::Model;
 use hivtac_sensing::motion::Motion;
@@ -12,7 +13,6 @@ use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::artifact;
-use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
 use serde_json::{Value, json};
 
 const SEED: u64 = 5;
@@ -92,7 +92,7 @@ fn said(line: &Value) -> Value {
 /// What the host tool shows of the next frames of a rig.
 fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
     let output = tool(rig, "monitor", &["--json", "--frames", &frames.to_string()]).unwrap();
-    assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+    assert_eq!(output.code, Some(0), "{output:?}");
     let lines = json_lines(&output.out).unwrap();
     assert_eq!(lines.len(), frames);
     lines
@@ -175,7 +175,7 @@ fn another_camera_geometry_gives_the_same_results() {
 /// Runs `hivtac threshold`, which must succeed.
 fn set_threshold(rig: &Rig, options: &[&str]) -> ToolOutput {
     let output = tool(rig, "threshold", options).unwrap();
-    assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+    assert_eq!(output.code, Some(0), "{output:?}");
     output
 }
 

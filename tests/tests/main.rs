@@ -17,6 +17,7 @@ mod panics;
 mod placement;
 mod places;
 mod recordings;
+mod rig;
 mod rooms;
 mod snapshots;
 mod status_bits;

@@ -5,8 +5,8 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use crate::rig::{Rig, json_lines, tool};
 use hivtac_tests::artifact;
-use hivtac_tests::rig::{Rig, json_lines, tool};
 use serde_json::Value;
 
 /// Records so many seconds of this computer's time; the rig's pass more slowly.

@@ -1,37 +1,41 @@
-//! The rig with the firmware, and the host tool, as programs: what a user would run.
+//! The rig with the firmware, and the host tool as a user runs it.
+//!
+//! The rig is not a program of its own here: so what one run translated of the firmware serves the
+//! next. The tests of `rig/` and those in Python have it as a program.
 
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::string::String;
-use std::time::{Duration, Instant};
-use std::{thread, vec::Vec};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
+use clap::Parser;
+use hivtac_rig::command::Arguments;
+use hivtac_rig::run::run;
+use hivtac_tests::artifact;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::artifact;
-
-/// How long anything may take here: the emulator runs at about a tenth of real time, and tests
+/// How long the host tool may take here: the emulator runs at about a tenth of real time, and tests
 /// share the processors.
 const PATIENCE: Duration = Duration::from_secs(240);
 /// How long the host tool waits for an answer, s: the emulated board boots slower than a real one.
 pub const TIMEOUT_S: u32 = 40;
 
-/// A running rig with its logs. Killed when it is dropped.
+/// A running rig with its logs. Ended when it is dropped.
 pub struct Rig {
-    process: Child,
+    running: Option<JoinHandle<Result<()>>>,
+    interrupt: Arc<AtomicBool>,
     port: String,
     folder: TempDir,
-    /// Kept open: a rig that cannot print would fail.
-    _stdout: BufReader<ChildStdout>,
 }
 
 impl Rig {
-    /// Starts the rig (`HIVTAC_RIG`) with the firmware (`HIVTAC_ELF`) and further options. It runs
-    /// while a client holds its port.
+    /// Starts the rig with the firmware (`HIVTAC_ELF`) and further options. It runs while a client
+    /// holds its port.
     ///
     /// # Errors
     /// When it does not get ready.
@@ -45,40 +49,35 @@ impl Rig {
     /// When it does not get ready.
     pub fn start_with(elf: &Path, options: &[&str]) -> Result<Rig> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
-        let mut process = Command::new(artifact::named_by("HIVTAC_RIG"))
-            .arg("--pty")
-            .arg("--truth")
-            .arg(folder.path().join("truth"))
-            .arg("--stats-json")
-            .arg(folder.path().join("stats"))
-            .args(options)
-            .arg(elf)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(File::create(folder.path().join("log"))?)
-            .spawn()
-            .context("starting the rig")?;
-        let stdout = process
-            .stdout
-            .take()
-            .context("the rig's output is not piped")?;
-        let mut stdout = BufReader::new(stdout);
-        let mut line = String::new();
-        stdout
-            .read_line(&mut line)
-            .context("reading what the rig says")?;
-        let port = line
-            .trim_end()
-            .split_once("pty=")
-            .map(|(_, path)| String::from(path));
-        let mut rig = Rig {
-            process,
-            port: String::new(),
+        let path = |path: &Path| path.to_str().map(str::to_owned).context("a path in UTF-8");
+        let [truth, stats] = ["truth", "stats"].map(|name| path(&folder.path().join(name)));
+        let (truth, stats, elf) = (truth?, stats?, path(elf)?);
+        let own = [
+            "hivtac-rig",
+            &elf,
+            "--pty",
+            "--truth",
+            &truth,
+            "--stats-json",
+            &stats,
+        ];
+        let arguments = Arguments::try_parse_from(own.iter().chain(options))?;
+        let interrupt = Arc::new(AtomicBool::new(false));
+        let (run_options, port) = arguments.prepare(interrupt.clone())?;
+        let port = port
+            .and_then(|port| port.pty)
+            .context("it has a terminal")?;
+        let running = thread::spawn(move || {
+            let outcome = run(run_options).and_then(|outcome| arguments.leave(&outcome));
+            // Told at once, as the host tool only sees that its port is silent.
+            outcome.inspect_err(|error| eprintln!("the rig failed: {error:#}"))
+        });
+        Ok(Rig {
+            running: Some(running),
+            interrupt,
+            port: path(&port)?,
             folder,
-            _stdout: stdout,
-        };
-        rig.port = port.with_context(|| std::format!("not ready: {line}{}", rig.log()))?;
-        Ok(rig)
+        })
     }
 
     /// The pseudo-terminal that is its serial port.
@@ -99,49 +98,35 @@ impl Rig {
         json_lines(&fs::read_to_string(self.file("truth")).context("reading the truth log")?)
     }
 
-    /// What it said on standard error.
-    pub fn log(&self) -> String {
-        fs::read_to_string(self.file("log")).unwrap_or_default()
-    }
-
     /// Ends it, and gives its counters.
     ///
     /// # Errors
-    /// When it does not end, or failed.
+    /// When it failed.
     pub fn finish(mut self) -> Result<Value> {
-        let id = std::format!("{}", self.process.id());
-        // Fails when it has ended already, and its exit code says why.
-        let _ = Command::new("kill")
-            .args(["-TERM", &id])
-            .stderr(Stdio::null())
-            .status();
-        let start = Instant::now();
-        while start.elapsed() < PATIENCE {
-            if let Some(status) = self.process.try_wait()? {
-                ensure!(
-                    status.success(),
-                    "the rig failed ({status}): {}",
-                    self.log()
-                );
-                let text =
-                    fs::read_to_string(self.file("stats")).context("reading the counters")?;
-                return serde_json::from_str(&text).context("the counters are not JSON");
-            }
-            thread::sleep(Duration::from_millis(20));
-        }
-        bail!("the rig did not end: {}", self.log())
+        self.end()?;
+        let text = fs::read_to_string(self.file("stats")).context("reading the counters")?;
+        serde_json::from_str(&text).context("the counters are not JSON")
+    }
+
+    /// Has it end, which it does within a millisecond of its own time.
+    fn end(&mut self) -> Result<()> {
+        self.interrupt.store(true, Ordering::Relaxed);
+        let ended = self.running.take().map(JoinHandle::join);
+        let ended = ended.context("it runs")?;
+        ended
+            .map_err(|_| anyhow!("the rig panicked"))?
+            .context("the rig failed")
     }
 
     fn file(&self, name: &str) -> PathBuf {
-        Path::join(self.folder.path(), name)
+        self.folder.path().join(name)
     }
 }
 
 impl Drop for Rig {
     fn drop(&mut self) {
-        // Fails only when it has ended already.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
+        // Fails when it was ended already, and is of no interest in a test that fails.
+        let _ = self.end();
     }
 }
 
@@ -177,11 +162,11 @@ pub fn tool_waiting(
 ) -> Result<ToolOutput> {
     let seconds = PATIENCE.as_secs();
     let output = Command::new("timeout")
-        .arg(std::format!("{seconds}"))
+        .arg(format!("{seconds}"))
         .arg(artifact::named_by("HIVTAC_TOOL"))
         .args(command.split(' '))
         .args(["--port", rig.port()])
-        .args(["--timeout", &std::format!("{timeout_s}")])
+        .args(["--timeout", &format!("{timeout_s}")])
         .args(options)
         .stdin(Stdio::null())
         .output()
@@ -192,11 +177,7 @@ pub fn tool_waiting(
         out: text(&output.stdout),
         err: text(&output.stderr),
     };
-    ensure!(
-        result.code != Some(124),
-        "hivtac did not end: {result:?}\nrig: {}",
-        rig.log()
-    );
+    ensure!(result.code != Some(124), "hivtac did not end: {result:?}");
     Ok(result)
 }
 
@@ -205,6 +186,6 @@ pub fn tool_waiting(
 /// # Errors
 /// Names the line that is none.
 pub fn json_lines(text: &str) -> Result<Vec<Value>> {
-    let parse = |line| serde_json::from_str(line).with_context(|| std::format!("no JSON: {line}"));
+    let parse = |line| serde_json::from_str(line).with_context(|| format!("no JSON: {line}"));
     text.lines().map(parse).collect()
 }

@@ -94,8 +94,8 @@ fn every_package_has_a_room() {
     }
 }
 
-/// What building a package of the workspace in a folder builds, a line each.
-fn tree_of(folder: &str, package: &str, features: &str) -> String {
+/// What building a package builds, a line each.
+fn tree_of(package: &str, features: &str) -> String {
     let arguments = [
         "tree",
         "--package",
@@ -107,14 +107,14 @@ fn tree_of(folder: &str, package: &str, features: &str) -> String {
         "--edges",
         "normal,build",
     ];
-    cargo(&root().join(folder), &arguments)
+    cargo(&root(), &arguments)
 }
 
 /// Users build it themselves.
 #[test]
 fn the_host_tool_is_small_unless_more_is_asked_for() {
     let packages = |features: &str| {
-        let tree = tree_of("", "hivtac", features);
+        let tree = tree_of("hivtac", features);
         let lines = tree
             .lines()
             .map(|line| line.trim_end_matches(" (*)").to_owned());
@@ -126,13 +126,8 @@ fn the_host_tool_is_small_unless_more_is_asked_for() {
 
 #[test]
 fn the_demo_builds_no_training_and_no_solver() {
-    let of = |folder: &str, package: &str| tree_of(folder, package, "");
-    let demo = [
-        of("", "hivtac"),
-        of("", "hivtac-firmware"),
-        of("", "xtask"),
-        of("rig", "hivtac-rig"),
-    ];
+    let of = |package: &str| tree_of(package, "");
+    let demo = ["hivtac", "hivtac-firmware", "xtask", "hivtac-rig"].map(of);
     for line in demo.iter().flat_map(|tree| tree.lines()) {
         let name = line.split(' ').next().unwrap_or("");
         assert!(
@@ -141,7 +136,7 @@ fn the_demo_builds_no_training_and_no_solver() {
         );
     }
     assert!(
-        of("", "hivtac-shell").contains("\nfaer"),
+        of("hivtac-shell").contains("\nfaer"),
         "the test can see the sparse solver"
     );
 }

@@ -1,8 +1,8 @@
 //! A snapshot of the firmware in the rig, through the host tool: what the tool's own sensing finds
 //! in it is what the device found, bit for bit.
 
+use crate::rig::{Rig, ToolOutput, json_lines, tool};
 use hivtac_tests::artifact;
-use hivtac_tests::rig::{Rig, ToolOutput, json_lines, tool};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -12,7 +12,7 @@ use std::string::String;
 fn take(rig: &Rig, raw: &Path) -> Value {
     let raw = raw.to_str().unwrap();
     let output = tool(rig, "snapshot", &["--json", "--raw", raw]).unwrap();
-    assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+    assert_eq!(output.code, Some(0), "{output:?}");
     json_lines(&output.out).unwrap().remove(0)
 }
 
@@ -80,7 +80,7 @@ fn a_wrong_threshold_is_mended() {
     let rig = Rig::start(&["--scene", "static", "--seed", "5"]).unwrap();
     let run = |command, options: &[&str]| {
         let output = tool(&rig, command, options).unwrap();
-        assert_eq!(output.code, Some(0), "{output:?}\nrig: {}", rig.log());
+        assert_eq!(output.code, Some(0), "{output:?}");
         output.out
     };
     let forces = || {

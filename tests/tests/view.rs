@@ -5,9 +5,9 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use crate::rig::Rig;
 use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
-use hivtac_tests::rig::Rig;
 use serde_json::Value;
 
 const PAGE: [u32; 2] = [1280, 1000];

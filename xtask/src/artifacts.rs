@@ -85,11 +85,13 @@ pub const HOST: [&str; 5] = [
     "hivtac-board",
 ];
 
-/// The host tool `hivtac`, without what reads pictures: the least that a first demo has to build.
-pub fn host_tool_without_pictures() -> Result<PathBuf> {
-    let mut command = tools_cargo("build", workspace::root());
-    command.args(["--package", "hivtac"]);
-    build(command.arg("--no-default-features"), "hivtac")
+/// The rig, and the host tool `hivtac` without what reads pictures: the least that a first demo has
+/// to build, in one go.
+pub fn of_demo() -> Result<[PathBuf; 2]> {
+    let mut command = tools_cargo("build");
+    command.args(["--package", "hivtac-rig", "--package", "hivtac"]);
+    command.args(["--bins", "--no-default-features"]);
+    build_all(&mut command, ["hivtac-rig", "hivtac"])
 }
 
 /// The host tool, as it is installed.
@@ -135,28 +137,28 @@ pub fn benchmark_cases() -> Result<PathBuf> {
 }
 
 fn host_command(program: &str) -> Command {
-    let mut command = tools_cargo("build", workspace::root());
+    let mut command = tools_cargo("build");
     command.args(HOST).args(["--bin", program]);
     command
 }
 
 /// The rig.
 pub fn rig() -> Result<PathBuf> {
-    let mut command = rig_cargo("build");
-    build(command.args(["--bin", "hivtac-rig"]), "hivtac-rig")
+    build(&mut host_command("hivtac-rig"), "hivtac-rig")
 }
 
-/// Runs a workspace's tests past those that fail: in the profile of the programs that they run, so
-/// that dependencies are built once.
-pub fn test(workspace: &Path) -> Command {
-    let mut command = tools_cargo("test", workspace);
-    command.arg("--no-fail-fast");
+/// Runs tests of the workspace past those that fail: in the profile of the programs that they run,
+/// so that dependencies are built once.
+pub fn test() -> Command {
+    let mut command = tools_cargo("test");
+    command.args(HOST).arg("--no-fail-fast");
     command
 }
 
-/// Lints a workspace, likewise: what dependencies run to build themselves is built once.
-pub fn clippy(workspace: &Path) -> Command {
-    tools_cargo("clippy", workspace)
+/// Lints packages of the workspace, likewise: what dependencies run to build themselves is built
+/// once.
+pub fn clippy() -> Command {
+    tools_cargo("clippy")
 }
 
 /// Whether packages of this project are linted as they are built for this computer.
@@ -169,22 +171,34 @@ pub fn lint_as_built() {
     LINTING.store(true, Ordering::Relaxed);
 }
 
-/// A cargo command in the profile of [`TOOLS`].
-fn tools_cargo(verb: &str, folder: &Path) -> Command {
-    let mut command = cargo(verb, folder);
+/// A cargo command in the profile of [`TOOLS`]. The rig's emulator declares a newer compiler than
+/// it needs.
+fn tools_cargo(verb: &str) -> Command {
+    let mut command = cargo(verb, workspace::root());
     if LINTING.load(Ordering::Relaxed) {
         command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
     }
-    command.args(["--profile", TOOLS]);
+    command.args(["--profile", TOOLS, "--ignore-rust-version"]);
     command
 }
 
-/// What builds all programs and tests of the workspace that run on this computer.
+/// What builds all programs and tests of the workspace that run on this computer, but for those of
+/// [`rig_tests`].
 pub fn everything() -> Command {
-    let mut command = tools_cargo("build", workspace::root());
+    let mut command = tools_cargo("build");
     command.args(HOST).arg("--all-targets");
     command
 }
+
+/// What builds the rig's tests that run firmware.
+pub fn rig_tests() -> Command {
+    let mut command = tools_cargo("build");
+    command.args(HOST).args(RIG_TESTS);
+    command
+}
+
+/// The target of the rig's tests that run firmware, which cargo builds only by its name.
+pub const RIG_TESTS: [&str; 2] = ["--test", "rig"];
 
 /// Runs `cargo build`.
 ///
@@ -211,14 +225,6 @@ fn said(line: &str) -> Option<(String, bool)> {
     Some((text.to_owned(), message["level"] == "warning"))
 }
 
-/// A cargo command for the rig: always in one profile, so that its emulator is built once, and with
-/// an emulator that declares a newer compiler than it needs.
-pub fn rig_cargo(verb: &str) -> Command {
-    let mut command = tools_cargo(verb, &workspace::folder("rig"));
-    command.arg("--ignore-rust-version");
-    command
-}
-
 /// The sensing as a Cortex-M7 program for QEMU.
 pub fn qemu_image(toolchain: &Toolchain) -> Result<PathBuf> {
     let mut command = toolchain.build(&workspace::folder("tests/qemu"));
@@ -240,14 +246,25 @@ pub fn instruction_counter(version: u32) -> Result<PathBuf> {
 /// # Errors
 /// When it fails, or makes no such file.
 pub fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
+    let [file] = build_all(command, [target])?;
+    Ok(file)
+}
+
+fn build_all<const N: usize>(command: &mut Command, targets: [&str; N]) -> Result<[PathBuf; N]> {
     command.arg("--message-format=json-render-diagnostics");
-    let mut file = None;
+    let mut files = targets.map(|_| PathBuf::new());
     process::for_each_line(command, |line| {
-        if let Some(found) = artifact(line, target) {
-            file = Some(found);
+        for (file, target) in files.iter_mut().zip(targets) {
+            if let Some(found) = artifact(line, target) {
+                *file = found;
+            }
         }
     })?;
-    file.with_context(|| format!("`{}` made no {target}", process::display(command)))
+    for (file, target) in files.iter().zip(targets) {
+        let made = !file.as_os_str().is_empty();
+        ensure!(made, "`{}` made no {target}", process::display(command));
+    }
+    Ok(files)
 }
 
 /// The file in one of cargo's messages, when it is the artifact of `target`.

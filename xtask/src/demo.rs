@@ -126,12 +126,10 @@ impl Stage {
         let folder = workspace::work_folder("demo")?;
         let (firmware, tools) = std::thread::scope(|scope| {
             let firmware = scope.spawn(|| artifacts::firmware_for(toolchain, board, ""));
-            let tools = artifacts::rig()
-                .and_then(|rig| Ok((rig, artifacts::host_tool_without_pictures()?)));
-            (firmware.join(), tools)
+            (firmware.join(), artifacts::of_demo())
         });
         let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))??;
-        let (rig, tool) = tools?;
+        let [rig, tool] = tools?;
         Ok(Stage {
             board,
             firmware,

@@ -17,9 +17,8 @@ use crate::{
 };
 
 /// The workspaces: folder, and whether it has more than one package.
-const WORKSPACES: [(&str, bool); 4] = [
+const WORKSPACES: [(&str, bool); 3] = [
     ("", true),
-    ("rig", false),
     ("tests/qemu", false),
     ("xtask/instruction-counter", false),
 ];
@@ -162,8 +161,7 @@ impl Test {
     fn host_tests(&self, report: &mut Report) {
         if self.wants("tests: host") {
             report.step("tests: host", |tally| {
-                let mut command = artifacts::test(workspace::root());
-                command.args(artifacts::HOST);
+                let mut command = artifacts::test();
                 command.args(["--exclude", "hivtac-tests"]);
                 run_tests(self.slow_ones(&mut command), tally)
             });
@@ -177,8 +175,8 @@ impl Test {
             if self.wants(step) {
                 report.step(step, |tally| {
                     let programs = programs.context("not run: the firmware could not be built")?;
-                    let mut command = artifacts::rig_cargo("test");
-                    programs.name_to(command.arg("--no-fail-fast"));
+                    let mut command = artifacts::test();
+                    programs.name_to(command.args(artifacts::RIG_TESTS));
                     prepare(&mut command);
                     run_tests(&mut command, tally)
                 });
@@ -190,7 +188,7 @@ impl Test {
         test("tests: rig at half speed", &|command| {
             command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");
             command.env("HIVTAC_BUSY_BUS", "1");
-            command.args(["--test", "rig", "--"]).args(TIMED);
+            command.arg("--").args(TIMED);
         });
     }
 
@@ -273,12 +271,14 @@ fn check_format() -> Result<()> {
 
 /// Of what [`artifacts::lint_as_built`] had linted, and of what is only checked.
 fn host_lints() -> Result<()> {
-    let mut rig = artifacts::rig_cargo("build");
-    rig.arg("--all-targets");
-    for command in [artifacts::everything(), artifacts::serving_command(), rig] {
+    for command in [
+        artifacts::everything(),
+        artifacts::rig_tests(),
+        artifacts::serving_command(),
+    ] {
         artifacts::without_warnings(command)?;
     }
-    let mut without_pictures = artifacts::clippy(workspace::root());
+    let mut without_pictures = artifacts::clippy();
     without_pictures.args(["--package", "hivtac", "--bins", "--no-default-features"]);
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
     counter.arg("--release");
@@ -303,12 +303,10 @@ fn target_lints(toolchain: &Toolchain) -> Result<()> {
 
 fn cross_room_tests(toolchain: &Toolchain, programs: &Programs) -> Result<Command> {
     packages::ensure_qemu()?;
-    let mut command = artifacts::test(workspace::root());
-    command.args(artifacts::HOST).args(["--test", "rooms"]);
-    programs.name_to(&mut command);
+    let mut command = artifacts::test();
+    programs.name_to(command.args(["--test", "rooms"]));
     command
         .env("HIVTAC_TOOL", artifacts::host_tool()?)
-        .env("HIVTAC_RIG", artifacts::rig()?)
         .env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image(toolchain)?);
     Ok(command)
 }

@@ -9,8 +9,10 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use nix::pty::openpty;
+use nix::fcntl::{OFlag, open};
+use nix::pty::{PtyMaster, grantpt, posix_openpt, ptsname_r, unlockpt};
 use nix::sys::inotify::{AddWatchFlags, InitFlags, Inotify};
+use nix::sys::stat::Mode;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::{Endpoint, nonblocking, read_all, write_all};
@@ -18,7 +20,7 @@ use super::{Endpoint, nonblocking, read_all, write_all};
 /// A pseudo-terminal whose other side a client may open.
 #[derive(Debug)]
 pub struct Pty {
-    master: OwnedFd,
+    master: PtyMaster,
     terminal: OwnedFd,
     path: PathBuf,
     link: Option<PathBuf>,
@@ -32,20 +34,25 @@ impl Pty {
     /// # Errors
     /// When the system gives none, or the link cannot be made.
     pub fn open(link: Option<&Path>) -> anyhow::Result<Self> {
-        let pair = openpty(None, None).context("pseudo-terminal")?;
-        let mut settings = tcgetattr(&pair.slave)?;
+        // Programs that are started meanwhile must not hold it.
+        let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC;
+        let master = posix_openpt(flags).context("pseudo-terminal")?;
+        grantpt(&master)?;
+        unlockpt(&master)?;
+        let path = PathBuf::from(ptsname_r(&master)?);
+        let terminal = open(&path, flags, Mode::empty())?;
+        let mut settings = tcgetattr(&terminal)?;
         cfmakeraw(&mut settings);
-        tcsetattr(&pair.slave, SetArg::TCSANOW, &settings)?;
-        nonblocking(&pair.master)?;
-        let path = nix::unistd::ttyname(&pair.slave)?;
+        tcsetattr(&terminal, SetArg::TCSANOW, &settings)?;
+        nonblocking(&master)?;
         let events = Inotify::init(InitFlags::IN_NONBLOCK | InitFlags::IN_CLOEXEC)?;
         events.add_watch(&path, AddWatchFlags::IN_OPEN | AddWatchFlags::IN_CLOSE)?;
         if let Some(link) = link {
             make_link(&path, link)?;
         }
         Ok(Self {
-            master: pair.master,
-            terminal: pair.slave,
+            master,
+            terminal,
             path,
             link: link.map(Path::to_owned),
             events,
