@@ -131,14 +131,15 @@ pub(crate) fn levels_of_rgb565(pixel: u16) -> [u8; 3] {
 }
 
 /// Pairs of pixels as Y₀ Cb, Y₁ Cr. Rows have an even number of pixels.
-fn yuyv(mut picture: impl Iterator<Item = [Channel; 3]>) -> Vec<u16> {
-    let mut words = Vec::with_capacity(picture.size_hint().0);
-    while let (Some(even), Some(odd)) = (picture.next(), picture.next()) {
+fn yuyv(picture: impl Iterator<Item = [Channel; 3]>) -> Vec<u16> {
+    let pixels: Vec<_> = picture.collect();
+    let (pairs, _) = pixels.as_chunks::<2>();
+    let words = pairs.iter().flat_map(|[even, odd]| {
         let mean = std::array::from_fn(|c| Q::from_bits((even[c] + odd[c]).bits() / 2));
         let [cb, cr] = chroma(mean);
-        words.extend([word(luma(even), cb), word(luma(odd), cr)]);
-    }
-    words
+        [word(luma(*even), cb), word(luma(*odd), cr)]
+    });
+    words.collect()
 }
 
 fn word(low: u8, high: u8) -> u16 {
@@ -156,13 +157,9 @@ const CB_SCALE: Q<16> = Q::from_bits(36_984);
 /// 0.713.
 const CR_SCALE: Q<16> = Q::from_bits(46_745);
 
-fn luma_channel(pixel: [Channel; 3]) -> Channel {
-    let products = LUMA.into_iter().zip(pixel).map(|(w, c)| w * c.bits());
-    Q::from_bits(
-        products
-            .fold(Q::default(), |sum, product| sum + product)
-            .rounded(),
-    )
+fn luma_channel([red, green, blue]: [Channel; 3]) -> Channel {
+    let sum = LUMA[0] * red.bits() + LUMA[1] * green.bits() + LUMA[2] * blue.bits();
+    Q::from_bits(sum.rounded())
 }
 
 fn luma(pixel: [Channel; 3]) -> u8 {
