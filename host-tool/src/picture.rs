@@ -1,5 +1,12 @@
 //! Pictures as a camera would deliver them: rows of pixels.
 
+use std::io::Cursor;
+
+use image::codecs::png::PngEncoder;
+use image::{
+    DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader,
+};
+
 use crate::failure::Failure;
 use crate::files::read_at_most;
 use crate::frame::pixels;
@@ -82,11 +89,7 @@ const LARGEST_FILE: u64 = 100 << 20;
 
 /// Turned as its EXIF data say it was taken. A file may claim any size: it is held against a
 /// frame's before there is memory for it.
-#[cfg(feature = "pictures")]
 fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
-    use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
-    use std::io::Cursor;
-
     let damaged = |error: image::ImageError| unreadable(path, &error);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|error| unreadable(path, &error))?;
@@ -111,16 +114,10 @@ fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
     })
 }
 
-#[cfg(not(feature = "pictures"))]
-fn decode(path: &str, _: &[u8]) -> Result<Rgb, Failure> {
-    Err(unreadable(path, &WITHOUT_PICTURES))
-}
-
 /// Whether a JPEG file goes on to its end-of-image marker: decoders paint what is missing grey.
 ///
 /// Segments have their length; after a start of scan come coded bytes, in which FF is followed by 0
 /// or the number of a restart. A thumbnail's end lies within a segment.
-#[cfg(feature = "pictures")]
 fn is_whole_jpeg(bytes: &[u8]) -> bool {
     const END: u8 = 0xD9;
     let mut at = 2;
@@ -142,15 +139,10 @@ fn is_whole_jpeg(bytes: &[u8]) -> bool {
     false
 }
 
-#[cfg(not(feature = "pictures"))]
-const WITHOUT_PICTURES: &str =
-    "this build does without: `cargo install --path host-tool` makes one that can";
-
 /// A PNG file for `path`.
 ///
 /// # Errors
-/// When this build makes none.
-#[cfg(feature = "pictures")]
+/// When its encoder fails.
 pub fn encode(
     path: &str,
     channels: Channels,
@@ -158,7 +150,6 @@ pub fn encode(
     height: u16,
     levels: &[u8],
 ) -> Result<Vec<u8>, Failure> {
-    use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
     let color = match channels {
         Channels::Grey => ExtendedColorType::L8,
         Channels::Colour => ExtendedColorType::Rgb8,
@@ -168,13 +159,6 @@ pub fn encode(
         .write_image(levels, width.into(), height.into(), color)
         .map_err(|error| Failure::input(format!("cannot make the picture {path}: {error}")))?;
     Ok(file)
-}
-
-/// None: this build makes no pictures.
-#[cfg(not(feature = "pictures"))]
-pub fn encode(path: &str, _: Channels, _: u16, _: u16, _: &[u8]) -> Result<Vec<u8>, Failure> {
-    let message = format!("cannot make the picture {path}: {WITHOUT_PICTURES}; --raw works here");
-    Err(Failure::input(message))
 }
 
 fn size(path: &str, width: u32, height: u32) -> Result<(u16, u16), Failure> {
@@ -214,7 +198,6 @@ mod tests {
     }
 
     /// 8 columns and 4,194,303,749 rows: 100 GB of pixels, of a file of 239 bytes.
-    #[cfg(feature = "pictures")]
     #[test]
     fn a_picture_that_claims_to_be_huge_takes_no_memory() {
         let file = include_bytes!("../../fuzz/corpus/picture/claims_100_gb");

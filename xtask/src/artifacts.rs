@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::toolchain::{Toolchain, cargo};
+use crate::toolchain::{self, Toolchain, cargo};
 use crate::{process, workspace};
 
 /// Features of the firmware that each seed one bug which the rig must notice.
@@ -44,33 +44,33 @@ impl Board {
 
 /// The firmware, as it is flashed.
 pub fn firmware(toolchain: &Toolchain) -> Result<PathBuf> {
-    build(&mut firmware_command(toolchain), "hivtac-firmware")
+    firmware_for(toolchain, Board::default(), "")
 }
 
 /// The firmware for a board, with one feature more, such as a seeded bug, or none.
 pub fn firmware_for(toolchain: &Toolchain, board: Board, feature: &str) -> Result<PathBuf> {
-    let mut command = firmware_command(toolchain);
-    let features = format!("board-{} {feature}", board.name());
-    command.args(["--no-default-features", "--features", &features]);
+    let mut command = firmware_command(toolchain, board, feature);
     build(&mut command, "hivtac-firmware")
-}
-
-/// The firmware with one feature, such as a seeded bug.
-pub fn firmware_with(toolchain: &Toolchain, feature: &str) -> Result<PathBuf> {
-    let mut command = firmware_command(toolchain);
-    build(command.args(["--features", feature]), "hivtac-firmware")
 }
 
 /// The firmware with the model for YUV422.
 pub fn firmware_for_yuv422(toolchain: &Toolchain) -> Result<PathBuf> {
-    let mut command = firmware_command(toolchain);
+    let mut command = firmware_command(toolchain, Board::default(), "");
     command.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
     build(&mut command, "hivtac-firmware")
 }
 
-fn firmware_command(toolchain: &Toolchain) -> Command {
+/// What builds the firmware for a board, with one feature more or none.
+pub fn firmware_command(toolchain: &Toolchain, board: Board, feature: &str) -> Command {
     let mut command = toolchain.build(workspace::root());
     command.args(["--package", "hivtac-firmware", "--release"]);
+    match board {
+        Board::Weact => command.args(["--features", feature]),
+        Board::OpenmvH7 => {
+            let features = format!("board-openmv-h7 {feature}");
+            command.args(["--no-default-features", "--features", &features])
+        }
+    };
     command
 }
 
@@ -85,13 +85,13 @@ pub const HOST: [&str; 5] = [
     "hivtac-board",
 ];
 
-/// The rig, and the host tool `hivtac` without what reads pictures: the least that a first demo has
-/// to build, in one go.
-pub fn of_demo() -> Result<[PathBuf; 2]> {
-    let mut command = tools_cargo("build");
-    command.args(["--package", "hivtac-rig", "--package", "hivtac"]);
-    command.args(["--bins", "--no-default-features"]);
-    build_all(&mut command, ["hivtac-rig", "hivtac"])
+/// The rig and the host tool, built in one go.
+pub fn rig_and_host_tool() -> Result<[PathBuf; 2]> {
+    let programs = ["hivtac-rig", "hivtac"];
+    build_all(
+        host_command(programs[0]).args(["--bin", programs[1]]),
+        programs,
+    )
 }
 
 /// The host tool, as it is installed.
@@ -155,12 +155,6 @@ pub fn test() -> Command {
     command
 }
 
-/// Lints packages of the workspace, likewise: what dependencies run to build themselves is built
-/// once.
-pub fn clippy() -> Command {
-    tools_cargo("clippy")
-}
-
 /// Whether packages of this project are linted as they are built for this computer.
 static LINTING: AtomicBool = AtomicBool::new(false);
 
@@ -176,29 +170,32 @@ pub fn lint_as_built() {
 fn tools_cargo(verb: &str) -> Command {
     let mut command = cargo(verb, workspace::root());
     if LINTING.load(Ordering::Relaxed) {
-        command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+        toolchain::lint(&mut command);
     }
     command.args(["--profile", TOOLS, "--ignore-rust-version"]);
     command
 }
 
 /// What builds all programs and tests of the workspace that run on this computer, but for those of
-/// [`rig_tests`].
+/// [`tests_by_name`].
 pub fn everything() -> Command {
     let mut command = tools_cargo("build");
     command.args(HOST).arg("--all-targets");
     command
 }
 
-/// What builds the rig's tests that run firmware.
-pub fn rig_tests() -> Command {
+/// What builds the tests that need firmware or programs: cargo builds and runs them only by their
+/// names.
+pub fn tests_by_name() -> Command {
     let mut command = tools_cargo("build");
-    command.args(HOST).args(RIG_TESTS);
+    command.args(HOST).args(RIG_TESTS).args(ROOMS_TESTS);
     command
 }
 
-/// The target of the rig's tests that run firmware, which cargo builds only by its name.
+/// The rig's tests that run firmware.
 pub const RIG_TESTS: [&str; 2] = ["--test", "rig"];
+/// Tests that cross rooms.
+pub const ROOMS_TESTS: [&str; 2] = ["--test", "rooms"];
 
 /// Runs `cargo build`.
 ///
@@ -227,8 +224,14 @@ fn said(line: &str) -> Option<(String, bool)> {
 
 /// The sensing as a Cortex-M7 program for QEMU.
 pub fn qemu_image(toolchain: &Toolchain) -> Result<PathBuf> {
+    build(&mut qemu_image_command(toolchain), "hivtac-qemu-image")
+}
+
+/// What builds it.
+pub fn qemu_image_command(toolchain: &Toolchain) -> Command {
     let mut command = toolchain.build(&workspace::folder("tests/qemu"));
-    build(command.arg("--release"), "hivtac-qemu-image")
+    command.arg("--release");
+    command
 }
 
 /// The plugin for QEMU that counts instructions, for a version of QEMU's plugin interface.

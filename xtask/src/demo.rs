@@ -126,7 +126,7 @@ impl Stage {
         let folder = workspace::work_folder("demo")?;
         let (firmware, tools) = std::thread::scope(|scope| {
             let firmware = scope.spawn(|| artifacts::firmware_for(toolchain, board, ""));
-            (firmware.join(), artifacts::of_demo())
+            (firmware.join(), artifacts::rig_and_host_tool())
         });
         let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))??;
         let [rig, tool] = tools?;

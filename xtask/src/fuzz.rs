@@ -69,23 +69,15 @@ pub fn run() -> Result<()> {
 }
 
 /// Gives the folder of the programs. They are for a named target, so that what is built to run
-/// while building is not attacked.
+/// while building is not attacked, and is that of the other tests.
 fn build() -> Result<PathBuf> {
     let host = toolchain::host()?;
-    let folder = workspace::work_folder("fuzz")?;
     let mut command = cargo("build", workspace::root());
-    command.args([
-        "--profile",
-        artifacts::TOOLS,
-        "--package",
-        "hivtac-fuzz",
-        "--bins",
-    ]);
-    command
-        .args(["--target", &host, "--target-dir"])
-        .arg(&folder);
-    process::run(command.env("RUSTFLAGS", COVERAGE.join(" ")))?;
-    Ok(folder.join(host).join(artifacts::TOOLS))
+    command.args(["--profile", artifacts::TOOLS, "--target", &host]);
+    command.args(["--package", "hivtac-fuzz", "--bins"]);
+    command.env("RUSTFLAGS", COVERAGE.join(" "));
+    let program = artifacts::build(&mut command, "model")?;
+    Ok(program.parent().context("it lies in a folder")?.to_owned())
 }
 
 /// Names of the targets.

@@ -62,9 +62,10 @@ impl Test {
             artifacts::lint_as_built();
         }
         let beside = thread::scope(|scope| {
-            let beside = scope.spawn(|| process::aside(printed, || self.beside(toolchain, built)));
+            let beside = || self.beside(toolchain, components, built);
+            let beside = scope.spawn(|| process::aside(printed, beside));
             if components {
-                self.checks(&mut report, toolchain);
+                self.checks(&mut report);
             }
             self.host_tests(&mut report);
             self.cross_room_tests(&mut report, toolchain, &programs);
@@ -75,13 +76,13 @@ impl Test {
         report.finish()
     }
 
-    /// About half of the work: the rig's tests, before them the programs that those across rooms
-    /// run, too, and around them what the others need nothing of. Attacks are first, as they are
-    /// built in a folder of their own while the lints hold the common one.
-    fn beside(&self, toolchain: &Toolchain, built: Sender<Programs>) -> Report {
+    /// About half of the work: what is for the microcontroller, attacks and the rig's tests, and
+    /// around them what the others need nothing of. What is for the microcontroller is first: it is
+    /// built in a folder of its own while the lints hold the common one.
+    fn beside(&self, toolchain: &Toolchain, components: bool, built: Sender<Programs>) -> Report {
         let mut report = Report::default();
-        if self.all && self.wants("attacks") {
-            report.optional("attacks", fuzz::obstacle(), |_| fuzz::run());
+        if components && self.wants("lints: microcontroller") {
+            report.step("lints: microcontroller", |_| target_lints(toolchain));
         }
         if self.wants_one_of(&["tests: rig at half speed", "tests: across rooms"]) {
             let programs = report.step("build: firmware", |_| Programs::build(toolchain));
@@ -91,6 +92,9 @@ impl Test {
             }
             drop(built);
             self.rig_tests(&mut report, programs.as_ref());
+        }
+        if self.all && self.wants("attacks") {
+            report.optional("attacks", fuzz::obstacle(), |_| fuzz::run());
         }
         self.benchmarks(&mut report, toolchain);
         if self.all {
@@ -104,10 +108,7 @@ impl Test {
             report.step("benchmark", |_| bench::Bench::default().run(toolchain));
         }
         if self.wants("build: board benchmark") {
-            report.step("build: board benchmark", |_| {
-                bench::board::build(toolchain)?;
-                bench::board::lint(toolchain)
-            });
+            report.step("build: board benchmark", |_| bench::board::lint(toolchain));
         }
     }
 
@@ -146,24 +147,19 @@ impl Test {
         wanted && report.step("components", ensure).is_some()
     }
 
-    fn checks(&self, report: &mut Report, toolchain: &Toolchain) {
+    fn checks(&self, report: &mut Report) {
         if self.wants("format") {
             report.step("format", |_| check_format().and_then(|()| columns::check()));
         }
         if self.wants("lints: host") {
             report.step("lints: host", |_| host_lints());
         }
-        if self.wants("lints: microcontroller") {
-            report.step("lints: microcontroller", |_| target_lints(toolchain));
-        }
     }
 
     fn host_tests(&self, report: &mut Report) {
         if self.wants("tests: host") {
             report.step("tests: host", |tally| {
-                let mut command = artifacts::test();
-                command.args(["--exclude", "hivtac-tests"]);
-                run_tests(self.slow_ones(&mut command), tally)
+                run_tests(self.slow_ones(&mut artifacts::test()), tally)
             });
         }
     }
@@ -227,7 +223,7 @@ impl Programs {
     fn build(toolchain: &Toolchain) -> Result<Programs> {
         let bugs = workspace::work_folder("bugs")?;
         for feature in artifacts::SEEDED_BUGS {
-            let elf = artifacts::firmware_with(toolchain, feature)?;
+            let elf = artifacts::firmware_for(toolchain, Board::default(), feature)?;
             artifacts::copy(&elf, &bugs.join(format!("{feature}.elf")))?;
         }
         let elf = artifacts::firmware_for_yuv422(toolchain)?;
@@ -273,38 +269,32 @@ fn check_format() -> Result<()> {
 fn host_lints() -> Result<()> {
     for command in [
         artifacts::everything(),
-        artifacts::rig_tests(),
+        artifacts::tests_by_name(),
         artifacts::serving_command(),
     ] {
         artifacts::without_warnings(command)?;
     }
-    let mut without_pictures = artifacts::clippy();
-    without_pictures.args(["--package", "hivtac", "--bins", "--no-default-features"]);
     let mut counter = cargo("clippy", &workspace::folder("xtask/instruction-counter"));
-    counter.arg("--release");
-    for command in [&mut without_pictures, &mut counter] {
-        process::run(command.args(["--", "-D", "warnings"]))?;
-    }
-    Ok(())
+    process::run(counter.args(["--release", "--", "-D", "warnings"]))
 }
 
+/// Both boards' firmware and the image for QEMU are built for this alone, with what they depend on
+/// as it is built for those that run: what is flashed does not depend on a linter.
 fn target_lints(toolchain: &Toolchain) -> Result<()> {
-    let mut firmware = toolchain.clippy(workspace::root())?;
-    firmware.args(["--package", "hivtac-firmware"]);
-    let mut second = toolchain.clippy(workspace::root())?;
-    second.args(["--package", "hivtac-firmware"]);
-    second.args(["--no-default-features", "--features", "board-openmv-h7"]);
-    let mut image = toolchain.clippy(&workspace::folder("tests/qemu"))?;
-    for command in [&mut firmware, &mut second, &mut image] {
-        process::run(command.args(["--release", "--", "-D", "warnings"]))?;
+    for board in [Board::Weact, Board::OpenmvH7] {
+        let mut command = artifacts::firmware_command(toolchain, board, "");
+        toolchain.lint(&mut command)?;
+        artifacts::without_warnings(command)?;
     }
-    Ok(())
+    let mut image = artifacts::qemu_image_command(toolchain);
+    toolchain.lint(&mut image)?;
+    artifacts::without_warnings(image)
 }
 
 fn cross_room_tests(toolchain: &Toolchain, programs: &Programs) -> Result<Command> {
     packages::ensure_qemu()?;
     let mut command = artifacts::test();
-    programs.name_to(command.args(["--test", "rooms"]));
+    programs.name_to(command.args(artifacts::ROOMS_TESTS));
     command
         .env("HIVTAC_TOOL", artifacts::host_tool()?)
         .env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image(toolchain)?);

@@ -15,7 +15,12 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
-const DEBIAN_CLIPPY: &str = "/usr/bin/cargo-clippy";
+const DEBIAN_CLIPPY: &str = "/usr/bin/clippy-driver";
+
+/// What runs in the compiler's place for the project's own packages, and lints them.
+const LINTER: &str = "RUSTC_WORKSPACE_WRAPPER";
+/// Of the toolchain in use.
+const CLIPPY: &str = "clippy-driver";
 
 /// Where the toolchain for the microcontroller may come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -86,22 +91,28 @@ impl Toolchain {
         }
     }
 
-    /// `cargo clippy` for the target, run in `folder`.
+    /// Has a command of [`build`](Self::build) lint the packages of this project that it builds.
     ///
     /// # Errors
     /// When Debian's clippy is needed and cannot be installed.
-    pub fn clippy(&self, folder: &Path) -> Result<Command> {
-        let Toolchain::Debian { linker } = self else {
-            return Ok(for_target(cargo("clippy", folder)));
+    pub fn lint(&self, command: &mut Command) -> Result<()> {
+        let driver = match self {
+            Toolchain::Own => CLIPPY,
+            Toolchain::Debian { .. } => {
+                if !Path::new(DEBIAN_CLIPPY).is_file() {
+                    packages::install(&["rust-web-clippy"], "Debian's clippy is missing")?;
+                }
+                DEBIAN_CLIPPY
+            }
         };
-        if !Path::new(DEBIAN_CLIPPY).is_file() {
-            packages::install(&["rust-web-clippy"], "Debian's clippy is missing")?;
-        }
-        // Called by its own name: `cargo clippy` would find rustup's first.
-        let mut command = Command::new(DEBIAN_CLIPPY);
-        command.arg("clippy");
-        Ok(debian_settings(command, folder, linker))
+        command.env(LINTER, driver);
+        Ok(())
     }
+}
+
+/// Has a cargo command for this computer lint likewise.
+pub fn lint(command: &mut Command) {
+    command.env(LINTER, CLIPPY);
 }
 
 /// A cargo command for this computer, run in `folder`, by the toolchain that runs this program.

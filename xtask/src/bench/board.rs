@@ -42,23 +42,26 @@ pub fn run(toolchain: &Toolchain) -> Result<()> {
 /// # Errors
 /// When it cannot be built.
 pub fn build(toolchain: &Toolchain) -> Result<PathBuf> {
+    artifacts::build(&mut command(toolchain)?, PACKAGE)
+}
+
+/// Builds the image and lints it.
+///
+/// # Errors
+/// When it cannot be built, or clippy complains.
+pub fn lint(toolchain: &Toolchain) -> Result<()> {
+    let mut command = command(toolchain)?;
+    toolchain.lint(&mut command)?;
+    artifacts::without_warnings(command)
+}
+
+fn command(toolchain: &Toolchain) -> Result<Command> {
     let data = workspace::work_folder("bench")?;
     cases::write(&data)?;
     let mut command = toolchain.build(workspace::root());
     command.args(["--package", PACKAGE, "--release"]);
-    artifacts::build(command.env("HIVTAC_BOARD_DATA", data), PACKAGE)
-}
-
-/// Clippy on the image, whose frames [`build`] has made.
-///
-/// # Errors
-/// When clippy complains.
-pub fn lint(toolchain: &Toolchain) -> Result<()> {
-    let data = workspace::work_folder("bench")?;
-    let mut command = toolchain.clippy(workspace::root())?;
-    command.args(["--package", PACKAGE, "--release"]);
     command.env("HIVTAC_BOARD_DATA", data);
-    process::run(command.args(["--", "-D", "warnings"]))
+    Ok(command)
 }
 
 fn find_probe() -> Result<()> {
