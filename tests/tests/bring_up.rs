@@ -1,6 +1,6 @@
 //! `hivtac bring-up` with the firmware in the rig: a good board, and one with each fault.
 
-use crate::rig::{Rig, ToolOutput, tool};
+use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, tool_waiting};
 use hivtac_tests::artifact;
 use serde_json::Value;
 use std::path::Path;
@@ -13,10 +13,15 @@ const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Brings a rig with these options up; what the tool left, and its report.
 fn bring_up(options: &[&str]) -> (ToolOutput, Value) {
+    bring_up_waiting(TIMEOUT_S, options)
+}
+
+/// The same with so many seconds to wait for an answer.
+fn bring_up_waiting(timeout_s: u32, options: &[&str]) -> (ToolOutput, Value) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("report.json");
     let rig = Rig::start(options).unwrap();
-    let output = tool(&rig, "bring-up", &[file.to_str().unwrap()]).unwrap();
+    let output = tool_waiting(&rig, timeout_s, "bring-up", &[file.to_str().unwrap()]).unwrap();
     rig.finish().unwrap();
     let report = report(&file);
     (output, report)
@@ -38,8 +43,7 @@ fn steps(report: &Value) -> Vec<(&str, bool)> {
 }
 
 /// Ends with `step`, which says all of these; the exit code is that of something wrong.
-fn ends_wrong(options: &[&str], step: &str, words: &[&str]) {
-    let (output, report) = bring_up(options);
+fn ends_wrong((output, report): (ToolOutput, Value), step: &str, words: &[&str]) {
     assert_eq!(output.code, Some(9), "{output:?}");
     let (last, before) = steps(&report)
         .split_last()
@@ -89,20 +93,20 @@ fn a_good_board_is_right_up_to_the_press() {
 #[test]
 fn without_a_camera_it_says_so() {
     let words = ["no OV7725 on I2C1", "ribbon"];
-    ends_wrong(&["--fault", "camera-absent"], "camera", &words);
+    ends_wrong(bring_up(&["--fault", "camera-absent"]), "camera", &words);
 }
 
 #[test]
 fn another_camera_is_named() {
     let words = ["ID 76 21", "ribbon"];
-    ends_wrong(&["--fault", "camera-wrong-id"], "camera", &words);
+    ends_wrong(bring_up(&["--fault", "camera-wrong-id"]), "camera", &words);
 }
 
 #[test]
 fn a_register_that_the_camera_forgot_is_named() {
     let words = ["register 03 holds 00, 40 was written"];
     ends_wrong(
-        &["--scene", "rest", "--fault", "camera-forgets@150"],
+        bring_up(&["--scene", "rest", "--fault", "camera-forgets@150"]),
         "camera",
         &words,
     );
@@ -112,7 +116,7 @@ fn a_register_that_the_camera_forgot_is_named() {
 fn a_camera_at_half_its_rate_is_noticed() {
     let words = ["half the frames"];
     ends_wrong(
-        &["--scene", "rest", "--fault", "camera-slow"],
+        bring_up(&["--scene", "rest", "--fault", "camera-slow"]),
         "clocks",
         &words,
     );
@@ -121,11 +125,8 @@ fn a_camera_at_half_its_rate_is_noticed() {
 #[test]
 fn broken_frames_are_counted() {
     let words = ["too few or too many bytes"];
-    ends_wrong(
-        &["--scene", "rest", "--fault", "frame-short@150-100000"],
-        "clocks",
-        &words,
-    );
+    let options = ["--scene", "rest", "--fault", "frame-short@150-100000"];
+    ends_wrong(bring_up_waiting(SILENCE_S, &options), "clocks", &words);
 }
 
 /// Something touches the film during the tare.

@@ -1,7 +1,7 @@
 //! Faults of the rig, seen through the host tool: each ends in its documented status or counter,
 //! and passes.
 
-use crate::rig::{Rig, TIMEOUT_S, ToolOutput, json_lines, tool_waiting};
+use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, json_lines, tool_waiting};
 use serde_json::Value;
 
 /// A run with faults, watched by `monitor --json`: its output, its lines, and the rig's counters.
@@ -11,7 +11,7 @@ fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
 
 /// The same with a cable that is pulled, after which nothing comes.
 fn watch_pulled(options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
-    watch_waiting(20, &["cable-pulled@300-700"], options)
+    watch_waiting(SILENCE_S, &["cable-pulled@300-700"], options)
 }
 
 fn watch_waiting(

@@ -24,6 +24,8 @@ use tempfile::TempDir;
 const PATIENCE: Duration = Duration::from_secs(240);
 /// How long the host tool waits for an answer, s: the emulated board boots slower than a real one.
 pub const TIMEOUT_S: u32 = 40;
+/// The same where a silence is meant: all the while the rig runs on.
+pub const SILENCE_S: u32 = 20;
 
 /// A running rig with its logs. Ended when it is dropped.
 pub struct Rig {
@@ -150,7 +152,7 @@ pub fn tool(rig: &Rig, command: &str, options: &[&str]) -> Result<ToolOutput> {
     tool_waiting(rig, TIMEOUT_S, command, options)
 }
 
-/// The same where a silence is meant, with so many seconds to wait: all the while the rig runs on.
+/// The same with so many seconds to wait.
 ///
 /// # Errors
 /// As [`tool`].

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use crate::rig::Rig;
+use crate::rig::{Rig, TIMEOUT_S};
 use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
 use serde_json::Value;
@@ -25,7 +25,13 @@ impl View {
     /// Of the port `sensor` in a folder.
     fn of(folder: &Path) -> View {
         let mut process = Command::new(artifact::named_by("HIVTAC_TOOL"))
-            .args(["view", "--timeout", "40", "--port", "sensor"])
+            .args([
+                "view",
+                "--timeout",
+                &TIMEOUT_S.to_string(),
+                "--port",
+                "sensor",
+            ])
             .current_dir(folder)
             .stdout(Stdio::piped())
             .spawn()
