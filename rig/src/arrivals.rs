@@ -41,7 +41,7 @@ impl Arrivals {
                 continue;
             };
             let line = json!({"frame": sample.frame, "time_s": at_ns as f64 / 1e9});
-            if let Err(error) = writeln!(file, "{line}") {
+            if let Err(error) = file.write_all(format!("{line}\n").as_bytes()) {
                 self.failed = Some(error.to_string());
             }
         }

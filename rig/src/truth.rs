@@ -82,7 +82,8 @@ impl TruthLog {
         if let (Some(line), Value::Object(truth)) = (line.as_object_mut(), truth) {
             line.extend(truth);
         }
-        if let Err(error) = writeln!(file, "{line}") {
+        // In one piece, for who reads meanwhile.
+        if let Err(error) = file.write_all(format!("{line}\n").as_bytes()) {
             self.failed = Some(error.to_string());
             self.file = None;
         }
@@ -91,5 +92,44 @@ impl TruthLog {
     /// Why the log ended early.
     pub fn failure(&self) -> Option<&str> {
         self.failed.as_deref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// But where it crosses a page of the file system's memory.
+    #[test]
+    fn who_reads_meanwhile_finds_whole_lines() {
+        const LINES: u64 = 2_000;
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let mut log = TruthLog::create(file.path()).unwrap();
+        let written = AtomicBool::new(false);
+        let reader = || {
+            let (mut reads, mut broken) = (0, 0);
+            while !written.load(Ordering::Relaxed) {
+                let text = std::fs::read(file.path()).unwrap();
+                reads += 1;
+                broken += u32::from(!text.is_empty() && !text.ends_with(b"\n"));
+            }
+            (reads, broken)
+        };
+        let (reads, broken) = std::thread::scope(|scope| {
+            let reader = scope.spawn(reader);
+            for frame in 0..LINES {
+                let exposed = Exposed {
+                    frame,
+                    ..Exposed::default()
+                };
+                log.exposed(exposed, json!({ "alpha_deg": 4.0 }));
+            }
+            written.store(true, Ordering::Relaxed);
+            reader.join().unwrap()
+        });
+        assert!(broken * 20 <= reads, "{broken} of {reads}");
+        let text = std::fs::read_to_string(file.path()).unwrap();
+        assert_eq!(text.lines().count() as u64, LINES);
     }
 }

@@ -92,12 +92,14 @@ impl Rig {
         self.file("truth")
     }
 
-    /// What is true of every exposure so far.
+    /// What is true of every exposure so far, without a line that is being written.
     ///
     /// # Errors
     /// When the log cannot be read.
     pub fn truth(&self) -> Result<Vec<Value>> {
-        json_lines(&fs::read_to_string(self.file("truth")).context("reading the truth log")?)
+        let text = fs::read_to_string(self.truth_file()).context("reading the truth log")?;
+        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+        json_lines(whole)
     }
 
     /// Ends it, and gives its counters.
