@@ -74,17 +74,6 @@ pub fn firmware_command(toolchain: &Toolchain, board: Board, feature: &str) -> C
     command
 }
 
-/// The packages that run on this computer, as cargo is told them: all of them even where one
-/// program is wanted, so that what it depends on has the features with which tests build it, and is
-/// built once.
-pub const HOST: [&str; 5] = [
-    "--workspace",
-    "--exclude",
-    "hivtac-firmware",
-    "--exclude",
-    "hivtac-board",
-];
-
 /// The rig and the host tool, built in one go.
 pub fn rig_and_host_tool() -> Result<[PathBuf; 2]> {
     let programs = ["hivtac-rig", "hivtac"];
@@ -137,8 +126,8 @@ pub fn benchmark_cases() -> Result<PathBuf> {
 }
 
 fn host_command(program: &str) -> Command {
-    let mut command = tools_cargo("build");
-    command.args(HOST).args(["--bin", program]);
+    let mut command = host_cargo("build");
+    command.args(["--bin", program]);
     command
 }
 
@@ -150,8 +139,8 @@ pub fn rig() -> Result<PathBuf> {
 /// Runs tests of the workspace past those that fail: in the profile of the programs that they run,
 /// so that dependencies are built once.
 pub fn test() -> Command {
-    let mut command = tools_cargo("test");
-    command.args(HOST).arg("--no-fail-fast");
+    let mut command = host_cargo("test");
+    command.arg("--no-fail-fast");
     command
 }
 
@@ -165,30 +154,42 @@ pub fn lint_as_built() {
     LINTING.store(true, Ordering::Relaxed);
 }
 
-/// A cargo command in the profile of [`TOOLS`]. The rig's emulator declares a newer compiler than
-/// it needs.
-fn tools_cargo(verb: &str) -> Command {
+/// The packages that run on this computer, as cargo is told them: all of them even where one
+/// program is wanted, so that what it depends on has the features with which tests build it, and is
+/// built once.
+const HOST: [&str; 5] = [
+    "--workspace",
+    "--exclude",
+    "hivtac-firmware",
+    "--exclude",
+    "hivtac-board",
+];
+
+/// A cargo command for those packages in the profile of [`TOOLS`]. The rig's emulator declares a
+/// newer compiler than it needs.
+fn host_cargo(verb: &str) -> Command {
     let mut command = cargo(verb, workspace::root());
     if LINTING.load(Ordering::Relaxed) {
         toolchain::lint(&mut command);
     }
     command.args(["--profile", TOOLS, "--ignore-rust-version"]);
+    command.args(HOST);
     command
 }
 
 /// What builds all programs and tests of the workspace that run on this computer, but for those of
 /// [`tests_by_name`].
 pub fn everything() -> Command {
-    let mut command = tools_cargo("build");
-    command.args(HOST).arg("--all-targets");
+    let mut command = host_cargo("build");
+    command.arg("--all-targets");
     command
 }
 
 /// What builds the tests that need firmware or programs: cargo builds and runs them only by their
 /// names.
 pub fn tests_by_name() -> Command {
-    let mut command = tools_cargo("build");
-    command.args(HOST).args(RIG_TESTS).args(ROOMS_TESTS);
+    let mut command = host_cargo("build");
+    command.args(RIG_TESTS).args(ROOMS_TESTS);
     command
 }
 
