@@ -3,6 +3,7 @@
 //! The rig is not a program of its own here: so what one run translated of the firmware serves the
 //! next. The tests of `rig/` and those in Python have it as a program.
 
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -51,24 +52,18 @@ impl Rig {
     /// When it does not get ready.
     pub fn start_with(elf: &Path, options: &[&str]) -> Result<Rig> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
-        let path = |path: &Path| path.to_str().map(str::to_owned).context("a path in UTF-8");
-        let [truth, stats] = ["truth", "stats"].map(|name| path(&folder.path().join(name)));
-        let (truth, stats, elf) = (truth?, stats?, path(elf)?);
-        let own = [
-            "hivtac-rig",
-            &elf,
-            "--pty",
-            "--truth",
-            &truth,
-            "--stats-json",
-            &stats,
-        ];
-        let arguments = Arguments::try_parse_from(own.iter().chain(options))?;
+        let [truth, stats] = ["truth", "stats"].map(|name| folder.path().join(name));
+        let mut arguments = Vec::from(["hivtac-rig", "--pty"].map(OsString::from));
+        arguments.extend(["--truth".into(), truth.into()]);
+        arguments.extend(["--stats-json".into(), stats.into()]);
+        arguments.extend(options.iter().map(OsString::from));
+        arguments.push(elf.into());
+        let arguments = Arguments::try_parse_from(arguments)?;
         let interrupt = Arc::new(AtomicBool::new(false));
         let (run_options, port) = arguments.prepare(interrupt.clone())?;
-        let port = port
-            .and_then(|port| port.pty)
-            .context("it has a terminal")?;
+        let terminal = port.and_then(|port| port.pty);
+        let port = terminal.as_ref().and_then(|path| path.to_str());
+        let port = port.context("it has a terminal")?.to_owned();
         let running = thread::spawn(move || {
             let outcome = run(run_options).and_then(|outcome| arguments.leave(&outcome));
             // Told at once, as the host tool only sees that its port is silent.
@@ -77,7 +72,7 @@ impl Rig {
         Ok(Rig {
             running: Some(running),
             interrupt,
-            port: path(&port)?,
+            port,
             folder,
         })
     }
