@@ -13,7 +13,7 @@ use std::time::Instant;
 use hivtac_film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::{Solved, octant, solve_place};
-use hivtac_shell::{Check, Design, Neighbours, ShellError, check, paper_camera, record, tables};
+use hivtac_shell::{Check, Design, ShellError, check, paper_camera, record, tables};
 
 const USAGE: &str = "reduce FOLDER [--check]
 Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are \
@@ -78,7 +78,7 @@ fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
         tip_radius_mm: radius_mm,
         ..Design::default()
     };
-    let (beside, camera) = (Neighbours::of(&design), paper_camera()?);
+    let camera = paper_camera()?;
     let file = Mutex::new(OpenOptions::new().create(true).append(true).open(&path)?);
     let task = format!("tip of {radius_mm} mm");
     in_parallel(
@@ -87,7 +87,7 @@ fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
         threads()?,
         progress(&task),
         |film, place| {
-            let solved = solve_place(film, &beside, &camera, *place)?;
+            let solved = solve_place(film, &camera, *place)?;
             let numbers = solved.iter().flat_map(record::numbers);
             let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
             let written = file.lock().map(|mut file| file.write_all(&bytes));

@@ -1,15 +1,19 @@
 //! How a pressed film answers to small changes: of its load, and of what it is made of.
 
-use crate::film::Response;
-use crate::shell::Shell;
+use crate::film::{Tip, mean, tip_shares, weighted};
+use crate::grid::Grid;
+use crate::point::{V3, cross, dot};
+use crate::shell::{Hold, Shell};
 use crate::{Design, Equilibrium, Film, ShellError};
 
-/// Steps by which forces are differentiated: tip's place and radius, mm; thickness and posts'
-/// places, mm.
+/// Steps by which forces are differentiated: tip's place and radius, posts' places, and what moves
+/// cells with it, mm.
 const TIP_STEP_MM: f64 = 1e-3;
-const THICKNESS_STEP_MM: f64 = 1e-4;
 const POST_STEP_MM: f64 = 2e-2;
-/// Films beside the one that is asked about: thinner and thicker.
+const MORPH_STEP_MM: f64 = 1e-3;
+/// Step by which the surface is differentiated along the film, mm.
+const SURFACE_STEP_MM: f64 = 1e-3;
+/// Films beside the one that is asked about.
 const BESIDE: [f64; 2] = [-1.0, 1.0];
 
 /// Something that a film's state answers to, with its unit.
@@ -27,11 +31,44 @@ pub enum Change {
     Grip,
     /// A post's place along x or y, mm.
     Post(usize, usize),
+    /// Young's modulus with the grip and the weight kept, in parts of itself.
+    Youngs,
+    /// The stretch along x or y.
+    Stretch(usize),
+    /// [`crate::Law::neo_hooke`].
+    NeoHooke,
+    /// [`crate::Law::stiffening`].
+    Stiffening,
+    /// [`Design::thickness_slope`]'s part.
+    ThicknessSlope(usize),
+    /// [`Design::thickness_curve`]'s part.
+    ThicknessCurve(usize),
+    /// [`Design::dot_stiffening`].
+    DotStiffening,
+    /// Gravity along x, y or z, in parts of g.
+    Down(usize),
+    /// The posts' radius, mm.
+    PostRadius,
+    /// How far the film reaches beyond the posts' centres, mm.
+    Overhang,
 }
 
 impl Change {
     /// All of them.
     pub fn all() -> impl Iterator<Item = Change> {
+        Change::of_sweep()
+            .chain([Change::Youngs])
+            .chain((0..2).map(Change::Stretch))
+            .chain([Change::NeoHooke, Change::Stiffening])
+            .chain((0..2).map(Change::ThicknessSlope))
+            .chain((0..3).map(Change::ThicknessCurve))
+            .chain([Change::DotStiffening])
+            .chain((0..3).map(Change::Down))
+            .chain([Change::PostRadius, Change::Overhang])
+    }
+
+    /// Those that the reduced film is made from, in the order of its records.
+    pub fn of_sweep() -> impl Iterator<Item = Change> {
         let posts = (0..4).flat_map(|post| (0..2).map(move |way| Change::Post(post, way)));
         (0..3)
             .map(Change::Force)
@@ -39,180 +76,472 @@ impl Change {
             .chain([Change::TipRadius, Change::Thickness, Change::Grip])
             .chain(posts)
     }
-}
 
-/// A film, and the films beside it that tell what a change of its own does.
-pub struct Neighbours {
-    thinner_and_thicker: [Shell; 2],
-    step_mm: f64,
-}
+    /// Which of the thickness's numbers it is.
+    pub(crate) fn term(self) -> Option<usize> {
+        match self {
+            Change::ThicknessSlope(k) => Some(k),
+            Change::ThicknessCurve(k) => Some(2 + k),
+            _ => None,
+        }
+    }
 
-impl Neighbours {
-    /// Of films of this design, wherever the tip is.
-    pub fn of(design: &Design) -> Neighbours {
-        let shell = |way: f64| {
-            let mut beside = design.clone();
-            beside.material.thickness_mm += way * THICKNESS_STEP_MM;
-            beside.shell()
-        };
-        Neighbours {
-            thinner_and_thicker: BESIDE.map(shell),
-            step_mm: THICKNESS_STEP_MM,
+    /// Whether it is one of the sheet itself, in its place.
+    fn of_sheet(self) -> bool {
+        self.term().is_some()
+            || matches!(
+                self,
+                Change::Thickness
+                    | Change::Youngs
+                    | Change::Stretch(_)
+                    | Change::NeoHooke
+                    | Change::Stiffening
+                    | Change::DotStiffening
+                    | Change::Down(_)
+            )
+    }
+
+    /// Which of [`Beside::morphed`] it is: it moves the cells.
+    fn morph(self) -> Option<usize> {
+        match self {
+            Change::PostRadius => Some(0),
+            Change::Overhang => Some(1),
+            _ => None,
         }
     }
 }
 
+/// How a state answers to a small change: its derivatives, per unit of the change.
+#[derive(Clone, Debug)]
+pub struct Response {
+    pub(crate) unknowns: Vec<f64>,
+    /// The tip's way, mm per unit.
+    pub tip_mm: V3,
+    /// What it answers to; none: to several changes of the load.
+    change: Option<Change>,
+}
+
+impl Response {
+    /// How a state answers to several changes of the load at once.
+    pub fn to_all(responses: &[Response; 5], changes: [f64; 5]) -> Response {
+        let mut sum = Response {
+            unknowns: vec![0.0; responses[0].unknowns.len()],
+            tip_mm: [0.0; 3],
+            change: None,
+        };
+        for (response, change) in responses.iter().zip(changes) {
+            for (total, part) in sum.unknowns.iter_mut().zip(&response.unknowns) {
+                *total += change * part;
+            }
+            for (total, part) in sum.tip_mm.iter_mut().zip(response.tip_mm) {
+                *total += change * part;
+            }
+        }
+        sum
+    }
+
+    /// The largest part of it.
+    pub fn size(&self) -> f64 {
+        let parts = self.unknowns.iter();
+        parts.fold(0.0, |most, part| most.max(part.abs()))
+    }
+}
+
+/// What tells of films beside one, made when it is first asked for.
+#[derive(Default)]
+pub(crate) struct Beside {
+    /// Each post moved along x and y, back and forth.
+    posts: std::sync::OnceLock<Vec<[Hold; 2]>>,
+    /// Smaller and larger posts; less and more overhang.
+    morphed: [std::sync::OnceLock<[Shell; 2]>; 2],
+}
+
 impl Film {
-    /// How a state answers to each change, per unit of it.
+    /// How a state answers to each change, per unit of it, as long as the tip's force is what it
+    /// is: the stiffness is factored once.
     ///
     /// # Errors
-    /// When the stiffness is not positive definite: a force would not hold the film there.
-    pub fn answers(
+    /// When the stiffness is not positive definite: a force would not hold the film there. When the
+    /// state is of another mesh.
+    pub fn linearize(
         &self,
-        beside: &Neighbours,
         state: &Equilibrium,
         changes: &[Change],
     ) -> Result<Vec<Response>, ShellError> {
+        self.fits(state)?;
         let factors = self.factors_at(state)?;
-        let mut sides = Vec::new();
-        for &change in changes {
-            sides.extend(self.force_of(beside, state, change));
+        let of_sheet: Vec<Change> = changes.iter().copied().filter(|c| c.of_sheet()).collect();
+        let mut by_sheet = match of_sheet.is_empty() {
+            true => Vec::new(),
+            false => self.shell().by_sheet(state.unknowns(), &of_sheet),
         }
-        factors.solve(&mut sides, changes.len());
+        .into_iter();
+        let mut sides = Vec::with_capacity(changes.len() * self.unknowns());
+        for &change in changes {
+            let side = match change.of_sheet() {
+                true => by_sheet.next().map(negative).unwrap_or_default(),
+                false => self.force_of(state, change),
+            };
+            sides.extend(side);
+        }
+        factors.solve(&mut sides, changes.len().max(1));
+        let tip = self.tip_of(&state.touched);
         let columns = sides.chunks(self.unknowns()).zip(changes);
-        let answer = |(unknowns, change): (&[f64], &Change)| {
-            let mut response = self.response(unknowns.to_vec());
-            // A tip that moved sees another part of the film.
-            if let Change::Place(_) | Change::TipRadius = change {
-                let shares = self.shares_by(*change);
-                let seen = self.mean(&shares, state);
-                for (sum, part) in response.tip_mm.iter_mut().zip(seen) {
+        let answer = |(unknowns, &change): (&[f64], &Change)| {
+            let mut tip_mm = mean(&tip, unknowns);
+            // A tip that moved, or cells that did, see another part of the film.
+            if let Some(shares) = self.shares_by(&state.touched, change) {
+                let seen = mean(&shares, state.unknowns());
+                for (sum, part) in tip_mm.iter_mut().zip(seen) {
                     *sum += part;
                 }
             }
-            response
+            Response {
+                unknowns: unknowns.to_vec(),
+                tip_mm,
+                change: Some(change),
+            }
         };
         Ok(columns.map(answer).collect())
     }
 
+    /// How a state answers to one more newton along x, y and z, and to a tip that touches the film
+    /// one millimetre farther along x and y with the force kept: its derivatives.
+    ///
+    /// # Errors
+    /// When the stiffness is not positive definite: a force would not hold the film there.
+    pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], ShellError> {
+        let load: Vec<Change> = Change::of_sweep().take(5).collect();
+        let answers = self.linearize(state, &load)?;
+        answers
+            .try_into()
+            .map_err(|_| ShellError::Solver("five changes have five answers".into()))
+    }
+
+    /// The state beside this one that a response foretells, `units` away; only its unknowns are
+    /// changed.
+    pub fn beside(&self, state: &Equilibrium, response: &Response, units: f64) -> Equilibrium {
+        let mut there = state.clone();
+        for (u, part) in there.unknowns.iter_mut().zip(&response.unknowns) {
+            *u += units * part;
+        }
+        there
+    }
+
+    /// How [`Film::displacement`] at a point (mm, of the mounted film) answers to the change that a
+    /// response is to, mm per unit: by the film's motion, and by what the change itself makes of
+    /// the surface.
+    pub fn surface_rate(
+        &self,
+        state: &Equilibrium,
+        response: &Response,
+        point_mm: [f64; 2],
+    ) -> [f64; 3] {
+        let grid = self.shell().grid();
+        let place = grid.place(point_mm);
+        let [mut a1, mut a2] = grid.gradients(state.unknowns(), &place);
+        a1[0] += 1.0;
+        a2[1] += 1.0;
+        let mut moved = grid.interpolate(&response.unknowns, &place);
+        let mut turned = grid.gradients(&response.unknowns, &place);
+        if let Some(k) = response.change.and_then(Change::morph) {
+            let [back, forth] = self.morphed(k);
+            let seen = [back, forth].map(|shell| {
+                let place = shell.grid().place(point_mm);
+                let [b1, b2] = shell.grid().gradients(state.unknowns(), &place);
+                [shell.grid().interpolate(state.unknowns(), &place), b1, b2]
+            });
+            let parts = [&mut moved];
+            let [first, second] = &mut turned;
+            for (k, sum) in parts.into_iter().chain([first, second]).enumerate() {
+                for c in 0..3 {
+                    sum[c] += (seen[1][k][c] - seen[0][k][c]) / (2.0 * MORPH_STEP_MM);
+                }
+            }
+        }
+
+        let area = cross(&a1, &a2);
+        let size = dot(&area, &area).sqrt();
+        let n = area.map(|part| part / size);
+        let [by1, by2] = [cross(&turned[0], &a2), cross(&a1, &turned[1])];
+        let swung: V3 = std::array::from_fn(|c| by1[c] + by2[c]);
+        let grown = dot(&swung, &n) / size;
+        let leant: V3 = std::array::from_fn(|c| swung[c] / size - grown * n[c]);
+        let half = self.half_mm(point_mm, size, 0.0);
+        let thinner = self.half_rate(point_mm, size, grown, response.change);
+        let flat = self.half_rate(point_mm, 1.0, 0.0, response.change);
+        let up = [0.0, 0.0, flat];
+        std::array::from_fn(|c| moved[c] - thinner * n[c] - half * leant[c] + up[c])
+    }
+
+    /// How [`Film::displacement`] changes along the mounted film by x and by y, mm per mm.
+    pub fn surface_slopes(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [[f64; 3]; 2] {
+        [0, 1].map(|way| {
+            let [back, forth] = BESIDE.map(|sign| {
+                let mut there = point_mm;
+                there[way] += sign * SURFACE_STEP_MM;
+                self.displacement(state, there)
+            });
+            std::array::from_fn(|c| (forth[c] - back[c]) / (2.0 * SURFACE_STEP_MM))
+        })
+    }
+
+    /// How half of the thickness at a point, where the area is `size` times that of the flat
+    /// mounted film and grows by `grown` of itself, answers to a change, mm per unit.
+    fn half_rate(&self, point: [f64; 2], size: f64, grown: f64, change: Option<Change>) -> f64 {
+        let sheet = self.shell().sheet();
+        let [across, down] = sheet.scales();
+        let (rubber, stretched) = (sheet.law.neo_hooke, across * down * size);
+        let unstretched = 0.5 * sheet.material.thickness_mm * sheet.relative(point);
+        let half = self.half_mm(point, size, 0.0);
+        let own = match change {
+            Some(Change::Thickness) => half / sheet.material.thickness_mm,
+            Some(change @ (Change::ThicknessSlope(_) | Change::ThicknessCurve(_))) => {
+                let term = change.term().unwrap_or_default();
+                half * crate::sheet::Sheet::terms_at(point)[term] / sheet.relative(point)
+            }
+            Some(Change::NeoHooke) => unstretched * (1.0 / stretched - 1.0),
+            Some(Change::Stretch(way)) => {
+                -unstretched * rubber / stretched / sheet.scales()[way]
+            }
+            _ => 0.0,
+        };
+        own - unstretched * rubber / stretched * grown
+    }
+
     /// The force on each unknown that one unit of a change leaves unbalanced, N.
-    fn force_of(&self, beside: &Neighbours, state: &Equilibrium, change: Change) -> Vec<f64> {
-        let u = state.unknowns();
+    fn force_of(&self, state: &Equilibrium, change: Change) -> Vec<f64> {
+        let (u, grid) = (state.unknowns(), self.shell().grid());
         match change {
             Change::Force(axis) => {
                 let mut force = [0.0; 3];
                 force[axis] = 1.0;
-                self.load(&force)
+                weighted(&self.tip_of(&state.touched), &force)
             }
-            Change::Place(_) | Change::TipRadius => {
-                Film::spread(&self.shares_by(change), &state.force_n)
+            Change::Grip => negative(self.shell().pull(u)),
+            Change::Post(post, way) => {
+                let [back, forth] = &self.posts_beside()[2 * post + way];
+                let mut sum = vec![0.0; u.len()];
+                back.pull(grid, u, 0.5 / POST_STEP_MM, &mut sum);
+                forth.pull(grid, u, -0.5 / POST_STEP_MM, &mut sum);
+                sum
             }
-            Change::Thickness => {
-                let [thinner, thicker] = &beside.thinner_and_thicker;
-                let pair = thinner.gradient(u).into_iter().zip(thicker.gradient(u));
-                pair.map(|(a, b)| (a - b) / (2.0 * beside.step_mm))
-                    .collect()
+            _ => {
+                let shares = self.shares_by(&state.touched, change);
+                let mut sum = shares.map_or_else(
+                    || vec![0.0; u.len()],
+                    |shares| weighted(&shares, &state.force_n),
+                );
+                if let Some(k) = change.morph() {
+                    let [back, forth] = self.morphed(k);
+                    let pair = back.first(u).1.into_iter().zip(forth.first(u).1);
+                    for (sum, (back, forth)) in sum.iter_mut().zip(pair) {
+                        *sum += (back - forth) / (2.0 * MORPH_STEP_MM);
+                    }
+                }
+                sum
             }
-            Change::Grip => {
-                let springs = self.design().springs(self.shell().grid());
-                let pull = self.shell().pull(u, &springs);
-                pull.into_iter().map(|part| -part).collect()
-            }
-            Change::Post(post, way) => self.force_of_post(u, post, way),
         }
     }
 
-    fn force_of_post(&self, u: &[f64], post: usize, way: usize) -> Vec<f64> {
+    /// How the tip's shares change, per unit of a change that they answer to.
+    fn shares_by(&self, tip: &Tip, change: Change) -> Option<Vec<f64>> {
+        let grid = self.shell().grid();
+        let there = |sign: f64| -> Option<(&Grid, Tip)> {
+            let mut tip = *tip;
+            match change {
+                Change::Place(way) => tip.place_mm[way] += sign * TIP_STEP_MM,
+                Change::TipRadius => tip.radius_mm += sign * TIP_STEP_MM,
+                _ => {
+                    let [back, forth] = self.morphed(change.morph()?);
+                    let shell = if sign < 0.0 { back } else { forth };
+                    return Some((shell.grid(), tip));
+                }
+            }
+            Some((grid, tip))
+        };
+        let step = match change.morph() {
+            Some(_) => MORPH_STEP_MM,
+            None => TIP_STEP_MM,
+        };
         let [back, forth] = BESIDE.map(|sign| {
-            let mut design = self.design().clone();
-            design.post_shift_mm[post][way] += sign * POST_STEP_MM;
-            self.shell().pull(u, &design.springs(self.shell().grid()))
+            there(sign).map(|(grid, tip)| tip_shares(grid, tip.place_mm, tip.radius_mm))
         });
-        let pairs = back.iter().zip(&forth);
-        pairs.map(|(a, b)| (a - b) / (2.0 * POST_STEP_MM)).collect()
+        let pairs = forth?.into_iter().zip(back?);
+        Some(pairs.map(|(b, a)| (b - a) / (2.0 * step)).collect())
     }
 
-    /// How the tip's shares change with its place or radius, per mm.
-    fn shares_by(&self, change: Change) -> Vec<f64> {
-        let [back, forth] = BESIDE.map(|sign| {
-            let mut design = self.design().clone();
-            match change {
-                Change::Place(way) => design.tip_offset_mm[way] += sign * TIP_STEP_MM,
-                _ => design.tip_radius_mm += sign * TIP_STEP_MM,
-            }
-            self.shares(&design)
-        });
-        let pairs = forth.iter().zip(&back);
-        pairs.map(|(b, a)| (b - a) / (2.0 * TIP_STEP_MM)).collect()
+    fn posts_beside(&self) -> &[[Hold; 2]] {
+        self.around().posts.get_or_init(|| {
+            let moved = |k: usize| {
+                BESIDE.map(|sign| {
+                    let mut design = self.design().clone();
+                    design.post_shift_mm[k / 2][k % 2] += sign * POST_STEP_MM;
+                    Hold::new(self.shell().grid(), design.springs(Some(k / 2)))
+                })
+            };
+            (0..8).map(moved).collect()
+        })
     }
+
+    fn morphed(&self, k: usize) -> &[Shell; 2] {
+        self.around().morphed[k].get_or_init(|| {
+            BESIDE.map(|sign| {
+                let mut design = Design {
+                    cells: Some(self.design().cells()),
+                    ..self.design().clone()
+                };
+                match k {
+                    0 => design.post_radius_mm += sign * MORPH_STEP_MM,
+                    _ => design.overhang_mm += sign * MORPH_STEP_MM,
+                }
+                design.shell(Some(self.shell().pattern()))
+            })
+        })
+    }
+}
+
+fn negative(mut force: Vec<f64>) -> Vec<f64> {
+    for part in &mut force {
+        *part = -*part;
+    }
+    force
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Contact;
+    use crate::{Contact, Law};
+
+    const POINT_MM: [f64; 2] = [3.7, -3.7];
+
+    fn changed(design: &Design, force: &mut [f64; 3], change: Change, by: f64) -> Design {
+        let mut there = design.clone();
+        match change {
+            Change::Force(axis) => force[axis] += by,
+            Change::Place(way) => there.tip_offset_mm[way] += by,
+            Change::TipRadius => there.tip_radius_mm += by,
+            Change::Thickness => there.material.thickness_mm += by,
+            Change::Grip => there.post_grip_n_per_mm3 *= 1.0 + by,
+            Change::Post(post, way) => there.post_shift_mm[post][way] += by,
+            Change::Youngs => there.material.youngs_mpa *= by.exp(),
+            Change::Stretch(way) => there.stretch[way] += by,
+            Change::NeoHooke => there.law.neo_hooke += by,
+            Change::Stiffening => there.law.stiffening += by,
+            Change::ThicknessSlope(k) => there.thickness_slope[k] += by,
+            Change::ThicknessCurve(k) => there.thickness_curve[k] += by,
+            Change::DotStiffening => there.dot_stiffening += by,
+            Change::Down(axis) => there.down[axis] += by,
+            Change::PostRadius => there.post_radius_mm += by,
+            Change::Overhang => there.overhang_mm += by,
+        }
+        there
+    }
 
     /// Every answer is the difference of full solutions.
+    fn answers_are_differences(design: &Design, force: [f64; 3]) {
+        let film = Film::new(design).unwrap();
+        let state = film.press(Contact::Force(force), &film.rest()).unwrap();
+        let pressed = |change, by| {
+            let mut force = force;
+            let there = film.changed(&changed(design, &mut force, change, by)).unwrap();
+            let pressed = there.press(Contact::Force(force), &state).unwrap();
+            (
+                there.displacement(&pressed, POINT_MM),
+                pressed.tip_mm,
+                there.displacement(&there.rest(), POINT_MM),
+            )
+        };
+        let changes: Vec<Change> = Change::all().collect();
+        let answers = film.linearize(&state, &changes).unwrap();
+        let at_rest = film.linearize(&film.rest(), &changes).unwrap();
+        for (k, change) in changes.into_iter().enumerate() {
+            let step = match change {
+                Change::Post(..) => 2e-2,
+                Change::Stretch(_) => 2e-4,
+                _ => 1e-3,
+            };
+            let (back, forth) = (pressed(change, -step), pressed(change, step));
+            let slope = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] {
+                std::array::from_fn(|c| (b[c] - a[c]) / (2.0 * step))
+            };
+            let mut pairs = vec![
+                (
+                    "surface",
+                    film.surface_rate(&state, &answers[k], POINT_MM),
+                    slope(back.0, forth.0),
+                ),
+                ("tip", answers[k].tip_mm, slope(back.1, forth.1)),
+            ];
+            // Forces at rest are none.
+            if !Change::of_sweep().take(6).any(|load| load == change) {
+                let told = film.surface_rate(&film.rest(), &at_rest[k], POINT_MM);
+                pairs.push(("rest", told, slope(back.2, forth.2)));
+            }
+            for (what, told, full) in pairs {
+                for c in 0..3 {
+                    assert!(
+                        (told[c] - full[c]).abs() < 2e-3 * full[c].abs() + 2e-4,
+                        "{change:?} {what} {c}: {told:?} {full:?}"
+                    );
+                }
+            }
+        }
+    }
+
     #[test]
-    fn answers_are_differences() {
-        let design = Design {
+    fn answers_of_a_nominal_film_are_differences() {
+        let mut design = Design {
             fineness: 0.5,
             tip_offset_mm: [2.0, 1.0],
             ..Design::default()
         };
-        let force = [0.02, -0.01, -0.1];
-        let pressed = |design: &Design, force: [f64; 3]| {
-            let film = Film::new(design).unwrap();
-            let state = film.press(Contact::Force(force), &film.rest()).unwrap();
-            (film.displacement(&state, [3.7, -3.7]), state.tip_mm)
+        // Where numbers may go both ways.
+        design.overhang_mm = 0.01;
+        design.law = Law {
+            neo_hooke: 0.01,
+            stiffening: 0.01,
         };
-        let film = Film::new(&design).unwrap();
-        let state = film.press(Contact::Force(force), &film.rest()).unwrap();
-        let changes: Vec<Change> = Change::all().collect();
-        let beside = Neighbours::of(&design);
-        let answers = film.answers(&beside, &state, &changes).unwrap();
-        for (change, answer) in changes.into_iter().zip(&answers) {
-            let step = 1e-3;
-            let [back, forth] = BESIDE.map(|sign| {
-                let (mut there, mut pull) = (design.clone(), force);
-                let by = sign * step;
-                match change {
-                    Change::Force(axis) => pull[axis] += by,
-                    Change::Place(way) => there.tip_offset_mm[way] += by,
-                    Change::TipRadius => there.tip_radius_mm += by,
-                    Change::Thickness => there.material.thickness_mm += by,
-                    Change::Grip => there.post_grip_n_per_mm3 *= 1.0 + by,
-                    Change::Post(post, way) => there.post_shift_mm[post][way] += 20.0 * by,
-                }
-                pressed(&there, pull)
-            });
-            let unit = match change {
-                Change::Post(..) => 20.0 * step,
-                _ => step,
-            };
-            let half = |sign: f64| {
-                let by = match change {
-                    Change::Thickness => sign * 1e-6,
-                    _ => 0.0,
-                };
-                let there = film.beside(&state, answer, sign * 1e-6);
-                film.surface(&there, [3.7, -3.7], (0.5 + by) / 2.0)
-            };
-            let [before, after] = BESIDE.map(half);
-            for c in 0..3 {
-                let full = (forth.0[c] - back.0[c]) / (2.0 * unit);
-                let told = (after[c] - before[c]) / 2e-6;
-                assert!(
-                    (told - full).abs() < 2e-3 * full.abs() + 2e-4,
-                    "{change:?} {c}: {told} {full}"
-                );
-                let full = (forth.1[c] - back.1[c]) / (2.0 * unit);
-                let told = answer.tip_mm[c];
-                assert!(
-                    (told - full).abs() < 2e-3 * full.abs() + 2e-4,
-                    "{change:?} tip {c}: {told} {full}"
-                );
-            }
-        }
+        design.dot_stiffening = 0.01;
+        answers_are_differences(&design, [0.02, -0.01, -0.1]);
+    }
+
+    #[test]
+    fn answers_of_a_mounted_film_are_differences() {
+        let design = Design {
+            fineness: 0.4,
+            overhang_mm: 4.0,
+            post_radius_mm: 1.8,
+            post_shift_mm: [[0.2, -0.1], [0.0, 0.3], [-0.2, 0.0], [0.1, 0.1]],
+            tip_offset_mm: [-1.0, 2.0],
+            stretch: [0.012, 0.004],
+            law: Law {
+                neo_hooke: 0.8,
+                stiffening: 0.1,
+            },
+            thickness_slope: [0.05, -0.04],
+            thickness_curve: [0.03, 0.02, -0.05],
+            down: [0.3, -0.2, -0.9],
+            dot_stiffening: 0.7,
+            ..Design::default()
+        };
+        answers_are_differences(&design, [0.06, -0.03, -0.15]);
+    }
+
+    #[test]
+    fn slack_films_answer_too() {
+        let design = Design {
+            fineness: 0.3,
+            stretch: [-0.003, -0.002],
+            down: [0.0, 0.0, 1.0],
+            law: Law {
+                neo_hooke: 0.5,
+                stiffening: 0.05,
+            },
+            dot_stiffening: 0.3,
+            overhang_mm: 1.0,
+            ..Design::default()
+        };
+        answers_are_differences(&design, [0.01, 0.0, -0.1]);
     }
 }

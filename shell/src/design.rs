@@ -1,14 +1,17 @@
 //! What a film is: its dimensions, its material and how finely it is computed.
 
 use std::f64::consts::PI;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
+use hivtac_film::MARKER_CENTRES_MM;
 use hivtac_film::reduced::Unit;
 
 use crate::ShellError;
 use crate::grid::Grid;
-use crate::point::Material;
-use crate::shell::{Shell, Spring};
+use crate::point::{Law, Material};
+use crate::sheet::Sheet;
+use crate::shell::{Hold, Shell};
+use crate::sparse::Pattern;
 use crate::spline::Axis;
 
 /// Points along a post by which it holds the film, both ways.
@@ -26,6 +29,8 @@ const GROWTH: f64 = 0.25;
 const TIP_CELL_MM: f64 = 0.5;
 const POST_CELL_MM: f64 = 0.35;
 const LARGEST_CELL_MM: f64 = 1.6;
+/// Steps in which cells are laid out.
+const SAMPLES: usize = 4000;
 
 /// The farthest that a post may be off its place along x and along y, mm.
 pub const MOST_POST_SHIFT_MM: f64 = 1.0;
@@ -40,6 +45,24 @@ pub struct Design {
     pub overhang_mm: f64,
     /// What it is made of.
     pub material: Material,
+    /// How it answers to being stretched.
+    pub law: Law,
+    /// The stretch with which it is mounted, along x and y: 0.012 has cut it 1.2 % shorter than it
+    /// is between the posts. −0.01 to 0.05.
+    pub stretch: [f64; 2],
+    /// How its thickness varies over the mounted film: t = thickness · (1 + sx X + sy Y + cxx X² +
+    /// cxy X Y + cyy Y²), X = x / 14 mm; this is (sx, sy). Nowhere below half nor above twice the
+    /// nominal thickness.
+    pub thickness_slope: [f64; 2],
+    /// See there: (cxx, cxy, cyy).
+    pub thickness_curve: [f64; 3],
+    /// Gravity in the film's frame, in parts of g; zeros: a weightless film. |down| ≤ 2.
+    pub down: [f64; 3],
+    /// How much stiffer, in parts of the film's own stiffness, it is on dots of 1 mm diameter, 0 to
+    /// 3.
+    pub dot_stiffening: f64,
+    /// Where those dots are on the mounted film, mm from the middle.
+    pub dots_mm: Vec<[f64; 2]>,
     /// Radius of the discs around the posts' centres on which the film is held, > 0.
     pub post_radius_mm: f64,
     /// How far each post is off its place, in the order of the markers' identities; the film is cut
@@ -56,6 +79,9 @@ pub struct Design {
     pub tip_offset_mm: [f64; 2],
     /// 1: the default mesh; 2: cells of half the size; 0.25 to 8.
     pub fineness: f64,
+    /// Cells along half of the edge, 4 to 400; none: as many as the fineness asks for. Films of as
+    /// many cells can be started from each other's states.
+    pub cells: Option<usize>,
 }
 
 impl Default for Design {
@@ -68,12 +94,20 @@ impl Default for Design {
                 poisson: 0.49,
                 thickness_mm: 0.5,
             },
+            law: Law::default(),
+            stretch: [0.0; 2],
+            thickness_slope: [0.0; 2],
+            thickness_curve: [0.0; 3],
+            down: [0.0; 3],
+            dot_stiffening: 0.0,
+            dots_mm: MARKER_CENTRES_MM.to_vec(),
             post_radius_mm: 1.5,
             post_shift_mm: [[0.0; 2]; 4],
             post_grip_n_per_mm3: 20.0,
             tip_radius_mm: 0.5,
             tip_offset_mm: [0.0; 2],
             fineness: 1.0,
+            cells: None,
         }
     }
 }
@@ -108,13 +142,17 @@ impl Design {
         positive("span", self.span_mm)?;
         positive("post radius", self.post_radius_mm)?;
         positive("post grip", self.post_grip_n_per_mm3)?;
-        positive("tip radius", self.tip_radius_mm)?;
         positive("Young's modulus", material.youngs_mpa)?;
         positive("thickness", material.thickness_mm)?;
         let ranged = [
             ("overhang", self.overhang_mm, 0.0, self.span_mm),
             ("Poisson's ratio", material.poisson, -0.99, 0.5),
             ("fineness", self.fineness, 0.25, 8.0),
+            ("stretch along x", self.stretch[0], -0.01, 0.05),
+            ("stretch along y", self.stretch[1], -0.01, 0.05),
+            ("part of neo-Hooke's law", self.law.neo_hooke, 0.0, 1.0),
+            ("stiffening", self.law.stiffening, 0.0, 0.5),
+            ("dots' stiffening", self.dot_stiffening, 0.0, 3.0),
         ];
         for (what, value, from, to) in ranged {
             if !(from..=to).contains(&value) {
@@ -127,12 +165,65 @@ impl Design {
                 return Err(refused("post shift", part, &bound));
             }
         }
-        self.check_tip()
+        self.check_sheet()?;
+        self.check_tip_at(self.tip_offset_mm, self.tip_radius_mm)
     }
 
-    fn check_tip(&self) -> Result<(), ShellError> {
-        let free = self.span_mm / 2.0 - self.post_radius_mm - self.tip_radius_mm;
-        for offset in self.tip_offset_mm {
+    fn check_sheet(&self) -> Result<(), ShellError> {
+        let down = self.down.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if !(0.0..=2.0).contains(&down) {
+            return Err(refused("size of gravity", down, "between 0 and 2"));
+        }
+        if self.cells.is_some_and(|cells| !(4..=400).contains(&cells)) {
+            let cells = self.cells.unwrap_or_default() as f64;
+            return Err(refused("number of cells", cells, "between 4 and 400"));
+        }
+        let edge = self.half_edge_mm();
+        for part in self.dots_mm.iter().flatten() {
+            if !(-edge..=edge).contains(part) {
+                let bound = format!("within ±{edge} mm, where the film is");
+                return Err(refused("dot's place", *part, &bound));
+            }
+        }
+        let sheet = self.sheet();
+        for i in -16..=16 {
+            for j in -16..=16 {
+                let at = [i, j].map(|k| edge * f64::from(k) / 16.0);
+                let relative = sheet.relative(at);
+                if !(0.5..=2.0).contains(&relative) {
+                    let bound = "within half and twice the nominal thickness all over the film";
+                    return Err(refused("relative thickness", relative, bound));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The film as a sheet, whatever holds it.
+    pub(crate) fn sheet(&self) -> Sheet {
+        let ([sx, sy], [cxx, cxy, cyy]) = (self.thickness_slope, self.thickness_curve);
+        Sheet {
+            material: self.material,
+            law: self.law,
+            stretch: self.stretch,
+            terms: [sx, sy, cxx, cxy, cyy],
+            down: self.down,
+            dots_mm: self.dots_mm.clone(),
+            dot_stiffening: self.dot_stiffening,
+        }
+    }
+
+    /// Cells along half of the edge.
+    pub fn cells(&self) -> usize {
+        self.cells
+            .unwrap_or_else(|| self.counts().last().map_or(0.0, |most| most.ceil()) as usize)
+    }
+
+    /// Whether a tip there (mm) is clear of the posts.
+    pub(crate) fn check_tip_at(&self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), ShellError> {
+        positive("tip radius", radius_mm)?;
+        let free = self.span_mm / 2.0 - self.post_radius_mm - radius_mm;
+        for offset in offset_mm {
             if !(-free..=free).contains(&offset) {
                 let bound = format!("within ±{free} mm, where the tip is clear of the posts");
                 return Err(refused("tip offset", offset, &bound));
@@ -141,48 +232,55 @@ impl Design {
         Ok(())
     }
 
-    /// The film, held by its posts.
-    pub(crate) fn shell(&self) -> Shell {
+    /// The film's cells.
+    pub(crate) fn grid(&self) -> Grid {
         let breaks = self.breaks();
-        let axes = [Axis::new(&breaks), Axis::new(&breaks)];
-        let mut shell = Shell::new(Grid { axes }, &self.material);
-        let springs = self.springs(shell.grid());
-        shell.hold(springs);
+        Grid {
+            axes: [Axis::new(&breaks), Axis::new(&breaks)],
+        }
+    }
+
+    /// The film, held by its posts; `pattern` is that of a film of as many cells.
+    pub(crate) fn shell(&self, pattern: Option<&Arc<Pattern>>) -> Shell {
+        let (grid, sheet) = (self.grid(), self.sheet());
+        let mut shell = match pattern {
+            Some(pattern) => Shell::of(grid, &sheet, Arc::clone(pattern)),
+            None => Shell::new(grid, &sheet),
+        };
+        let hold = Hold::new(shell.grid(), self.springs(None));
+        shell.hold(hold);
         shell
     }
 
-    /// What holds a film over `grid`.
-    pub(crate) fn springs(&self, grid: &Grid) -> Vec<Spring> {
-        let spring = |(point, area)| Spring {
-            place: grid.place(point),
-            stiffness: area * self.post_grip_n_per_mm3,
-        };
-        self.post_points().into_iter().map(spring).collect()
+    /// What holds the film, N/mm at points; of all posts or one.
+    pub(crate) fn springs(&self, post: Option<usize>) -> impl Iterator<Item = ([f64; 2], f64)> {
+        let grip = self.post_grip_n_per_mm3;
+        let points = self.points_of_posts(post).into_iter();
+        points.map(move |(point, area)| (point, area * grip))
     }
 
     /// The points of the film on which the tip presses, mm at rest, with their shares of its force.
     pub fn tip_points(&self) -> Vec<([f64; 2], f64)> {
-        let radius = self.tip_radius_mm;
-        let points: Vec<_> = disc(self.tip_offset_mm, radius, TIP_RINGS, TIP_RAYS)
-            .map(|(point, area, r)| (point, area * (1.0 - (r / radius).powi(2)).powi(2)))
-            .collect();
-        let total: f64 = points.iter().map(|(_, share)| share).sum();
-        points
-            .into_iter()
-            .map(|(point, share)| (point, share / total))
-            .collect()
+        tip_points(self.tip_offset_mm, self.tip_radius_mm)
     }
 
     /// The points of the film on posts, mm at rest, with their areas in mm²: Gauss's over the angle
     /// whose sine is x, and along the chord there. They follow a post that is shifted, and the
     /// film's edge cuts them, without a jump.
     pub fn post_points(&self) -> Vec<([f64; 2], f64)> {
+        self.points_of_posts(None)
+    }
+
+    fn points_of_posts(&self, only: Option<usize>) -> Vec<([f64; 2], f64)> {
         let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
         let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];
         let radius = self.post_radius_mm;
         let on_film = |from: f64, to: f64| [from.max(-edge), to.min(edge)];
         let mut points = Vec::new();
-        for ([cx, cy], [dx, dy]) in centres.into_iter().zip(self.post_shift_mm) {
+        for (post, ([cx, cy], [dx, dy])) in centres.into_iter().zip(self.post_shift_mm).enumerate() {
+            if only.is_some_and(|only| only != post) {
+                continue;
+            }
             let (cx, cy) = (cx + dx, cy + dy);
             let angles = on_film(cx - radius, cx + radius)
                 .map(|x| ((x - cx) / radius).clamp(-1.0, 1.0).asin());
@@ -197,15 +295,9 @@ impl Design {
 
     /// Cell borders along one side: even steps in the integral of 1 / (wanted size), symmetric.
     fn breaks(&self) -> Vec<f64> {
-        const SAMPLES: usize = 4000;
-        let edge = self.half_edge_mm();
-        let step = edge / SAMPLES as f64;
-        let mut counts = vec![0.0];
-        for i in 0..SAMPLES {
-            let at = (i as f64 + 0.5) * step;
-            counts.push(counts[i] + step / self.cell_mm(at));
-        }
-        let cells = counts[SAMPLES].ceil();
+        let step = self.half_edge_mm() / SAMPLES as f64;
+        let counts = self.counts();
+        let cells = self.cells.map_or(counts[SAMPLES].ceil(), |cells| cells as f64);
         let scale = counts[SAMPLES] / cells;
         let border = |k: usize| {
             let i = counts
@@ -219,6 +311,17 @@ impl Design {
         left.chain([0.0]).chain(half.iter().copied()).collect()
     }
 
+    /// How many cells are wanted from the middle to each of many even steps towards the edge.
+    fn counts(&self) -> Vec<f64> {
+        let step = self.half_edge_mm() / SAMPLES as f64;
+        let mut counts = vec![0.0];
+        for i in 0..SAMPLES {
+            let at = (i as f64 + 0.5) * step;
+            counts.push(counts[i] + step / self.cell_mm(at));
+        }
+        counts
+    }
+
     /// The wanted size of a cell `at` mm from the middle: small wherever a tip may press, and at
     /// the posts.
     fn cell_mm(&self, at: f64) -> f64 {
@@ -227,6 +330,18 @@ impl Design {
         let post = POST_CELL_MM + GROWTH * outside.max(0.0);
         tip.min(post).min(LARGEST_CELL_MM) / self.fineness
     }
+}
+
+/// The points on which a tip presses, mm, with their shares of its force.
+pub(crate) fn tip_points(place_mm: [f64; 2], radius: f64) -> Vec<([f64; 2], f64)> {
+    let points: Vec<_> = disc(place_mm, radius, TIP_RINGS, TIP_RAYS)
+        .map(|(point, area, r)| (point, area * (1.0 - (r / radius).powi(2)).powi(2)))
+        .collect();
+    let total: f64 = points.iter().map(|(_, share)| share).sum();
+    points
+        .into_iter()
+        .map(|(point, share)| (point, share / total))
+        .collect()
 }
 
 /// Gauss's points on a length, with their weights: none on one that is not there.

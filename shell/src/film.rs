@@ -1,11 +1,19 @@
 //! The film under a tip.
 
-use crate::answers::{Change, Neighbours};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use crate::answers::Beside;
+use crate::design::tip_points;
+use crate::grid::Grid;
 use crate::newton::{Guide, Problem, Solution};
-use crate::point::{V3, dot, normal};
+use crate::point::{V3, cross, dot};
 use crate::shell::Shell;
 use crate::sparse::{COMPONENTS, Factors, Solver};
 use crate::{Design, ShellError};
+
+/// A slack film is pushed by so much to begin with, so that it knows which way to bulge, mm.
+const PUSH_MM: f64 = 1e-2;
 
 /// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a
 /// press has F_z < 0).
@@ -13,9 +21,10 @@ use crate::{Design, ShellError};
 pub enum Contact {
     /// It presses with this force (N) and goes where the film lets it: the `force` reading.
     Force([f64; 3]),
-    /// It goes this far (mm) with the film stuck to it, whatever the force.
+    /// It goes this far (mm, from the flat mounted film) with the film stuck to it, whatever the
+    /// force.
     Travel([f64; 3]),
-    /// It moves along a direction (of any length) with the film stuck to it, until the force along
+    /// From the film at rest it moves along a direction (of any length) with the film stuck to it, until the force along
     /// that direction is `force_n`, as a gauge on a stage reads it: the `stick` reading.
     Stick {
         /// Where the tip moves; its third part < 0.
@@ -39,20 +48,34 @@ pub struct Touch {
     pub radius_mm: f64,
 }
 
-/// A film ready to be pressed.
+/// Where a tip is and how large.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Tip {
+    /// Its middle on the mounted film, mm.
+    pub place_mm: [f64; 2],
+    /// The radius of its disc, mm.
+    pub radius_mm: f64,
+}
+
+/// A film ready to be pressed; threads can share it.
 pub struct Film {
     design: Design,
     shell: Shell,
-    solver: Solver,
+    solver: Arc<Solver>,
     /// The share of each coefficient in the tip's mean displacement.
     tip: Vec<f64>,
+    /// The unknowns at rest, mm, and the steps that they took.
+    rest: Solution,
+    around: Beside,
 }
 
 /// A film at rest or pressed.
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
-    unknowns: Vec<f64>,
-    /// Where the tip's disc went (mean over it, weighted as its force), mm.
+    pub(crate) unknowns: Vec<f64>,
+    pub(crate) touched: Tip,
+    /// Where the tip's disc went from the flat mounted film (mean over it, weighted as its force),
+    /// mm.
     pub tip_mm: [f64; 3],
     /// The tip's force on the film, N.
     pub force_n: [f64; 3],
@@ -63,20 +86,51 @@ pub struct Equilibrium {
 }
 
 impl Film {
-    /// Prepares the film of a design.
+    /// Prepares the film of a design and finds how it rests.
     ///
     /// # Errors
-    /// When the design cannot be ([`Design::check`]), or memory runs out.
+    /// When the design cannot be ([`Design::check`]), memory runs out, or the film finds no rest.
     pub fn new(design: &Design) -> Result<Film, ShellError> {
         design.check()?;
-        let shell = design.shell();
-        let solver = Solver::new(shell.pattern())?;
-        let tip = tip_shares(&shell, design);
+        let shell = design.shell(None);
+        let solver = Arc::new(Solver::new(shell.pattern())?);
+        Film::of(design, shell, solver, None)
+    }
+
+    /// The film of another design with as many cells as this one, whatever
+    /// [`Design::cells`] says: its rest is found from this one's, and this one's states are starts
+    /// for its own.
+    ///
+    /// # Errors
+    /// As [`Film::new`].
+    pub fn changed(&self, design: &Design) -> Result<Film, ShellError> {
+        let design = Design {
+            cells: Some(self.design.cells()),
+            ..design.clone()
+        };
+        design.check()?;
+        let shell = design.shell(Some(self.shell.pattern()));
+        Film::of(
+            &design,
+            shell,
+            Arc::clone(&self.solver),
+            Some(&self.rest.unknowns),
+        )
+    }
+
+    fn of(
+        design: &Design,
+        shell: Shell,
+        solver: Arc<Solver>,
+        start: Option<&[f64]>,
+    ) -> Result<Film, ShellError> {
         Ok(Film {
+            tip: tip_shares(shell.grid(), design.tip_offset_mm, design.tip_radius_mm),
+            rest: rest_of(design, &shell, &solver, start)?,
             design: design.clone(),
             shell,
             solver,
-            tip,
+            around: Beside::default(),
         })
     }
 
@@ -85,15 +139,15 @@ impl Film {
     /// # Errors
     /// When the tip would press on a post.
     pub fn move_tip(&mut self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), ShellError> {
-        let design = Design {
-            tip_offset_mm: offset_mm,
-            tip_radius_mm: radius_mm,
-            ..self.design.clone()
-        };
-        design.check()?;
-        self.tip = tip_shares(&self.shell, &design);
-        self.design = design;
+        self.check_tip(offset_mm, radius_mm)?;
+        self.tip = tip_shares(self.shell.grid(), offset_mm, radius_mm);
+        self.design.tip_offset_mm = offset_mm;
+        self.design.tip_radius_mm = radius_mm;
         Ok(())
+    }
+
+    fn check_tip(&self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), ShellError> {
+        self.design.check_tip_at(offset_mm, radius_mm)
     }
 
     /// What it was made from.
@@ -106,39 +160,72 @@ impl Film {
         self.shell.grid().unknowns()
     }
 
-    /// The film at rest.
+    /// The film at rest: flat where it is neither stretched nor heavy. A slack film that weighs
+    /// nothing bulges towards the camera.
     pub fn rest(&self) -> Equilibrium {
+        let unknowns = self.rest.unknowns.clone();
         Equilibrium {
-            unknowns: vec![0.0; self.unknowns()],
-            tip_mm: [0.0; 3],
+            tip_mm: mean(&self.tip, &unknowns),
+            touched: self.own_tip(),
             force_n: [0.0; 3],
-            reaction_n: [0.0; 3],
-            steps: 0,
+            reaction_n: self.shell.reaction(&unknowns),
+            steps: self.rest.steps,
+            unknowns,
         }
     }
 
-    /// The film under a contact, found from the state `start` (of this film; the nearer, the
-    /// quicker).
+    /// The film under a contact, found from the state `start` (of this film or of another with as
+    /// many cells; the nearer, the quicker).
     ///
     /// # Errors
-    /// When the contact's numbers are not finite, its direction is none, or no equilibrium is
-    /// found.
+    /// When the contact's numbers are not finite, its direction is none, no equilibrium is found,
+    /// or the start is of another mesh.
     pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, ShellError> {
-        let (force, guides) = self.asked(contact)?;
+        self.press_tip(self.own_tip(), contact, start)
+    }
+
+    /// The same with the tip elsewhere, mm on the mounted film, and of another radius, mm.
+    ///
+    /// # Errors
+    /// The same, and when the tip would press on a post.
+    pub fn press_at(
+        &self,
+        place_mm: [f64; 2],
+        radius_mm: f64,
+        contact: Contact,
+        start: &Equilibrium,
+    ) -> Result<Equilibrium, ShellError> {
+        self.check_tip(place_mm, radius_mm)?;
+        let tip = Tip {
+            place_mm,
+            radius_mm,
+        };
+        self.press_tip(tip, contact, start)
+    }
+
+    fn press_tip(
+        &self,
+        tip: Tip,
+        contact: Contact,
+        start: &Equilibrium,
+    ) -> Result<Equilibrium, ShellError> {
+        self.fits(start)?;
+        let shares = self.tip_of(&tip);
+        let (force, guides) = self.asked(contact, mean(&shares, &self.rest.unknowns))?;
         let guided: Vec<V3> = guides.iter().map(|(direction, _)| *direction).collect();
         let problem = Problem {
             shell: &self.shell,
-            load: weighted(&self.tip, &force),
+            load: weighted(&shares, &force),
             guides: guides
                 .iter()
                 .map(|(direction, target_mm)| Guide {
-                    weights: weighted(&self.tip, direction),
+                    weights: weighted(&shares, direction),
                     target_mm: *target_mm,
                 })
                 .collect(),
         };
         let solution = problem.solve(&self.solver, &start.unknowns)?;
-        Ok(self.equilibrium(solution, force, &guided))
+        Ok(self.equilibrium(solution, force, &guided, tip))
     }
 
     /// The film under several tips at once, each with a force of its own, found from rest. What the
@@ -150,13 +237,8 @@ impl Film {
         let (mut load, mut sum_n) = (vec![0.0; self.unknowns()], [0.0; 3]);
         for touch in touches {
             let force_n = finite("force", touch.force_n)?;
-            let design = Design {
-                tip_offset_mm: touch.at_mm,
-                tip_radius_mm: touch.radius_mm,
-                ..self.design.clone()
-            };
-            design.check()?;
-            let shares = self.shares(&design);
+            self.check_tip(touch.at_mm, touch.radius_mm)?;
+            let shares = tip_shares(self.shell.grid(), touch.at_mm, touch.radius_mm);
             for (sum, part) in load.iter_mut().zip(weighted(&shares, &force_n)) {
                 *sum += part;
             }
@@ -167,30 +249,81 @@ impl Film {
             load,
             guides: Vec::new(),
         };
-        let solution = problem.solve(&self.solver, &self.rest().unknowns)?;
-        Ok(self.equilibrium(solution, sum_n, &[]))
+        let solution = problem.solve(&self.solver, &self.rest.unknowns)?;
+        Ok(self.equilibrium(solution, sum_n, &[], self.own_tip()))
     }
 
-    /// How the camera-side surface point that rests at (x, y) mm moves, mm: half the thickness
-    /// below the middle surface, along its normal.
-    pub fn displacement(&self, state: &Equilibrium, rest_mm: [f64; 2]) -> [f64; 3] {
-        self.surface(state, rest_mm, self.design.material.thickness_mm / 2.0)
+    /// How the camera-side surface point of the mounted film at (x, y) mm is displaced from where
+    /// it is in the flat mounted film, mm: half the thickness below the middle surface, along its
+    /// normal. How it moved since rest is the difference to [`Film::rest`]'s.
+    pub fn displacement(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [f64; 3] {
+        self.surface(state, point_mm, 0.0)
     }
 
-    /// The same of the surface that is `half` mm below the middle one.
-    pub(crate) fn surface(&self, state: &Equilibrium, rest_mm: [f64; 2], half: f64) -> [f64; 3] {
+    /// The same of a film that is `thicker_mm` thicker.
+    pub(crate) fn surface(
+        &self,
+        state: &Equilibrium,
+        point_mm: [f64; 2],
+        thicker_mm: f64,
+    ) -> [f64; 3] {
         let grid = self.shell.grid();
-        let place = grid.place(rest_mm);
+        let place = grid.place(point_mm);
         let [mut a1, mut a2] = grid.gradients(&state.unknowns, &place);
         a1[0] += 1.0;
         a2[1] += 1.0;
-        let n = normal(&a1, &a2);
+        let area = cross(&a1, &a2);
+        let size = dot(&area, &area).sqrt();
+        let half = self.half_mm(point_mm, size, thicker_mm);
+        let flat = self.half_mm(point_mm, 1.0, thicker_mm);
         let [dx, dy, dz] = grid.interpolate(&state.unknowns, &place);
-        [dx - half * n[0], dy - half * n[1], dz + half * (1.0 - n[2])]
+        let [x, y, z] = area.map(|part| half * part / size);
+        [dx - x, dy - y, dz + flat - z]
+    }
+
+    /// Half of the thickness at a point whose area is `size` times that of the flat mounted film:
+    /// rubber's falls as it is stretched.
+    pub(crate) fn half_mm(&self, point_mm: [f64; 2], size: f64, thicker_mm: f64) -> f64 {
+        let sheet = self.shell.sheet();
+        let [across, down] = sheet.scales();
+        let rubber = sheet.law.neo_hooke;
+        let thinned = 1.0 - rubber + rubber / (across * down * size);
+        0.5 * (sheet.material.thickness_mm + thicker_mm) * sheet.relative(point_mm) * thinned
+    }
+
+    /// Half of the flat mounted film's thickness at a point, mm: how far its camera-side surface is
+    /// from the plane of its middle.
+    pub fn half_thickness_mm(&self, point_mm: [f64; 2]) -> f64 {
+        self.half_mm(point_mm, 1.0, 0.0)
+    }
+
+    /// The point of the mounted film (its coordinates where it is flat, mm) whose camera side is at
+    /// (x, y) mm in a state, as that at rest. The inverse of [`Film::lab_place`].
+    pub fn material_point(&self, state: &Equilibrium, lab_mm: [f64; 2]) -> [f64; 2] {
+        let mut point = lab_mm;
+        for _ in 0..100 {
+            let there = self.lab_place(state, point);
+            let gap = [0, 1].map(|c| lab_mm[c] - there[c]);
+            point = [0, 1].map(|c| point[c] + gap[c]);
+            if gap.iter().all(|part| part.abs() < 1e-13) {
+                break;
+            }
+        }
+        point
+    }
+
+    /// Where (x, y), mm, a state has the camera side of a point of the mounted film.
+    pub fn lab_place(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [f64; 2] {
+        let [x, y, _] = self.displacement(state, point_mm);
+        [point_mm[0] + x, point_mm[1] + y]
     }
 
     /// The force on the tip, and directions in which its travel is given (mm).
-    fn asked(&self, contact: Contact) -> Result<(V3, Vec<(V3, f64)>), ShellError> {
+    fn asked(
+        &self,
+        contact: Contact,
+        at_rest: V3,
+    ) -> Result<(V3, Vec<(V3, f64)>), ShellError> {
         match contact {
             Contact::Force(force) => finite("force", force).map(|force| (force, Vec::new())),
             Contact::Travel(travel) => {
@@ -204,7 +337,7 @@ impl Film {
                 slid_mm: [x, y],
             } => {
                 finite("force", [force_n; 3])?;
-                let lag = finite("slide", [-x, -y, 0.0])?;
+                let lag = finite("slide", [at_rest[0] - x, at_rest[1] - y, at_rest[2]])?;
                 let along = unit(finite("direction", direction)?)?;
                 let sides = across(&along).map(|side| (side, dot(&side, &lag)));
                 Ok((along.map(|part| force_n * part), sides.to_vec()))
@@ -212,7 +345,7 @@ impl Film {
         }
     }
 
-    fn equilibrium(&self, solution: Solution, load: V3, guided: &[V3]) -> Equilibrium {
+    fn equilibrium(&self, solution: Solution, load: V3, guided: &[V3], tip: Tip) -> Equilibrium {
         let mut force_n = load;
         for (direction, size) in guided.iter().zip(&solution.guide_n) {
             for (sum, part) in force_n.iter_mut().zip(direction) {
@@ -220,7 +353,8 @@ impl Film {
             }
         }
         Equilibrium {
-            tip_mm: mean(&self.tip, &solution.unknowns),
+            tip_mm: mean(&self.tip_of(&tip), &solution.unknowns),
+            touched: tip,
             force_n,
             reaction_n: self.shell.reaction(&solution.unknowns),
             unknowns: solution.unknowns,
@@ -229,18 +363,11 @@ impl Film {
     }
 }
 
-/// How a state's tip and unknowns answer to a small change.
-pub struct Response {
-    unknowns: Vec<f64>,
-    /// The tip's way, mm per unit.
-    pub tip_mm: V3,
-}
-
 impl Film {
     /// The factored stiffness of a state.
     pub(crate) fn factors_at(&self, state: &Equilibrium) -> Result<Factors, ShellError> {
-        let at = self.shell.derivatives(&state.unknowns);
-        let factors = self.solver.factor(self.shell.pattern(), &at.stiffness);
+        let stiffness = self.shell.stiffness(&state.unknowns);
+        let factors = self.solver.factor(self.shell.pattern(), &stiffness);
         factors.ok_or_else(|| ShellError::Solver("the film is not stable".into()))
     }
 
@@ -248,82 +375,72 @@ impl Film {
         &self.shell
     }
 
-    /// The response whose unknowns change so, as far as the tip stays where it is.
-    pub(crate) fn response(&self, unknowns: Vec<f64>) -> Response {
-        Response {
-            tip_mm: mean(&self.tip, &unknowns),
-            unknowns,
+    pub(crate) fn around(&self) -> &Beside {
+        &self.around
+    }
+
+    fn own_tip(&self) -> Tip {
+        Tip {
+            place_mm: self.design.tip_offset_mm,
+            radius_mm: self.design.tip_radius_mm,
         }
     }
 
-    /// The tip's shares of another design on this mesh.
-    pub(crate) fn shares(&self, design: &Design) -> Vec<f64> {
-        tip_shares(&self.shell, design)
-    }
-
-    /// The displacement of what `shares` weigh, mm.
-    pub(crate) fn mean(&self, shares: &[f64], state: &Equilibrium) -> V3 {
-        mean(shares, &state.unknowns)
-    }
-
-    /// A force at the tip on each unknown, N.
-    pub(crate) fn load(&self, force: &V3) -> Vec<f64> {
-        weighted(&self.tip, force)
-    }
-
-    /// A force on each unknown by its share, N.
-    pub(crate) fn spread(shares: &[f64], force: &V3) -> Vec<f64> {
-        weighted(shares, force)
-    }
-
-    /// How a state answers to one more newton along x, y and z, and to a tip that touches the film
-    /// one millimetre farther along x and y with the force kept: its derivatives.
-    ///
-    /// # Errors
-    /// When the stiffness is not positive definite: a force would not hold the film there.
-    pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], ShellError> {
-        let load: Vec<Change> = Change::all().take(5).collect();
-        let beside = Neighbours::of(&self.design);
-        let answers = self.answers(&beside, state, &load)?;
-        answers
-            .try_into()
-            .map_err(|_| ShellError::Solver("five changes have five answers".into()))
-    }
-
-    /// The state beside this one that a response foretells, `units` away; only its unknowns are
-    /// changed.
-    pub fn beside(&self, state: &Equilibrium, response: &Response, units: f64) -> Equilibrium {
-        let mut there = state.clone();
-        for (u, part) in there.unknowns.iter_mut().zip(&response.unknowns) {
-            *u += units * part;
+    /// A tip's shares.
+    pub(crate) fn tip_of(&self, tip: &Tip) -> Cow<'_, [f64]> {
+        if *tip == self.own_tip() {
+            return Cow::Borrowed(&self.tip);
         }
-        there
+        Cow::Owned(tip_shares(self.shell.grid(), tip.place_mm, tip.radius_mm))
+    }
+
+    /// Refuses a state of another mesh.
+    pub(crate) fn fits(&self, state: &Equilibrium) -> Result<(), ShellError> {
+        let (own, other) = (self.unknowns(), state.unknowns.len());
+        if own == other {
+            return Ok(());
+        }
+        Err(ShellError::Contact(format!(
+            "a state of {other} unknowns is none of a film of {own}: start from a film of as many \
+             cells"
+        )))
     }
 }
 
-impl Response {
-    /// How a state answers to several changes at once.
-    pub fn to_all(responses: &[Response; 5], changes: [f64; 5]) -> Response {
-        let mut sum = Response {
-            unknowns: vec![0.0; responses[0].unknowns.len()],
-            tip_mm: [0.0; 3],
+/// How a film rests, found from `start` or from the flat film.
+fn rest_of(
+    design: &Design,
+    shell: &Shell,
+    solver: &Solver,
+    start: Option<&[f64]>,
+) -> Result<Solution, ShellError> {
+    let unknowns = shell.grid().unknowns();
+    if design.stretch == [0.0; 2] && design.down == [0.0; 3] {
+        return Ok(Solution {
+            unknowns: vec![0.0; unknowns],
+            guide_n: Vec::new(),
+            steps: 0,
+        });
+    }
+    let mut from = start.map_or_else(|| vec![0.0; unknowns], <[f64]>::to_vec);
+    let slack = design.stretch.iter().any(|part| *part < 0.0);
+    if slack && from.iter().skip(2).step_by(COMPONENTS).all(|part| part.abs() < PUSH_MM) {
+        let way = if design.down[2] > 0.0 { 1.0 } else { -1.0 };
+        let [columns, rows] = shell.grid().functions();
+        let bulge = |k: usize, count: usize| {
+            let along = k as f64 / (count - 1) as f64;
+            (std::f64::consts::PI * along).sin()
         };
-        for (response, change) in responses.iter().zip(changes) {
-            for (total, part) in sum.unknowns.iter_mut().zip(&response.unknowns) {
-                *total += change * part;
-            }
-            for (total, part) in sum.tip_mm.iter_mut().zip(response.tip_mm) {
-                *total += change * part;
-            }
+        for (k, u) in from.chunks_mut(COMPONENTS).enumerate() {
+            u[2] += way * PUSH_MM * bulge(k % columns, columns) * bulge(k / columns, rows);
         }
-        sum
     }
-
-    /// The largest part of it.
-    pub fn size(&self) -> f64 {
-        let parts = self.unknowns.iter();
-        parts.fold(0.0, |most, part| most.max(part.abs()))
-    }
+    let problem = Problem {
+        shell,
+        load: vec![0.0; unknowns],
+        guides: Vec::new(),
+    };
+    problem.solve(solver, &from)
 }
 
 impl Equilibrium {
@@ -350,7 +467,7 @@ impl Equilibrium {
 }
 
 /// Σ share · displacement.
-fn mean(shares: &[f64], unknowns: &[f64]) -> V3 {
+pub(crate) fn mean(shares: &[f64], unknowns: &[f64]) -> V3 {
     let mut sum = [0.0; 3];
     for (share, u) in shares.iter().zip(unknowns.chunks(COMPONENTS)) {
         for (total, part) in sum.iter_mut().zip(u) {
@@ -361,17 +478,17 @@ fn mean(shares: &[f64], unknowns: &[f64]) -> V3 {
 }
 
 /// A vector on each coefficient by its share.
-fn weighted(shares: &[f64], vector: &V3) -> Vec<f64> {
+pub(crate) fn weighted(shares: &[f64], vector: &V3) -> Vec<f64> {
     let parts = shares
         .iter()
         .flat_map(|share| vector.map(|part| share * part));
     parts.collect()
 }
 
-fn tip_shares(shell: &Shell, design: &Design) -> Vec<f64> {
-    let grid = shell.grid();
+/// The shares of a tip's force on each coefficient.
+pub(crate) fn tip_shares(grid: &Grid, place_mm: [f64; 2], radius_mm: f64) -> Vec<f64> {
     let mut shares = vec![0.0; grid.unknowns() / COMPONENTS];
-    for (point, share) in design.tip_points() {
+    for (point, share) in tip_points(place_mm, radius_mm) {
         let place = grid.place(point);
         for (local, value) in place.values.iter().enumerate() {
             shares[grid.coefficient(place.origin, local)] += share * value;

@@ -9,6 +9,7 @@
 )]
 
 mod answers;
+mod cell;
 mod check;
 mod design;
 mod error;
@@ -20,6 +21,7 @@ pub mod parallel;
 mod path;
 mod point;
 pub mod record;
+mod sheet;
 mod shell;
 mod sparse;
 mod spline;
@@ -29,13 +31,13 @@ mod tables;
 mod verification;
 mod view;
 
-pub use answers::{Change, Neighbours};
+pub use answers::{Change, Response};
 pub use check::{Check, check};
 pub use design::Design;
 pub use error::ShellError;
 pub use film::{Contact, Equilibrium, Film, Touch};
 pub use load::{Loaded, press_load};
 pub use path::halton;
-pub use point::Material;
+pub use point::{DENSITY_KG_PER_M3, Law, Material};
 pub use tables::tables;
 pub use view::{Marker, markers, markers_on, paper_camera};

@@ -21,6 +21,8 @@ pub struct Loaded {
 /// A tip that slides: film, load and what is known of it so far.
 struct Slide<'a> {
     film: &'a mut Film,
+    /// Where the tip began, mm.
+    from_mm: [f64; 3],
     load: &'a Load,
     mu: f64,
     state: Equilibrium,
@@ -51,6 +53,7 @@ pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, ShellError> {
     match friction {
         mu if x.hypot(y) > mu * -z => {
             let slide = Slide {
+                from_mm: film.rest().tip_mm,
                 film,
                 load,
                 mu,
@@ -79,7 +82,7 @@ impl Slide<'_> {
     fn find(mut self) -> Result<Loaded, ShellError> {
         let [x, y, z] = self.state.force_n;
         let share = 1.0 - self.mu * -z / x.hypot(y);
-        let mut slid = [0, 1].map(|c| share * self.state.tip_mm[c]);
+        let mut slid = [0, 1].map(|c| share * (self.state.tip_mm[c] - self.from_mm[c]));
         let mut gap = self.gap(slid)?;
         let mut slopes = self.slopes(slid, gap)?;
         for _ in 0..MAX_STEPS {
@@ -117,7 +120,7 @@ impl Slide<'_> {
         self.film.move_tip([x + slid[0], y + slid[1]], radius_mm)?;
         self.state = self.film.press(stage(self.load, slid), &self.state)?;
         let [x, y, z] = self.state.force_n;
-        let across = (slid[0] * y - slid[1] * x) / -self.state.tip_mm[2];
+        let across = (slid[0] * y - slid[1] * x) / (self.from_mm[2] - self.state.tip_mm[2]);
         Ok([x.hypot(y) + self.mu * z, across])
     }
 

@@ -8,7 +8,7 @@
 //! which costs a fifth of a step, as long as each use brings the film ten times nearer.
 
 use crate::ShellError;
-use crate::shell::{Derivatives, Shell};
+use crate::shell::Shell;
 use crate::sparse::{Factors, Solver};
 
 /// Less left over than this is near: there the energy needs no watching, N.
@@ -51,6 +51,9 @@ pub struct Solution {
     pub steps: usize,
 }
 
+/// An energy and its gradient.
+type First = (f64, Vec<f64>);
+
 /// A step towards equilibrium and what it was made of.
 struct Step {
     step: Vec<f64>,
@@ -67,12 +70,12 @@ impl Problem<'_> {
         let mut guide_n = vec![0.0; self.guides.len()];
         let mut left_over_n = f64::INFINITY;
         let mut factors = None;
+        let mut at = self.shell.first(&u);
         for steps in 0..=MAX_STEPS {
-            let gradient = self.shell.gradient(&u);
             let missing = self.missing(&u);
             let met = missing.iter().all(|gap| gap.abs() < TARGET_TOLERANCE_MM);
             let before_n = left_over_n;
-            left_over_n = largest(&self.left_over(&gradient, &guide_n));
+            left_over_n = largest(&self.left_over(&at.1, &guide_n));
             if left_over_n.is_nan() {
                 break;
             }
@@ -85,22 +88,20 @@ impl Problem<'_> {
                 });
             }
             let serves = met && left_over_n < NEAR_N && left_over_n < 0.1 * before_n;
-            let Some(known) = factors.as_ref().filter(|_| serves) else {
-                let at = self.shell.derivatives(&u);
-                let fresh = self.factors(solver, &at)?;
-                let step = self.step(&fresh, &gradient, &missing)?;
-                let length = if met {
-                    self.length(&u, &at, &step.step)
-                } else {
-                    1.0
-                };
-                factors = Some(fresh);
-                advance(&mut u, &step.step, length);
-                guide_n = step.guide_n;
-                continue;
+            let again = factors.is_some() && serves;
+            let known = match factors.filter(|_| serves) {
+                Some(known) => known,
+                None => self.factors(solver, &self.shell.stiffness(&u))?,
             };
-            let step = self.step(known, &gradient, &missing)?;
-            advance(&mut u, &step.step, 1.0);
+            let step = self.step(&known, &at.1, &missing)?;
+            at = match met && !again {
+                true => self.shortened(&mut u, &at, &step.step),
+                false => {
+                    advance(&mut u, &step.step, 1.0);
+                    self.shell.first(&u)
+                }
+            };
+            factors = Some(known);
             guide_n = step.guide_n;
         }
         Err(ShellError::NoEquilibrium {
@@ -166,18 +167,18 @@ impl Problem<'_> {
     }
 
     /// Factors of the stiffness, shifted if need be.
-    fn factors(&self, solver: &Solver, at: &Derivatives) -> Result<Factors, ShellError> {
+    fn factors(&self, solver: &Solver, stiffness: &[f64]) -> Result<Factors, ShellError> {
         let pattern = self.shell.pattern();
-        if let Some(factors) = solver.factor(pattern, &at.stiffness) {
+        if let Some(factors) = solver.factor(pattern, stiffness) {
             return Ok(factors);
         }
         let diagonal = pattern.diagonal();
-        let mean = diagonal.iter().map(|&k| at.stiffness[k].abs()).sum::<f64>();
+        let mean = diagonal.iter().map(|&k| stiffness[k].abs()).sum::<f64>();
         let mut shift = 1e-5 * mean / diagonal.len() as f64;
-        let mut shifted = at.stiffness.clone();
+        let mut shifted = stiffness.to_vec();
         for _ in 0..12 {
             for &entry in diagonal {
-                shifted[entry] = at.stiffness[entry] + shift;
+                shifted[entry] = stiffness[entry] + shift;
             }
             if let Some(factors) = solver.factor(pattern, &shifted) {
                 return Ok(factors);
@@ -187,33 +188,32 @@ impl Problem<'_> {
         Err(ShellError::Solver("the stiffness has no factors".into()))
     }
 
-    /// How much of the step to take: all of it, or the half, quarter … at which the energy falls
-    /// most.
-    fn length(&self, u: &[f64], at: &Derivatives, step: &[f64]) -> f64 {
-        let here = at.energy - inner(&self.load, u);
-        let slope = inner(&at.gradient, step) - inner(&self.load, step);
-        if slope > -HIDDEN_N_MM {
-            return 1.0;
-        }
-        let energy = |length: f64| {
-            let mut there = u.to_vec();
+    /// Takes all of the step, or the half, quarter … at which the energy falls most; the energy and
+    /// gradient there.
+    fn shortened(&self, u: &mut Vec<f64>, at: &First, step: &[f64]) -> First {
+        let here = at.0 - inner(&self.load, u);
+        let slope = inner(&at.1, step) - inner(&self.load, step);
+        let look = |length: f64| {
+            let mut there = u.clone();
             advance(&mut there, step, length);
-            self.shell.energy(&there) - inner(&self.load, &there)
+            let first = self.shell.first(&there);
+            (first.0 - inner(&self.load, &there), there, first)
         };
         let mut length = 1.0;
-        let mut best = energy(length);
-        if best <= here + SUFFICIENT * slope {
-            return length;
-        }
-        for _ in 0..30 {
-            let half = energy(length / 2.0);
-            if best <= here + SUFFICIENT * length * slope && best <= half {
-                break;
+        let mut best = look(length);
+        if slope <= -HIDDEN_N_MM && (best.0.is_nan() || best.0 > here + SUFFICIENT * slope) {
+            for _ in 0..30 {
+                let half = look(length / 2.0);
+                if best.0 <= here + SUFFICIENT * length * slope && best.0 <= half.0 {
+                    break;
+                }
+                length /= 2.0;
+                best = half;
             }
-            length /= 2.0;
-            best = half;
         }
-        length
+        let (_, there, first) = best;
+        *u = there;
+        first
     }
 }
 

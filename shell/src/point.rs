@@ -1,33 +1,40 @@
 //! The energy of one point of the shell, with its first and second derivatives.
 //!
-//! A Kirchhoff–Love shell with Koiter's energy per unit of undeformed area,
+//! A Kirchhoff–Love shell with an energy per unit of undeformed area of
 //!
-//! ψ = ½ Eᵀ A E + ½ Kᵀ D K,
+//! ψ = m · W(E) + b · ½ Kᵀ D K,
 //!
 //! E = (ε₁₁, ε₂₂, 2ε₁₂) with Green's membrane strain ε = (a_α·a_β − δ_αβ)/2, K = (κ₁₁, κ₂₂, 2κ₁₂)
-//! with the curvature κ_αβ = x,αβ · n of a film that rests flat, and the St Venant–Kirchhoff
-//! plane-stress law A = E t/(1−ν²) · [1 ν 0; ν 1 0; 0 0 (1−ν)/2], D = A t²/12. Nothing is
-//! linearized.
+//! with the curvature κ_αβ = x,αβ · n of a film that rests flat; m and b are what a place has of
+//! the film's stiffness. W goes from Koiter's ½ Eᵀ A E (St Venant–Kirchhoff's plane stress, A = E
+//! t/(1−ν²) · [1 ν 0; ν 1 0; 0 0 (1−ν)/2]) to rubber's t C₁ (I + s I²) with I = I₁ − 3 of an
+//! incompressible film in plane stress and C₁ = E/6. Bending is Koiter's with the modulus at rest,
+//! D = A t²/12, for either. Nothing is linearized.
 
 /// A vector in space.
 pub type V3 = [f64; 3];
-type M3 = [V3; 3];
+/// A matrix of three rows.
+pub type M3 = [V3; 3];
 
 /// The vectors that ψ depends on: a₁ = x,₁, a₂ = x,₂, x,₁₁, x,₂₂ and x,₁₂.
 pub const VECTORS: usize = 5;
 /// One vector for each of them.
 pub type Point = [V3; VECTORS];
-/// The second derivatives: a 3×3 block for each pair.
-pub type Blocks = [[M3; VECTORS]; VECTORS];
+
+/// Density of silicone rubber, kg/m³.
+pub const DENSITY_KG_PER_M3: f64 = 1070.0;
+/// Its weight, N/mm³.
+pub const WEIGHT_N_PER_MM3: f64 = DENSITY_KG_PER_M3 * 9.806_65e-9;
 
 /// What a film is made of: an isotropic elastic sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
-    /// Young's modulus, MPa (= N/mm²), > 0.
+    /// Young's modulus at rest, MPa (= N/mm²), > 0.
     pub youngs_mpa: f64,
-    /// Poisson's ratio, −1 < ν ≤ 0.5.
+    /// Poisson's ratio, −1 < ν ≤ 0.5; a neo-Hookean film's is 0.5 whatever is said here, but in
+    /// bending.
     pub poisson: f64,
-    /// Thickness, mm, > 0.
+    /// Thickness before it is mounted, mm, > 0.
     pub thickness_mm: f64,
 }
 
@@ -53,54 +60,229 @@ impl Material {
     }
 }
 
+/// How a film answers to being stretched: 0 and 0 is St Venant–Kirchhoff's law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Law {
+    /// The part of it that is rubber: 0 (St Venant–Kirchhoff) to 1 (W = C₁ (I₁−3) + C₂ (I₁−3)² of
+    /// an incompressible film, which also thins as it is stretched).
+    pub neo_hooke: f64,
+    /// C₂/C₁ of that part, 0 (neo-Hooke) to 0.5 (Yeoh).
+    pub stiffening: f64,
+}
+
 /// The membrane and bending laws of a material, ready for use.
 #[derive(Clone, Copy, Debug)]
 pub struct Laws {
     membrane: M3,
     bending: M3,
+    /// C₁ times the thickness, N/mm.
+    rubber: f64,
+    law: Law,
+}
+
+/// What a place has of the film's stiffness, for membrane and bending: times its area, mm².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// Of the membrane's.
+    pub membrane: f64,
+    /// Of bending's.
+    pub bending: f64,
+}
+
+/// The whole stiffness, of a unit of area.
+#[cfg(test)]
+pub const WHOLE: Share = Share {
+    membrane: 1.0,
+    bending: 1.0,
+};
+
+/// The second derivatives of ψ: a 3×3 block for each pair of vectors.
+pub struct Second {
+    /// Of a₁ and a₂.
+    pub plane: [[M3; 2]; 2],
+    /// Of a_k and x,₁₁ x,₂₂ x,₁₂.
+    pub mixed: [[M3; 3]; 2],
+    /// Of two of the last three: this times the normal's products.
+    pub far: M3,
+    /// The normal.
+    pub normal: V3,
+}
+
+/// I = I₁ − 3 of an incompressible film in plane stress with its derivatives by E.
+struct Invariant {
+    value: f64,
+    /// det C and its derivatives.
+    det: f64,
+    by: V3,
+    slopes: V3,
+}
+
+impl Invariant {
+    #[inline(always)]
+    fn new([e1, e2, g]: &V3) -> Invariant {
+        let (sum, product) = (2.0 * (e1 + e2), 4.0 * e1 * e2 - g * g);
+        let det = 1.0 + sum + product;
+        let by = [2.0 + 4.0 * e2, 2.0 + 4.0 * e1, -2.0 * g];
+        let square = det * det;
+        Invariant {
+            value: (sum * (sum + product) - product) / det,
+            det,
+            by,
+            slopes: [2.0 - by[0] / square, 2.0 - by[1] / square, -by[2] / square],
+        }
+    }
+
+    #[inline(always)]
+    fn second(&self) -> M3 {
+        let square = self.det * self.det;
+        let mut second = scaled(&outer(&self.by, &self.by), 2.0 / (square * self.det));
+        second[0][1] -= 4.0 / square;
+        second[1][0] -= 4.0 / square;
+        second[2][2] += 2.0 / square;
+        second
+    }
 }
 
 impl Laws {
     /// The laws of `material`.
-    pub fn new(material: &Material) -> Laws {
+    pub fn new(material: &Material, law: Law) -> Laws {
         Laws {
             membrane: material.law(material.membrane_n_per_mm()),
             bending: material.law(material.bending_n_mm()),
+            rubber: material.youngs_mpa * material.thickness_mm / 6.0,
+            law,
         }
     }
 
-    /// ψ at a point, N/mm.
-    pub fn energy(&self, x: &Point) -> f64 {
-        let (strain, curvature) = (strain(x), Surface::new(x).curvature(x));
-        let of = |law: &M3, e: &V3| 0.5 * dot(e, &apply(law, e));
-        of(&self.membrane, &strain) + of(&self.bending, &curvature)
+    /// W and its derivatives by E, N/mm.
+    #[inline(always)]
+    fn tension(&self, strain: &V3) -> (f64, V3) {
+        let linear = apply(&self.membrane, strain);
+        let energy = 0.5 * dot(strain, &linear);
+        if self.law.neo_hooke == 0.0 {
+            return (energy, linear);
+        }
+        let (rubber, by) = self.rubber(&Invariant::new(strain));
+        let part = self.law.neo_hooke;
+        (
+            energy + part * (rubber - energy),
+            std::array::from_fn(|i| linear[i] + part * (by[i] - linear[i])),
+        )
     }
 
-    /// ψ, its gradient and its second derivatives.
-    pub fn derivatives(&self, x: &Point) -> (f64, Point, Blocks) {
+    #[inline(always)]
+    fn rubber(&self, i: &Invariant) -> (f64, V3) {
+        let s = self.law.stiffening;
+        let slope = self.rubber * (1.0 + 2.0 * s * i.value);
+        (
+            self.rubber * i.value * (1.0 + s * i.value),
+            i.slopes.map(|part| slope * part),
+        )
+    }
+
+    /// The second derivatives of W by E, N/mm.
+    #[inline(always)]
+    fn tangent(&self, strain: &V3) -> M3 {
+        if self.law.neo_hooke == 0.0 {
+            return self.membrane;
+        }
+        let (part, s) = (self.law.neo_hooke, self.law.stiffening);
+        let i = Invariant::new(strain);
+        let mut tangent = scaled(&self.membrane, 1.0 - part);
+        let slope = part * self.rubber * (1.0 + 2.0 * s * i.value);
+        add_scaled(&mut tangent, &i.second(), slope);
+        add_outer(
+            &mut tangent,
+            &i.slopes,
+            &i.slopes,
+            2.0 * s * part * self.rubber,
+        );
+        tangent
+    }
+
+    /// ψ at a point.
+    #[cfg(test)]
+    pub fn energy(&self, x: &Point, share: Share) -> f64 {
+        self.first(x, share).0
+    }
+
+    /// ψ and its gradient.
+    #[inline(always)]
+    pub fn first(&self, x: &Point, share: Share) -> (f64, Point) {
+        let (stretched, tension) = self.tension(&strain(x));
+        let (bent, gradient) = self.bend(x, share.bending);
+        let energy = share.membrane * stretched + bent;
+        (
+            energy,
+            stretched_by(x, &tension, share.membrane, gradient),
+        )
+    }
+
+    /// The gradients of membrane and bending, each of the whole stiffness.
+    pub fn parts(&self, x: &Point) -> [Point; 2] {
+        let (_, tension) = self.tension(&strain(x));
+        let zero = [[0.0; 3]; VECTORS];
+        [stretched_by(x, &tension, 1.0, zero), self.bend(x, 1.0).1]
+    }
+
+    /// How the membrane's gradient answers to the law's two numbers.
+    pub fn by_law(&self, x: &Point) -> [Point; 2] {
+        let strain = strain(x);
+        let i = Invariant::new(&strain);
+        let (_, rubber) = self.rubber(&i);
+        let linear = apply(&self.membrane, &strain);
+        let rubbery = std::array::from_fn(|k| rubber[k] - linear[k]);
+        let stiffer = 2.0 * self.law.neo_hooke * self.rubber * i.value;
+        let zero = [[0.0; 3]; VECTORS];
+        [
+            stretched_by(x, &rubbery, 1.0, zero),
+            stretched_by(x, &i.slopes.map(|part| stiffer * part), 1.0, zero),
+        ]
+    }
+
+    /// Bending's energy and gradient.
+    #[inline(always)]
+    fn bend(&self, x: &Point, share: f64) -> (f64, Point) {
+        let [a1, a2, ..] = x;
         let surface = Surface::new(x);
-        let (strain, curvature) = (strain(x), surface.curvature(x));
-        let tension = apply(&self.membrane, &strain);
-        let moment = apply(&self.bending, &curvature);
-        let energy = 0.5 * (dot(&strain, &tension) + dot(&curvature, &moment));
-        let (stretch, bend) = (strain_gradients(x), surface.curvature_gradients(x));
+        let curvature = surface.curvature(x);
+        let moment = apply(&self.bending, &curvature).map(|part| share * part);
+        let weights = [moment[0], moment[1], 2.0 * moment[2]];
+        let pull = sum_of(&weights, x);
+        let along = dot(&pull, &surface.normal);
+        let turned: V3 =
+            std::array::from_fn(|c| (pull[c] - along * surface.normal[c]) / surface.area);
+        let n = &surface.normal;
+        (
+            0.5 * dot(&curvature, &moment),
+            [
+                cross(a2, &turned),
+                cross(&turned, a1),
+                n.map(|part| weights[0] * part),
+                n.map(|part| weights[1] * part),
+                n.map(|part| weights[2] * part),
+            ],
+        )
+    }
 
-        let mut blocks = [[[[0.0; 3]; 3]; VECTORS]; VECTORS];
-        add_products(&mut blocks, &stretch, &self.membrane);
-        add_products(&mut blocks, &bend, &self.bending);
-        add_tension(&mut blocks, &tension);
-        surface.add_moment(&mut blocks, x, &moment);
-        (energy, combine(&stretch, &tension, &bend, &moment), blocks)
+    /// The second derivatives of ψ.
+    #[inline(always)]
+    pub fn second(&self, x: &Point, share: Share) -> Second {
+        let strain = strain(x);
+        let (_, tension) = self.tension(&strain);
+        let surface = Surface::new(x);
+        let bending = scaled(&self.bending, share.bending);
+        let moment = apply(&bending, &surface.curvature(x));
+        let mut second = surface.second(x, &bending, &moment);
+        let tangent = scaled(&self.tangent(&strain), share.membrane);
+        let tension = tension.map(|part| share.membrane * part);
+        add_stretch(&mut second.plane, x, &tangent, &tension);
+        second.plane[1][0] = transposed(&second.plane[0][1]);
+        second
     }
 }
 
-/// The unit normal of the deformed surface.
-pub fn normal(a1: &V3, a2: &V3) -> V3 {
-    let m = cross(a1, a2);
-    let length = dot(&m, &m).sqrt();
-    m.map(|part| part / length)
-}
-
+#[inline(always)]
 fn strain([a1, a2, ..]: &Point) -> V3 {
     [
         0.5 * (dot(a1, a1) - 1.0),
@@ -109,14 +291,42 @@ fn strain([a1, a2, ..]: &Point) -> V3 {
     ]
 }
 
-/// ∂E/∂x for the three strains.
-fn strain_gradients([a1, a2, ..]: &Point) -> [Point; 3] {
-    let zero = [0.0; 3];
-    [
-        [*a1, zero, zero, zero, zero],
-        [zero, *a2, zero, zero, zero],
-        [*a2, *a1, zero, zero, zero],
-    ]
+/// Adds the tension's part to a gradient.
+#[inline(always)]
+fn stretched_by([a1, a2, ..]: &Point, tension: &V3, share: f64, mut gradient: Point) -> Point {
+    let [t1, t2, t12] = tension.map(|part| share * part);
+    for c in 0..3 {
+        gradient[0][c] += t1 * a1[c] + t12 * a2[c];
+        gradient[1][c] += t2 * a2[c] + t12 * a1[c];
+    }
+    gradient
+}
+
+/// Adds the membrane's second derivatives; the block of a₂ and a₁ is left out.
+#[inline(always)]
+fn add_stretch(plane: &mut [[M3; 2]; 2], [a1, a2, ..]: &Point, law: &M3, tension: &V3) {
+    for (k, l, ways) in [
+        (0, 0, [Some(a1), None, Some(a2)]),
+        (1, 1, [None, Some(a2), Some(a1)]),
+    ] {
+        for i in 0..3 {
+            for j in 0..3 {
+                if let (Some(left), Some(right)) = (ways[i], ways[j]) {
+                    add_outer(&mut plane[k][l], left, right, law[i][j]);
+                }
+            }
+        }
+    }
+    let both = &mut plane[0][1];
+    add_outer(both, a1, a2, law[0][1]);
+    add_outer(both, a1, a1, law[0][2]);
+    add_outer(both, a2, a2, law[2][1]);
+    add_outer(both, a2, a1, law[2][2]);
+    for c in 0..3 {
+        plane[0][0][c][c] += tension[0];
+        plane[1][1][c][c] += tension[1];
+        plane[0][1][c][c] += tension[2];
+    }
 }
 
 /// What the curvatures need of the deformed surface.
@@ -131,6 +341,7 @@ struct Surface {
 }
 
 impl Surface {
+    #[inline(always)]
     fn new([a1, a2, ..]: &Point) -> Surface {
         let m = cross(a1, a2);
         let area = dot(&m, &m).sqrt();
@@ -145,111 +356,94 @@ impl Surface {
         }
     }
 
+    #[inline(always)]
     fn curvature(&self, [_, _, x11, x22, x12]: &Point) -> V3 {
         let n = &self.normal;
         [dot(x11, n), dot(x22, n), 2.0 * dot(x12, n)]
     }
 
-    /// ∂K/∂x for the three curvatures.
-    fn curvature_gradients(&self, x: &Point) -> [Point; 3] {
-        let mut gradients = [[[0.0; 3]; VECTORS]; 3];
-        for (i, gradient) in gradients.iter_mut().enumerate() {
-            let twice = TWICE[i];
-            for (slot, turn) in gradient.iter_mut().zip(&self.turns) {
-                *slot = apply_transposed(turn, &x[2 + i]).map(|part| twice * part);
+    /// The second derivatives of ½ Kᵀ law K; the block of a₂ and a₁ is left out.
+    #[inline(always)]
+    fn second(&self, x: &Point, law: &M3, moment: &V3) -> Second {
+        let n = &self.normal;
+        // ∂K_i/∂a_k.
+        let gradients: [M3; 2] = [0, 1].map(|k| {
+            [0, 1, 2].map(|i| {
+                apply_transposed(&self.turns[k], &x[2 + i]).map(|part| TWICE[i] * part)
+            })
+        });
+        let mut plane = [[[[0.0; 3]; 3]; 2]; 2];
+        let mut mixed = [[[[0.0; 3]; 3]; 3]; 2];
+        for k in 0..2 {
+            // law · gradients: what each curvature of a_k weighs.
+            let weighted: M3 = std::array::from_fn(|j| {
+                std::array::from_fn(|c| (0..3).map(|i| law[i][j] * gradients[k][i][c]).sum())
+            });
+            for l in k..2 {
+                for j in 0..3 {
+                    add_outer(&mut plane[k][l], &weighted[j], &gradients[l][j], 1.0);
+                }
             }
-            gradient[2 + i] = self.normal.map(|part| twice * part);
+            for j in 0..3 {
+                mixed[k][j] = scaled(&transposed(&self.turns[k]), moment[j] * TWICE[j]);
+                add_outer(&mut mixed[k][j], &weighted[j], n, TWICE[j]);
+            }
         }
-        gradients
-    }
-
-    /// Adds Σ moment_i · ∂²K_i/∂x².
-    fn add_moment(&self, blocks: &mut Blocks, x: &Point, moment: &V3) {
-        let mut pull = [0.0; 3];
-        for i in 0..3 {
-            let weight = moment[i] * TWICE[i];
-            for k in 0..2 {
-                add_scaled(&mut blocks[2 + i][k], &self.turns[k], weight);
-                add_scaled(&mut blocks[k][2 + i], &transposed(&self.turns[k]), weight);
-            }
-            for (sum, part) in pull.iter_mut().zip(&x[2 + i]) {
-                *sum += weight * part;
-            }
+        let weights: V3 = std::array::from_fn(|i| moment[i] * TWICE[i]);
+        self.add_turning(&mut plane, x, &sum_of(&weights, x));
+        Second {
+            plane,
+            mixed,
+            far: std::array::from_fn(|i| {
+                std::array::from_fn(|j| law[i][j] * TWICE[i] * TWICE[j])
+            }),
+            normal: *n,
         }
-        self.add_turning(blocks, x, &pull);
     }
 
     /// Adds the second derivative of pull · n by (a₁, a₂), of S/J with S = pull · (a₁ × a₂) and J =
     /// |a₁ × a₂|.
-    fn add_turning(&self, blocks: &mut Blocks, [a1, a2, ..]: &Point, pull: &V3) {
+    #[inline(always)]
+    fn add_turning(&self, plane: &mut [[M3; 2]; 2], [a1, a2, ..]: &Point, pull: &V3) {
         let (j, n) = (self.area, &self.normal);
         let s_over_j = dot(pull, n);
         let ds = [cross(a2, pull), cross(pull, a1)];
         let dj = [cross(a2, n), cross(n, a1)];
-        let flat = across(n);
+        let square = 1.0 / (j * j);
         for k in 0..2 {
-            for l in 0..2 {
-                let block = &mut blocks[k][l];
-                add_outer(block, &ds[k], &dj[l], -1.0 / (j * j));
-                add_outer(block, &dj[k], &ds[l], -1.0 / (j * j));
-                add_outer(block, &dj[k], &dj[l], 2.0 * s_over_j / (j * j));
-                let bent = product(
-                    &transposed(&self.swings[k]),
-                    &product(&flat, &self.swings[l]),
-                );
-                add_scaled(block, &bent, -s_over_j / (j * j));
+            for l in k..2 {
+                let block = &mut plane[k][l];
+                add_outer(block, &ds[k], &dj[l], -square);
+                add_outer(block, &dj[k], &ds[l], -square);
+                add_outer(block, &dj[k], &dj[l], 2.0 * s_over_j * square);
+                let bent = product(&transposed(&self.swings[k]), &self.turns[l]);
+                add_scaled(block, &bent, -s_over_j / j);
             }
         }
         // The mixed second derivatives of v · (a₁ × a₂), for v = pull in S and v = n in J.
         let mixed: V3 = std::array::from_fn(|i| (pull[i] - s_over_j * n[i]) / j);
-        add_scaled(&mut blocks[0][1], &skew(&mixed), -1.0);
-        add_scaled(&mut blocks[1][0], &skew(&mixed), 1.0);
+        add_scaled(&mut plane[0][1], &skew(&mixed), -1.0);
     }
 }
 
 /// K's third entry is 2κ₁₂.
 const TWICE: V3 = [1.0, 1.0, 2.0];
 
-/// Adds Σ tension_i · ∂²E_i/∂x².
-fn add_tension(blocks: &mut Blocks, tension: &V3) {
-    for i in 0..3 {
-        blocks[0][0][i][i] += tension[0];
-        blocks[1][1][i][i] += tension[1];
-        blocks[0][1][i][i] += tension[2];
-        blocks[1][0][i][i] += tension[2];
-    }
-}
-
-/// Adds Σ law_ij · gradient_i ⊗ gradient_j.
-fn add_products(blocks: &mut Blocks, gradients: &[Point; 3], law: &M3) {
-    for p in 0..VECTORS {
-        let weighted: [V3; 3] = std::array::from_fn(|j| {
-            std::array::from_fn(|c| (0..3).map(|i| gradients[i][p][c] * law[i][j]).sum())
-        });
-        for q in 0..VECTORS {
-            for j in 0..3 {
-                add_outer(&mut blocks[p][q], &weighted[j], &gradients[j][q], 1.0);
-            }
-        }
-    }
-}
-
-fn combine(stretch: &[Point; 3], tension: &V3, bend: &[Point; 3], moment: &V3) -> Point {
-    std::array::from_fn(|p| {
-        std::array::from_fn(|c| {
-            (0..3)
-                .map(|i| stretch[i][p][c] * tension[i] + bend[i][p][c] * moment[i])
-                .sum()
-        })
-    })
+/// Σ weight_i · x_(2 + i).
+#[inline(always)]
+fn sum_of(weights: &V3, x: &Point) -> V3 {
+    std::array::from_fn(|c| weights[0] * x[2][c] + weights[1] * x[3][c] + weights[2] * x[4][c])
 }
 
 /// a · b.
+#[inline(always)]
 pub fn dot(a: &V3, b: &V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn cross(a: &V3, b: &V3) -> V3 {
+/// a × b.
+#[inline(always)]
+pub fn cross(a: &V3, b: &V3) -> V3 {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -258,37 +452,50 @@ fn cross(a: &V3, b: &V3) -> V3 {
 }
 
 /// The matrix of v ×.
+#[inline(always)]
 fn skew(v: &V3) -> M3 {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
 
 /// I − n nᵀ.
+#[inline(always)]
 fn across(n: &V3) -> M3 {
     let mut matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     add_outer(&mut matrix, n, n, -1.0);
     matrix
 }
 
+#[inline(always)]
 fn apply(m: &M3, v: &V3) -> V3 {
     [dot(&m[0], v), dot(&m[1], v), dot(&m[2], v)]
 }
 
+#[inline(always)]
 fn apply_transposed(m: &M3, v: &V3) -> V3 {
     std::array::from_fn(|c| m[0][c] * v[0] + m[1][c] * v[1] + m[2][c] * v[2])
 }
 
+#[inline(always)]
 fn product(a: &M3, b: &M3) -> M3 {
     a.map(|row| apply_transposed(b, &row))
 }
 
+#[inline(always)]
 fn transposed(m: &M3) -> M3 {
     std::array::from_fn(|r| std::array::from_fn(|c| m[c][r]))
 }
 
+#[inline(always)]
 fn scaled(m: &M3, factor: f64) -> M3 {
     m.map(|row| row.map(|part| part * factor))
 }
 
+#[inline(always)]
+fn outer(a: &V3, b: &V3) -> M3 {
+    a.map(|left| b.map(|right| left * right))
+}
+
+#[inline(always)]
 fn add_scaled(sum: &mut M3, m: &M3, factor: f64) {
     for (row, add) in sum.iter_mut().zip(m) {
         for (slot, part) in row.iter_mut().zip(add) {
@@ -297,6 +504,7 @@ fn add_scaled(sum: &mut M3, m: &M3, factor: f64) {
     }
 }
 
+#[inline(always)]
 fn add_outer(sum: &mut M3, a: &V3, b: &V3, factor: f64) {
     for (row, left) in sum.iter_mut().zip(a) {
         let left = factor * left;
@@ -326,76 +534,178 @@ mod tests {
         })
     }
 
+    /// One stretched less, which rubber's law makes no steep wall of.
+    fn calm(mut x: Point) -> Point {
+        for (k, vector) in x.iter_mut().enumerate().take(2) {
+            for (c, part) in vector.iter_mut().enumerate() {
+                let rest = if k == c { 1.0 } else { 0.0 };
+                *part = rest + 0.5 * (*part - rest);
+            }
+        }
+        x
+    }
+
+    fn any_law() -> impl Strategy<Value = Laws> {
+        (0.0..=1.0, 0.0..0.5).prop_map(|(neo_hooke, stiffening)| {
+            let law = Law {
+                neo_hooke,
+                stiffening,
+            };
+            Laws::new(&FILM, law)
+        })
+    }
+
+    fn linear() -> Laws {
+        Laws::new(&FILM, Law::default())
+    }
+
+    const SHARE: Share = Share {
+        membrane: 0.7,
+        bending: 1.3,
+    };
+
     fn stepped(x: &Point, p: usize, c: usize, step: f64) -> Point {
         let mut moved = *x;
         moved[p][c] += step;
         moved
     }
 
-    proptest! {
-        #[test]
-        fn gradient_is_the_energys_slope(x in any_point()) {
-            let laws = Laws::new(&FILM);
-            let (energy, gradient, _) = laws.derivatives(&x);
-            prop_assert!((energy - laws.energy(&x)).abs() < 1e-14);
-            for p in 0..VECTORS {
-                for c in 0..3 {
-                    let at = |step| laws.energy(&stepped(&x, p, c, step));
-                    let slope = (8.0 * (at(1e-3) - at(-1e-3)) - at(2e-3) + at(-2e-3)) / 12e-3;
-                    prop_assert!((slope - gradient[p][c]).abs() < 1e-9);
+    /// All pairs' blocks.
+    fn blocks(second: &Second) -> [[M3; VECTORS]; VECTORS] {
+        let far = outer(&second.normal, &second.normal);
+        std::array::from_fn(|p| {
+            std::array::from_fn(|q| match (p, q) {
+                (0..2, 0..2) => second.plane[p][q],
+                (0..2, _) => second.mixed[p][q - 2],
+                (_, 0..2) => transposed(&second.mixed[q][p - 2]),
+                _ => scaled(&far, second.far[p - 2][q - 2]),
+            })
+        })
+    }
+
+    fn hold_together(laws: &Laws, x: &Point) {
+        let (_, gradient) = laws.first(x, SHARE);
+        let second = laws.second(x, SHARE);
+        let [membrane, bending] = laws.parts(x);
+        let blocks = blocks(&second);
+        for q in 0..VECTORS {
+            for d in 0..3 {
+                let moved = |step| laws.first(&stepped(x, q, d, step), SHARE);
+                let [a, b, aa, bb] = [1e-3, -1e-3, 2e-3, -2e-3].map(moved);
+                let slope = (8.0 * (a.0 - b.0) - aa.0 + bb.0) / 12e-3;
+                assert!((slope - gradient[q][d]).abs() < 1e-8);
+                let sum = SHARE.membrane * membrane[q][d] + SHARE.bending * bending[q][d];
+                assert!((sum - gradient[q][d]).abs() < 1e-13);
+                for p in 0..VECTORS {
+                    for c in 0..3 {
+                        let [a, b, aa, bb] = [&a, &b, &aa, &bb].map(|at| at.1[p][c]);
+                        let slope = (8.0 * (a - b) - aa + bb) / 12e-3;
+                        assert!((slope - blocks[p][q][c][d]).abs() < 1e-7);
+                    }
                 }
             }
         }
+    }
+
+    proptest! {
+        #[test]
+        fn derivatives_are_slopes(x in any_point()) {
+            hold_together(&linear(), &x);
+        }
 
         #[test]
-        fn blocks_are_the_gradients_slopes(x in any_point()) {
-            let laws = Laws::new(&FILM);
-            let (_, _, blocks) = laws.derivatives(&x);
-            for q in 0..VECTORS {
-                for d in 0..3 {
-                    let at = |step| laws.derivatives(&stepped(&x, q, d, step)).1;
-                    let (a, b, aa, bb) = (at(1e-3), at(-1e-3), at(2e-3), at(-2e-3));
-                    for p in 0..VECTORS {
-                        for c in 0..3 {
-                            let slope = (8.0 * (a[p][c] - b[p][c]) - aa[p][c] + bb[p][c]) / 12e-3;
-                            prop_assert!((slope - blocks[p][q][c][d]).abs() < 1e-8);
-                        }
+        fn derivatives_are_slopes_of_rubber(laws in any_law(), x in any_point()) {
+            hold_together(&laws, &calm(x));
+        }
+
+        #[test]
+        fn the_law_answers_to_its_numbers(laws in any_law(), x in any_point()) {
+            let x = calm(x);
+            let by = laws.by_law(&x);
+            let gradient = |rubber: f64, stiffer: f64| {
+                let mut there = laws;
+                there.law.neo_hooke += rubber;
+                there.law.stiffening += stiffer;
+                there.parts(&x)[0]
+            };
+            let pairs = [
+                [gradient(1e-4, 0.0), gradient(-1e-4, 0.0)],
+                [gradient(0.0, 1e-4), gradient(0.0, -1e-4)],
+            ];
+            for (by, [forth, back]) in by.iter().zip(pairs) {
+                for p in 0..VECTORS {
+                    for c in 0..3 {
+                        let slope = (forth[p][c] - back[p][c]) / 2e-4;
+                        prop_assert!((slope - by[p][c]).abs() < 1e-9);
                     }
                 }
             }
         }
 
         #[test]
-        fn a_rigid_turn_costs_nothing(angle in -3.0..3.0, bent in any_point()) {
+        fn a_rigid_turn_costs_nothing(angle in -3.0..3.0, laws in any_law(), bent in any_point()) {
             let (sin, cos) = f64::sin_cos(angle);
             let turn = |v: V3| [v[0], cos * v[1] - sin * v[2], sin * v[1] + cos * v[2]];
-            let laws = Laws::new(&FILM);
-            let difference = laws.energy(&bent.map(turn)) - laws.energy(&bent);
+            let bent = calm(bent);
+            let difference = laws.energy(&bent.map(turn), WHOLE) - laws.energy(&bent, WHOLE);
             prop_assert!(difference.abs() < 1e-14);
         }
     }
 
+    fn stretched(x: f64, y: f64) -> Point {
+        [
+            [x, 0.0, 0.0],
+            [0.0, y, 0.0],
+            [0.0; 3],
+            [0.0; 3],
+            [0.0; 3],
+        ]
+    }
+
     #[test]
     fn known_states_have_their_energies() {
-        let laws = Laws::new(&FILM);
-        let flat = [
-            [1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [0.0; 3],
-            [0.0; 3],
-            [0.0; 3],
-        ];
-        assert_eq!(laws.energy(&flat), 0.0);
+        let laws = linear();
+        let flat = stretched(1.0, 1.0);
+        assert_eq!(laws.energy(&flat, WHOLE), 0.0);
 
-        let mut stretched = flat;
-        stretched[0][0] = 1.1;
         let strain = (1.1f64 * 1.1 - 1.0) / 2.0;
         let expected = 0.5 * FILM.membrane_n_per_mm() * strain * strain;
-        assert!((laws.energy(&stretched) - expected).abs() < 1e-15);
+        assert!((laws.energy(&stretched(1.1, 1.0), WHOLE) - expected).abs() < 1e-15);
 
         let mut twisted = flat;
         twisted[4][2] = 0.2;
         let expected = FILM.bending_n_mm() * (1.0 - FILM.poisson) * 0.2 * 0.2;
-        assert!((laws.energy(&twisted) - expected).abs() < 1e-15);
+        assert!((laws.energy(&twisted, WHOLE) - expected).abs() < 1e-15);
+    }
+
+    /// Treloar's stresses (per area at rest) of uniaxial and equibiaxial tension, 2 (λ − λ⁻²) (C₁ +
+    /// 2 C₂ I) and 2 (λ − λ⁻⁵) (C₁ + 2 C₂ I).
+    #[test]
+    fn rubber_has_its_stresses() {
+        for stiffening in [0.0, 0.3] {
+            let law = Law {
+                neo_hooke: 1.0,
+                stiffening,
+            };
+            let laws = Laws::new(&FILM, law);
+            let c1 = FILM.youngs_mpa / 6.0;
+            for stretch in [0.9f64, 1.01, 1.3, 2.0] {
+                let free = stretch.powf(-0.5);
+                let pull = laws.first(&stretched(stretch, free), WHOLE).1;
+                let more = |i: f64| c1 * (1.0 + 2.0 * stiffening * i);
+                let i = stretch.powi(2) + 2.0 / stretch - 3.0;
+                let stress = 2.0 * (stretch - stretch.powi(-2)) * more(i);
+                assert!((pull[0][0] - FILM.thickness_mm * stress).abs() < 1e-12);
+                assert!(pull[1][1].abs() < 1e-12, "the sides are free");
+                let pull = laws.first(&stretched(stretch, stretch), WHOLE).1;
+                let i = 2.0 * stretch.powi(2) + stretch.powi(-4) - 3.0;
+                let stress = 2.0 * (stretch - stretch.powi(-5)) * more(i);
+                assert!((pull[0][0] - FILM.thickness_mm * stress).abs() < 1e-12);
+            }
+            // Young's modulus at rest.
+            let stretch = 1.0 + 1e-6;
+            let pull = laws.first(&stretched(stretch, stretch.powf(-0.5)), WHOLE).1;
+            assert!((pull[0][0] / (FILM.thickness_mm * 1e-6) - FILM.youngs_mpa).abs() < 1e-5);
+        }
     }
 }

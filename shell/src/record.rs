@@ -13,7 +13,7 @@ const MOVED: usize = 3 + 4 * DISC;
 
 /// Numbers of a record.
 pub fn length() -> usize {
-    5 + (1 + Change::all().count()) * MOVED
+    5 + (1 + Change::of_sweep().count()) * MOVED
 }
 
 /// A solution as numbers.
@@ -75,7 +75,7 @@ mod tests {
         let numbers_in: Vec<f64> = (0..length()).map(|k| k as f64).collect();
         let read = solved(&numbers_in).unwrap();
         assert_eq!(numbers(&read), numbers_in);
-        assert_eq!(read.answers.len(), Change::all().count());
+        assert_eq!(read.answers.len(), Change::of_sweep().count());
         assert!(solved(&numbers_in[1..]).is_none());
     }
 }

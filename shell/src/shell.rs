@@ -1,7 +1,15 @@
 //! The energy of a whole film, with its gradient and stiffness.
 
-use crate::grid::{Grid, Place};
-use crate::point::{Blocks, Laws, Material, Point, V3, VECTORS};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use pulp::{Arch, Simd, WithSimd};
+
+use crate::answers::Change;
+use crate::cell::{CellSum, Row, add_force};
+use crate::grid::Grid;
+use crate::point::{Laws, Point, Share, V3, VECTORS};
+use crate::sheet::Sheet;
 use crate::sparse::{COMPONENTS, Pattern};
 use crate::spline::{Axis, Basis, SUPPORT};
 
@@ -15,60 +23,130 @@ const GAUSS_POINTS: [(f64, f64); GAUSS] = [
     (0.0, 8.0 / 9.0),
     (0.774_596_669_241_483_4, 5.0 / 9.0),
 ];
+/// How often each vector holds a derivative by x and by y.
+const ORDERS: [[f64; 2]; VECTORS] = [[1.0, 0.0], [0.0, 1.0], [2.0, 0.0], [0.0, 2.0], [1.0, 1.0]];
+/// By what a stretch is changed to see what a point's forces answer.
+const STRETCH_STEP: f64 = 1e-4;
 
-/// The five derivatives of one function: ,₁ ,₂ ,₁₁ ,₂₂ ,₁₂.
-type Slopes = [f64; VECTORS];
-/// A span's Gauss points: weight (mm) and functions.
+/// A span's Gauss points: weight (mm before the film was stretched) and functions with their
+/// derivatives by the place before it was stretched.
 type Samples = [(f64, Basis); GAUSS];
+/// Sums along x: for each Gauss point along x, line of functions and derivative by x.
+type Lines = [[[V3; 3]; SUPPORT]; GAUSS];
 
-/// A film on springs: the sum of Koiter's energy over the cells and of what holds the film.
+/// A film on springs: the sum of the points' energy over the cells and of what holds the film, less
+/// what its weight gives.
 ///
 /// Displacements are given by coefficients: unknown 3 · k + c is component c of coefficient k, in
 /// mm.
 pub struct Shell {
     grid: Grid,
+    sheet: Sheet,
     laws: Laws,
     samples: [Vec<Samples>; 2],
-    pattern: Pattern,
-    springs: Vec<Spring>,
+    /// Of each cell's Gauss points.
+    shares: Vec<[[Share; GAUSS]; GAUSS]>,
+    /// Points of the dots, by cells.
+    spots: BTreeMap<[usize; 2], Vec<Spot>>,
+    /// The weight on each unknown, N.
+    weight: Vec<f64>,
+    pattern: Arc<Pattern>,
+    hold: Hold,
     pins: Vec<(usize, f64)>,
 }
 
-/// Holds a place of the film where it rests.
-pub struct Spring {
-    /// The place.
-    pub place: Place,
-    /// N/mm, in every direction.
-    pub stiffness: f64,
+/// A point of a dot.
+struct Spot {
+    slopes: [Row; VECTORS],
+    at: [f64; 2],
+    /// What a stiffening of 1 adds there.
+    share: Share,
+}
+
+/// Springs that hold a film where it is flat, summed by cells.
+pub struct Hold {
+    cells: BTreeMap<[usize; 2], Box<[Row; LOCAL]>>,
 }
 
 /// Energy (N·mm), gradient (N) and the stiffness matrix's entries (N/mm).
+#[cfg(test)]
 pub struct Derivatives {
-    /// Energy, N·mm.
     pub energy: f64,
-    /// Its gradient by the unknowns, N.
     pub gradient: Vec<f64>,
-    /// Its second derivatives in the order of [`Shell::pattern`], N/mm.
     pub stiffness: Vec<f64>,
 }
 
-impl Shell {
-    /// A free film of `material` over `grid`.
-    pub fn new(grid: Grid, material: &Material) -> Shell {
-        let [columns, rows] = grid.functions();
-        Shell {
-            laws: Laws::new(material),
-            samples: [samples(&grid.axes[0]), samples(&grid.axes[1])],
-            pattern: Pattern::new(columns, rows),
-            springs: Vec::new(),
-            pins: Vec::new(),
-            grid,
+impl Hold {
+    /// Springs at points (mm, N/mm in every direction) of a film over `grid`.
+    pub fn new(grid: &Grid, springs: impl IntoIterator<Item = ([f64; 2], f64)>) -> Hold {
+        let mut cells = BTreeMap::new();
+        for (point, stiffness) in springs {
+            let place = grid.place(point);
+            let cell = cells
+                .entry(place.origin)
+                .or_insert_with(|| Box::new([[0.0; LOCAL]; LOCAL]));
+            for (row, value) in cell.iter_mut().zip(&place.values) {
+                for (slot, other) in row.iter_mut().zip(&place.values) {
+                    *slot += stiffness * value * other;
+                }
+            }
         }
+        Hold { cells }
     }
 
-    /// Holds places.
-    pub fn hold(&mut self, springs: impl IntoIterator<Item = Spring>) {
-        self.springs.extend(springs);
+    /// The gradient of the energy that displacements `u` give to the springs, N, added `factor`
+    /// times; that energy, N·mm.
+    pub fn pull(&self, grid: &Grid, u: &[f64], factor: f64, sum: &mut [f64]) -> f64 {
+        let mut energy = 0.0;
+        for (&origin, matrix) in &self.cells {
+            let local = grid.gather(u, origin);
+            for (a, row) in matrix.iter().enumerate() {
+                let first = COMPONENTS * grid.coefficient(origin, a);
+                for c in 0..COMPONENTS {
+                    let parts = row.iter().zip(&local).map(|(k, moved)| k * moved[c]);
+                    let force: f64 = parts.sum();
+                    sum[first + c] += factor * force;
+                    energy += 0.5 * local[a][c] * force;
+                }
+            }
+        }
+        energy
+    }
+}
+
+impl Shell {
+    /// A free film over `grid`.
+    pub fn new(grid: Grid, sheet: &Sheet) -> Shell {
+        let [columns, rows] = grid.functions();
+        let pattern = Arc::new(Pattern::new(columns, rows));
+        Shell::of(grid, sheet, pattern)
+    }
+
+    /// The same with the pattern that such grids have.
+    pub fn of(grid: Grid, sheet: &Sheet, pattern: Arc<Pattern>) -> Shell {
+        let scales = sheet.scales();
+        let samples = [0, 1].map(|way| samples(&grid.axes[way], scales[way]));
+        let mut shell = Shell {
+            laws: Laws::new(&sheet.material, sheet.law),
+            shares: shares(&grid, &samples, sheet),
+            spots: spots(&grid, sheet),
+            samples,
+            weight: Vec::new(),
+            pattern,
+            hold: Hold {
+                cells: BTreeMap::new(),
+            },
+            pins: Vec::new(),
+            sheet: sheet.clone(),
+            grid,
+        };
+        shell.weight = shell.weights();
+        shell
+    }
+
+    /// Holds the film.
+    pub fn hold(&mut self, hold: Hold) {
+        self.hold = hold;
     }
 
     /// Holds one unknown at zero by `stiffness` N/mm.
@@ -82,155 +160,206 @@ impl Shell {
         &self.grid
     }
 
+    /// The film as a sheet.
+    pub fn sheet(&self) -> &Sheet {
+        &self.sheet
+    }
+
     /// Which unknowns meet.
-    pub fn pattern(&self) -> &Pattern {
+    pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
     /// The energy of displacements `u`, N·mm.
+    #[cfg(test)]
     pub fn energy(&self, u: &[f64]) -> f64 {
-        let mut energy = self.holding_energy(u);
-        for cell in self.cells() {
-            let local = self.grid.gather(u, cell.origin);
-            for (weight, slopes) in self.points(&cell) {
-                energy += weight * self.laws.energy(&surface(&slopes, &local));
-            }
-        }
-        energy
+        self.first(u).0
     }
 
-    /// The gradient of the energy of displacements `u`, N.
-    pub fn gradient(&self, u: &[f64]) -> Vec<f64> {
-        let mut sum = self.pull(u, &self.springs);
-        for &(unknown, stiffness) in &self.pins {
-            sum[unknown] += stiffness * u[unknown];
-        }
-        for cell in self.cells() {
-            let local = self.grid.gather(u, cell.origin);
-            let mut own = [[0.0; 3]; LOCAL];
-            for (weight, slopes) in self.points(&cell) {
-                let (_, first, _) = self.laws.derivatives(&surface(&slopes, &local));
-                add_gradient(&mut own, &slopes, &first, weight);
-            }
-            for (a, part) in own.iter().enumerate() {
-                let row = COMPONENTS * self.grid.coefficient(cell.origin, a);
-                for (total, part) in sum[row..].iter_mut().zip(part) {
-                    *total += part;
-                }
-            }
-        }
-        sum
+    /// The energy of displacements `u`, N·mm, and its gradient, N.
+    pub fn first(&self, u: &[f64]) -> (f64, Vec<f64>) {
+        Arch::new().dispatch(First { shell: self, u })
     }
 
-    /// The gradient of the energy that displacements `u` give to `springs`, N.
-    pub fn pull(&self, u: &[f64], springs: &[Spring]) -> Vec<f64> {
-        let mut sum = vec![0.0; u.len()];
-        for Spring { place, stiffness } in springs {
-            let moved = self.grid.interpolate(u, place);
-            for (a, value) in place.values.iter().enumerate() {
-                let row = self.grid.coefficient(place.origin, a);
-                for c in 0..COMPONENTS {
-                    sum[COMPONENTS * row + c] += stiffness * value * moved[c];
-                }
-            }
-        }
-        sum
+    /// The second derivatives of the energy of displacements `u`, N/mm, in the order of
+    /// [`Shell::pattern`].
+    pub fn stiffness(&self, u: &[f64]) -> Vec<f64> {
+        Arch::new().dispatch(Assembly { shell: self, u })
     }
 
-    /// The energy of displacements `u` with its derivatives.
+    #[cfg(test)]
     pub fn derivatives(&self, u: &[f64]) -> Derivatives {
-        let mut sum = Derivatives {
-            energy: self.holding_energy(u),
-            gradient: vec![0.0; u.len()],
-            stiffness: vec![0.0; self.pattern.entries()],
-        };
-        self.add_holding(u, &mut sum);
-        let mut cell_blocks = Box::new([[[[0.0; 3]; 3]; LOCAL]; LOCAL]);
-        for cell in self.cells() {
-            self.add_cell(&cell, u, &mut sum, &mut cell_blocks);
+        let (energy, gradient) = self.first(u);
+        Derivatives {
+            energy,
+            gradient,
+            stiffness: self.stiffness(u),
         }
+    }
+
+    /// The gradient of the springs' energy, N.
+    pub fn pull(&self, u: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; u.len()];
+        self.hold.pull(&self.grid, u, 1.0, &mut sum);
         sum
     }
 
     /// What the springs pull the film with, N: the sum of their forces.
     pub fn reaction(&self, u: &[f64]) -> V3 {
         let mut sum = [0.0; 3];
-        for spring in &self.springs {
-            let moved = self.grid.interpolate(u, &spring.place);
-            for (total, part) in sum.iter_mut().zip(moved) {
-                *total -= spring.stiffness * part;
+        for force in self.pull(u).chunks(COMPONENTS) {
+            for (total, part) in sum.iter_mut().zip(force) {
+                *total -= part;
             }
         }
         sum
     }
 
-    fn holding_energy(&self, u: &[f64]) -> f64 {
-        let springs = self.springs.iter().map(|spring| {
-            let moved = self.grid.interpolate(u, &spring.place);
-            spring.stiffness * moved.iter().map(|part| part * part).sum::<f64>()
-        });
-        let pins = self
-            .pins
-            .iter()
-            .map(|(unknown, stiffness)| stiffness * u[*unknown].powi(2));
-        0.5 * (springs.sum::<f64>() + pins.sum::<f64>())
-    }
-
-    fn add_holding(&self, u: &[f64], sum: &mut Derivatives) {
+    /// The energy of what holds the film and of its weight; their gradient is added.
+    fn held(&self, u: &[f64], gradient: &mut [f64]) -> f64 {
+        let mut energy = self.hold.pull(&self.grid, u, 1.0, gradient);
         for &(unknown, stiffness) in &self.pins {
-            sum.gradient[unknown] += stiffness * u[unknown];
-            sum.stiffness[self.pattern.diagonal()[unknown]] += stiffness;
+            gradient[unknown] += stiffness * u[unknown];
+            energy += 0.5 * stiffness * u[unknown].powi(2);
         }
-        for Spring { place, stiffness } in &self.springs {
-            let moved = self.grid.interpolate(u, place);
-            for (a, value) in place.values.iter().enumerate() {
-                let row = self.grid.coefficient(place.origin, a);
-                for c in 0..COMPONENTS {
-                    sum.gradient[COMPONENTS * row + c] += stiffness * value * moved[c];
+        for ((slot, weight), u) in gradient.iter_mut().zip(&self.weight).zip(u) {
+            *slot -= weight;
+            energy -= weight * u;
+        }
+        energy
+    }
+
+    fn add_holding_stiffness(&self, stiffness: &mut [f64]) {
+        for &(unknown, size) in &self.pins {
+            stiffness[self.pattern.diagonal()[unknown]] += size;
+        }
+        for (&origin, matrix) in &self.hold.cells {
+            self.pattern.add_springs(stiffness, origin, matrix);
+        }
+    }
+
+    /// The weight on each unknown, N.
+    fn weights(&self) -> Vec<f64> {
+        let mut sum = vec![0.0; self.grid.unknowns()];
+        if self.sheet.down == [0.0; 3] {
+            return sum;
+        }
+        let down = self.sheet.down.map(|part| part * self.sheet.weight());
+        for cell in self.cells() {
+            let mut lines = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+            for (j, (_, y)) in cell.y.iter().enumerate() {
+                for (line, share) in lines.iter_mut().zip(&cell.shares[j]) {
+                    spread_value(line, y, &down.map(|part| share.membrane * part));
                 }
-                for (b, other) in place.values.iter().enumerate().take(a + 1) {
-                    let column = self.grid.coefficient(place.origin, b);
-                    let k = stiffness * value * other;
-                    let block = [[k, 0.0, 0.0], [0.0, k, 0.0], [0.0, 0.0, k]];
-                    self.pattern
-                        .add_block(&mut sum.stiffness, row, column, &block);
+            }
+            self.scatter(&mut sum, cell.origin, &gathered(&lines, cell.x));
+        }
+        sum
+    }
+
+    /// The gradient's derivatives by each of some changes of the sheet itself (of another change:
+    /// none), all in one pass.
+    pub fn by_sheet(&self, u: &[f64], changes: &[Change]) -> Vec<Vec<f64>> {
+        let mut sums = vec![vec![0.0; u.len()]; changes.len()];
+        let mut lines = vec![[[[[0.0; 3]; 3]; SUPPORT]; GAUSS]; changes.len()];
+        for cell in self.cells() {
+            let local = self.grid.gather(u, cell.origin);
+            let moved = contracted(&local, cell.x);
+            for line in &mut lines {
+                *line = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+            }
+            for (j, (_, y)) in cell.y.iter().enumerate() {
+                for (i, along) in moved.iter().enumerate() {
+                    let x = self.vectors(along, y);
+                    let rates = Rates::new(self, &x, cell.shares[j][i], cell.at(i, j), changes);
+                    for (line, change) in lines.iter_mut().zip(changes) {
+                        spread(&mut line[i], y, &rates.gradient(*change));
+                        spread_value(&mut line[i], y, &rates.weight(*change));
+                    }
                 }
+            }
+            for (sum, line) in sums.iter_mut().zip(&lines) {
+                self.scatter(sum, cell.origin, &gathered(line, cell.x));
+            }
+        }
+        let stiffening = self.sheet.dot_stiffening;
+        for (&origin, spots) in &self.spots {
+            let local = self.grid.gather(u, origin);
+            for spot in spots {
+                let x = self.surface(&spot.slopes, &local);
+                let rates = Rates::new(self, &x, spot.share, spot.at, changes);
+                for (sum, change) in sums.iter_mut().zip(changes) {
+                    let gradient = match change {
+                        Change::DotStiffening => rates.gradient(Change::Youngs),
+                        _ if stiffening == 0.0 => continue,
+                        _ => rates
+                            .gradient(*change)
+                            .map(|vector| vector.map(|part| stiffening * part)),
+                    };
+                    let mut own = [[0.0; 3]; LOCAL];
+                    add_force(&mut own, &spot.slopes, &gradient);
+                    self.scatter(sum, origin, &own);
+                }
+            }
+        }
+        sums
+    }
+
+    #[inline(always)]
+    fn scatter(&self, sum: &mut [f64], origin: [usize; 2], local: &[V3; LOCAL]) {
+        for (a, force) in local.iter().enumerate() {
+            let first = COMPONENTS * self.grid.coefficient(origin, a);
+            for (slot, part) in sum[first..first + COMPONENTS].iter_mut().zip(force) {
+                *slot += part;
             }
         }
     }
 
-    fn add_cell(
-        &self,
-        cell: &Cell,
-        u: &[f64],
-        sum: &mut Derivatives,
-        blocks: &mut [[[[f64; 3]; 3]; LOCAL]; LOCAL],
-    ) {
-        let local = self.grid.gather(u, cell.origin);
-        let mut gradient = [[0.0; 3]; LOCAL];
-        blocks
-            .iter_mut()
-            .flatten()
-            .flatten()
-            .flatten()
-            .for_each(|part| *part = 0.0);
-        for (weight, slopes) in self.points(cell) {
-            let (energy, first, second) = self.laws.derivatives(&surface(&slopes, &local));
-            sum.energy += weight * energy;
-            add_gradient(&mut gradient, &slopes, &first, weight);
-            add_blocks(blocks, &slopes, &second, weight);
-        }
-        for a in 0..LOCAL {
-            let row = self.grid.coefficient(cell.origin, a);
-            for c in 0..COMPONENTS {
-                sum.gradient[COMPONENTS * row + c] += gradient[a][c];
-            }
-            for b in 0..=a {
-                let column = self.grid.coefficient(cell.origin, b);
-                self.pattern
-                    .add_block(&mut sum.stiffness, row, column, &blocks[a][b]);
+    /// The surface's vectors at a point: those of the flat film, plus the displacement's
+    /// derivatives.
+    #[inline(always)]
+    fn vectors(&self, line: &[[V3; 3]; SUPPORT], y: &Basis) -> Point {
+        let mut x = self.flat();
+        for j in 0..SUPPORT {
+            for c in 0..3 {
+                x[0][c] += y[0][j] * line[j][1][c];
+                x[1][c] += y[1][j] * line[j][0][c];
+                x[2][c] += y[0][j] * line[j][2][c];
+                x[3][c] += y[2][j] * line[j][0][c];
+                x[4][c] += y[1][j] * line[j][1][c];
             }
         }
+        x
+    }
+
+    /// The same at a point whose slopes are known.
+    #[inline(always)]
+    fn surface(&self, slopes: &[Row; VECTORS], local: &[V3; LOCAL]) -> Point {
+        let mut x = self.flat();
+        for (vector, row) in x.iter_mut().zip(slopes) {
+            for (slope, moved) in row.iter().zip(local) {
+                for (part, moved) in vector.iter_mut().zip(moved) {
+                    *part += slope * moved;
+                }
+            }
+        }
+        x
+    }
+
+    #[inline(always)]
+    fn flat(&self) -> Point {
+        let [across, down] = self.sheet.scales();
+        let mut x = [[0.0; 3]; VECTORS];
+        (x[0][0], x[1][1]) = (across, down);
+        x
+    }
+
+    #[inline(always)]
+    fn spots_at(&self, origin: [usize; 2]) -> &[Spot] {
+        if self.sheet.dot_stiffening == 0.0 {
+            return &[];
+        }
+        self.spots.get(&origin).map_or(&[], |spots| spots)
     }
 
     fn cells(&self) -> impl Iterator<Item = Cell<'_>> {
@@ -240,113 +369,355 @@ impl Shell {
                 origin: [i, j],
                 x,
                 y,
+                shares: &self.shares[j * across.len() + i],
+                grid: &self.grid,
             };
             across.iter().enumerate().map(cell)
         })
     }
-
-    /// The Gauss points of a cell: weight (mm²) and the slopes of its functions.
-    fn points(&self, cell: &Cell) -> impl Iterator<Item = (f64, [Slopes; LOCAL])> {
-        cell.y.iter().flat_map(move |(height, y)| {
-            cell.x
-                .iter()
-                .map(move |(width, x)| (width * height, slopes(x, y)))
-        })
-    }
 }
 
-/// One cell of the grid: its first coefficient and the Gauss points along its sides.
+/// One cell of the grid: its first coefficient, the Gauss points along its sides and their shares.
 struct Cell<'a> {
     origin: [usize; 2],
     x: &'a Samples,
     y: &'a Samples,
+    shares: &'a [[Share; GAUSS]; GAUSS],
+    grid: &'a Grid,
 }
 
-fn samples(axis: &Axis) -> Vec<Samples> {
+impl Cell<'_> {
+    /// Where Gauss point (i, j) is, mm.
+    fn at(&self, i: usize, j: usize) -> [f64; 2] {
+        [
+            place_of(&self.grid.axes[0], self.origin[0], i),
+            place_of(&self.grid.axes[1], self.origin[1], j),
+        ]
+    }
+}
+
+/// The pass for energy and gradient.
+struct First<'a> {
+    shell: &'a Shell,
+    u: &'a [f64],
+}
+
+impl WithSimd for First<'_> {
+    type Output = (f64, Vec<f64>);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> (f64, Vec<f64>) {
+        let First { shell, u } = self;
+        let mut sum = vec![0.0; u.len()];
+        let mut energy = shell.held(u, &mut sum);
+        for cell in shell.cells() {
+            let local = shell.grid.gather(u, cell.origin);
+            let moved = contracted(&local, cell.x);
+            let mut lines = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+            for (j, (_, y)) in cell.y.iter().enumerate() {
+                for i in 0..GAUSS {
+                    let x = shell.vectors(&moved[i], y);
+                    let (part, gradient) = shell.laws.first(&x, cell.shares[j][i]);
+                    energy += part;
+                    spread(&mut lines[i], y, &gradient);
+                }
+            }
+            let mut own = gathered(&lines, cell.x);
+            for spot in shell.spots_at(cell.origin) {
+                let share = times(spot.share, shell.sheet.dot_stiffening);
+                let x = shell.surface(&spot.slopes, &local);
+                let (part, gradient) = shell.laws.first(&x, share);
+                energy += part;
+                add_force(&mut own, &spot.slopes, &gradient);
+            }
+            shell.scatter(&mut sum, cell.origin, &own);
+        }
+        (energy, sum)
+    }
+}
+
+/// The pass for the stiffness.
+struct Assembly<'a> {
+    shell: &'a Shell,
+    u: &'a [f64],
+}
+
+impl WithSimd for Assembly<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
+        let Assembly { shell, u } = self;
+        let mut stiffness = vec![0.0; shell.pattern.entries()];
+        shell.add_holding_stiffness(&mut stiffness);
+        let mut sum = CellSum::new();
+        for cell in shell.cells() {
+            let local = shell.grid.gather(u, cell.origin);
+            let moved = contracted(&local, cell.x);
+            sum.clear();
+            for (j, (_, y)) in cell.y.iter().enumerate() {
+                for (i, (_, x)) in cell.x.iter().enumerate() {
+                    let at = shell.vectors(&moved[i], y);
+                    let second = shell.laws.second(&at, cell.shares[j][i]);
+                    sum.add(simd, &slopes(x, y), &second);
+                }
+            }
+            for spot in shell.spots_at(cell.origin) {
+                let share = times(spot.share, shell.sheet.dot_stiffening);
+                let at = shell.surface(&spot.slopes, &local);
+                sum.add(simd, &spot.slopes, &shell.laws.second(&at, share));
+            }
+            sum.finish(simd);
+            shell
+                .pattern
+                .add_cell(&mut stiffness, cell.origin, &sum.stiffness);
+        }
+        stiffness
+    }
+}
+
+/// How a point's gradient and weight answer to changes of the sheet.
+struct Rates<'a> {
+    shell: &'a Shell,
+    share: Share,
+    /// The thickness's terms, in parts of the thickness there.
+    terms: [f64; crate::sheet::TERMS],
+    parts: [Point; 2],
+    by_law: [Point; 2],
+    by_stretch: [Point; 2],
+}
+
+impl<'a> Rates<'a> {
+    fn new(
+        shell: &'a Shell,
+        x: &Point,
+        share: Share,
+        at: [f64; 2],
+        changes: &[Change],
+    ) -> Rates<'a> {
+        let zero = [[[0.0; 3]; VECTORS]; 2];
+        let relative = shell.sheet.relative(at);
+        let any = |one: fn(&Change) -> bool| changes.iter().any(one);
+        Rates {
+            shell,
+            share,
+            terms: Sheet::terms_at(at).map(|term| term / relative),
+            parts: shell.laws.parts(x),
+            by_law: match any(|change| matches!(change, Change::NeoHooke | Change::Stiffening)) {
+                true => shell.laws.by_law(x),
+                false => zero,
+            },
+            by_stretch: match any(|change| matches!(change, Change::Stretch(_))) {
+                true => [0, 1].map(|way| by_stretch(shell, x, share, way)),
+                false => zero,
+            },
+        }
+    }
+
+    /// The gradient's answer.
+    fn gradient(&self, change: Change) -> Point {
+        let Share { membrane, bending } = self.share;
+        match change {
+            Change::Youngs => self.sum(membrane, bending),
+            Change::Thickness => {
+                let t = self.shell.sheet.material.thickness_mm;
+                self.sum(membrane / t, 3.0 * bending / t)
+            }
+            Change::ThicknessSlope(_) | Change::ThicknessCurve(_) => {
+                let term = change.term().map_or(0.0, |k| self.terms[k]);
+                self.sum(term * membrane, 3.0 * term * bending)
+            }
+            Change::NeoHooke => scaled(&self.by_law[0], membrane),
+            Change::Stiffening => scaled(&self.by_law[1], membrane),
+            Change::Stretch(way) => self.by_stretch[way],
+            _ => [[0.0; 3]; VECTORS],
+        }
+    }
+
+    /// Less the weight's answer, N.
+    fn weight(&self, change: Change) -> V3 {
+        let sheet = &self.shell.sheet;
+        let size = -self.share.membrane * sheet.weight();
+        let part = match change {
+            Change::Thickness => 1.0 / sheet.material.thickness_mm,
+            Change::ThicknessSlope(_) | Change::ThicknessCurve(_) => {
+                change.term().map_or(0.0, |k| self.terms[k])
+            }
+            Change::Stretch(way) => -1.0 / sheet.scales()[way],
+            Change::Down(axis) => {
+                let mut weight = [0.0; 3];
+                weight[axis] = size;
+                return weight;
+            }
+            _ => return [0.0; 3],
+        };
+        sheet.down.map(|down| part * size * down)
+    }
+
+    fn sum(&self, membrane: f64, bending: f64) -> Point {
+        let [stretch, bend] = &self.parts;
+        std::array::from_fn(|p| {
+            std::array::from_fn(|c| membrane * stretch[p][c] + bending * bend[p][c])
+        })
+    }
+}
+
+/// What the slopes' factors, the vectors and the area make of a stretch.
+fn by_stretch(shell: &Shell, x: &Point, share: Share, way: usize) -> Point {
+    let scale = shell.sheet.scales()[way];
+    let at = |step: f64| {
+        let stretched = std::array::from_fn(|p| {
+            let factor = 1.0 + ORDERS[p][way] * step / scale;
+            x[p].map(|part| factor * part)
+        });
+        shell.laws.first(&stretched, share).1
+    };
+    let (here, back, forth) = (at(0.0), at(-STRETCH_STEP), at(STRETCH_STEP));
+    std::array::from_fn(|p| {
+        let own = (ORDERS[p][way] - 1.0) / scale;
+        std::array::from_fn(|c| {
+            own * here[p][c] + (forth[p][c] - back[p][c]) / (2.0 * STRETCH_STEP)
+        })
+    })
+}
+
+fn scaled(point: &Point, factor: f64) -> Point {
+    point.map(|vector| vector.map(|part| factor * part))
+}
+
+fn times(share: Share, factor: f64) -> Share {
+    Share {
+        membrane: factor * share.membrane,
+        bending: factor * share.bending,
+    }
+}
+
+fn samples(axis: &Axis, scale: f64) -> Vec<Samples> {
     let span_samples = |span| {
         let [from, to] = axis.ends(span);
-        let (middle, half) = ((from + to) / 2.0, (to - from) / 2.0);
-        GAUSS_POINTS.map(|(at, weight)| (weight * half, axis.basis(span, middle + half * at)))
+        let half = (to - from) / 2.0;
+        std::array::from_fn(|k| {
+            let basis = axis.basis(span, place_of(axis, span, k));
+            (GAUSS_POINTS[k].1 * half / scale, stretched(basis, scale))
+        })
     };
     (0..axis.spans()).map(span_samples).collect()
 }
 
-fn slopes(x: &Basis, y: &Basis) -> [Slopes; LOCAL] {
-    std::array::from_fn(|k| {
-        let (i, j) = (k % SUPPORT, k / SUPPORT);
-        [
-            x[1][i] * y[0][j],
-            x[0][i] * y[1][j],
-            x[2][i] * y[0][j],
-            x[0][i] * y[2][j],
-            x[1][i] * y[1][j],
-        ]
-    })
+fn place_of(axis: &Axis, span: usize, k: usize) -> f64 {
+    let [from, to] = axis.ends(span);
+    (from + to) / 2.0 + (to - from) / 2.0 * GAUSS_POINTS[k].0
 }
 
-/// The surface's vectors at a point: those of the film at rest, plus the displacement's
-/// derivatives.
-fn surface(slopes: &[Slopes; LOCAL], local: &[V3; LOCAL]) -> Point {
-    let mut x = [
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0; 3],
-        [0.0; 3],
-        [0.0; 3],
-    ];
-    for (slope, u) in slopes.iter().zip(local) {
-        for (vector, d) in x.iter_mut().zip(slope) {
-            for (part, moved) in vector.iter_mut().zip(u) {
-                *part += d * moved;
-            }
+/// Derivatives by the place before the film was stretched.
+fn stretched([values, first, second]: Basis, scale: f64) -> Basis {
+    [
+        values,
+        first.map(|part| scale * part),
+        second.map(|part| scale * scale * part),
+    ]
+}
+
+fn shares(
+    grid: &Grid,
+    samples: &[Vec<Samples>; 2],
+    sheet: &Sheet,
+) -> Vec<[[Share; GAUSS]; GAUSS]> {
+    let [across, down] = samples;
+    let mut shares = Vec::with_capacity(across.len() * down.len());
+    for (row, y) in down.iter().enumerate() {
+        for (column, x) in across.iter().enumerate() {
+            shares.push(std::array::from_fn(|j| {
+                std::array::from_fn(|i| {
+                    let at = [
+                        place_of(&grid.axes[0], column, i),
+                        place_of(&grid.axes[1], row, j),
+                    ];
+                    sheet.share(at, x[i].0 * y[j].0)
+                })
+            }));
         }
     }
-    x
+    shares
 }
 
-fn add_gradient(sum: &mut [V3; LOCAL], slopes: &[Slopes; LOCAL], first: &Point, weight: f64) {
-    for (total, slope) in sum.iter_mut().zip(slopes) {
-        for (d, vector) in slope.iter().zip(first) {
-            for (part, force) in total.iter_mut().zip(vector) {
-                *part += weight * d * force;
-            }
-        }
+fn spots(grid: &Grid, sheet: &Sheet) -> BTreeMap<[usize; 2], Vec<Spot>> {
+    let [across, down] = sheet.scales();
+    let mut spots: BTreeMap<[usize; 2], Vec<Spot>> = BTreeMap::new();
+    for (at, area) in sheet.dot_points() {
+        let origin = [0, 1].map(|way| grid.axes[way].span_of(at[way]));
+        let x = stretched(grid.axes[0].basis(origin[0], at[0]), across);
+        let y = stretched(grid.axes[1].basis(origin[1], at[1]), down);
+        spots.entry(origin).or_default().push(Spot {
+            slopes: slopes(&x, &y),
+            at,
+            share: sheet.share(at, area / (across * down)),
+        });
     }
+    spots
 }
 
-/// Adds the lower triangle of the cell's stiffness.
-fn add_blocks(
-    sum: &mut [[[[f64; 3]; 3]; LOCAL]; LOCAL],
-    slopes: &[Slopes; LOCAL],
-    second: &Blocks,
-    weight: f64,
-) {
-    for (b, right) in slopes.iter().enumerate() {
-        let half = half_block(second, right, weight);
-        for (a, left) in slopes.iter().enumerate().skip(b) {
-            let block = &mut sum[a][b];
-            for (d, part) in left.iter().zip(&half) {
-                for c in 0..3 {
-                    for e in 0..3 {
-                        block[c][e] += d * part[c][e];
+/// The derivatives of a cell's functions.
+#[inline(always)]
+fn slopes(x: &Basis, y: &Basis) -> [Row; VECTORS] {
+    const ORDERS: [[usize; 2]; VECTORS] = [[1, 0], [0, 1], [2, 0], [0, 2], [1, 1]];
+    ORDERS.map(|[dx, dy]| std::array::from_fn(|k| x[dx][k % SUPPORT] * y[dy][k / SUPPORT]))
+}
+
+/// Sums of a cell's coefficients along x.
+#[inline(always)]
+fn contracted(local: &[V3; LOCAL], x: &Samples) -> Lines {
+    let mut lines = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+    for (line, (_, basis)) in lines.iter_mut().zip(x) {
+        for j in 0..SUPPORT {
+            for d in 0..3 {
+                for i in 0..SUPPORT {
+                    for c in 0..3 {
+                        line[j][d][c] += basis[d][i] * local[SUPPORT * j + i][c];
                     }
                 }
             }
         }
     }
+    lines
 }
 
-/// Σ_q slope_q · second[p][q], for each p.
-fn half_block(second: &Blocks, slope: &Slopes, weight: f64) -> [[[f64; 3]; 3]; VECTORS] {
-    let mut half = [[[0.0; 3]; 3]; VECTORS];
-    for (sum, row) in half.iter_mut().zip(second) {
-        for (d, block) in slope.iter().zip(row) {
-            for c in 0..3 {
-                for e in 0..3 {
-                    sum[c][e] += weight * d * block[c][e];
+/// The other way round: the force on each coefficient.
+#[inline(always)]
+fn gathered(lines: &Lines, x: &Samples) -> [V3; LOCAL] {
+    let mut local = [[0.0; 3]; LOCAL];
+    for (line, (_, basis)) in lines.iter().zip(x) {
+        for j in 0..SUPPORT {
+            for d in 0..3 {
+                for i in 0..SUPPORT {
+                    for c in 0..3 {
+                        local[SUPPORT * j + i][c] += basis[d][i] * line[j][d][c];
+                    }
                 }
             }
         }
     }
-    half
+    local
+}
+
+/// A gradient's part of the sums along x.
+#[inline(always)]
+fn spread(line: &mut [[V3; 3]; SUPPORT], y: &Basis, gradient: &Point) {
+    for j in 0..SUPPORT {
+        for c in 0..3 {
+            line[j][0][c] += y[1][j] * gradient[1][c] + y[2][j] * gradient[3][c];
+            line[j][1][c] += y[0][j] * gradient[0][c] + y[1][j] * gradient[4][c];
+            line[j][2][c] += y[0][j] * gradient[2][c];
+        }
+    }
+}
+
+/// A force's part of the sums along x.
+#[inline(always)]
+fn spread_value(line: &mut [[V3; 3]; SUPPORT], y: &Basis, force: &V3) {
+    for j in 0..SUPPORT {
+        for c in 0..3 {
+            line[j][0][c] += y[0][j] * force[c];
+        }
+    }
 }

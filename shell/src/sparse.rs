@@ -6,11 +6,15 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{MatMut, Side};
 
 use crate::ShellError;
+use crate::cell::{CellStiffness, Row};
+use crate::shell::LOCAL;
 use crate::spline::SUPPORT;
 
 /// Components of a displacement, and so unknowns of a coefficient.
 pub const COMPONENTS: usize = 3;
 const REACH: usize = SUPPORT - 1;
+/// Where a cell's stiffness has each pair of components.
+const PAIR: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
 
 /// Which unknowns of a grid of coefficients meet in the energy: lower triangle, by columns.
 ///
@@ -54,29 +58,55 @@ impl Pattern {
         self.entries.len()
     }
 
-    /// Adds a 3×3 block where coefficient `row` meets `column` ≤ `row`.
-    #[inline]
-    pub fn add_block(
-        &self,
-        values: &mut [f64],
-        row: usize,
-        column: usize,
-        block: &[[f64; 3]; COMPONENTS],
-    ) {
-        if row == column {
+    /// Adds the stiffness of the cell whose first coefficient is at `origin`.
+    #[inline(always)]
+    pub fn add_cell(&self, values: &mut [f64], origin: [usize; 2], cell: &CellStiffness) {
+        self.each_pair(origin, |column, row, starts, reach| {
             for d in 0..COMPONENTS {
-                let start = self.starts[COMPONENTS * column + d];
-                for c in d..COMPONENTS {
-                    values[start + c - d] += block[c][d];
+                let own = if row == column { d } else { 0 };
+                let start = starts[d] + reach;
+                let start = if row == column { start } else { start - d };
+                for c in own..COMPONENTS {
+                    let part = if c <= d {
+                        cell[PAIR[c][d]][row][column]
+                    } else {
+                        cell[PAIR[d][c]][column][row]
+                    };
+                    values[start + c - own] += part;
                 }
             }
-            return;
-        }
-        let before = COMPONENTS * self.between(row, column);
-        for d in 0..COMPONENTS {
-            let start = self.starts[COMPONENTS * column + d] + (COMPONENTS - d) + before;
-            for (c, part) in block.iter().enumerate() {
-                values[start + c] += part[d];
+        });
+    }
+
+    /// Adds springs that pull alike in all directions.
+    pub fn add_springs(&self, values: &mut [f64], origin: [usize; 2], cell: &[Row; LOCAL]) {
+        self.each_pair(origin, |column, row, starts, reach| {
+            for d in 0..COMPONENTS {
+                values[starts[d] + reach] += cell[row][column];
+            }
+        });
+    }
+
+    /// Calls with each pair of a cell's coefficients (column, row ≥ column), the first entries of
+    /// the column's unknowns, and how far after the first of them the row's unknowns begin.
+    #[inline(always)]
+    fn each_pair(
+        &self,
+        [i, j]: [usize; 2],
+        mut call: impl FnMut(usize, usize, &[usize; COMPONENTS], usize),
+    ) {
+        for column in 0..LOCAL {
+            let (k, l) = (i + column % SUPPORT, j + column / SUPPORT);
+            let first = COMPONENTS * (l * self.columns + k);
+            let starts = [0, 1, 2].map(|d| self.starts[first + d]);
+            let (from, end) = self.neighbouring_columns(k);
+            for row in column..LOCAL {
+                let (m, n) = (i + row % SUPPORT, row / SUPPORT - column / SUPPORT);
+                let reach = match n {
+                    0 => m - k,
+                    _ => (end - k) + (n - 1) * (end - from) + (m - from),
+                };
+                call(column, row, &starts, COMPONENTS * reach);
             }
         }
     }
@@ -93,18 +123,6 @@ impl Pattern {
             let of_column = self.starts[column]..self.starts[column + 1];
             of_column.map(move |entry| (column, self.entries[entry], values[entry]))
         })
-    }
-
-    /// How many neighbours of `column` come after it and before `row`.
-    #[inline]
-    fn between(&self, row: usize, column: usize) -> usize {
-        let (i, j) = (column % self.columns, column / self.columns);
-        let (k, l) = (row % self.columns, row / self.columns);
-        if l == j {
-            return k - i - 1;
-        }
-        let (first, end) = self.neighbouring_columns(i);
-        (end - 1 - i) + (l - j - 1) * (end - first) + (k - first)
     }
 
     fn neighbouring_columns(&self, i: usize) -> (usize, usize) {
@@ -173,30 +191,32 @@ impl Factors {
 mod tests {
     use super::*;
 
-    /// Every pair of coefficients that meet, filled as a diagonally dominant matrix; also in full.
+    /// Every cell's numbers, with a diagonal that dominates; also in full.
     fn filled(pattern: &Pattern) -> (Vec<f64>, Vec<Vec<f64>>) {
         let n = pattern.unknowns();
         let (mut values, mut full) = (vec![0.0; pattern.entries()], vec![vec![0.0; n]; n]);
-        for row in 0..n / 3 {
-            for column in 0..=row {
-                let (i, k) = (row % pattern.columns, column % pattern.columns);
-                let (j, l) = (row / pattern.columns, column / pattern.columns);
-                if i.abs_diff(k) > 3 || j.abs_diff(l) > 3 {
-                    continue;
-                }
-                let dominant = if row == column { 500.0 } else { 0.0 };
-                let block: [[f64; 3]; 3] = std::array::from_fn(|c| {
-                    std::array::from_fn(|d| {
-                        let symmetric = if row == column { c * d } else { c + 2 * d };
-                        let part = ((row * 7 + column * 3 + symmetric) % 5) as f64;
-                        part + if c == d { dominant } else { 0.0 }
-                    })
-                });
-                pattern.add_block(&mut values, row, column, &block);
-                for c in 0..3 {
-                    for d in 0..3 {
-                        full[3 * row + c][3 * column + d] = block[c][d];
-                        full[3 * column + d][3 * row + c] = block[c][d];
+        let cells = (0..pattern.rows - 3)
+            .flat_map(|j| (0..pattern.columns - 3).map(move |i| [i, j]));
+        for [i, j] in cells {
+            let part = |p: usize, a: usize, b: usize| {
+                let dominant = if p < 3 && a == b { 500.0 } else { 0.0 };
+                let (a, b) = if p < 3 { (a.max(b), a.min(b)) } else { (a, b) };
+                ((a * 7 + b * 3 + p + i + 2 * j) % 5) as f64 + dominant
+            };
+            let cell: CellStiffness = std::array::from_fn(|p| {
+                std::array::from_fn(|a| std::array::from_fn(|b| part(p, a, b)))
+            });
+            pattern.add_cell(&mut values, [i, j], &cell);
+            let index = |a: usize| (j + a / 4) * pattern.columns + i + a % 4;
+            for a in 0..LOCAL {
+                for b in 0..LOCAL {
+                    for c in 0..3 {
+                        for e in 0..3 {
+                            full[3 * index(a) + c][3 * index(b) + e] += match c <= e {
+                                true => part(PAIR[c][e], a, b),
+                                false => part(PAIR[e][c], b, a),
+                            };
+                        }
                     }
                 }
             }
@@ -222,6 +242,9 @@ mod tests {
         factors.unwrap().solve(&mut sides, 2);
         for (found, expected) in sides.iter().zip(&expected) {
             assert!((found - expected).abs() < 1e-10);
+        }
+        for (column, row, value) in pattern.triplets(&values) {
+            assert_eq!(value, full[row][column]);
         }
         for (k, &entry) in pattern.diagonal().iter().enumerate() {
             assert_eq!(values[entry], full[k][k]);

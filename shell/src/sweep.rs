@@ -5,10 +5,9 @@ use hivtac_film::DiscMotion;
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
 use hivtac_scene::{Camera, MARKERS};
 
-use crate::film::Response;
 use crate::path::Path;
 use crate::view::seen_motion;
-use crate::{Change, Contact, Equilibrium, Film, Neighbours, ShellError};
+use crate::{Change, Contact, Equilibrium, Film, Response, ShellError};
 
 /// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where
 /// nothing moves.
@@ -44,7 +43,6 @@ pub struct Solved {
 /// When no equilibrium is found.
 pub fn solve_place(
     film: &mut Film,
-    beside: &Neighbours,
     camera: &Camera,
     place_mm: [f64; 2],
 ) -> Result<Vec<Solved>, ShellError> {
@@ -55,7 +53,7 @@ pub fn solve_place(
         tilt: [0.0; 2],
         place_mm,
     };
-    let mut solved = vec![look(film, beside, camera, at_rest, &film.rest())?];
+    let mut solved = vec![look(film, camera, at_rest, &film.rest())?];
     for tilt in tilts() {
         let mut path = Path::from_rest(film);
         for part in SIZES {
@@ -65,7 +63,7 @@ pub fn solve_place(
                 place_mm,
             };
             let state = path.go(film, Contact::Force(pose.force_n()), pose.size)?;
-            solved.push(look(film, beside, camera, pose, &state)?);
+            solved.push(look(film, camera, pose, &state)?);
         }
     }
     Ok(solved)
@@ -84,20 +82,18 @@ fn tilts() -> Vec<[f64; 2]> {
 
 fn look(
     film: &Film,
-    beside: &Neighbours,
     camera: &Camera,
     pose: Pose,
     state: &Equilibrium,
 ) -> Result<Solved, ShellError> {
-    let changes: Vec<Change> = Change::all().collect();
-    let answers = film.answers(beside, state, &changes)?;
-    let half = film.design().material.thickness_mm / 2.0;
+    let changes: Vec<Change> = Change::of_sweep().collect();
+    let answers = film.linearize(state, &changes)?;
     let answered = changes.iter().zip(&answers);
     Ok(Solved {
         pose,
         moved: Moved {
             tip_mm: state.tip_mm,
-            discs: discs(film, state, half, camera),
+            discs: discs(film, state, 0.0, camera),
         },
         answers: answered
             .map(|(change, answer)| answered_by(film, state, camera, *change, answer))
@@ -105,8 +101,8 @@ fn look(
     })
 }
 
-fn discs(film: &Film, state: &Equilibrium, half: f64, camera: &Camera) -> [DiscMotion; 4] {
-    MARKERS.map(|disc| seen_motion(|rest| film.surface(state, rest, half), &disc, camera))
+fn discs(film: &Film, state: &Equilibrium, thicker: f64, camera: &Camera) -> [DiscMotion; 4] {
+    MARKERS.map(|disc| seen_motion(|rest| film.surface(state, rest, thicker), &disc, camera))
 }
 
 fn answered_by(
@@ -117,16 +113,13 @@ fn answered_by(
     answer: &Response,
 ) -> Moved {
     let step = STEP_MM / answer.size().max(0.1);
-    let half = |sign: f64| {
-        let thicker = match change {
-            Change::Thickness => sign * step,
-            _ => 0.0,
-        };
-        (film.design().material.thickness_mm + thicker) / 2.0
+    let thicker = |sign: f64| match change {
+        Change::Thickness => sign * step,
+        _ => 0.0,
     };
     let [back, forth] = [-1.0, 1.0].map(|sign| {
         let there = film.beside(state, answer, sign * step);
-        discs(film, &there, half(sign), camera)
+        discs(film, &there, thicker(sign), camera)
     });
     let slope = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] {
         std::array::from_fn(|c| (b[c] - a[c]) / (2.0 * step))

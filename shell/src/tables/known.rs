@@ -125,7 +125,7 @@ fn poses(pose: Pose) -> Vec<Pose> {
 }
 
 fn answer(solved: &Solved, change: Change) -> Moved {
-    let place = Change::all().position(|one| one == change);
+    let place = Change::of_sweep().position(|one| one == change);
     place.map_or_else(Moved::default, |k| solved.answers[k])
 }
 

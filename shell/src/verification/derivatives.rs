@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::newton::inner;
-use crate::shell::Spring;
+use crate::shell::Hold;
 use proptest::prelude::*;
 
 fn film() -> Shell {
@@ -13,11 +13,9 @@ fn film() -> Shell {
         thickness_mm: 0.5,
     };
     let mut shell = rectangle([4.0, 3.0], [4, 3], &material);
-    let springs = [[0.3, 0.2], [3.5, 2.9]].map(|at| Spring {
-        place: shell.grid().place(at),
-        stiffness: 2.0,
-    });
-    shell.hold(springs);
+    let springs = [[0.3, 0.2], [3.5, 2.9]].map(|at| (at, 2.0));
+    let hold = Hold::new(shell.grid(), springs);
+    shell.hold(hold);
     shell.pin(40, 3.0);
     shell
 }

@@ -9,6 +9,7 @@ mod plates;
 use crate::Material;
 use crate::grid::Grid;
 use crate::newton::Problem;
+use crate::sheet::Sheet;
 use crate::shell::Shell;
 use crate::sparse::Solver;
 use crate::spline::Axis;
@@ -18,6 +19,11 @@ const PIN_N_PER_MM: f64 = 1e7;
 
 /// A rectangle [0, a] × [0, b] in equal cells.
 fn rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], material: &Material) -> Shell {
+    sheet_rectangle([a, b], [columns, rows], &Sheet::of(material))
+}
+
+/// The same of any sheet.
+fn sheet_rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], sheet: &Sheet) -> Shell {
     let axis = |length: f64, cells: usize| {
         let breaks: Vec<f64> = (0..=cells)
             .map(|i| length * i as f64 / cells as f64)
@@ -25,7 +31,7 @@ fn rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], material: &Material)
         Axis::new(&breaks)
     };
     let axes = [axis(a, columns), axis(b, rows)];
-    Shell::new(Grid { axes }, material)
+    Shell::new(Grid { axes }, sheet)
 }
 
 /// How far coefficient `k` is from the film's edges, in coefficients: along x and along y.
@@ -110,4 +116,44 @@ fn ramped(shell: &Shell, load: &[f64], stages: usize) -> Vec<f64> {
 
 fn displacement(shell: &Shell, u: &[f64], at: [f64; 2]) -> [f64; 3] {
     shell.grid().interpolate(u, &shell.grid().place(at))
+}
+
+/// Prints what the parts of a Newton step take, ms: the least of several tries.
+#[test]
+#[ignore = "a measurement"]
+fn speed() {
+    use std::time::Instant;
+    let least = |tries: usize, mut work: Box<dyn FnMut() + '_>| {
+        let mut best = f64::INFINITY;
+        for _ in 0..tries {
+            let begin = Instant::now();
+            work();
+            best = best.min(begin.elapsed().as_secs_f64());
+        }
+        1e3 * best
+    };
+    for fineness in [0.3, 0.5, 0.7, 1.0] {
+        let design = crate::Design { fineness, ..Default::default() };
+        let film = crate::Film::new(&design).unwrap();
+        let shell = film.shell();
+        let state = film.press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest()).unwrap();
+        let u = state.unknowns();
+        let solver = Solver::new(shell.pattern()).unwrap();
+        let at = shell.derivatives(u);
+        let factors = solver.factor(shell.pattern(), &at.stiffness).unwrap();
+        let mut sides = vec![1.0; 30 * u.len()];
+        println!(
+            "{fineness}: {} unknowns: new {:.2}, stiffness {:.2}, gradient {:.2}, changes {:.2}, factor {:.2}, solve 1 {:.2}, solve 30 {:.2}, press ({} steps) {:.2}",
+            u.len(),
+            least(5, Box::new(|| drop(crate::Film::new(&design)))),
+            least(15, Box::new(|| drop(shell.stiffness(u)))),
+            least(15, Box::new(|| drop(shell.first(u)))),
+            least(15, Box::new(|| { shell.by_sheet(u, &crate::Change::all().collect::<Vec<_>>()); })),
+            least(15, Box::new(|| drop(solver.factor(shell.pattern(), &at.stiffness)))),
+            least(15, Box::new(|| factors.solve(&mut sides[..u.len()], 1))),
+            least(15, Box::new(|| factors.solve(&mut vec![1.0; 30 * u.len()], 30))),
+            state.steps,
+            least(7, Box::new(|| drop(film.press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest())))),
+        );
+    }
 }
