@@ -49,40 +49,40 @@ impl CellSum {
     pub fn add<S: Simd>(&mut self, simd: S, slopes: &[Row; VECTORS], second: &Second) {
         let first = VECTORS * self.points;
         self.left[first..first + VECTORS].copy_from_slice(slopes);
-        let far: [Row; 3] = [0, 1, 2].map(|i| {
-            let [a, b, c] = second.far[i];
-            let mut row = [0.0; LOCAL];
-            combine(simd, &mut row, [(a, &slopes[2]), (b, &slopes[3]), (c, &slopes[4])]);
-            row
-        });
         let n = &second.normal;
-        for (pair, &(c, e)) in self.right.iter_mut().zip(&PAIRS) {
-            for (k, row) in pair[first..first + 2].iter_mut().enumerate() {
-                let plane = [0, 1].map(|l| second.plane[k][l][c][e]);
-                let mixed = [0, 1, 2].map(|j| second.mixed[k][j][c][e]);
-                combine(
-                    simd,
-                    row,
-                    [
-                        (plane[0], &slopes[0]),
-                        (plane[1], &slopes[1]),
-                        (mixed[0], &slopes[2]),
-                        (mixed[1], &slopes[3]),
-                        (mixed[2], &slopes[4]),
-                    ],
-                );
+        let lanes = LOCAL / S::as_simd_f64s(&slopes[0]).0.len();
+        for column in (0..LOCAL).step_by(lanes) {
+            let columns = column..column + lanes;
+            let [s0, s1, s2, s3, s4] = [
+                S::as_simd_f64s(&slopes[0][columns.clone()]).0[0],
+                S::as_simd_f64s(&slopes[1][columns.clone()]).0[0],
+                S::as_simd_f64s(&slopes[2][columns.clone()]).0[0],
+                S::as_simd_f64s(&slopes[3][columns.clone()]).0[0],
+                S::as_simd_f64s(&slopes[4][columns.clone()]).0[0],
+            ];
+            let mut far = [s0; 3];
+            for (sum, [a, b, c]) in far.iter_mut().zip(second.far) {
+                *sum = simd.mul_f64s(simd.splat_f64s(a), s2);
+                *sum = simd.mul_add_e_f64s(simd.splat_f64s(b), s3, *sum);
+                *sum = simd.mul_add_e_f64s(simd.splat_f64s(c), s4, *sum);
             }
-            for (i, row) in pair[first + 2..first + VECTORS].iter_mut().enumerate() {
-                let mixed = [0, 1].map(|k| second.mixed[k][i][e][c]);
-                combine(
-                    simd,
-                    row,
-                    [
-                        (n[c] * n[e], &far[i]),
-                        (mixed[0], &slopes[0]),
-                        (mixed[1], &slopes[1]),
-                    ],
-                );
+            for (pair, &(c, e)) in self.right.iter_mut().zip(&PAIRS) {
+                for k in 0..2 {
+                    let (plane, mixed) = (&second.plane[k], &second.mixed[k]);
+                    let mut sum = simd.mul_f64s(simd.splat_f64s(plane[0][c][e]), s0);
+                    sum = simd.mul_add_e_f64s(simd.splat_f64s(plane[1][c][e]), s1, sum);
+                    sum = simd.mul_add_e_f64s(simd.splat_f64s(mixed[0][c][e]), s2, sum);
+                    sum = simd.mul_add_e_f64s(simd.splat_f64s(mixed[1][c][e]), s3, sum);
+                    sum = simd.mul_add_e_f64s(simd.splat_f64s(mixed[2][c][e]), s4, sum);
+                    S::as_mut_simd_f64s(&mut pair[first + k][columns.clone()]).0[0] = sum;
+                }
+                let along = simd.splat_f64s(n[c] * n[e]);
+                for i in 0..3 {
+                    let mut sum = simd.mul_f64s(along, far[i]);
+                    sum = simd.mul_add_e_f64s(simd.splat_f64s(second.mixed[0][i][e][c]), s0, sum);
+                    sum = simd.mul_add_e_f64s(simd.splat_f64s(second.mixed[1][i][e][c]), s1, sum);
+                    S::as_mut_simd_f64s(&mut pair[first + 2 + i][columns.clone()]).0[0] = sum;
+                }
             }
         }
         self.points += 1;
@@ -117,20 +117,6 @@ impl CellSum {
                 }
             }
         }
-    }
-}
-
-/// row = Σ factor · other row.
-#[inline(always)]
-fn combine<S: Simd, const N: usize>(simd: S, row: &mut Row, terms: [(f64, &Row); N]) {
-    let out = S::as_mut_simd_f64s(row).0;
-    for (k, slot) in out.iter_mut().enumerate() {
-        let mut sum = simd.splat_f64s(0.0);
-        for (factor, other) in terms {
-            let other = S::as_simd_f64s(other).0[k];
-            sum = simd.mul_add_e_f64s(simd.splat_f64s(factor), other, sum);
-        }
-        *slot = sum;
     }
 }
 

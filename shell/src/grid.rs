@@ -55,11 +55,14 @@ impl Grid {
     }
 
     /// The coefficients of the functions that are not zero on a cell.
+    #[inline]
     pub fn gather(&self, u: &[f64], origin: [usize; 2]) -> [V3; LOCAL] {
-        std::array::from_fn(|local| {
+        let mut gathered = [[0.0; 3]; LOCAL];
+        for (local, slot) in gathered.iter_mut().enumerate() {
             let first = COMPONENTS * self.coefficient(origin, local);
-            [u[first], u[first + 1], u[first + 2]]
-        })
+            slot.copy_from_slice(&u[first..first + COMPONENTS]);
+        }
+        gathered
     }
 
     /// The displacement of a place, mm.

@@ -166,7 +166,7 @@ impl Laws {
         let part = self.law.neo_hooke;
         (
             energy + part * (rubber - energy),
-            std::array::from_fn(|i| linear[i] + part * (by[i] - linear[i])),
+            less(&times(&linear, 1.0 - part), &by, -part),
         )
     }
 
@@ -176,7 +176,7 @@ impl Laws {
         let slope = self.rubber * (1.0 + 2.0 * s * i.value);
         (
             self.rubber * i.value * (1.0 + s * i.value),
-            i.slopes.map(|part| slope * part),
+            times(&i.slopes, slope),
         )
     }
 
@@ -246,21 +246,20 @@ impl Laws {
         let [a1, a2, ..] = x;
         let surface = Surface::new(x);
         let curvature = surface.curvature(x);
-        let moment = apply(&self.bending, &curvature).map(|part| share * part);
+        let moment = times(&apply(&self.bending, &curvature), share);
         let weights = [moment[0], moment[1], 2.0 * moment[2]];
         let pull = sum_of(&weights, x);
         let along = dot(&pull, &surface.normal);
-        let turned: V3 =
-            std::array::from_fn(|c| (pull[c] - along * surface.normal[c]) / surface.area);
         let n = &surface.normal;
+        let turned = times(&less(&pull, n, along), 1.0 / surface.area);
         (
             0.5 * dot(&curvature, &moment),
             [
                 cross(a2, &turned),
                 cross(&turned, a1),
-                n.map(|part| weights[0] * part),
-                n.map(|part| weights[1] * part),
-                n.map(|part| weights[2] * part),
+                times(n, weights[0]),
+                times(n, weights[1]),
+                times(n, weights[2]),
             ],
         )
     }
@@ -275,7 +274,7 @@ impl Laws {
         let moment = apply(&bending, &surface.curvature(x));
         let mut second = surface.second(x, &bending, &moment);
         let tangent = scaled(&self.tangent(&strain), share.membrane);
-        let tension = tension.map(|part| share.membrane * part);
+        let tension = times(&tension, share.membrane);
         add_stretch(&mut second.plane, x, &tangent, &tension);
         second.plane[1][0] = transposed(&second.plane[0][1]);
         second
@@ -294,7 +293,7 @@ fn strain([a1, a2, ..]: &Point) -> V3 {
 /// Adds the tension's part to a gradient.
 #[inline(always)]
 fn stretched_by([a1, a2, ..]: &Point, tension: &V3, share: f64, mut gradient: Point) -> Point {
-    let [t1, t2, t12] = tension.map(|part| share * part);
+    let [t1, t2, t12] = times(tension, share);
     for c in 0..3 {
         gradient[0][c] += t1 * a1[c] + t12 * a2[c];
         gradient[1][c] += t2 * a2[c] + t12 * a1[c];
@@ -305,17 +304,12 @@ fn stretched_by([a1, a2, ..]: &Point, tension: &V3, share: f64, mut gradient: Po
 /// Adds the membrane's second derivatives; the block of a₂ and a₁ is left out.
 #[inline(always)]
 fn add_stretch(plane: &mut [[M3; 2]; 2], [a1, a2, ..]: &Point, law: &M3, tension: &V3) {
-    for (k, l, ways) in [
-        (0, 0, [Some(a1), None, Some(a2)]),
-        (1, 1, [None, Some(a2), Some(a1)]),
-    ] {
-        for i in 0..3 {
-            for j in 0..3 {
-                if let (Some(left), Some(right)) = (ways[i], ways[j]) {
-                    add_outer(&mut plane[k][l], left, right, law[i][j]);
-                }
-            }
-        }
+    for (k, own, other, at) in [(0, a1, a2, 0), (1, a2, a1, 1)] {
+        let block = &mut plane[k][k];
+        add_outer(block, own, own, law[at][at]);
+        add_outer(block, own, other, law[at][2]);
+        add_outer(block, other, own, law[2][at]);
+        add_outer(block, other, other, law[2][2]);
     }
     let both = &mut plane[0][1];
     add_outer(both, a1, a2, law[0][1]);
@@ -345,9 +339,10 @@ impl Surface {
     fn new([a1, a2, ..]: &Point) -> Surface {
         let m = cross(a1, a2);
         let area = dot(&m, &m).sqrt();
-        let normal = m.map(|part| part / area);
-        let swings = [skew(&a2.map(|part| -part)), skew(a1)];
-        let turns = swings.map(|swing| scaled(&product(&across(&normal), &swing), 1.0 / area));
+        let normal = times(&m, 1.0 / area);
+        let swings = [skew(&times(a2, -1.0)), skew(a1)];
+        let flat = scaled(&across(&normal), 1.0 / area);
+        let turns = [product(&flat, &swings[0]), product(&flat, &swings[1])];
         Surface {
             area,
             normal,
@@ -367,18 +362,17 @@ impl Surface {
     fn second(&self, x: &Point, law: &M3, moment: &V3) -> Second {
         let n = &self.normal;
         // ∂K_i/∂a_k.
-        let gradients: [M3; 2] = [0, 1].map(|k| {
-            [0, 1, 2].map(|i| {
-                apply_transposed(&self.turns[k], &x[2 + i]).map(|part| TWICE[i] * part)
-            })
-        });
+        let mut gradients = [[[0.0; 3]; 3]; 2];
+        for k in 0..2 {
+            for i in 0..3 {
+                gradients[k][i] = times(&apply_transposed(&self.turns[k], &x[2 + i]), TWICE[i]);
+            }
+        }
         let mut plane = [[[[0.0; 3]; 3]; 2]; 2];
         let mut mixed = [[[[0.0; 3]; 3]; 3]; 2];
         for k in 0..2 {
             // law · gradients: what each curvature of a_k weighs.
-            let weighted: M3 = std::array::from_fn(|j| {
-                std::array::from_fn(|c| (0..3).map(|i| law[i][j] * gradients[k][i][c]).sum())
-            });
+            let weighted = product(&transposed(law), &gradients[k]);
             for l in k..2 {
                 for j in 0..3 {
                     add_outer(&mut plane[k][l], &weighted[j], &gradients[l][j], 1.0);
@@ -389,14 +383,18 @@ impl Surface {
                 add_outer(&mut mixed[k][j], &weighted[j], n, TWICE[j]);
             }
         }
-        let weights: V3 = std::array::from_fn(|i| moment[i] * TWICE[i]);
+        let weights = [moment[0], moment[1], 2.0 * moment[2]];
+        let mut far = *law;
+        for i in 0..3 {
+            for j in 0..3 {
+                far[i][j] *= TWICE[i] * TWICE[j];
+            }
+        }
         self.add_turning(&mut plane, x, &sum_of(&weights, x));
         Second {
             plane,
             mixed,
-            far: std::array::from_fn(|i| {
-                std::array::from_fn(|j| law[i][j] * TWICE[i] * TWICE[j])
-            }),
+            far,
             normal: *n,
         }
     }
@@ -421,7 +419,7 @@ impl Surface {
             }
         }
         // The mixed second derivatives of v · (a₁ × a₂), for v = pull in S and v = n in J.
-        let mixed: V3 = std::array::from_fn(|i| (pull[i] - s_over_j * n[i]) / j);
+        let mixed = times(&less(pull, n, s_over_j), 1.0 / j);
         add_scaled(&mut plane[0][1], &skew(&mixed), -1.0);
     }
 }
@@ -432,7 +430,11 @@ const TWICE: V3 = [1.0, 1.0, 2.0];
 /// Σ weight_i · x_(2 + i).
 #[inline(always)]
 fn sum_of(weights: &V3, x: &Point) -> V3 {
-    std::array::from_fn(|c| weights[0] * x[2][c] + weights[1] * x[3][c] + weights[2] * x[4][c])
+    let mut sum = [0.0; 3];
+    for c in 0..3 {
+        sum[c] = weights[0] * x[2][c] + weights[1] * x[3][c] + weights[2] * x[4][c];
+    }
+    sum
 }
 
 /// a · b.
@@ -472,27 +474,54 @@ fn apply(m: &M3, v: &V3) -> V3 {
 
 #[inline(always)]
 fn apply_transposed(m: &M3, v: &V3) -> V3 {
-    std::array::from_fn(|c| m[0][c] * v[0] + m[1][c] * v[1] + m[2][c] * v[2])
+    let mut sum = [0.0; 3];
+    for c in 0..3 {
+        sum[c] = m[0][c] * v[0] + m[1][c] * v[1] + m[2][c] * v[2];
+    }
+    sum
 }
 
 #[inline(always)]
 fn product(a: &M3, b: &M3) -> M3 {
-    a.map(|row| apply_transposed(b, &row))
+    [
+        apply_transposed(b, &a[0]),
+        apply_transposed(b, &a[1]),
+        apply_transposed(b, &a[2]),
+    ]
 }
 
 #[inline(always)]
-fn transposed(m: &M3) -> M3 {
-    std::array::from_fn(|r| std::array::from_fn(|c| m[c][r]))
+fn transposed([a, b, c]: &M3) -> M3 {
+    [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]]
 }
 
 #[inline(always)]
 fn scaled(m: &M3, factor: f64) -> M3 {
-    m.map(|row| row.map(|part| part * factor))
+    [
+        times(&m[0], factor),
+        times(&m[1], factor),
+        times(&m[2], factor),
+    ]
+}
+
+#[inline(always)]
+fn times([a, b, c]: &V3, factor: f64) -> V3 {
+    [factor * a, factor * b, factor * c]
 }
 
 #[inline(always)]
 fn outer(a: &V3, b: &V3) -> M3 {
-    a.map(|left| b.map(|right| left * right))
+    [times(b, a[0]), times(b, a[1]), times(b, a[2])]
+}
+
+/// a − factor · b.
+#[inline(always)]
+fn less(a: &V3, b: &V3, factor: f64) -> V3 {
+    [
+        a[0] - factor * b[0],
+        a[1] - factor * b[1],
+        a[2] - factor * b[2],
+    ]
 }
 
 #[inline(always)]

@@ -661,7 +661,15 @@ fn spots(grid: &Grid, sheet: &Sheet) -> BTreeMap<[usize; 2], Vec<Spot>> {
 #[inline(always)]
 fn slopes(x: &Basis, y: &Basis) -> [Row; VECTORS] {
     const ORDERS: [[usize; 2]; VECTORS] = [[1, 0], [0, 1], [2, 0], [0, 2], [1, 1]];
-    ORDERS.map(|[dx, dy]| std::array::from_fn(|k| x[dx][k % SUPPORT] * y[dy][k / SUPPORT]))
+    let mut slopes = [[0.0; LOCAL]; VECTORS];
+    for (row, [dx, dy]) in slopes.iter_mut().zip(ORDERS) {
+        for (line, factor) in row.as_chunks_mut::<SUPPORT>().0.iter_mut().zip(y[dy]) {
+            for (slot, value) in line.iter_mut().zip(x[dx]) {
+                *slot = value * factor;
+            }
+        }
+    }
+    slopes
 }
 
 /// Sums of a cell's coefficients along x.

@@ -1,9 +1,16 @@
 //! The stiffness matrix and its factors.
 
-use faer::linalg::solvers::Solve;
-use faer::sparse::linalg::solvers::{Llt, SymbolicLlt};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{MatMut, Side};
+use std::sync::Arc;
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
 
 use crate::ShellError;
 use crate::cell::{CellStiffness, Row};
@@ -13,6 +20,8 @@ use crate::spline::SUPPORT;
 /// Components of a displacement, and so unknowns of a coefficient.
 pub const COMPONENTS: usize = 3;
 const REACH: usize = SUPPORT - 1;
+/// A rectangle of fewer coefficients a side, beside what separates it, is not halved.
+const LEAF: usize = 4;
 /// Where a cell's stiffness has each pair of components.
 const PAIR: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
 
@@ -142,6 +151,30 @@ impl Pattern {
             .collect()
     }
 
+    /// The unknowns of the coefficients in a rectangle (from, end along each side), so that two that
+    /// do not meet are kept apart by others that come after both.
+    fn dissect(&self, [i, k]: [usize; 2], [j, l]: [usize; 2], order: &mut Vec<usize>) {
+        let (wide, high) = (k - i, l - j);
+        if wide.max(high) < 2 * REACH + LEAF {
+            self.in_rows([i, k], [j, l], order);
+        } else if wide >= high {
+            let cut = i + (wide - REACH) / 2;
+            self.dissect([i, cut], [j, l], order);
+            self.dissect([cut + REACH, k], [j, l], order);
+            self.in_rows([cut, cut + REACH], [j, l], order);
+        } else {
+            let cut = j + (high - REACH) / 2;
+            self.dissect([i, k], [j, cut], order);
+            self.dissect([i, k], [cut + REACH, l], order);
+            self.in_rows([i, k], [cut, cut + REACH], order);
+        }
+    }
+
+    fn in_rows(&self, [i, k]: [usize; 2], [j, l]: [usize; 2], order: &mut Vec<usize>) {
+        let indices = (j..l).flat_map(|row| (i..k).map(move |at| row * self.columns + at));
+        order.extend(indices.flat_map(|at| (0..COMPONENTS).map(move |c| COMPONENTS * at + c)));
+    }
+
     fn symbolic(&self) -> SymbolicSparseColMatRef<'_, usize> {
         let n = self.unknowns();
         SymbolicSparseColMatRef::new_checked(n, n, &self.starts, None, &self.entries)
@@ -150,32 +183,67 @@ impl Pattern {
 
 /// Factors matrices of one pattern.
 pub struct Solver {
-    order: SymbolicLlt<usize>,
+    symbolic: Arc<SymbolicCholesky<usize>>,
 }
 
 impl Solver {
-    /// Finds the elimination order.
+    /// Finds the elimination order: the grid is halved again and again, and what lies between the
+    /// halves comes last.
     ///
     /// # Errors
     /// When memory runs out.
     pub fn new(pattern: &Pattern) -> Result<Solver, ShellError> {
-        let order = SymbolicLlt::try_new(pattern.symbolic(), Side::Lower)
-            .map_err(|error| ShellError::Solver(error.to_string()))?;
-        Ok(Solver { order })
+        let refused = |error: FaerError| ShellError::Solver(error.to_string());
+        let mut order = Vec::with_capacity(pattern.unknowns());
+        pattern.dissect([0, pattern.columns], [0, pattern.rows], &mut order);
+        let mut back = vec![0; order.len()];
+        for (place, &unknown) in order.iter().enumerate() {
+            back[unknown] = place;
+        }
+        let order = PermRef::new_checked(&order, &back, order.len());
+        let mut params = CholeskySymbolicParams::default();
+        params.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
+        let symbolic = factorize_symbolic_cholesky(
+            pattern.symbolic(),
+            Side::Lower,
+            if std::env::var("AMD").is_ok() {SymmetricOrdering::Amd} else {SymmetricOrdering::Custom(order)},
+            params,
+        );
+        Ok(Solver {
+            symbolic: Arc::new(symbolic.map_err(refused)?),
+        })
     }
 
     /// Cholesky's factors of the matrix with these entries; `None` when it is not positive
-    /// definite.
+    /// definite, or memory runs out.
     pub fn factor(&self, pattern: &Pattern, values: &[f64]) -> Option<Factors> {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
-        let factors = Llt::try_new_with_symbolic(self.order.clone(), matrix, Side::Lower).ok()?;
-        Some(Factors { factors })
+        let mut factors = vec![0.0; self.symbolic.len_val()];
+        let scratch = self
+            .symbolic
+            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        self.symbolic
+            .factorize_numeric_llt(
+                &mut factors,
+                matrix,
+                Side::Lower,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(&mut MemBuffer::try_new(scratch).ok()?),
+                Default::default(),
+            )
+            .ok()?;
+        Some(Factors {
+            symbolic: Arc::clone(&self.symbolic),
+            factors,
+        })
     }
 }
 
 /// A factored matrix.
 pub struct Factors {
-    factors: Llt<usize, f64>,
+    symbolic: Arc<SymbolicCholesky<usize>>,
+    factors: Vec<f64>,
 }
 
 impl Factors {
@@ -183,7 +251,14 @@ impl Factors {
     pub fn solve(&self, sides: &mut [f64], count: usize) {
         let unknowns = sides.len() / count;
         let sides = MatMut::from_column_major_slice_mut(sides, unknowns, count);
-        self.factors.solve_in_place(sides);
+        let scratch = self.symbolic.solve_in_place_scratch::<f64>(count, Par::Seq);
+        let mut memory = MemBuffer::new(scratch);
+        LltRef::new(&self.symbolic, &self.factors).solve_in_place_with_conj(
+            Conj::No,
+            sides,
+            Par::Seq,
+            MemStack::new(&mut memory),
+        );
     }
 }
 
