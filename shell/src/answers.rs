@@ -170,6 +170,9 @@ impl Film {
     ) -> Result<Vec<Response>, ShellError> {
         self.fits(state)?;
         let factors = self.factors_at(state)?;
+        if changes.is_empty() {
+            return Ok(Vec::new());
+        }
         let of_sheet: Vec<Change> = changes.iter().copied().filter(|c| c.of_sheet()).collect();
         let mut by_sheet = match of_sheet.is_empty() {
             true => Vec::new(),
@@ -184,7 +187,7 @@ impl Film {
             };
             sides.extend(side);
         }
-        factors.solve(&mut sides, changes.len().max(1));
+        factors.solve(&mut sides, changes.len());
         let tip = self.tip_of(&state.touched);
         let columns = sides.chunks(self.unknowns()).zip(changes);
         let answer = |(unknowns, &change): (&[f64], &Change)| {
@@ -301,9 +304,7 @@ impl Film {
                 half * crate::sheet::Sheet::terms_at(point)[term] / sheet.relative(point)
             }
             Some(Change::NeoHooke) => unstretched * (1.0 / stretched - 1.0),
-            Some(Change::Stretch(way)) => {
-                -unstretched * rubber / stretched / sheet.scales()[way]
-            }
+            Some(Change::Stretch(way)) => -unstretched * rubber / stretched / sheet.scales()[way],
             _ => 0.0,
         };
         own - unstretched * rubber / stretched * grown
@@ -444,7 +445,9 @@ mod tests {
         let state = film.press(Contact::Force(force), &film.rest()).unwrap();
         let pressed = |change, by| {
             let mut force = force;
-            let there = film.changed(&changed(design, &mut force, change, by)).unwrap();
+            let there = film
+                .changed(&changed(design, &mut force, change, by))
+                .unwrap();
             let pressed = there.press(Contact::Force(force), &state).unwrap();
             (
                 there.displacement(&pressed, POINT_MM),

@@ -220,7 +220,11 @@ impl Design {
     }
 
     /// Whether a tip there (mm) is clear of the posts.
-    pub(crate) fn check_tip_at(&self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), ShellError> {
+    pub(crate) fn check_tip_at(
+        &self,
+        offset_mm: [f64; 2],
+        radius_mm: f64,
+    ) -> Result<(), ShellError> {
         positive("tip radius", radius_mm)?;
         let free = self.span_mm / 2.0 - self.post_radius_mm - radius_mm;
         for offset in offset_mm {
@@ -277,7 +281,8 @@ impl Design {
         let radius = self.post_radius_mm;
         let on_film = |from: f64, to: f64| [from.max(-edge), to.min(edge)];
         let mut points = Vec::new();
-        for (post, ([cx, cy], [dx, dy])) in centres.into_iter().zip(self.post_shift_mm).enumerate() {
+        for (post, ([cx, cy], [dx, dy])) in centres.into_iter().zip(self.post_shift_mm).enumerate()
+        {
             if only.is_some_and(|only| only != post) {
                 continue;
             }
@@ -297,7 +302,9 @@ impl Design {
     fn breaks(&self) -> Vec<f64> {
         let step = self.half_edge_mm() / SAMPLES as f64;
         let counts = self.counts();
-        let cells = self.cells.map_or(counts[SAMPLES].ceil(), |cells| cells as f64);
+        let cells = self
+            .cells
+            .map_or(counts[SAMPLES].ceil(), |cells| cells as f64);
         let scale = counts[SAMPLES] / cells;
         let border = |k: usize| {
             let i = counts

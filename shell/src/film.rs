@@ -319,11 +319,7 @@ impl Film {
     }
 
     /// The force on the tip, and directions in which its travel is given (mm).
-    fn asked(
-        &self,
-        contact: Contact,
-        at_rest: V3,
-    ) -> Result<(V3, Vec<(V3, f64)>), ShellError> {
+    fn asked(&self, contact: Contact, at_rest: V3) -> Result<(V3, Vec<(V3, f64)>), ShellError> {
         match contact {
             Contact::Force(force) => finite("force", force).map(|force| (force, Vec::new())),
             Contact::Travel(travel) => {
@@ -424,7 +420,13 @@ fn rest_of(
     }
     let mut from = start.map_or_else(|| vec![0.0; unknowns], <[f64]>::to_vec);
     let slack = design.stretch.iter().any(|part| *part < 0.0);
-    if slack && from.iter().skip(2).step_by(COMPONENTS).all(|part| part.abs() < PUSH_MM) {
+    if slack
+        && from
+            .iter()
+            .skip(2)
+            .step_by(COMPONENTS)
+            .all(|part| part.abs() < PUSH_MM)
+    {
         let way = if design.down[2] > 0.0 { 1.0 } else { -1.0 };
         let [columns, rows] = shell.grid().functions();
         let bulge = |k: usize, count: usize| {

@@ -212,13 +212,11 @@ impl Laws {
         let (stretched, tension) = self.tension(&strain(x));
         let (bent, gradient) = self.bend(x, share.bending);
         let energy = share.membrane * stretched + bent;
-        (
-            energy,
-            stretched_by(x, &tension, share.membrane, gradient),
-        )
+        (energy, stretched_by(x, &tension, share.membrane, gradient))
     }
 
     /// The gradients of membrane and bending, each of the whole stiffness.
+    #[inline(always)]
     pub fn parts(&self, x: &Point) -> [Point; 2] {
         let (_, tension) = self.tension(&strain(x));
         let zero = [[0.0; 3]; VECTORS];
@@ -226,17 +224,18 @@ impl Laws {
     }
 
     /// How the membrane's gradient answers to the law's two numbers.
+    #[inline(always)]
     pub fn by_law(&self, x: &Point) -> [Point; 2] {
         let strain = strain(x);
         let i = Invariant::new(&strain);
         let (_, rubber) = self.rubber(&i);
         let linear = apply(&self.membrane, &strain);
-        let rubbery = std::array::from_fn(|k| rubber[k] - linear[k]);
+        let rubbery = less(&rubber, &linear, 1.0);
         let stiffer = 2.0 * self.law.neo_hooke * self.rubber * i.value;
         let zero = [[0.0; 3]; VECTORS];
         [
             stretched_by(x, &rubbery, 1.0, zero),
-            stretched_by(x, &i.slopes.map(|part| stiffer * part), 1.0, zero),
+            stretched_by(x, &times(&i.slopes, stiffer), 1.0, zero),
         ]
     }
 
@@ -682,13 +681,7 @@ mod tests {
     }
 
     fn stretched(x: f64, y: f64) -> Point {
-        [
-            [x, 0.0, 0.0],
-            [0.0, y, 0.0],
-            [0.0; 3],
-            [0.0; 3],
-            [0.0; 3],
-        ]
+        [[x, 0.0, 0.0], [0.0, y, 0.0], [0.0; 3], [0.0; 3], [0.0; 3]]
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::answers::Change;
 use crate::cell::{CellSum, Row, add_force};
 use crate::grid::Grid;
 use crate::point::{Laws, Point, Share, V3, VECTORS};
-use crate::sheet::Sheet;
+use crate::sheet::{Sheet, TERMS};
 use crate::sparse::{COMPONENTS, Pattern};
 use crate::spline::{Axis, Basis, SUPPORT};
 
@@ -31,8 +31,13 @@ const STRETCH_STEP: f64 = 1e-4;
 /// A span's Gauss points: weight (mm before the film was stretched) and functions with their
 /// derivatives by the place before it was stretched.
 type Samples = [(f64, Basis); GAUSS];
-/// Sums along x: for each Gauss point along x, line of functions and derivative by x.
-type Lines = [[[V3; 3]; SUPPORT]; GAUSS];
+/// A vector in space and a zero: as wide as what is added at once.
+type Wide = [f64; 4];
+/// Sums along x at one of its Gauss points: for each line of functions and derivative by x.
+type Line = [[Wide; 3]; SUPPORT];
+/// At all of them.
+type Lines = [Line; GAUSS];
+const NO_LINES: Lines = [[[[0.0; 4]; 3]; SUPPORT]; GAUSS];
 
 /// A film on springs: the sum of the points' energy over the cells and of what holds the film, less
 /// what its weight gives.
@@ -246,7 +251,7 @@ impl Shell {
         }
         let down = self.sheet.down.map(|part| part * self.sheet.weight());
         for cell in self.cells() {
-            let mut lines = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+            let mut lines = NO_LINES;
             for (j, (_, y)) in cell.y.iter().enumerate() {
                 for (line, share) in lines.iter_mut().zip(&cell.shares[j]) {
                     spread_value(line, y, &down.map(|part| share.membrane * part));
@@ -260,49 +265,11 @@ impl Shell {
     /// The gradient's derivatives by each of some changes of the sheet itself (of another change:
     /// none), all in one pass.
     pub fn by_sheet(&self, u: &[f64], changes: &[Change]) -> Vec<Vec<f64>> {
-        let mut sums = vec![vec![0.0; u.len()]; changes.len()];
-        let mut lines = vec![[[[[0.0; 3]; 3]; SUPPORT]; GAUSS]; changes.len()];
-        for cell in self.cells() {
-            let local = self.grid.gather(u, cell.origin);
-            let moved = contracted(&local, cell.x);
-            for line in &mut lines {
-                *line = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
-            }
-            for (j, (_, y)) in cell.y.iter().enumerate() {
-                for (i, along) in moved.iter().enumerate() {
-                    let x = self.vectors(along, y);
-                    let rates = Rates::new(self, &x, cell.shares[j][i], cell.at(i, j), changes);
-                    for (line, change) in lines.iter_mut().zip(changes) {
-                        spread(&mut line[i], y, &rates.gradient(*change));
-                        spread_value(&mut line[i], y, &rates.weight(*change));
-                    }
-                }
-            }
-            for (sum, line) in sums.iter_mut().zip(&lines) {
-                self.scatter(sum, cell.origin, &gathered(line, cell.x));
-            }
-        }
-        let stiffening = self.sheet.dot_stiffening;
-        for (&origin, spots) in &self.spots {
-            let local = self.grid.gather(u, origin);
-            for spot in spots {
-                let x = self.surface(&spot.slopes, &local);
-                let rates = Rates::new(self, &x, spot.share, spot.at, changes);
-                for (sum, change) in sums.iter_mut().zip(changes) {
-                    let gradient = match change {
-                        Change::DotStiffening => rates.gradient(Change::Youngs),
-                        _ if stiffening == 0.0 => continue,
-                        _ => rates
-                            .gradient(*change)
-                            .map(|vector| vector.map(|part| stiffening * part)),
-                    };
-                    let mut own = [[0.0; 3]; LOCAL];
-                    add_force(&mut own, &spot.slopes, &gradient);
-                    self.scatter(sum, origin, &own);
-                }
-            }
-        }
-        sums
+        Arch::new().dispatch(BySheet {
+            shell: self,
+            u,
+            changes,
+        })
     }
 
     #[inline(always)]
@@ -318,10 +285,10 @@ impl Shell {
     /// The surface's vectors at a point: those of the flat film, plus the displacement's
     /// derivatives.
     #[inline(always)]
-    fn vectors(&self, line: &[[V3; 3]; SUPPORT], y: &Basis) -> Point {
-        let mut x = self.flat();
+    fn vectors(&self, line: &Line, y: &Basis) -> Point {
+        let mut x = [[0.0; 4]; VECTORS];
         for j in 0..SUPPORT {
-            for c in 0..3 {
+            for c in 0..4 {
                 x[0][c] += y[0][j] * line[j][1][c];
                 x[1][c] += y[1][j] * line[j][0][c];
                 x[2][c] += y[0][j] * line[j][2][c];
@@ -329,7 +296,13 @@ impl Shell {
                 x[4][c] += y[1][j] * line[j][1][c];
             }
         }
-        x
+        let mut point = self.flat();
+        for (vector, x) in point.iter_mut().zip(&x) {
+            for c in 0..3 {
+                vector[c] += x[c];
+            }
+        }
+        point
     }
 
     /// The same at a point whose slopes are known.
@@ -413,7 +386,7 @@ impl WithSimd for First<'_> {
         for cell in shell.cells() {
             let local = shell.grid.gather(u, cell.origin);
             let moved = contracted(&local, cell.x);
-            let mut lines = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+            let mut lines = NO_LINES;
             for (j, (_, y)) in cell.y.iter().enumerate() {
                 for i in 0..GAUSS {
                     let x = shell.vectors(&moved[i], y);
@@ -476,45 +449,129 @@ impl WithSimd for Assembly<'_> {
     }
 }
 
+/// The pass for how the gradient answers to changes of the sheet.
+struct BySheet<'a> {
+    shell: &'a Shell,
+    u: &'a [f64],
+    changes: &'a [Change],
+}
+
+impl WithSimd for BySheet<'_> {
+    type Output = Vec<Vec<f64>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<Vec<f64>> {
+        let BySheet { shell, u, changes } = self;
+        let any = |one: fn(&Change) -> bool| changes.iter().any(one);
+        let asked = Asked {
+            law: any(|change| matches!(change, Change::NeoHooke | Change::Stiffening)),
+            stretch: any(|change| matches!(change, Change::Stretch(_))),
+        };
+        let heavy = shell.sheet.down != [0.0; 3];
+        let mut sums = vec![vec![0.0; u.len()]; changes.len()];
+        let mut lines = vec![NO_LINES; changes.len()];
+        for cell in shell.cells() {
+            let local = shell.grid.gather(u, cell.origin);
+            let moved = contracted(&local, cell.x);
+            for line in &mut lines {
+                *line = NO_LINES;
+            }
+            for (j, (_, y)) in cell.y.iter().enumerate() {
+                for i in 0..GAUSS {
+                    let x = shell.vectors(&moved[i], y);
+                    let rates = Rates::new(shell, &x, cell.shares[j][i], cell.at(i, j), asked);
+                    for (line, change) in lines.iter_mut().zip(changes) {
+                        spread(&mut line[i], y, &rates.gradient(*change));
+                        if heavy || matches!(change, Change::Down(_)) {
+                            spread_value(&mut line[i], y, &rates.weight(*change));
+                        }
+                    }
+                }
+            }
+            for (sum, line) in sums.iter_mut().zip(&lines) {
+                shell.scatter(sum, cell.origin, &gathered(line, cell.x));
+            }
+        }
+        shell.add_dots(u, changes, asked, &mut sums);
+        sums
+    }
+}
+
+/// What is asked for that costs something.
+#[derive(Clone, Copy)]
+struct Asked {
+    law: bool,
+    stretch: bool,
+}
+
+impl Shell {
+    /// The dots' part of how the gradient answers to changes.
+    fn add_dots(&self, u: &[f64], changes: &[Change], asked: Asked, sums: &mut [Vec<f64>]) {
+        let stiffening = self.sheet.dot_stiffening;
+        for (&origin, spots) in &self.spots {
+            let local = self.grid.gather(u, origin);
+            for spot in spots {
+                let x = self.surface(&spot.slopes, &local);
+                let rates = Rates::new(self, &x, spot.share, spot.at, asked);
+                for (sum, change) in sums.iter_mut().zip(changes) {
+                    let gradient = match change {
+                        Change::DotStiffening => rates.gradient(Change::Youngs),
+                        _ if stiffening == 0.0 => continue,
+                        _ => scaled(&rates.gradient(*change), stiffening),
+                    };
+                    let mut own = [[0.0; 3]; LOCAL];
+                    add_force(&mut own, &spot.slopes, &gradient);
+                    self.scatter(sum, origin, &own);
+                }
+            }
+        }
+    }
+}
+
 /// How a point's gradient and weight answer to changes of the sheet.
 struct Rates<'a> {
     shell: &'a Shell,
     share: Share,
     /// The thickness's terms, in parts of the thickness there.
-    terms: [f64; crate::sheet::TERMS],
+    terms: [f64; TERMS],
     parts: [Point; 2],
     by_law: [Point; 2],
     by_stretch: [Point; 2],
 }
 
 impl<'a> Rates<'a> {
-    fn new(
-        shell: &'a Shell,
-        x: &Point,
-        share: Share,
-        at: [f64; 2],
-        changes: &[Change],
-    ) -> Rates<'a> {
+    #[inline(always)]
+    fn new(shell: &'a Shell, x: &Point, share: Share, at: [f64; 2], asked: Asked) -> Rates<'a> {
         let zero = [[[0.0; 3]; VECTORS]; 2];
-        let relative = shell.sheet.relative(at);
-        let any = |one: fn(&Change) -> bool| changes.iter().any(one);
+        let (sheet, mut terms) = (&shell.sheet, Sheet::terms_at(at));
+        let mut relative = 1.0;
+        for k in 0..TERMS {
+            relative += sheet.terms[k] * terms[k];
+        }
+        for term in &mut terms {
+            *term /= relative;
+        }
         Rates {
             shell,
             share,
-            terms: Sheet::terms_at(at).map(|term| term / relative),
+            terms,
             parts: shell.laws.parts(x),
-            by_law: match any(|change| matches!(change, Change::NeoHooke | Change::Stiffening)) {
+            by_law: match asked.law {
                 true => shell.laws.by_law(x),
                 false => zero,
             },
-            by_stretch: match any(|change| matches!(change, Change::Stretch(_))) {
-                true => [0, 1].map(|way| by_stretch(shell, x, share, way)),
+            by_stretch: match asked.stretch {
+                true => [
+                    by_stretch(shell, x, share, 0),
+                    by_stretch(shell, x, share, 1),
+                ],
                 false => zero,
             },
         }
     }
 
     /// The gradient's answer.
+    #[inline(always)]
     fn gradient(&self, change: Change) -> Point {
         let Share { membrane, bending } = self.share;
         match change {
@@ -535,56 +592,75 @@ impl<'a> Rates<'a> {
     }
 
     /// Less the weight's answer, N.
+    #[inline(always)]
     fn weight(&self, change: Change) -> V3 {
         let sheet = &self.shell.sheet;
         let size = -self.share.membrane * sheet.weight();
         let part = match change {
-            Change::Thickness => 1.0 / sheet.material.thickness_mm,
+            Change::Thickness => size / sheet.material.thickness_mm,
             Change::ThicknessSlope(_) | Change::ThicknessCurve(_) => {
-                change.term().map_or(0.0, |k| self.terms[k])
+                change.term().map_or(0.0, |k| size * self.terms[k])
             }
-            Change::Stretch(way) => -1.0 / sheet.scales()[way],
+            Change::Stretch(way) => -size / sheet.scales()[way],
             Change::Down(axis) => {
                 let mut weight = [0.0; 3];
                 weight[axis] = size;
                 return weight;
             }
-            _ => return [0.0; 3],
+            _ => 0.0,
         };
-        sheet.down.map(|down| part * size * down)
+        let [x, y, z] = sheet.down;
+        [part * x, part * y, part * z]
     }
 
+    #[inline(always)]
     fn sum(&self, membrane: f64, bending: f64) -> Point {
-        let [stretch, bend] = &self.parts;
-        std::array::from_fn(|p| {
-            std::array::from_fn(|c| membrane * stretch[p][c] + bending * bend[p][c])
-        })
+        let mut sum = scaled(&self.parts[0], membrane);
+        for (sum, bend) in sum.iter_mut().zip(&self.parts[1]) {
+            for (sum, bend) in sum.iter_mut().zip(bend) {
+                *sum += bending * bend;
+            }
+        }
+        sum
     }
 }
 
 /// What the slopes' factors, the vectors and the area make of a stretch.
+#[inline(always)]
 fn by_stretch(shell: &Shell, x: &Point, share: Share, way: usize) -> Point {
     let scale = shell.sheet.scales()[way];
-    let at = |step: f64| {
-        let stretched = std::array::from_fn(|p| {
-            let factor = 1.0 + ORDERS[p][way] * step / scale;
-            x[p].map(|part| factor * part)
-        });
-        shell.laws.first(&stretched, share).1
-    };
-    let (here, back, forth) = (at(0.0), at(-STRETCH_STEP), at(STRETCH_STEP));
-    std::array::from_fn(|p| {
-        let own = (ORDERS[p][way] - 1.0) / scale;
-        std::array::from_fn(|c| {
-            own * here[p][c] + (forth[p][c] - back[p][c]) / (2.0 * STRETCH_STEP)
-        })
-    })
+    let (mut longer, mut shorter) = (*x, *x);
+    for p in 0..VECTORS {
+        let part = ORDERS[p][way] * STRETCH_STEP / scale;
+        for c in 0..3 {
+            longer[p][c] *= 1.0 + part;
+            shorter[p][c] *= 1.0 - part;
+        }
+    }
+    let mut sum = shell.laws.first(x, share).1;
+    let (forth, back) = (
+        shell.laws.first(&longer, share).1,
+        shell.laws.first(&shorter, share).1,
+    );
+    for p in 0..VECTORS {
+        for c in 0..3 {
+            sum[p][c] *= (ORDERS[p][way] - 1.0) / scale;
+            sum[p][c] += (forth[p][c] - back[p][c]) / (2.0 * STRETCH_STEP);
+        }
+    }
+    sum
 }
 
+#[inline(always)]
 fn scaled(point: &Point, factor: f64) -> Point {
-    point.map(|vector| vector.map(|part| factor * part))
+    let mut sum = *point;
+    for part in sum.as_flattened_mut() {
+        *part *= factor;
+    }
+    sum
 }
 
+#[inline(always)]
 fn times(share: Share, factor: f64) -> Share {
     Share {
         membrane: factor * share.membrane,
@@ -618,11 +694,7 @@ fn stretched([values, first, second]: Basis, scale: f64) -> Basis {
     ]
 }
 
-fn shares(
-    grid: &Grid,
-    samples: &[Vec<Samples>; 2],
-    sheet: &Sheet,
-) -> Vec<[[Share; GAUSS]; GAUSS]> {
+fn shares(grid: &Grid, samples: &[Vec<Samples>; 2], sheet: &Sheet) -> Vec<[[Share; GAUSS]; GAUSS]> {
     let [across, down] = samples;
     let mut shares = Vec::with_capacity(across.len() * down.len());
     for (row, y) in down.iter().enumerate() {
@@ -675,13 +747,17 @@ fn slopes(x: &Basis, y: &Basis) -> [Row; VECTORS] {
 /// Sums of a cell's coefficients along x.
 #[inline(always)]
 fn contracted(local: &[V3; LOCAL], x: &Samples) -> Lines {
-    let mut lines = [[[[0.0; 3]; 3]; SUPPORT]; GAUSS];
+    let mut wide = [[0.0; 4]; LOCAL];
+    for (wide, local) in wide.iter_mut().zip(local) {
+        wide[..3].copy_from_slice(local);
+    }
+    let mut lines = NO_LINES;
     for (line, (_, basis)) in lines.iter_mut().zip(x) {
         for j in 0..SUPPORT {
             for d in 0..3 {
                 for i in 0..SUPPORT {
-                    for c in 0..3 {
-                        line[j][d][c] += basis[d][i] * local[SUPPORT * j + i][c];
+                    for c in 0..4 {
+                        line[j][d][c] += basis[d][i] * wide[SUPPORT * j + i][c];
                     }
                 }
             }
@@ -693,36 +769,44 @@ fn contracted(local: &[V3; LOCAL], x: &Samples) -> Lines {
 /// The other way round: the force on each coefficient.
 #[inline(always)]
 fn gathered(lines: &Lines, x: &Samples) -> [V3; LOCAL] {
-    let mut local = [[0.0; 3]; LOCAL];
+    let mut wide = [[0.0; 4]; LOCAL];
     for (line, (_, basis)) in lines.iter().zip(x) {
         for j in 0..SUPPORT {
             for d in 0..3 {
                 for i in 0..SUPPORT {
-                    for c in 0..3 {
-                        local[SUPPORT * j + i][c] += basis[d][i] * line[j][d][c];
+                    for c in 0..4 {
+                        wide[SUPPORT * j + i][c] += basis[d][i] * line[j][d][c];
                     }
                 }
             }
         }
+    }
+    let mut local = [[0.0; 3]; LOCAL];
+    for (local, wide) in local.iter_mut().zip(&wide) {
+        local.copy_from_slice(&wide[..3]);
     }
     local
 }
 
 /// A gradient's part of the sums along x.
 #[inline(always)]
-fn spread(line: &mut [[V3; 3]; SUPPORT], y: &Basis, gradient: &Point) {
+fn spread(line: &mut Line, y: &Basis, gradient: &Point) {
+    let mut wide = [[0.0; 4]; VECTORS];
+    for (wide, vector) in wide.iter_mut().zip(gradient) {
+        wide[..3].copy_from_slice(vector);
+    }
     for j in 0..SUPPORT {
-        for c in 0..3 {
-            line[j][0][c] += y[1][j] * gradient[1][c] + y[2][j] * gradient[3][c];
-            line[j][1][c] += y[0][j] * gradient[0][c] + y[1][j] * gradient[4][c];
-            line[j][2][c] += y[0][j] * gradient[2][c];
+        for c in 0..4 {
+            line[j][0][c] += y[1][j] * wide[1][c] + y[2][j] * wide[3][c];
+            line[j][1][c] += y[0][j] * wide[0][c] + y[1][j] * wide[4][c];
+            line[j][2][c] += y[0][j] * wide[2][c];
         }
     }
 }
 
 /// A force's part of the sums along x.
 #[inline(always)]
-fn spread_value(line: &mut [[V3; 3]; SUPPORT], y: &Basis, force: &V3) {
+fn spread_value(line: &mut Line, y: &Basis, force: &V3) {
     for j in 0..SUPPORT {
         for c in 0..3 {
             line[j][0][c] += y[0][j] * force[c];

@@ -201,13 +201,14 @@ impl Solver {
             back[unknown] = place;
         }
         let order = PermRef::new_checked(&order, &back, order.len());
-        let mut params = CholeskySymbolicParams::default();
-        params.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
         let symbolic = factorize_symbolic_cholesky(
             pattern.symbolic(),
             Side::Lower,
-            if std::env::var("AMD").is_ok() {SymmetricOrdering::Amd} else {SymmetricOrdering::Custom(order)},
-            params,
+            SymmetricOrdering::Custom(order),
+            CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                ..CholeskySymbolicParams::default()
+            },
         );
         Ok(Solver {
             symbolic: Arc::new(symbolic.map_err(refused)?),
@@ -270,8 +271,8 @@ mod tests {
     fn filled(pattern: &Pattern) -> (Vec<f64>, Vec<Vec<f64>>) {
         let n = pattern.unknowns();
         let (mut values, mut full) = (vec![0.0; pattern.entries()], vec![vec![0.0; n]; n]);
-        let cells = (0..pattern.rows - 3)
-            .flat_map(|j| (0..pattern.columns - 3).map(move |i| [i, j]));
+        let cells =
+            (0..pattern.rows - 3).flat_map(|j| (0..pattern.columns - 3).map(move |i| [i, j]));
         for [i, j] in cells {
             let part = |p: usize, a: usize, b: usize| {
                 let dominant = if p < 3 && a == b { 500.0 } else { 0.0 };

@@ -3,6 +3,7 @@
 mod bending;
 mod derivatives;
 mod large;
+mod mounted;
 mod patch;
 mod plates;
 
@@ -133,10 +134,15 @@ fn speed() {
         1e3 * best
     };
     for fineness in [0.3, 0.5, 0.7, 1.0] {
-        let design = crate::Design { fineness, ..Default::default() };
+        let design = crate::Design {
+            fineness,
+            ..Default::default()
+        };
         let film = crate::Film::new(&design).unwrap();
         let shell = film.shell();
-        let state = film.press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest()).unwrap();
+        let state = film
+            .press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest())
+            .unwrap();
         let u = state.unknowns();
         let solver = Solver::new(shell.pattern()).unwrap();
         let at = shell.derivatives(u);
@@ -148,12 +154,28 @@ fn speed() {
             least(5, Box::new(|| drop(crate::Film::new(&design)))),
             least(15, Box::new(|| drop(shell.stiffness(u)))),
             least(15, Box::new(|| drop(shell.first(u)))),
-            least(15, Box::new(|| { shell.by_sheet(u, &crate::Change::all().collect::<Vec<_>>()); })),
-            least(15, Box::new(|| drop(solver.factor(shell.pattern(), &at.stiffness)))),
+            least(
+                15,
+                Box::new(|| {
+                    shell.by_sheet(u, &crate::Change::all().collect::<Vec<_>>());
+                })
+            ),
+            least(
+                15,
+                Box::new(|| drop(solver.factor(shell.pattern(), &at.stiffness)))
+            ),
             least(15, Box::new(|| factors.solve(&mut sides[..u.len()], 1))),
-            least(15, Box::new(|| factors.solve(&mut vec![1.0; 30 * u.len()], 30))),
+            least(
+                15,
+                Box::new(|| factors.solve(&mut vec![1.0; 30 * u.len()], 30))
+            ),
             state.steps,
-            least(7, Box::new(|| drop(film.press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest())))),
+            least(
+                7,
+                Box::new(|| drop(
+                    film.press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest())
+                ))
+            ),
         );
     }
 }
