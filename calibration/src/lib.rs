@@ -24,4 +24,5 @@ pub mod quantize;
 pub mod train;
 pub mod uncertainty;
 pub mod unit;
+pub mod unit_fit;
 pub mod weights;

@@ -9,7 +9,7 @@ use crate::noise::{LOTS, Noise};
 use crate::{
     Camera, Disc, Format, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Shutter, Truth,
 };
-use hivtac_film::Film;
+use hivtac_film::{Film, Pressed};
 
 /// A simulated sensor and what presses it. Frames depend on nothing but the scene and the
 /// arguments.
@@ -159,6 +159,28 @@ impl Scene {
         self.options.film.check(&self.film, load)?;
         let exposure = self.exposure(&self.options.shutter, |_| *load);
         Ok(self.expose(&exposure, number))
+    }
+
+    /// A frame of a film that somebody else pressed, such as finite elements; the number selects its
+    /// noise, and the load is what the frame's truth says. The film's markers are those of this
+    /// scene.
+    pub fn render_pressed(&self, pressed: Pressed, load: &Load, number: u64) -> Frame {
+        let shutter = Shutter::default();
+        let exposure = Exposure {
+            now: pressed,
+            ..self.exposure(&shutter, |_| *load)
+        };
+        self.expose(&exposure, number)
+    }
+
+    /// What is true of such a film, without rendering.
+    pub fn truth_of_pressed(&self, pressed: Pressed, load: &Load) -> Truth {
+        let shutter = Shutter::default();
+        let exposure = Exposure {
+            now: pressed,
+            ..self.exposure(&shutter, |_| *load)
+        };
+        self.truth_of(&exposure, &self.marker_images(&exposure))
     }
 
     /// The frame of a camera with a shutter under a load in time that is no [`Motion`]: what

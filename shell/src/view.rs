@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use hivtac_film::DiscMotion;
+use hivtac_film::{DiscMotion, Pressed};
 use hivtac_scene::{Camera, Disc, MARKERS, Preset};
 
 use crate::{Equilibrium, Film, ShellError};
@@ -45,6 +45,26 @@ pub fn markers_on(moved: impl Fn([f64; 2]) -> [f64; 3], camera: &Camera) -> [Mar
         moved_mm: disc_motion(&moved, &disc).moved_mm,
         seen_px: disc.centroid_px(&moved, camera),
     })
+}
+
+/// A film in a state as a scene shows it: how it moved at the first four of these discs, from where
+/// the mounted film is flat.
+///
+/// # Errors
+/// Never, while the camera's preset exists.
+pub fn pressed(
+    film: &Film,
+    state: &Equilibrium,
+    discs: impl Iterator<Item = Disc>,
+) -> Result<Pressed, ShellError> {
+    let camera = paper_camera()?;
+    let mut pressed = Pressed::default();
+    let places = pressed.centres_mm.iter_mut().zip(&mut pressed.discs);
+    for ((centre_mm, motion), disc) in places.zip(discs) {
+        *centre_mm = disc.centre_mm;
+        *motion = seen_motion(|point| film.displacement(state, point), &disc, &camera);
+    }
+    Ok(pressed)
 }
 
 /// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u ·

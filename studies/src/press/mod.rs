@@ -3,6 +3,7 @@
 mod bound;
 mod drawn;
 mod held;
+mod real;
 mod rows;
 mod unit;
 
@@ -10,6 +11,7 @@ pub use bound::{Bound, Noise};
 use drawn::Drawn;
 pub use drawn::{normal, seeded};
 pub use held::{Held, noise_of};
+pub use real::{RealFilm, dots_mm};
 pub use rows::{Errors, Off, Row};
 pub use unit::{Answer, Tared, TestedUnit};
 

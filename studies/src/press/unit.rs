@@ -3,7 +3,7 @@
 use anyhow::{Result, anyhow};
 use hivtac_data::dataset::measure;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
-use hivtac_scene::{Frame, Load, Options, Scene};
+use hivtac_scene::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::{Conditions, Model};
 use hivtac_sensing::motion::Motion;
@@ -13,7 +13,7 @@ use hivtac_sensing::tare::TareBuilder;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 
-use super::Drawn;
+use super::{Drawn, RealFilm};
 
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
@@ -22,6 +22,8 @@ const TARE_FRAMES: u16 = 64;
 pub struct TestedUnit {
     scene: Scene,
     tip_radius_mm: f64,
+    /// Its film, where it is not the scene's.
+    real: Option<RealFilm>,
 }
 
 /// A sensor with a model, tared on a unit.
@@ -62,6 +64,7 @@ impl TestedUnit {
         Ok(Self {
             scene: scene.with_options(options)?,
             tip_radius_mm,
+            real: None,
         })
     }
 
@@ -76,6 +79,45 @@ impl TestedUnit {
             tip_radius_mm,
         } = Drawn::new(number, focal_px);
         Self::new(conditions, options, tip_radius_mm, number)
+    }
+
+    /// The same with the film of this number of those that people mount.
+    ///
+    /// # Errors
+    /// When there is no such camera, or the film finds no rest position.
+    pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
+        let unit = Self::drawn(conditions, number)?;
+        let options = unit.scene.options();
+        let film = RealFilm::drawn(number, options, unit.tip_radius_mm)?;
+        Ok(Self {
+            real: Some(film),
+            ..unit
+        })
+    }
+
+    /// Its film, where it is not the scene's.
+    pub fn real_film(&self) -> Option<&RealFilm> {
+        self.real.as_ref()
+    }
+
+    /// A frame under a press; the number selects its noise.
+    ///
+    /// # Errors
+    /// When the film cannot take the press.
+    pub fn frame(&self, load: &Load, number: u64) -> Result<Frame> {
+        let load = self.with_tip(*load)?;
+        match &self.real {
+            None => Ok(self.scene.render_load(&load, number)?),
+            Some(film) => Ok(self.scene.render_pressed(film.press(&load)?, &load, number)),
+        }
+    }
+
+    fn truth(&self, load: &Load) -> Result<Truth> {
+        let load = self.with_tip(*load)?;
+        match &self.real {
+            None => Ok(self.scene.truth_under(&load)?),
+            Some(film) => Ok(self.scene.truth_of_pressed(film.press(&load)?, &load)),
+        }
     }
 
     /// The scene.
@@ -103,18 +145,10 @@ impl TestedUnit {
     /// # Errors
     /// When the film cannot take the press.
     pub fn shows_all(&self, load: &Load) -> Result<bool> {
-        let Unit {
-            stiffness,
-            thickness,
-            ..
-        } = self.scene.options().film.unit;
-        let stretching = stiffness * thickness;
-        let times = [stretching * thickness * thickness, stretching];
-        let pose = Pose::of_force(load.vector_n(), load.offset_mm(), times);
-        if pose.size > LARGEST_SIZE {
+        if self.real.is_none() && !self.scene_holds(load) {
             return Ok(false);
         }
-        let truth = self.scene.truth_under(&self.with_tip(*load)?)?;
+        let truth = self.truth(load)?;
         let camera = self.scene.camera();
         let sides = [camera.width(), camera.height()].map(f64::from);
         let inside = truth.markers.iter().flatten().filter(|marker| {
@@ -124,8 +158,20 @@ impl TestedUnit {
             let [x, y] = marker.centroid_px;
             within(x, sides[0]) && within(y, sides[1])
         });
-        let inside = inside.count() == 4;
-        Ok(inside)
+        Ok(inside.count() == 4)
+    }
+
+    /// Whether the tables of the scene's film hold a press.
+    fn scene_holds(&self, load: &Load) -> bool {
+        let Unit {
+            stiffness,
+            thickness,
+            ..
+        } = self.scene.options().film.unit;
+        let stretching = stiffness * thickness;
+        let times = [stretching * thickness * thickness, stretching];
+        let pose = Pose::of_force(load.vector_n(), load.offset_mm(), times);
+        pose.size <= LARGEST_SIZE
     }
 
     /// A sensor with this model, tared on the unit at rest.
@@ -145,9 +191,7 @@ impl TestedUnit {
     fn rest(&self, sensor: &mut Sensor<'_>) -> Result<Rest> {
         let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
         for number in 0..TARE_FRAMES {
-            let frame = self
-                .scene
-                .render_load(&Load::REST, 1_000_000 + u64::from(number))?;
+            let frame = self.frame(&Load::REST, 1_000_000 + u64::from(number))?;
             let seen = measure(sensor, &frame);
             if let Some(outcome) = sensor.tare_with(&mut tare, &seen) {
                 return outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"));
@@ -198,9 +242,7 @@ impl Tared<'_> {
     ) -> Result<[[f64; 2]; 4]> {
         let mut mean = [[0.0; 2]; 4];
         for frame in 0..frames {
-            let picture = unit
-                .scene
-                .render_load(&unit.with_tip(load)?, number + frame)?;
+            let picture = unit.frame(&load, number + frame)?;
             let markers = measure(&mut self.sensor, &picture).markers;
             let markers = markers.ok_or_else(|| anyhow!("no markers under a load"))?;
             for (mean, marker) in mean.iter_mut().zip(markers) {
@@ -238,7 +280,7 @@ impl Tared<'_> {
         number: u64,
         measure: impl Fn(&mut Sensor<'_>, &Frame) -> Measurement,
     ) -> Result<Answer> {
-        let frame = unit.scene.render_load(&unit.with_tip(load)?, number)?;
+        let frame = unit.frame(&load, number)?;
         let seen = measure(&mut self.sensor, &frame);
         let off = |k: usize| {
             let [x, y] = frame.truth.markers[k]?.centroid_px;

@@ -1,0 +1,62 @@
+//! Gauss–Newton steps to the unit that explains the loads best.
+
+use anyhow::Result;
+
+use super::linear::Matrix;
+use super::problem::{At, Problem, Unknowns};
+
+/// Steps at most, and the change of χ² that ends them.
+const ROUNDS: usize = 12;
+const SETTLED: f64 = 0.05;
+/// Parts of a step that are tried, the first at which χ² falls is taken.
+const LENGTHS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
+
+/// Where a descent ended.
+pub struct Found {
+    pub at: At,
+    /// Of the numbers, in parts of their standard deviations before.
+    pub covariance: Matrix,
+}
+
+impl Problem<'_> {
+    /// Every unknown as it is most likely before there is a load.
+    pub fn likeliest(&self) -> Unknowns {
+        Unknowns {
+            numbers: vec![0.0; self.priors.len()],
+            loads: vec![[0.0; super::load::UNKNOWNS]; self.loads.len()],
+        }
+    }
+
+    /// Descends from some values.
+    ///
+    /// # Errors
+    /// When the film finds no equilibrium under a load.
+    pub fn descend(&self, from: Unknowns) -> Result<Found> {
+        let mut here = self.at(from, None)?;
+        for round in 1.. {
+            let solved = self.solve(&here)?;
+            let mut fell = 0.0;
+            if round <= ROUNDS {
+                for length in LENGTHS {
+                    let there = here.unknowns.after(&solved.step, length, &self.priors);
+                    let Ok(there) = self.at(there, Some(&here)) else {
+                        continue;
+                    };
+                    fell = here.square() - there.square();
+                    if fell > 0.0 {
+                        here = there;
+                        break;
+                    }
+                }
+            }
+            if std::env::var("TRACE").is_ok() { eprintln!("round {round} square {:.1} fell {fell:.2} {:?}", here.square(), here.made.design.stretch); }
+            if fell < SETTLED {
+                return Ok(Found {
+                    at: here,
+                    covariance: solved.covariance,
+                });
+            }
+        }
+        unreachable!("the rounds end")
+    }
+}

@@ -1,0 +1,314 @@
+//! How a unit's film moves its dots under any load: from finite elements at few places of the tip to
+//! every place.
+//!
+//! The dimple under a tip moves with it. So the motion of a dot with the tip at a place is that of
+//! the point as far from the tip, with the tip at solved places nearby: interpolated between these
+//! it changes slowly, although the film moves quite otherwise a little beside a tip.
+
+use anyhow::{Context, Result};
+use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
+use hivtac_shell::{Equilibrium, Response};
+use rayon::prelude::*;
+
+use super::linear::{Matrix, dot, inverse, times};
+use super::problem::{At, Problem, press};
+use super::seen::{View, mean, seen_through};
+
+/// Places of the tip along x and along y at which the film is solved: from the first, so far apart,
+/// mm.
+const FIRST_MM: f64 = -5.0;
+const APART_MM: f64 = 2.0;
+const TIPS: usize = 6;
+/// Places that a value is interpolated from, along each axis.
+const SPAN: usize = 4;
+/// The force of the largest size, N.
+const LARGEST_N: f64 = 0.256;
+/// Loads at each place: sizes in parts of the largest without tilt, and with tilts: radius in parts
+/// of the largest, the turn of the first of four, °, and the size.
+const STRAIGHT: [f64; 5] = [0.1, 0.3, 0.6, 0.85, 1.0];
+const TILTED: [(f64, f64, f64); 4] = [(0.5, 20.0, 0.2), (0.6, 65.0, 0.5), (0.5, 20.0, 0.95), (1.0, 42.0, 0.75)];
+/// What slopes count for beside values.
+const SLOPES_COUNT: f64 = 0.05;
+/// How many sizes the terms have without tilt, with its first degree, and so on.
+const TERMS: [u8; 5] = [7, 5, 4, 2, 1];
+
+/// A unit's film, solved under some loads at some places of the tip.
+pub struct Field<'a> {
+    problem: &'a Problem<'a>,
+    at: &'a At,
+    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    stiffness_n: [f64; 2],
+    poses: Vec<Pose>,
+    /// By place along y, place along x and load.
+    solved: Vec<Solved>,
+    /// Rows by term: what each sample counts for.
+    nearest: Matrix,
+    terms: Terms,
+}
+
+struct Solved {
+    state: Equilibrium,
+    /// By size, and by tilt along x and y, 1/rad.
+    slopes: Vec<Response>,
+}
+
+/// The terms' coefficients of a dot's motion along x and y, focal lengths.
+pub type Coefficients = [Vec<f64>; 2];
+
+impl<'a> Field<'a> {
+    /// Solves the film of a unit that was found.
+    ///
+    /// # Errors
+    /// When the film finds no equilibrium.
+    pub fn new(problem: &'a Problem<'a>, at: &'a At) -> Result<Self> {
+        let poses = poses();
+        let stiffness_n = stiffness_n(at)?;
+        let terms = Terms::with_sizes(TERMS);
+        let nearest = nearest(&terms, &poses)?;
+        let mut field = Field {
+            problem,
+            at,
+            stiffness_n,
+            poses,
+            solved: Vec::new(),
+            nearest,
+            terms,
+        };
+        let places: Vec<usize> = (0..TIPS * TIPS).collect();
+        let solve = |k: usize| field.solve_place([k % TIPS, k / TIPS].map(tip_mm));
+        let solved = places.into_par_iter().map(solve);
+        field.solved = solved.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect();
+        Ok(field)
+    }
+
+    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    pub fn stiffness_n(&self) -> [f64; 2] {
+        self.stiffness_n
+    }
+
+    /// The terms that motions are sums of.
+    pub fn terms(&self) -> &Terms {
+        &self.terms
+    }
+
+    /// The force of a pose, N.
+    pub fn force_n(&self, pose: &Pose) -> [f64; 3] {
+        let [a, b] = self.stiffness_n;
+        let size_n = a * pose.size + b * pose.size * pose.size * pose.size;
+        pose.direction().map(|part| size_n * part)
+    }
+
+    fn solve_place(&self, place_mm: [f64; 2]) -> Result<Vec<Solved>> {
+        let film = &self.at.film;
+        let mut solved: Vec<Solved> = Vec::new();
+        for (k, pose) in self.poses.iter().enumerate() {
+            let near = |other: &usize| {
+                let other = &self.poses[*other];
+                let tilt = [0, 1].map(|i| pose.tilt[i] - other.tilt[i]);
+                (pose.size - other.size).abs() + 0.3 * tilt[0].hypot(tilt[1])
+            };
+            let nearest = (0..k).min_by(|a, b| near(a).total_cmp(&near(b)));
+            let start = nearest.map_or(&self.at.rest, |k| &solved[k].state);
+            let force_n = self.force_n(pose);
+            let state = press(film, place_mm, force_n, start)?;
+            let by_load = film.responses(&state)?;
+            let slopes = self.per_pose(pose).map(|[x, y, z]| {
+                Response::to_all(&by_load, [x, y, z, 0.0, 0.0])
+            });
+            solved.push(Solved {
+                state,
+                slopes: slopes.into(),
+            });
+        }
+        Ok(solved)
+    }
+
+    /// How the force answers to size and tilt, N and N/rad.
+    fn per_pose(&self, pose: &Pose) -> [[f64; 3]; 3] {
+        const STEP: f64 = 1e-5;
+        [0, 1, 2].map(|axis| {
+            let [back, forth] = [-STEP, STEP].map(|step| {
+                let mut there = *pose;
+                match axis {
+                    0 => there.size += step,
+                    _ => there.tilt[axis - 1] += step,
+                }
+                self.force_n(&there)
+            });
+            [0, 1, 2].map(|i| (forth[i] - back[i]) / (2.0 * STEP))
+        })
+    }
+
+    /// The terms' coefficients of the motion of a dot's image with the tip at a place at rest, mm.
+    pub fn coefficients(&self, dot_mm: [f64; 2], place_mm: [f64; 2]) -> Coefficients {
+        let At {
+            film, rest, made, ..
+        } = self.at;
+        let view = View {
+            film,
+            camera: &self.problem.bench.camera,
+            farther_mm: made.farther_mm,
+        };
+        let place_mm = film.material_point(rest, place_mm);
+        let around = Around::new(place_mm);
+        let still = |point: [f64; 2]| film.displacement(rest, point);
+        let at_rest = view.image_of(still, dot_mm);
+        let mut samples = [Vec::new(), Vec::new()];
+        for load in 0..self.poses.len() {
+            let displaced = |point: [f64; 2]| {
+                let mut sum = still(point);
+                around.add(&mut sum, |tip, shift| {
+                    let there = self.on_film([0, 1].map(|i| point[i] + shift[i]));
+                    let moved = film.displacement(&self.solved(tip, load).state, there);
+                    let rested = film.displacement(rest, there);
+                    [0, 1, 2].map(|i| moved[i] - rested[i])
+                });
+                sum
+            };
+            let image = view.image_of(displaced, dot_mm);
+            let lens = view.lens_at(displaced, dot_mm);
+            for i in [0, 1] {
+                samples[i].push(image[i] - at_rest[i]);
+            }
+            for slope in 0..3 {
+                let rate = mean(dot_mm, |point| {
+                    let mut sum = [0.0; 3];
+                    around.add(&mut sum, |tip, shift| {
+                        let there = self.on_film([0, 1].map(|i| point[i] + shift[i]));
+                        let Solved { state, slopes } = self.solved(tip, load);
+                        film.surface_rate(state, &slopes[slope], there)
+                    });
+                    sum
+                });
+                let rate = seen_through(&lens, rate);
+                for i in [0, 1] {
+                    samples[i].push(SLOPES_COUNT * rate[i]);
+                }
+            }
+        }
+        samples.map(|samples| times(&self.nearest, &samples))
+    }
+
+    fn solved(&self, [i, j]: [usize; 2], load: usize) -> &Solved {
+        &self.solved[(j * TIPS + i) * self.poses.len() + load]
+    }
+
+    /// The nearest point of the film.
+    fn on_film(&self, point_mm: [f64; 2]) -> [f64; 2] {
+        let edge = self.at.made.design.half_edge_mm();
+        point_mm.map(|part| part.clamp(-edge, edge))
+    }
+}
+
+/// The solved places around a place, and what each counts for.
+struct Around {
+    first: [usize; 2],
+    parts: [[f64; SPAN]; 2],
+    place_mm: [f64; 2],
+}
+
+impl Around {
+    fn new(place_mm: [f64; 2]) -> Around {
+        let at = place_mm.map(|part| (part - FIRST_MM) / APART_MM);
+        let first = at.map(|at| (at.floor() as isize - 1).clamp(0, (TIPS - SPAN) as isize) as usize);
+        // Lagrange's polynomials.
+        let parts = [0, 1].map(|axis| {
+            let x = at[axis] - first[axis] as f64;
+            std::array::from_fn(|k| {
+                let others = (0..SPAN).filter(|other| *other != k);
+                let factor = |other: usize| (x - other as f64) / (k as f64 - other as f64);
+                others.map(factor).product()
+            })
+        });
+        Around {
+            first,
+            parts,
+            place_mm,
+        }
+    }
+
+    /// Adds a vector of each solved place: by its number along x and y, and how far it is from the
+    /// place, mm.
+    fn add(&self, sum: &mut [f64; 3], of: impl Fn([usize; 2], [f64; 2]) -> [f64; 3]) {
+        for (j, down) in self.parts[1].iter().enumerate() {
+            for (i, right) in self.parts[0].iter().enumerate() {
+                let tip = [self.first[0] + i, self.first[1] + j];
+                let shift = [0, 1].map(|axis| tip_mm(tip[axis]) - self.place_mm[axis]);
+                let part = right * down;
+                for (sum, value) in sum.iter_mut().zip(of(tip, shift)) {
+                    *sum += part * value;
+                }
+            }
+        }
+    }
+}
+
+fn tip_mm(number: usize) -> f64 {
+    FIRST_MM + APART_MM * number as f64
+}
+
+fn poses() -> Vec<Pose> {
+    let straight = STRAIGHT.map(|part| (part, [0.0; 2]));
+    let tilted = TILTED.into_iter().flat_map(|(radius, turn, part)| {
+        (0..4).map(move |k| {
+            let (sin, cos) = libm::sincos((turn + 90.0 * f64::from(k)).to_radians());
+            (part, [cos, sin].map(|along| radius * LARGEST_TILT * along))
+        })
+    });
+    let pose = |(part, tilt): (f64, [f64; 2])| Pose {
+        size: part * LARGEST_SIZE,
+        tilt,
+        place_mm: [0.0; 2],
+    };
+    straight.into_iter().chain(tilted).map(pose).collect()
+}
+
+/// By term, what each sample counts for in the coefficients nearest to all of them: values and
+/// slopes of the poses.
+fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Matrix> {
+    let mut rows: Matrix = Vec::new();
+    for pose in poses {
+        let [value, slopes @ ..] = terms.rows(pose);
+        rows.push(value);
+        let weighed = |row: Vec<f64>| row.iter().map(|part| SLOPES_COUNT * part).collect();
+        rows.extend(slopes.map(weighed));
+    }
+    let count = terms.count();
+    let column = |k: usize| -> Vec<f64> { rows.iter().map(|row| row[k]).collect() };
+    let columns: Matrix = (0..count).map(column).collect();
+    let products = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect());
+    let inverse = inverse(products.collect()).context("the tables' loads")?;
+    let row = |own: &Vec<f64>| rows.iter().map(|row| dot(own, row)).collect();
+    Ok(inverse.iter().map(row).collect())
+}
+
+/// How strong the force of a size is: sizes grow like the depth of a tip in the film's middle.
+fn stiffness_n(at: &At) -> Result<[f64; 2]> {
+    let mut start = at.rest.clone();
+    let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
+    let mut deepest = 0.0;
+    for part in [0.02, 0.1, 0.4, 1.0] {
+        let force = part * LARGEST_N;
+        let state = press(&at.film, [0.0; 2], [0.0, 0.0, -force], &start)?;
+        let depth = depth(at, &state);
+        deepest = depth;
+        // Each force counts alike: in parts of itself.
+        let (x, y) = (depth / force, depth * depth * depth / force);
+        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+        (xf, yf) = (xf + x, yf + y);
+        start = state;
+    }
+    let whole = xx * yy - xy * xy;
+    let (a, b) = ((yy * xf - xy * yf) / whole, (xx * yf - xy * xf) / whole);
+    // Either may be near nothing, never below.
+    let (a, b) = (a.max(1e-3 * LARGEST_N / deepest), b.max(1e-3 * LARGEST_N / deepest.powi(3)));
+    let unscaled = [a * deepest, b * deepest.powi(3)];
+    let of_largest = LARGEST_N / (unscaled[0] + unscaled[1]);
+    let mm = deepest / LARGEST_SIZE;
+    Ok([of_largest * a * mm, of_largest * b * mm.powi(3)])
+}
+
+fn depth(at: &At, state: &Equilibrium) -> f64 {
+    let [here, rest] = [state, &at.rest].map(|state| at.film.displacement(state, [0.0; 2])[2]);
+    rest - here
+}

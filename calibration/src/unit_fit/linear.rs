@@ -1,0 +1,60 @@
+//! Small dense linear algebra of a fit.
+
+use anyhow::{Result, ensure};
+
+/// A symmetric matrix by rows.
+pub type Matrix = Vec<Vec<f64>>;
+
+/// a · b.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The factor L of a symmetric matrix L·Lᵀ; 0 above its diagonal.
+///
+/// # Errors
+/// When the matrix is not positive definite.
+pub fn cholesky(mut matrix: Matrix) -> Result<Matrix> {
+    let count = matrix.len();
+    for i in 0..count {
+        for j in 0..=i {
+            let left = matrix[i][j] - dot(&matrix[i][..j], &matrix[j][..j]);
+            matrix[i][j] = if i == j {
+                left.sqrt()
+            } else {
+                left / matrix[j][j]
+            };
+        }
+        ensure!(
+            matrix[i][i] > 0.0,
+            "the loads do not tell the unit's numbers"
+        );
+        matrix[i][i + 1..].fill(0.0);
+    }
+    Ok(matrix)
+}
+
+/// The inverse of a symmetric matrix that is positive definite.
+///
+/// # Errors
+/// When it is not.
+pub fn inverse(matrix: Matrix) -> Result<Matrix> {
+    let (count, factor) = (matrix.len(), cholesky(matrix)?);
+    // Columns of the factor's inverse, then their products.
+    let mut columns = vec![vec![0.0; count]; count];
+    for (k, column) in columns.iter_mut().enumerate() {
+        for i in k..count {
+            let known = dot(&factor[i][k..i], &column[k..i]);
+            column[i] = (f64::from(u8::from(i == k)) - known) / factor[i][i];
+        }
+    }
+    let product = |i: usize, j: usize| dot(&columns[i], &columns[j]);
+    Ok((0..count)
+        .map(|i| (0..count).map(|j| product(i, j)).collect())
+        .collect())
+}
+
+/// The product of a symmetric matrix and a vector.
+pub fn times(matrix: &Matrix, vector: &[f64]) -> Vec<f64> {
+    matrix.iter().map(|row| dot(row, vector)).collect()
+}

@@ -1,0 +1,150 @@
+//! The numbers in which units differ, and what is known of them before there is a load.
+
+use hivtac_shell::{Change, Design};
+
+use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
+
+/// Standard deviations of what the pixel grid does to a marker at rest, px, and of how far the
+/// camera is from the film beyond its nominal distance, mm.
+const REST_PX: f64 = 0.006;
+const DISTANCE_MM: f64 = 0.1;
+
+/// A number of a unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Number {
+    /// Of the film: ln of Young's modulus, thickness and grip in parts of the nominal ones, all
+    /// others in the unit of the change.
+    Film(Change),
+    /// How far a marker is glued beside its place along x or y, mm.
+    Marker(usize, usize),
+    /// What the pixel grid does to a marker at rest along x or y, px.
+    Rest(usize, usize),
+    /// How far the camera is rolled, x towards y, degrees.
+    Roll,
+    /// ln of the focal length in parts of the nominal one.
+    Focal,
+    /// How much farther than nominal the camera is from the film, mm.
+    Distance,
+    /// Where the camera's axis meets the picture, beside the nominal point, px.
+    Middle(usize),
+    /// The stage's zero on the film along x or y, mm.
+    Stage(usize),
+}
+
+/// A number with its mean and its standard deviation among units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    pub number: Number,
+    pub mean: f64,
+    pub sigma: f64,
+    /// Least and largest value.
+    pub range: [f64; 2],
+}
+
+impl Prior {
+    /// With a mean of 0 and a range of four standard deviations.
+    pub fn about_zero(number: Number, sigma: f64) -> Prior {
+        Prior {
+            number,
+            mean: 0.0,
+            sigma,
+            range: [-4.0 * sigma, 4.0 * sigma],
+        }
+    }
+
+    /// The nearest number of standard deviations beside the mean that is within the range.
+    pub fn within(&self, part: f64) -> f64 {
+        let [least, largest] = self.range.map(|end| (end - self.mean) / self.sigma);
+        part.clamp(least, largest)
+    }
+
+    /// The value that lies so many standard deviations beside the mean, within the range.
+    pub fn value(&self, part: f64) -> f64 {
+        let [least, largest] = self.range;
+        (self.mean + self.sigma * part).clamp(least, largest)
+    }
+}
+
+/// A film's numbers: mean, standard deviation, least and largest value.
+const FILM: [(Change, [f64; 4]); 17] = [
+    (Change::Youngs, [0.0, 0.3, -1.2, 1.2]),
+    (Change::Thickness, [0.0, 0.1, -0.35, 0.35]),
+    (Change::Stretch(0), [0.01, 0.01, -0.006, 0.045]),
+    (Change::Stretch(1), [0.01, 0.01, -0.006, 0.045]),
+    (Change::Overhang, [3.0, 3.0, 0.0, 8.5]),
+    (Change::PostRadius, [1.8, 0.5, 0.9, 3.2]),
+    (Change::Grip, [0.0, 0.7, -2.0, 2.0]),
+    (Change::NeoHooke, [0.5, 0.4, 0.0, 1.0]),
+    (Change::Stiffening, [0.05, 0.08, 0.0, 0.4]),
+    (Change::ThicknessSlope(0), [0.0, 0.04, -0.15, 0.15]),
+    (Change::ThicknessSlope(1), [0.0, 0.04, -0.15, 0.15]),
+    (Change::ThicknessCurve(0), [0.0, 0.02, -0.08, 0.08]),
+    (Change::ThicknessCurve(1), [0.0, 0.02, -0.08, 0.08]),
+    (Change::ThicknessCurve(2), [0.0, 0.02, -0.08, 0.08]),
+    (Change::DotStiffening, [0.4, 0.4, 0.0, 2.5]),
+    (Change::TipRadius, [0.5, 0.25, 0.25, 2.0]),
+    (Change::Down(2), [0.0, 0.6, -1.2, 1.2]),
+];
+
+/// The numbers of units whose stage's zero is known to so many mm, with this many dots.
+pub fn priors(dots: usize, stage_mm: f64) -> Vec<Prior> {
+    let film = FILM.map(|(change, [mean, sigma, least, largest])| Prior {
+        number: Number::Film(change),
+        mean,
+        sigma,
+        range: [least, largest],
+    });
+    let mut all = film.to_vec();
+    let mut add = |number, sigma| all.push(Prior::about_zero(number, sigma));
+    for axis in [0, 1] {
+        add(Number::Film(Change::Down(axis)), 0.6);
+        add(Number::Middle(axis), MIDDLE_PX);
+        add(Number::Stage(axis), stage_mm);
+        for post in 0..4 {
+            add(Number::Film(Change::Post(post, axis)), POST_MM);
+        }
+        for dot in 0..dots {
+            add(Number::Marker(dot, axis), MARKER_MM);
+            add(Number::Rest(dot, axis), REST_PX);
+        }
+    }
+    add(Number::Roll, ROLL_DEG);
+    add(Number::Focal, FOCAL);
+    add(Number::Distance, DISTANCE_MM);
+    all
+}
+
+/// Sets a number of the film; true when the number is the film's.
+pub fn set(design: &mut Design, number: Number, value: f64) {
+    let nominal = Design::default();
+    let Number::Film(change) = number else {
+        return;
+    };
+    match change {
+        Change::Force(_) | Change::Place(_) => {}
+        Change::Youngs => design.material.youngs_mpa = nominal.material.youngs_mpa * libm::exp(value),
+        Change::Thickness => {
+            design.material.thickness_mm = nominal.material.thickness_mm * libm::exp(value);
+        }
+        Change::Grip => design.post_grip_n_per_mm3 = nominal.post_grip_n_per_mm3 * libm::exp(value),
+        Change::Post(post, axis) => design.post_shift_mm[post][axis] = value,
+        Change::TipRadius => design.tip_radius_mm = value,
+        Change::Stretch(axis) => design.stretch[axis] = value,
+        Change::NeoHooke => design.law.neo_hooke = value,
+        Change::Stiffening => design.law.stiffening = value,
+        Change::ThicknessSlope(axis) => design.thickness_slope[axis] = value,
+        Change::ThicknessCurve(k) => design.thickness_curve[k] = value,
+        Change::DotStiffening => design.dot_stiffening = value,
+        Change::Down(axis) => design.down[axis] = value,
+        Change::PostRadius => design.post_radius_mm = value,
+        Change::Overhang => design.overhang_mm = value,
+    }
+}
+
+/// The unit of a change per unit of its number.
+pub fn per_number(design: &Design, change: Change) -> f64 {
+    match change {
+        Change::Thickness => design.material.thickness_mm,
+        _ => 1.0,
+    }
+}

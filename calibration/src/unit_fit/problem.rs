@@ -1,0 +1,556 @@
+//! A unit's numbers, held against its rest position and its loads.
+
+use anyhow::Result;
+use hivtac_scene::Camera;
+use hivtac_shell::{Change, Contact, Design, Equilibrium, Film, ShellError};
+use rayon::prelude::*;
+
+use super::linear::{Matrix, dot, inverse, times};
+use super::load::{KnownLoad, UNKNOWNS};
+use super::numbers::{self, Number, Prior};
+use super::seen::View;
+
+/// What is known of the camera and the rest position before there is a load.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// The camera's nominal focal length, px.
+    pub focal_px: f64,
+    /// Where its axis nominally meets the picture, px.
+    pub middle_px: [f64; 2],
+    /// Where markers rest, px.
+    pub rest_px: Vec<[f64; 2]>,
+    /// Standard uncertainty of these coordinates, px.
+    pub noise_px: f64,
+    /// Where dots are nominally glued, mm.
+    pub dots_mm: Vec<[f64; 2]>,
+    /// The camera whose lens sees the film; images count in its focal lengths.
+    pub camera: Camera,
+    /// How fine the film's mesh is.
+    pub fineness: f64,
+}
+
+/// A unit's numbers, what is known of them, and loads to hold them against.
+pub struct Problem<'a> {
+    pub bench: &'a Bench,
+    pub loads: &'a [KnownLoad],
+    pub priors: Vec<Prior>,
+}
+
+/// A unit as some values of its numbers make it.
+#[derive(Clone, Debug)]
+pub struct Made {
+    pub design: Design,
+    /// Where its dots are on the film, mm.
+    pub dots_mm: Vec<[f64; 2]>,
+    /// What a tare takes for the rest position less where the markers rest, px.
+    pub rest_px: Vec<[f64; 2]>,
+    pub roll_deg: f64,
+    pub focal_px: f64,
+    pub farther_mm: f64,
+    pub middle_px: [f64; 2],
+    /// The stage's zero on the film, mm.
+    pub stage_mm: [f64; 2],
+}
+
+/// Values of all unknowns, in parts of their standard deviations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknowns {
+    /// Of the unit's numbers.
+    pub numbers: Vec<f64>,
+    /// Of each load.
+    pub loads: Vec<[f64; UNKNOWNS]>,
+}
+
+/// What some values explain.
+pub struct At {
+    pub unknowns: Unknowns,
+    pub made: Made,
+    pub film: Film,
+    pub rest: Equilibrium,
+    /// Under each load.
+    pub states: Vec<Equilibrium>,
+    /// What is seen less what should be, in parts of its uncertainty: at rest, and under each load.
+    rest_residual: Vec<f64>,
+    pub residuals: Vec<Vec<f64>>,
+}
+
+/// How residuals answer to the unknowns.
+struct Slopes {
+    /// By number: of the rest position.
+    rest: Vec<Vec<f64>>,
+    loads: Vec<LoadSlopes>,
+}
+
+struct LoadSlopes {
+    /// By number.
+    numbers: Vec<Vec<f64>>,
+    /// By the load's own unknowns.
+    own: Vec<Vec<f64>>,
+}
+
+/// Images of the dots, focal lengths.
+struct Images {
+    rest: Vec<[f64; 2]>,
+    pressed: Vec<Vec<[f64; 2]>>,
+}
+
+/// What is seen of a unit, x and y of each dot, px.
+struct Seen {
+    rest: Vec<f64>,
+    pressed: Vec<Vec<f64>>,
+}
+
+/// How what is seen of a unit answers to the unknowns: x and y of each dot, px.
+pub struct UnitRates {
+    /// By number, per standard deviation: where the dots rest.
+    pub rest: Vec<Vec<f64>>,
+    /// How far beside that they are in each state.
+    pub pressed: Vec<Rates>,
+}
+
+/// How dots under a load move.
+pub struct Rates {
+    /// By number, per standard deviation.
+    pub numbers: Vec<Vec<f64>>,
+    /// By the force along x, y and z, per N.
+    pub force: Vec<Vec<f64>>,
+    /// By the place along x and y, per mm.
+    pub place: Vec<Vec<f64>>,
+}
+
+/// A step of the unknowns, and what is known after it.
+pub struct Solved {
+    pub step: Unknowns,
+    /// Of the numbers, in parts of their standard deviations before.
+    pub covariance: Matrix,
+}
+
+impl Made {
+    /// Turns what the camera sees, in focal lengths, into px.
+    pub fn to_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
+        [
+            self.focal_px * (cos * x - sin * y),
+            self.focal_px * (sin * x + cos * y),
+        ]
+    }
+}
+
+impl At {
+    /// χ²: what is seen, and how far the unknowns are from what was known of them.
+    pub fn square(&self) -> f64 {
+        let seen = self.residuals.iter().flatten().chain(&self.rest_residual);
+        let own = self.unknowns.loads.iter().flatten();
+        let all = seen.chain(&self.unknowns.numbers).chain(own);
+        all.map(|part| part * part).sum()
+    }
+}
+
+impl Problem<'_> {
+    /// The changes that the film's numbers are.
+    fn changes(&self) -> impl Iterator<Item = (usize, Change)> {
+        let all = self.priors.iter().enumerate();
+        all.filter_map(|(k, prior)| match prior.number {
+            Number::Film(change) => Some((k, change)),
+            _ => None,
+        })
+    }
+
+    /// The unit that some values make.
+    pub fn made(&self, parts: &[f64]) -> Made {
+        let bench = self.bench;
+        let mut made = Made {
+            design: Design {
+                fineness: bench.fineness,
+                ..Design::default()
+            },
+            dots_mm: bench.dots_mm.clone(),
+            rest_px: vec![[0.0; 2]; bench.dots_mm.len()],
+            roll_deg: 0.0,
+            focal_px: bench.focal_px,
+            farther_mm: 0.0,
+            middle_px: bench.middle_px,
+            stage_mm: [0.0; 2],
+        };
+        for (prior, part) in self.priors.iter().zip(parts) {
+            let value = prior.value(*part);
+            match prior.number {
+                Number::Film(_) => numbers::set(&mut made.design, prior.number, value),
+                Number::Marker(k, axis) => made.dots_mm[k][axis] += value,
+                Number::Rest(k, axis) => made.rest_px[k][axis] = value,
+                Number::Roll => made.roll_deg = value,
+                Number::Focal => made.focal_px *= libm::exp(value),
+                Number::Distance => made.farther_mm = value,
+                Number::Middle(axis) => made.middle_px[axis] += value,
+                Number::Stage(axis) => made.stage_mm[axis] = value,
+            }
+        }
+        made
+    }
+
+    fn view<'a>(&'a self, made: &Made, film: &'a Film) -> View<'a> {
+        View {
+            film,
+            camera: &self.bench.camera,
+            farther_mm: made.farther_mm,
+        }
+    }
+
+    /// What some values explain, found from what others do.
+    ///
+    /// # Errors
+    /// When the film finds no equilibrium.
+    pub fn at(&self, unknowns: Unknowns, near: Option<&At>) -> Result<At> {
+        let made = self.made(&unknowns.numbers);
+        let film = match near {
+            Some(near) => near.film.changed(&made.design)?,
+            None => Film::new(&made.design)?,
+        };
+        let rest = film.rest();
+        let press = |k: usize| -> Result<Equilibrium> {
+            let pressed = self.loads[k].at(&unknowns.loads[k]);
+            let place_mm = [0, 1].map(|i| pressed.place_mm[i] + made.stage_mm[i]);
+            let at_mm = film.material_point(&rest, place_mm);
+            let start = near.map_or(&rest, |near| &near.states[k]);
+            Ok(press(&film, at_mm, pressed.force_n, start)?)
+        };
+        let numbers: Vec<usize> = (0..self.loads.len()).collect();
+        let states = numbers.into_par_iter().map(press);
+        let states = states.collect::<Result<Vec<_>>>()?;
+        let mut at = At {
+            unknowns,
+            made,
+            film,
+            rest,
+            states,
+            rest_residual: Vec::new(),
+            residuals: Vec::new(),
+        };
+        (at.rest_residual, at.residuals) = self.residuals(&at);
+        Ok(at)
+    }
+
+    /// Where the dots' images are at rest and in some states, focal lengths.
+    fn images(&self, at: &At, made: &Made, states: &[Equilibrium]) -> Images {
+        let view = self.view(made, &at.film);
+        let of = |state: &Equilibrium| -> Vec<[f64; 2]> {
+            let dots = made.dots_mm.iter();
+            dots.map(|dot| view.image(state, *dot)).collect()
+        };
+        Images {
+            rest: of(&at.rest),
+            pressed: states.par_iter().map(of).collect(),
+        }
+    }
+
+    /// What a unit with these images is seen to do, px: where its dots rest, and how far beside the
+    /// rest position that a tare takes they are in each state.
+    fn seen(&self, made: &Made, images: &Images) -> Seen {
+        let rest = images.rest.iter().zip(&made.rest_px).flat_map(|(image, off)| {
+            let at = made.to_px(*image);
+            [0, 1].map(|i| made.middle_px[i] + at[i] + off[i])
+        });
+        let of_state = |pressed: &Vec<[f64; 2]>| -> Vec<f64> {
+            let dots = pressed.iter().zip(&images.rest).zip(&made.rest_px);
+            let moved = dots.flat_map(|((there, here), off)| {
+                let moved = made.to_px([0, 1].map(|i| there[i] - here[i]));
+                [0, 1].map(|i| moved[i] - off[i])
+            });
+            moved.collect()
+        };
+        Seen {
+            rest: rest.collect(),
+            pressed: images.pressed.iter().map(of_state).collect(),
+        }
+    }
+
+    /// What is seen less what should be, in parts of its uncertainty.
+    fn residuals(&self, at: &At) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let bench = self.bench;
+        let should = self.seen(&at.made, &self.images(at, &at.made, &at.states));
+        let rest = bench.rest_px.as_flattened().iter().zip(&should.rest);
+        let of_load = |(load, should): (&KnownLoad, &Vec<f64>)| -> Vec<f64> {
+            let seen = load.seen_px.as_flattened().iter();
+            let moved = seen.zip(bench.rest_px.as_flattened()).map(|(seen, rest)| seen - rest);
+            let off = moved.zip(should).map(|(moved, should)| moved - should);
+            off.map(|off| off / load.noise_px).collect()
+        };
+        (
+            rest.map(|(seen, should)| (seen - should) / bench.noise_px).collect(),
+            self.loads.iter().zip(&should.pressed).map(of_load).collect(),
+        )
+    }
+
+    /// How residuals answer to the unknowns there.
+    fn slopes(&self, at: &At) -> Result<Slopes> {
+        let rates = self.rates(at, &at.states)?;
+        let scaled = |column: &[f64], by: f64| column.iter().map(|part| by * part).collect();
+        let of_load = |(load, rates): (&KnownLoad, &Rates)| {
+            let column = |parts: &[f64; 3]| {
+                let sum = (0..rates.force[0].len()).map(|i| {
+                    (0..3).map(|axis| parts[axis] * rates.force[axis][i]).sum::<f64>()
+                });
+                sum.map(|part| -part / load.noise_px).collect()
+            };
+            let of_place = |column: &Vec<f64>| scaled(column, -load.each_place_mm / load.noise_px);
+            let numbers = rates.numbers.iter();
+            LoadSlopes {
+                numbers: numbers.map(|column| scaled(column, -1.0 / load.noise_px)).collect(),
+                own: (load.directions().iter().map(column))
+                    .chain(rates.place.iter().map(of_place))
+                    .collect(),
+            }
+        };
+        let at_rest = rates.rest.iter();
+        Ok(Slopes {
+            rest: at_rest.map(|column| scaled(column, -1.0 / self.bench.noise_px)).collect(),
+            loads: self.loads.iter().zip(&rates.pressed).map(of_load).collect(),
+        })
+    }
+
+    /// How what is seen answers to the unknowns, at rest and in some states of the unit's film.
+    ///
+    /// # Errors
+    /// When a state is not stable.
+    pub fn rates(&self, at: &At, states: &[Equilibrium]) -> Result<UnitRates> {
+        let (numbers, changes): (Vec<usize>, Vec<Change>) = self.changes().unzip();
+        let units: Vec<f64> = numbers
+            .iter()
+            .zip(&changes)
+            .map(|(k, change)| self.priors[*k].sigma * numbers::per_number(&at.made.design, *change))
+            .collect();
+        let at_rest = self.image_rates(at, &at.rest, &changes)?;
+        let mut all = changes.clone();
+        all.extend((0..3).map(Change::Force));
+        all.extend((0..2).map(Change::Place));
+        let of_state = |state: &Equilibrium| -> Result<Rates> {
+            let moved = self.image_rates(at, state, &all)?;
+            let (of_film, of_load) = moved.split_at(changes.len());
+            let (force, place) = of_load.split_at(3);
+            let mut rates = Rates {
+                numbers: vec![Vec::new(); self.priors.len()],
+                force: force.to_vec(),
+                place: place.to_vec(),
+            };
+            for (j, k) in numbers.iter().enumerate() {
+                let pairs = of_film[j].iter().zip(&at_rest[j]);
+                rates.numbers[*k] = pairs.map(|(a, b)| units[j] * (a - b)).collect();
+            }
+            for (k, prior) in self.priors.iter().enumerate() {
+                if let Number::Stage(axis) = prior.number {
+                    let column = place[axis].iter();
+                    rates.numbers[k] = column.map(|part| prior.sigma * part).collect();
+                }
+            }
+            Ok(rates)
+        };
+        let mut rates = UnitRates {
+            rest: vec![vec![0.0; 2 * at.made.dots_mm.len()]; self.priors.len()],
+            pressed: states.par_iter().map(of_state).collect::<Result<_>>()?,
+        };
+        for (j, k) in numbers.iter().enumerate() {
+            rates.rest[*k] = at_rest[j].iter().map(|part| units[j] * part).collect();
+        }
+        self.add_camera(at, states, &mut rates);
+        Ok(rates)
+    }
+
+    /// The rates by numbers that change no film: by differences.
+    fn add_camera(&self, at: &At, states: &[Equilibrium], rates: &mut UnitRates) {
+        const STEP: f64 = 0.01;
+        let here = self.images(at, &at.made, states);
+        let seen_here = self.seen(&at.made, &here);
+        for (k, prior) in self.priors.iter().enumerate() {
+            let moves_images = match prior.number {
+                Number::Film(_) | Number::Stage(_) => continue,
+                Number::Marker(..) | Number::Distance => true,
+                _ => false,
+            };
+            let mut there = at.unknowns.numbers.clone();
+            there[k] += STEP;
+            let made = self.made(&there);
+            let seen = match moves_images {
+                true => self.seen(&made, &self.images(at, &made, states)),
+                false => self.seen(&made, &here),
+            };
+            let rate = |there: &[f64], here: &[f64]| -> Vec<f64> {
+                let pairs = there.iter().zip(here);
+                pairs.map(|(a, b)| (a - b) / STEP).collect()
+            };
+            rates.rest[k] = rate(&seen.rest, &seen_here.rest);
+            for (k_state, rates) in rates.pressed.iter_mut().enumerate() {
+                rates.numbers[k] = rate(&seen.pressed[k_state], &seen_here.pressed[k_state]);
+            }
+        }
+    }
+
+    /// By change: how the dots' images answer, x and y of each, px per unit of the change.
+    fn image_rates(
+        &self,
+        at: &At,
+        state: &Equilibrium,
+        changes: &[Change],
+    ) -> Result<Vec<Vec<f64>>> {
+        let responses = at.film.linearize(state, changes)?;
+        let view = self.view(&at.made, &at.film);
+        let mut rates = vec![Vec::new(); changes.len()];
+        for dot in &at.made.dots_mm {
+            for (column, rate) in rates.iter_mut().zip(view.rates(state, &responses, *dot)) {
+                column.extend(at.made.to_px(rate));
+            }
+        }
+        Ok(rates)
+    }
+
+    /// The step to where the unknowns explain most, and what is known of the numbers then.
+    ///
+    /// # Errors
+    /// When a state is not stable.
+    pub fn solve(&self, at: &At) -> Result<Solved> {
+        let slopes = self.slopes(at)?;
+        let count = self.priors.len();
+        let mut matrix: Matrix = (0..count)
+            .map(|i| (0..count).map(|j| f64::from(u8::from(i == j))).collect())
+            .collect();
+        let mut side: Vec<f64> = at.unknowns.numbers.iter().map(|part| -part).collect();
+        add_normal(&mut matrix, &mut side, &slopes.rest, &at.rest_residual, 1.0);
+        // Each load's own unknowns are eliminated.
+        let mut eliminated = Vec::new();
+        for (k, load) in slopes.loads.iter().enumerate() {
+            let residual = &at.residuals[k];
+            add_normal(&mut matrix, &mut side, &load.numbers, residual, 1.0);
+            let own = (0..UNKNOWNS)
+                .map(|i| {
+                    (0..UNKNOWNS)
+                        .map(|j| {
+                            dot(&load.own[i], &load.own[j]) + f64::from(u8::from(i == j))
+                        })
+                        .collect()
+                })
+                .collect();
+            let own = inverse(own)?;
+            let own_side: Vec<f64> = (0..UNKNOWNS)
+                .map(|i| -dot(&load.own[i], residual) - at.unknowns.loads[k][i])
+                .collect();
+            // Rows by number: products with the load's own unknowns.
+            let mixed: Matrix = (0..count)
+                .map(|i| {
+                    let row = load.own.iter();
+                    row.map(|own| dot(&load.numbers[i], own)).collect()
+                })
+                .collect();
+            let taken: Matrix = mixed.iter().map(|row| times(&own, row)).collect();
+            for i in 0..count {
+                for j in 0..count {
+                    matrix[i][j] -= dot(&taken[i], &mixed[j]);
+                }
+                side[i] -= dot(&taken[i], &own_side);
+            }
+            eliminated.push((own, own_side, mixed));
+        }
+        let numbers = self.step_within(&matrix, &side, &at.unknowns.numbers)?;
+        let covariance = inverse(matrix)?;
+        let loads = eliminated.iter().map(|(own, own_side, mixed)| {
+            let mut left = own_side.clone();
+            for (row, step) in mixed.iter().zip(&numbers) {
+                for (left, part) in left.iter_mut().zip(row) {
+                    *left -= part * step;
+                }
+            }
+            let step = times(own, &left);
+            std::array::from_fn(|i| step[i])
+        });
+        Ok(Solved {
+            step: Unknowns {
+                loads: loads.collect(),
+                numbers,
+            },
+            covariance,
+        })
+    }
+}
+
+impl Problem<'_> {
+    /// The solution of normal equations in which no number leaves its range: one that would is held
+    /// at its end, and the others are solved for anew.
+    fn step_within(&self, matrix: &Matrix, side: &[f64], at: &[f64]) -> Result<Vec<f64>> {
+        let mut held: Vec<Option<f64>> = vec![None; side.len()];
+        loop {
+            let (mut matrix, mut side) = (matrix.clone(), side.to_vec());
+            for k in 0..side.len() {
+                let Some(step) = held[k] else { continue };
+                for i in 0..side.len() {
+                    side[i] -= matrix[i][k] * step;
+                    matrix[i][k] = 0.0;
+                    matrix[k][i] = 0.0;
+                }
+                matrix[k][k] = 1.0;
+            }
+            for (side, held) in side.iter_mut().zip(&held) {
+                *side = held.unwrap_or(*side);
+            }
+            let step = times(&inverse(matrix)?, &side);
+            let mut is_within = true;
+            for (k, prior) in self.priors.iter().enumerate() {
+                let there = at[k] + step[k];
+                let within = prior.within(there);
+                if held[k].is_none() && within != there {
+                    held[k] = Some(within - at[k]);
+                    is_within = false;
+                }
+            }
+            if is_within {
+                return Ok(step);
+            }
+        }
+    }
+}
+
+/// A film under a force, N, at a point of it, mm, found from a state nearby, or else from rest.
+///
+/// # Errors
+/// When it finds no equilibrium.
+pub fn press(
+    film: &Film,
+    at_mm: [f64; 2],
+    force_n: [f64; 3],
+    start: &Equilibrium,
+) -> Result<Equilibrium, ShellError> {
+    let radius_mm = film.design().tip_radius_mm;
+    let from = |start: &Equilibrium| {
+        film.press_at(at_mm, radius_mm, Contact::Force(force_n), start)
+    };
+    from(start).or_else(|_| from(&film.rest()))
+}
+
+/// Adds the normal equations of some columns to a matrix and its right side.
+fn add_normal(
+    matrix: &mut Matrix,
+    side: &mut [f64],
+    columns: &[Vec<f64>],
+    residual: &[f64],
+    weight: f64,
+) {
+    for (i, left) in columns.iter().enumerate() {
+        for (j, right) in columns.iter().enumerate() {
+            matrix[i][j] += weight * dot(left, right);
+        }
+        side[i] -= weight * dot(left, residual);
+    }
+}
+
+impl Unknowns {
+    /// So much of a step away.
+    pub fn after(&self, step: &Unknowns, length: f64, priors: &[Prior]) -> Unknowns {
+        let numbers = self.numbers.iter().zip(&step.numbers).zip(priors);
+        let within =
+            |((at, step), prior): ((&f64, &f64), &Prior)| prior.within(at + length * step);
+        let loads = self.loads.iter().zip(&step.loads);
+        Unknowns {
+            numbers: numbers.map(within).collect(),
+            loads: loads
+                .map(|(at, step)| std::array::from_fn(|i| at[i] + length * step[i]))
+                .collect(),
+        }
+    }
+}

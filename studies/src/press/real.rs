@@ -1,0 +1,146 @@
+//! Films as people mount them, solved by finite elements: stretched, cut otherwise, of other rubber.
+
+use std::sync::Mutex;
+
+use anyhow::Result;
+use hivtac_film::Pressed;
+use hivtac_scene::{Disc, Load, Options};
+use hivtac_shell::{Contact, Design, Equilibrium, Film, Law, Material, ShellError, pressed};
+use rand::Rng;
+
+use super::seeded;
+
+/// States that are kept to start others from.
+const MOST_KEPT: usize = 40;
+/// How fine the films' meshes are: another one than that of fits.
+const FINENESS: f64 = 0.6;
+
+/// A film on its posts.
+pub struct RealFilm {
+    film: Film,
+    rest: Equilibrium,
+    /// States that were found, by their loads.
+    kept: Mutex<Vec<(Load, Equilibrium)>>,
+}
+
+impl RealFilm {
+    /// The film with this number, on the posts and with the dots of these options, under a tip of a
+    /// radius, mm.
+    ///
+    /// # Errors
+    /// When it finds no rest position.
+    pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
+        let mut random = seeded(77_000 + number);
+        let mut between = |from: f64, to: f64| random.random_range(from..to);
+        let unit = &options.film.unit;
+        let nominal = Design::default();
+        let across = [between(-0.05, 0.05), between(-0.05, 0.05)];
+        let curve = [(); 3].map(|()| between(-0.03, 0.03));
+        let law = match number % 3 {
+            0 => Law::default(),
+            1 => Law { neo_hooke: 1.0, stiffening: 0.0 },
+            _ => Law { neo_hooke: 1.0, stiffening: between(0.02, 0.2) },
+        };
+        // Every third is cut at its holes.
+        let overhang_mm = match number / 3 % 3 {
+            0 => 0.0,
+            _ => between(0.0, 8.0),
+        };
+        let down = loop {
+            let vector = [(); 3].map(|()| between(-1.0, 1.0));
+            let length = vector.iter().map(|part| part * part).sum::<f64>().sqrt();
+            if (0.1..1.0).contains(&length) {
+                break vector.map(|part| part / length);
+            }
+        };
+        let dots_mm = dots_mm(options).to_vec();
+        let design = Design {
+            material: Material {
+                youngs_mpa: unit.stiffness * nominal.material.youngs_mpa,
+                thickness_mm: unit.thickness * nominal.material.thickness_mm,
+                ..nominal.material
+            },
+            law,
+            stretch: [between(-0.003, 0.03), between(-0.003, 0.03)],
+            overhang_mm,
+            post_radius_mm: between(1.0, 3.0),
+            post_shift_mm: unit.posts_mm,
+            thickness_slope: across,
+            thickness_curve: curve,
+            dot_stiffening: between(0.0, 1.0),
+            dots_mm,
+            down,
+            tip_radius_mm,
+            fineness: FINENESS,
+            ..nominal
+        };
+        let film = Film::new(&design)?;
+        Ok(Self {
+            rest: film.rest(),
+            film,
+            kept: Mutex::default(),
+        })
+    }
+
+    /// What it was made from.
+    pub fn design(&self) -> &Design {
+        self.film.design()
+    }
+
+    /// The film under a load.
+    ///
+    /// # Errors
+    /// When it finds no equilibrium.
+    pub fn press(&self, load: &Load) -> Result<Pressed, ShellError> {
+        let discs = self.film.design().dots_mm.iter().copied().map(Disc::marker);
+        let state = match load.magnitude_n() {
+            0.0 => self.rest.clone(),
+            _ => self.state(load)?,
+        };
+        Ok(Pressed {
+            tip_mm: state.tip_mm,
+            force_n: load.vector_n(),
+            touches_mm: load.offset_mm(),
+            ..pressed(&self.film, &state, discs)?
+        })
+    }
+
+    fn state(&self, load: &Load) -> Result<Equilibrium, ShellError> {
+        let far = |other: &Load| {
+            let apart = |a: &[f64], b: &[f64]| -> f64 {
+                a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+            };
+            // A millimetre of place is as far as 20 mN.
+            apart(&load.vector_n(), &other.vector_n())
+                + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
+        };
+        let start = {
+            let kept = self.kept.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let near = kept.iter().min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
+            match near {
+                Some((known, state)) if known == load => return Ok(state.clone()),
+                Some((_, state)) => state.clone(),
+                None => self.rest.clone(),
+            }
+        };
+        let at_mm = self.film.material_point(&self.rest, load.offset_mm());
+        let contact = Contact::Force(load.vector_n());
+        let radius_mm = self.film.design().tip_radius_mm;
+        let press = |start: &Equilibrium| self.film.press_at(at_mm, radius_mm, contact, start);
+        let state = press(&start).or_else(|_| press(&self.rest))?;
+        let mut kept = self.kept.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if kept.len() >= MOST_KEPT {
+            kept.remove(0);
+        }
+        kept.push((*load, state.clone()));
+        Ok(state)
+    }
+}
+
+/// Where the dots of a scene are glued, mm.
+pub fn dots_mm(options: &Options) -> [[f64; 2]; 4] {
+    std::array::from_fn(|k| {
+        let at = hivtac_film::MARKER_CENTRES_MM[k];
+        [0, 1].map(|i| at[i] + options.glued_mm[k][i])
+    })
+}
