@@ -1,27 +1,30 @@
-//! Numbers that depend on a load: splines over its place, sums of terms in its size and tilt.
+//! How one marker's image moves: splines over the tip's place, whose coefficients count as functions
+//! of size and tilt say.
 //!
-//! Coefficients are steps of 16 bits of a size for each output and term. Along both axes they are
-//! summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what is
-//! left is single precision.
+//! Coefficients are steps of 16 bits of a size for each output and function. Along both axes they
+//! are summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what
+//! is left is single precision.
 
 use super::axis::{Axis, ONE, Weights};
-use super::terms::{MOST_TERMS, Sizes, Terms, Tilts};
+use super::predict::MOST_FUNCTIONS;
 use crate::kernels::{Factors, Parts, spline};
-use heapless::Vec;
 
 /// Steps that a sum over both axes is in parts of: what weights are parts of, squared, / 2¹⁶.
 const SUM: f32 = 65_536.0 / (ONE * ONE);
+/// Motion along x and along y.
+pub const OUTPUTS: usize = 2;
 
-/// Outputs, each a sum of terms whose coefficients are splines over the place. Borrowed from a
-/// file.
+/// How a marker's image moves along x and y, each a sum of functions of size and tilt whose
+/// coefficients are splines over the place. Borrowed from a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<'a> {
-    axis: Axis,
-    terms: Terms,
-    outputs: usize,
-    /// The size of a step by output and term, f32 each.
+    axes: [Axis; 2],
+    /// The direction along which the first part of its functions' tilt is.
+    away: [f32; 2],
+    functions: usize,
+    /// The size of a step by output and function, f32 each.
     sizes: &'a [[u8; 4]],
-    /// By node along y, output, term and node along x, i16 each.
+    /// By node along y, output, function and node along x, i16 each.
     steps: &'a [u8],
 }
 
@@ -34,11 +37,6 @@ pub struct Place {
     pub y: Weights,
 }
 
-/// What a step of each of an output's terms is under a load, with its slopes by size and by tilt
-/// along x and y.
-#[derive(Clone, Debug, Default)]
-pub struct Steps(Vec<Factors, MOST_TERMS>);
-
 /// An output with its slopes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Answer {
@@ -49,25 +47,26 @@ pub struct Answer {
 }
 
 impl<'a> Table<'a> {
-    /// Of these bytes, as many as [`Table::lengths`] says; `None` of others, or when the size of a
-    /// step is no number.
+    /// Of axes along x and y, a direction of the tilt's first part and these bytes, as many as [`Table::lengths`] says; `None` of others,
+    /// or when the size of a step is no number from 0 to 1.
     pub fn new(
-        axis: Axis,
-        terms: Terms,
-        outputs: usize,
+        axes: [Axis; 2],
+        away: [f32; 2],
+        functions: usize,
         sizes: &'a [u8],
         steps: &'a [u8],
     ) -> Option<Table<'a>> {
-        let fits = Table::lengths(&axis, &terms, outputs) == [sizes.len(), steps.len()];
+        let fits = (1..=MOST_FUNCTIONS).contains(&functions)
+            && Table::lengths(&axes, functions) == [sizes.len(), steps.len()];
         let sizes = sizes.as_chunks().0;
         let sound = sizes.iter().all(|size| {
             let size = f32::from_le_bytes(*size);
             (0.0..=1.0).contains(&size)
         });
         let table = Table {
-            axis,
-            terms,
-            outputs,
+            axes,
+            away,
+            functions,
             sizes,
             steps,
         };
@@ -75,74 +74,72 @@ impl<'a> Table<'a> {
     }
 
     /// Bytes of a table's sizes and of its steps.
-    pub fn lengths(axis: &Axis, terms: &Terms, outputs: usize) -> [usize; 2] {
-        let rows = outputs * terms.count();
-        [4 * rows, 2 * rows * axis.count() * axis.count()]
+    pub fn lengths([x, y]: &[Axis; 2], functions: usize) -> [usize; 2] {
+        let rows = OUTPUTS * functions;
+        [4 * rows, 2 * rows * x.count() * y.count()]
     }
 
-    /// Its axis, the same along x and y.
-    pub fn axis(&self) -> &Axis {
-        &self.axis
+    /// Its axes, along x and y.
+    pub fn axes(&self) -> &[Axis; 2] {
+        &self.axes
     }
 
-    /// Writes down what steps of an output's terms are under a load.
-    pub fn set(&self, steps: &mut Steps, output: usize, sizes: &Sizes, tilts: &Tilts) {
-        steps.0.clear();
-        let of_output = self.sizes.get(output * self.terms.count()..);
-        let mut terms = of_output.unwrap_or_default().iter();
-        let mut tilts = tilts.0.iter();
-        for (count, groups) in self.terms.sizes_of_degrees() {
-            for [whole, by_a, by_b] in tilts.by_ref().take(groups) {
-                let sizes = sizes.values.iter().zip(&sizes.slopes).take(count);
-                for ((value, slope), step) in sizes.zip(&mut terms) {
-                    let step = SUM * f32::from_le_bytes(*step);
-                    let (value, slope) = (step * value, step * slope);
-                    let factors = [value * whole, slope * whole, value * by_a, value * by_b];
-                    // There is room for all terms.
-                    let _ = steps.0.push(factors);
-                }
-            }
+    /// How many functions it is a sum of.
+    pub fn functions(&self) -> usize {
+        self.functions
+    }
+
+    /// A tilt along its direction and across that.
+    pub fn tilt(&self, [a, b]: [f32; 2]) -> [f32; 2] {
+        let [c, s] = self.away;
+        [c * a + s * b, c * b - s * a]
+    }
+
+    /// A place, mm, on its axes.
+    pub fn place(&self, [x, y]: [f32; 2]) -> Place {
+        let [along_x, along_y] = &self.axes;
+        Place {
+            x: along_x.at(x),
+            y: along_y.at(y),
         }
     }
 
-    /// Turns the tilt's part along x (0) or y (1) around. Slopes stay those by the part as it was.
-    pub fn turn(&self, steps: &mut Steps, along: usize) {
-        let mut terms = &mut steps.0[..];
-        for (degree, (count, groups)) in self.terms.sizes_of_degrees().enumerate() {
-            for k in 0..groups {
-                let group;
-                (group, terms) = terms.split_at_mut(count.min(terms.len()));
-                let power = if along == 0 { degree - k } else { k };
-                if power % 2 == 1 {
-                    for factor in group.as_flattened_mut() {
-                        // By its sign bit: cheaper than in the floating-point unit.
-                        *factor = f32::from_bits(factor.to_bits() ^ 1 << 31);
-                    }
-                }
-            }
+    /// An output (0 along x, 1 along y) with its slopes, by what its functions and their slopes are
+    /// under a load: by size, and by the tilt along its direction and across that.
+    pub fn answer(&self, output: usize, place: &Place, functions: &[Factors]) -> Answer {
+        let sizes = self.sizes.get(output * self.functions..).unwrap_or_default();
+        let mut factors = [Factors::default(); MOST_FUNCTIONS];
+        for ((factors, size), function) in factors.iter_mut().zip(sizes).zip(functions) {
+            let size = SUM * f32::from_le_bytes(*size);
+            *factors = function.map(|part| size * part);
         }
-    }
-
-    /// An output with its slopes, by what its terms' steps are.
-    pub fn answer(&self, output: usize, place: &Place, steps: &Steps) -> Answer {
-        let [value, by_size, by_a, by_b, by_x, by_y] = self.spline(output, place, &steps.0);
-        let along = self.axis.slope_unit();
+        let count = self.functions.min(functions.len());
+        let factors = factors.get(..count).unwrap_or_default();
+        let [value, by_size, by_a, by_b, by_x, by_y] = self.spline(output, place, factors);
+        let [along_x, along_y] = self.axes.each_ref().map(Axis::slope_unit);
+        let [c, s] = self.away;
         Answer {
             value,
-            slopes: [by_size, by_a, by_b, along * by_x, along * by_y],
+            slopes: [
+                by_size,
+                c * by_a - s * by_b,
+                s * by_a + c * by_b,
+                along_x * by_x,
+                along_y * by_y,
+            ],
         }
     }
 
     /// The sums of an output's coefficients around a place, times factors.
     fn spline(&self, output: usize, place: &Place, factors: &[Factors]) -> [f32; 6] {
-        let count = self.terms.count();
-        let node = 2 * self.axis.count();
-        let before = (place.y.first * self.outputs + output) * count * node + 2 * place.x.first;
+        let node = 2 * self.axes[0].count();
+        let before =
+            (place.y.first * OUTPUTS + output) * self.functions * node + 2 * place.x.first;
         let parts = Parts {
             y: core::array::from_fn(|j| [place.y.values[j], place.y.slopes[j]]),
             x: [place.x.values, place.x.slopes],
         };
-        let line = self.outputs * count * node;
+        let line = OUTPUTS * self.functions * node;
         let steps = self.steps.get(before..).unwrap_or_default();
         spline(steps, line, node, &parts, factors)
     }
