@@ -195,3 +195,155 @@ impl Whitening {
         white
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const LIMITS: Limits = Limits {
+        size: 0.8,
+        tilt: 0.67,
+    };
+    const COUNTS: [u8; 3] = [3, 2, 4];
+
+    fn pose(size: f32, place_mm: [f32; 2]) -> Pose {
+        Pose {
+            size,
+            tilt: [0.1, -0.2],
+            place_mm,
+        }
+    }
+
+    /// Knots of entries by knot and entry, in steps of 10⁻⁵.
+    fn knots(entry: impl Fn(usize, usize) -> i16) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        for knot in 0..COUNTS.map(usize::from).iter().product() {
+            bytes.extend(1e-5f32.to_le_bytes());
+            bytes.extend((0..TRIANGLE).flat_map(|k| entry(knot, k).to_le_bytes()));
+        }
+        bytes
+    }
+
+    /// Covariances of one coordinate alone that are linear along each axis, the size's root for the
+    /// size, come out as they are, at knots, between them and beyond.
+    #[test]
+    fn planes_come_back() {
+        let square = |size: f32, y: f32, x: f32| 1e6 * (1.0 + size + 2.0 * y + x);
+        let entry = |knot: usize, k: usize| {
+            let (x, line) = (knot % 4, knot / 4);
+            let [size, y] = [line / 2, line % 2].map(|k| k as f32);
+            match k {
+                0 => square(size, y, x as f32).sqrt() as i16,
+                _ => 0,
+            }
+        };
+        let bytes = knots(entry);
+        let grid = CovarianceGrid::new(COUNTS, 3.0, &bytes).unwrap();
+        for (size, [x, y]) in [
+            (0.0, [-3.0, -3.0]),
+            (0.2, [1.0, -2.0]),
+            (0.53, [0.3, 2.9]),
+            (0.8, [3.0, 3.0]),
+            (1.1, [9.0, -7.0]),
+        ] {
+            let found = grid.at(&pose(size, [x, y]), &LIMITS);
+            let part = |at: f32| (at.clamp(-3.0, 3.0) + 3.0) / 6.0;
+            let sizes = 2.0 * (size.min(0.8) / 0.8).sqrt();
+            let expected = 1e-10 * square(sizes, part(y), 3.0 * part(x));
+            let off = (found[0][0] - expected).abs();
+            assert!(off < 2e-3 * expected, "{size} {x} {y}: {found:?} {expected}");
+            assert_eq!(found[7][7], 0.0);
+        }
+    }
+
+    #[test]
+    fn white_coordinates_have_the_unit_matrix() {
+        let wave = |i: usize, j: usize| ((5 * i + 3 * j) as f32).sin();
+        let product = |i: usize, j: usize| (0..8).map(|k| wave(i, k) * wave(j, k)).sum::<f32>();
+        let mut covariance: Covariance =
+            core::array::from_fn(|i| core::array::from_fn(|j| product(i, j)));
+        for (i, row) in covariance.iter_mut().enumerate() {
+            row[i] += 0.5;
+        }
+        let whitening = Whitening::new(&covariance).unwrap();
+        // Columns of what whitens.
+        let inverse: [Column; 8] = core::array::from_fn(|k| {
+            let mut unit = Column::default();
+            unit[k] = 1.0;
+            whitening.of(&unit)
+        });
+        for a in 0..8 {
+            for b in 0..8 {
+                let row = |k: usize| -> Column { core::array::from_fn(|i| inverse[i][k]) };
+                let (row_a, row_b) = (row(a), row(b));
+                let mut sum = 0.0;
+                for i in 0..8 {
+                    for j in 0..8 {
+                        sum += row_a[i] * covariance[i][j] * row_b[j];
+                    }
+                }
+                let expected = f32::from(u8::from(a == b));
+                assert!((sum - expected).abs() < 1e-4, "{a} {b}: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_covariance_whitens_nothing() {
+        assert!(Whitening::new(&Covariance::default()).is_none());
+        for wrong in [f32::NAN, f32::INFINITY, -1.0] {
+            let mut covariance = Covariance::default();
+            for (k, row) in covariance.iter_mut().enumerate() {
+                row[k] = 1.0;
+            }
+            assert!(Whitening::new(&covariance).is_some());
+            covariance[5][5] = wrong;
+            assert!(Whitening::new(&covariance).is_none(), "{wrong}");
+        }
+    }
+
+    proptest! {
+        /// Whatever a file holds and wherever the load is: with noise it is a covariance.
+        #[test]
+        fn with_noise_it_is_always_a_covariance(
+            seed in any::<u64>(),
+            size in prop_oneof![-1.0f32..2.0, any::<f32>()],
+            x in prop_oneof![-6.0f32..6.0, any::<f32>()],
+            noise in 1e-5f32..1e-2,
+        ) {
+            let entry = |knot: usize, k: usize| {
+                let mixed = (knot * TRIANGLE + k) as u64 ^ seed;
+                (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) as i16
+            };
+            let bytes = knots(entry);
+            let grid = CovarianceGrid::new(COUNTS, 4.0, &bytes).unwrap();
+            let mut covariance = grid.at(&pose(size, [x, 0.5]), &LIMITS);
+            for (k, row) in covariance.iter_mut().enumerate() {
+                row[k] += noise * noise;
+            }
+            let no_number = size.is_nan() || x.is_nan();
+            prop_assert!(no_number || Whitening::new(&covariance).is_some(), "{covariance:?}");
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let bytes = knots(|_, _| 3);
+        let is_sound = |counts, end_mm, bytes: &[u8]| {
+            CovarianceGrid::new(counts, end_mm, bytes).is_some()
+        };
+        assert!(is_sound(COUNTS, 4.0, &bytes[..]));
+        assert!(!is_sound(COUNTS, 4.0, &bytes[1..]) && !is_sound(COUNTS, 4.0, &bytes[KNOT..]));
+        assert!(!is_sound([1, 6, 4], 4.0, &bytes[..]) && !is_sound([0, 2, 4], 4.0, &[]));
+        for end_mm in [0.0, -4.0, 101.0, f32::NAN] {
+            assert!(!is_sound(COUNTS, end_mm, &bytes[..]), "{end_mm}");
+        }
+        for step in [-1e-4, 1.1e-3, f32::NAN, f32::INFINITY] {
+            let mut bytes = bytes.clone();
+            bytes[KNOT..KNOT + 4].copy_from_slice(&step.to_le_bytes());
+            assert!(!is_sound(COUNTS, 4.0, &bytes[..]), "{step}");
+        }
+    }
+}

@@ -148,52 +148,49 @@ impl<'a> Table<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward::terms::{Limits, Powers};
+    use crate::forward::terms::{Limits, Powers, Sizes, Tilts};
     use std::vec::Vec;
 
     const LIMITS: Limits = Limits {
         size: 0.63,
         tilt: 0.67,
     };
+    const FUNCTIONS: usize = 3;
+    /// Of 30°.
+    const AWAY: [f32; 2] = [0.866_025_4, 0.5];
 
-    fn axis() -> Axis {
-        Axis::new(&[-2.0, -1.0, 0.0, 1.0, 2.0, 3.0]).unwrap()
+    fn axes() -> [Axis; 2] {
+        let x = Axis::new(&[-2.0, -1.0, 0.0, 1.0, 2.0, 3.0]);
+        let y = Axis::new(&[-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0]);
+        [x.unwrap(), y.unwrap()]
     }
 
-    fn at(x: f32, y: f32) -> Place {
-        Place {
-            x: axis().at(x),
-            y: axis().at(y),
-        }
+    /// s, s·a² and s·T₁·b, of the tilt as the table sees it.
+    fn functions(table: &Table, [size, a, b]: [f32; 3]) -> [Factors; FUNCTIONS] {
+        let [a, b] = table.tilt([a, b]).map(|part| Powers::at(part, &LIMITS));
+        let (sizes, tilts) = (Sizes::at(size, &LIMITS), Tilts::of(&a, &b).0);
+        [(0, 0), (0, 3), (1, 2)].map(|(i, group)| {
+            let [whole, by_a, by_b] = tilts[group];
+            let (value, slope) = (sizes.values[i], sizes.slopes[i]);
+            [value * whole, slope * whole, value * by_a, value * by_b]
+        })
     }
 
-    fn load([size, a, b]: [f32; 3]) -> (Sizes, Tilts) {
-        let [a, b] = [a, b].map(|part| Powers::at(part, &LIMITS));
-        let tilts = Tilts::of(&a, &b);
-        (Sizes::at(size, &LIMITS), tilts)
-    }
-
-    fn answer(table: &Table, output: usize, place: &Place, load: [f32; 3]) -> Answer {
-        let (sizes, tilts) = self::load(load);
-        let mut steps = Steps::default();
-        table.set(&mut steps, output, &sizes, &tilts);
-        table.answer(output, place, &steps)
-    }
-
-    /// Of two outputs, the steps from a function of their index.
+    /// The steps from a function of their index.
     fn with<R>(step: impl Fn(usize) -> i16, use_it: impl FnOnce(&Table) -> R) -> R {
-        let (axis, terms) = (axis(), Terms::new([4, 3, 2, 0, 0]).unwrap());
-        let [sizes, steps] = Table::lengths(&axis, &terms, 2);
+        let [sizes, steps] = Table::lengths(&axes(), FUNCTIONS);
         let sizes: Vec<u8> = (0..sizes / 4).flat_map(|_| 1e-4f32.to_le_bytes()).collect();
         let steps: Vec<u8> = (0..steps / 2).flat_map(|k| step(k).to_le_bytes()).collect();
-        use_it(&Table::new(axis, terms, 2, &sizes, &steps).unwrap())
+        use_it(&Table::new(axes(), AWAY, FUNCTIONS, &sizes, &steps).unwrap())
     }
 
     #[test]
     fn slopes_are_the_values_differences() {
         let wild = |k: usize| (20_000.0 * (k as f64).sin()) as i16;
         with(wild, |table| {
-            let answer = |[s, a, b, x, y]: [f32; 5]| answer(table, 1, &at(x, y), [s, a, b]);
+            let answer = |[s, a, b, x, y]: [f32; 5]| {
+                table.answer(1, &table.place([x, y]), &functions(table, [s, a, b]))
+            };
             let here = [0.4, 0.3, -0.2, 0.7, 1.3];
             let told = answer(here).slopes;
             for axis in 0..5 {
@@ -211,23 +208,16 @@ mod tests {
     }
 
     #[test]
-    fn turned_steps_are_those_of_the_mirrored_load() {
-        let wild = |k: usize| (20_000.0 * (k as f64).sin()) as i16;
-        with(wild, |table| {
-            for (along, signs) in [(0, [-1.0, 1.0]), (1, [1.0, -1.0])] {
-                let (sizes, tilts) = load([0.4, 0.3, -0.2]);
-                let mut steps = Steps::default();
-                table.set(&mut steps, 0, &sizes, &tilts);
-                table.turn(&mut steps, along);
-                let turned = table.answer(0, &at(0.7, 1.3), &steps);
-                let [sa, sb] = signs;
-                let mut seen = answer(table, 0, &at(0.7, 1.3), [0.4, 0.3 * sa, -0.2 * sb]);
-                // By the part of the tilt as it was.
-                seen.slopes[1] *= sa;
-                seen.slopes[2] *= sb;
-                assert_eq!(turned, seen);
-            }
-        });
+    fn a_tilt_is_seen_from_the_markers_side() {
+        with(
+            |_| 0,
+            |table| {
+                let [along, across] = table.tilt([0.866_025_4, 0.5]);
+                assert!((along - 1.0).abs() < 1e-6 && across.abs() < 1e-6);
+                let [along, across] = table.tilt([-0.5, 0.866_025_4]);
+                assert!(along.abs() < 1e-6 && (across - 1.0).abs() < 1e-6);
+            },
+        );
     }
 
     /// The largest steps everywhere, of either sign: nothing overflows (tests check it), and the
@@ -238,15 +228,10 @@ mod tests {
             with(
                 |_| step,
                 |table| {
-                    for (x, y) in [(-2.0, -2.0), (0.4, 2.9), (3.0, 3.0)] {
-                        let (sizes, tilts) = load([0.6, 0.6, 0.6]);
-                        let mut groups = tilts.0.iter().map(|[value, ..]| value);
-                        let mut of_degree = |(count, groups_of): (usize, usize)| {
-                            let tilts: f32 = groups.by_ref().take(groups_of).sum();
-                            tilts * sizes.values[..count].iter().sum::<f32>()
-                        };
-                        let sum: f32 = table.terms.sizes_of_degrees().map(&mut of_degree).sum();
-                        let value = answer(table, 0, &at(x, y), [0.6, 0.6, 0.6]).value;
+                    for place in [[-2.0, -2.0], [0.4, 2.9], [3.0, 3.0]] {
+                        let functions = functions(table, [0.6, 0.6, 0.6]);
+                        let sum: f32 = functions.iter().map(|[whole, ..]| whole).sum();
+                        let value = table.answer(1, &table.place(place), &functions).value;
                         let expected = 1e-4 * f32::from(step) * sum;
                         assert!(
                             (value - expected).abs() < 2e-3 * expected.abs(),
@@ -257,38 +242,40 @@ mod tests {
             );
         }
         // Signs as the slopes' parts have them.
-        let place = at(0.4, 0.4);
-        let along_y = |k: usize| k / (2 * 16 * 6);
+        let [x, y] = axes().map(|axis| axis.at(0.4));
         let sign = |k: usize| {
-            let (i, j) = (k % 6, along_y(k));
+            let (i, j) = (k % 6, k / (OUTPUTS * FUNCTIONS * 6));
             let is_negative = |parts: &Weights, k: usize| {
                 let part = parts.slopes.get(k.wrapping_sub(parts.first));
                 part.is_some_and(|part| part.bits() < 0)
             };
-            match is_negative(&place.x, i) != is_negative(&place.y, j) {
+            match is_negative(&x, i) != is_negative(&y, j) {
                 true => i16::MIN,
                 false => i16::MAX,
             }
         };
         with(sign, |table| {
-            let answer = answer(table, 0, &place, [0.6, 0.6, 0.6]);
+            let functions = functions(table, [0.6, 0.6, 0.6]);
+            let answer = table.answer(0, &table.place([0.4, 0.4]), &functions);
             assert!(answer.slopes.iter().all(|part| part.is_finite()));
         });
     }
 
     #[test]
     fn wrong_lengths_and_sizes_are_refused() {
-        let (axis, terms) = (axis(), Terms::new([4, 3, 2, 0, 0]).unwrap());
-        let lengths = Table::lengths(&axis, &terms, 2);
-        assert_eq!(lengths, [4 * 32, 2 * 32 * 36]);
+        let lengths = Table::lengths(&axes(), FUNCTIONS);
+        assert_eq!(lengths, [4 * 6, 2 * 6 * 42]);
         let [sizes, steps] = lengths.map(|length| std::vec![0; length]);
-        let new = |sizes: &[u8], steps: &[u8]| Table::new(axis, terms, 2, sizes, steps).is_some();
-        assert!(new(&sizes, &steps));
-        assert!(!new(&sizes[4..], &steps) && !new(&sizes, &steps[2..]));
+        let new = |functions: usize, sizes: &[u8], steps: &[u8]| {
+            Table::new(axes(), AWAY, functions, sizes, steps).is_some()
+        };
+        assert!(new(FUNCTIONS, &sizes, &steps));
+        assert!(!new(FUNCTIONS, &sizes[4..], &steps) && !new(FUNCTIONS, &sizes, &steps[2..]));
+        assert!(!new(2, &sizes, &steps) && !new(0, &[], &[]));
         for wrong in [f32::NAN, -1.0, f32::INFINITY, 1.1] {
             let mut sizes = sizes.clone();
             sizes[8..12].copy_from_slice(&wrong.to_le_bytes());
-            assert!(!new(&sizes, &steps), "{wrong}");
+            assert!(!new(FUNCTIONS, &sizes, &steps), "{wrong}");
         }
     }
 }
