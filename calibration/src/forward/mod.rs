@@ -2,11 +2,14 @@
 //! a model file.
 
 pub mod building;
+mod covariances;
+mod functions;
 mod honest;
-mod left_open;
 mod left_out;
+mod matrix;
 mod nearest;
 mod noise;
+mod others;
 mod tables;
 mod ten_loads;
 mod unit;
@@ -14,18 +17,20 @@ mod unit;
 use std::sync::Mutex;
 
 use anyhow::{Result, anyhow, ensure};
+use hivtac_film::Film;
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
-use hivtac_scene::{Camera, FILM_DISTANCE_MM, MARKER_REST_MM, MARKERS, Preset};
-use hivtac_sensing::forward::{
-    self, KNOTS, Limits, Mounting, PARTS, PLACES, RestImage, SIZES, Stiffness, Tolerance,
-};
-use hivtac_sensing::model::{ForwardSpec, SystematicSpec, TableSpec};
+use hivtac_scene::{Camera, Disc, FILM_DISTANCE_MM, Preset};
+use hivtac_sensing::forward::{self, DOTS, Limits, RestImage, Stiffness};
+use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
 
-pub use left_open::Open;
-use left_open::left_open;
+use covariances::{even, sum_of_squares};
+pub use covariances::{Covariance, Moved, covariances};
+pub use functions::{Sampled, compressed};
 pub use noise::Noise;
-pub use tables::UnitSetup;
+use others::others;
+use tables::turned;
+pub use tables::{Dot, UnitSetup, tables};
 pub use ten_loads::{Bench, Fit, KnownLoad, fit};
 
 /// What is known of a unit's film and camera.
@@ -44,11 +49,10 @@ pub struct FilmModel {
     pub noise_px: [f64; 2],
     /// How many times that it is when the marker is four times as large.
     pub noise_at_four_areas: [f64; 2],
-    /// What the errors on the unit that it was made on are beside what the markers' noise makes, at
-    /// even sizes from nothing to the largest: standard uncertainties of the force across itself,
-    /// N, of |F|, as sizes, and of the place, mm.
+    /// What the chip's tables leave of each coordinate of a marker under the largest force, standard
+    /// uncertainty, px at 320×240; less in parts of the size under smaller ones.
     #[serde(default)]
-    pub beside_noise: [[f64; 3]; SIZES],
+    pub beside_px: f64,
     /// The unit; without it the film is the nominal one, and the rest picture tells the markers'
     /// places.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -61,13 +65,22 @@ pub struct FilmModel {
 
 /// A calibration leaves fewer directions open than this.
 const MOST_OPEN: usize = 64;
-/// What units that somebody built and did not calibrate differ in, for dots 0.15 mm off, a camera
-/// rolled by 2° and 2 % longer, a film 20 % stiffer and 10 % thicker, posts 0.3 mm off and a tip of
-/// 0.25 to 1 mm: `hivtac-studies units` finds that 95 of 100 errors lie within their bounds then.
-const OTHER_UNITS: Tolerance = Tolerance {
-    shape: 0.03,
-    stiffness: 0.2,
-};
+/// How far an open unit is moved, in parts of what is not known of it.
+pub const STEP: f64 = 0.25;
+/// The focal length at 320×240, px.
+const FOCAL_PX: f64 = 175.0;
+
+/// A unit that is as likely as the one that was found, but for [`STEP`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Open {
+    /// Its film and camera.
+    pub unit: OwnUnit,
+    /// Its tip's radius, mm.
+    pub tip_radius_mm: f64,
+    /// What a tare takes for its rest position less where its markers rest, px.
+    pub rest_px: [[f64; 2]; 4],
+}
 
 /// A unit as its calibration found it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -123,18 +136,15 @@ impl OwnUnit {
         }
     }
 
-    fn mounting(&self) -> Mounting {
+    /// Focal lengths per px, a complex number.
+    fn per_px(&self) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
-        Mounting {
-            per_px: [cos, -sin].map(|part| (part / self.focal_px) as f32),
-            beside_mm: self.markers_mm.map(|place| place.map(|part| part as f32)),
-        }
+        [cos, -sin].map(|part| part / self.focal_px)
     }
 }
 
 impl FilmModel {
-    /// The nominal film, for units of which nothing is known: tolerances as `hivtac-studies units`
-    /// finds them.
+    /// The nominal film, for units of which nothing is known.
     pub fn nominal(steps: u8, noise: &Noise) -> Self {
         Self {
             steps,
@@ -142,7 +152,7 @@ impl FilmModel {
             rest_px: noise.rest_px,
             noise_px: noise.at_rest_px,
             noise_at_four_areas: noise.at_four_areas,
-            beside_noise: Default::default(),
+            beside_px: 0.0,
             unit: None,
             open: Vec::new(),
         }
@@ -160,6 +170,7 @@ impl FilmModel {
         );
         for (name, value, [low, high]) in [
             ("tip_radius_mm", self.tip_radius_mm, [0.25, 2.0]),
+            ("beside_px", self.beside_px, [0.0, 1.0]),
             ("noise_px", self.noise_px[0], [1e-4, 10.0]),
             ("noise_px", self.noise_px[1], [1e-4, 10.0]),
             (
@@ -176,12 +187,6 @@ impl FilmModel {
             ensure!(
                 (low..=high).contains(&value),
                 "film.{name} is {value}: use {low} to {high}"
-            );
-        }
-        for part in self.beside_noise.as_flattened() {
-            ensure!(
-                (0.0..=1.0).contains(part),
-                "film.beside_noise has {part}: use 0 to 1"
             );
         }
         ensure!(
@@ -207,77 +212,166 @@ impl FilmModel {
             camera: &camera,
         };
         let stiffness_n = setup.stiffness_n().map(|part| part as f32);
-        let [moved, beside] = match (&self.unit, self.tip_radius_mm == NOMINAL_RADIUS_MM) {
-            (None, true) => nominal_tables(&camera)?,
-            _ => [setup.moved_table()?, setup.beside_table()?],
+        let is_nominal = self.unit.is_none() && self.tip_radius_mm == NOMINAL_RADIUS_MM;
+        let (tables, left) = match is_nominal {
+            true => (nominal(&camera)?.tables, 0.0),
+            false => setup.tables()?,
         };
-        let mut spec = ForwardSpec {
+        let [own, other] = match &self.unit {
+            Some(unit) => [Some(self.left_open(unit, left, &camera)?), None],
+            None => [
+                (self.beside_px > 0.0).then(|| even(self.beside_px / FOCAL_PX)),
+                Some(nominal(&camera)?.other),
+            ],
+        };
+        Ok(ForwardSpec {
             steps: self.steps,
-            limits: Limits {
-                size: LARGEST_SIZE as f32,
-                tilt: LARGEST_TILT as f32,
-            },
+            limits: limits(),
             stiffness: Stiffness {
                 linear_n: stiffness_n[0],
                 cubic_n: stiffness_n[1],
             },
-            rest_image: rest_image(&camera),
-            mounting: self.unit.as_ref().map(OwnUnit::mounting),
+            rest_image: rest_image(&Film::of(setup.unit)?, &camera),
+            per_px: (self.unit.as_ref()).map(|unit| unit.per_px().map(|part| part as f32)),
             noise: forward::Noise {
                 rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
                 at_rest_px: self.noise_px.map(|part| part as f32),
                 at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
             },
-            own: self.systematic(&[]),
-            other: OTHER_UNITS,
-            moved,
-            beside,
-            own_table: None,
-        };
-        if let Some(unit) = &self.unit {
-            let bytes = spec.to_bytes();
-            let even = parsed(&bytes)?;
-            spec.own_table = Some(setup.own_table(|pose| told(&even, pose))?);
-            let bytes = spec.to_bytes();
-            spec.own = self.systematic(&left_open(self, unit, &parsed(&bytes)?)?);
-        }
-        Ok(spec)
+            tables,
+            own,
+            other,
+        })
     }
 
-    /// What is not known of the unit, and of the film that is run forwards.
-    fn systematic(&self, left_open: &[[f32; PARTS]]) -> SystematicSpec {
-        let mut knots = left_open.to_vec();
-        knots.resize(KNOTS, [0.0; PARTS]);
-        for (of_size, beside) in knots.chunks_mut(PLACES * PLACES).zip(self.beside_noise) {
-            for knot in of_size {
-                for (part, beside) in knot.iter_mut().zip(beside) {
-                    *part = libm::hypotf(*part, beside as f32);
+    /// What its calibration leaves open of a unit, and what the chip's tables leave of it.
+    fn left_open(&self, unit: &OwnUnit, left: f64, camera: &Camera) -> Result<CovarianceSpec> {
+        let found = Open {
+            unit: unit.clone(),
+            tip_radius_mm: self.tip_radius_mm,
+            rest_px: self.rest_px,
+        };
+        let here = Moving::new(&found, camera)?;
+        let open = self.open.iter().map(|open| Moving::new(open, camera));
+        let open: Vec<Moving<'_>> = open.collect::<Result<_>>()?;
+        covariances(|pose| {
+            let moved = here.moved_px(pose)?;
+            let difference = |there: &Moving<'_>| -> Result<Moved> {
+                let more = there.moved_px(&here.same_force(pose, there))?;
+                let mut focal: Moved = std::array::from_fn(|i| (more[i] - moved[i]) / STEP);
+                for marker in focal.as_chunks_mut().0 {
+                    *marker = turned(unit.per_px(), *marker);
                 }
+                Ok(focal)
+            };
+            let differences = open.iter().map(difference).collect::<Result<Vec<_>>>()?;
+            let mut covariance = sum_of_squares(&differences);
+            let left = left.hypot(self.beside_px / FOCAL_PX) * pose.size / LARGEST_SIZE;
+            for (k, row) in covariance.iter_mut().enumerate() {
+                row[k] += left * left;
             }
-        }
-        SystematicSpec {
-            end_mm: left_open::END_MM as f32,
-            knots,
-        }
+            Ok(covariance)
+        })
     }
 }
 
-/// The first two tables of the nominal film under the nominal tip. Every file of such a film has
-/// them: they are made once.
-fn nominal_tables(camera: &Camera) -> Result<[TableSpec; 2]> {
-    static MADE: Mutex<Option<[TableSpec; 2]>> = Mutex::new(None);
+/// What every file of the nominal film under the nominal tip has: made once.
+#[derive(Clone)]
+struct Nominal {
+    tables: TablesSpec,
+    other: CovarianceSpec,
+}
+
+fn nominal(camera: &Camera) -> Result<Nominal> {
+    static MADE: Mutex<Option<Nominal>> = Mutex::new(None);
     let mut made = MADE.lock().map_err(|error| anyhow!("{error}"))?;
-    if let Some(tables) = &*made {
-        return Ok(tables.clone());
+    if let Some(nominal) = &*made {
+        return Ok(nominal.clone());
     }
     let setup = UnitSetup {
         unit: Unit::default(),
         tip_radius_mm: NOMINAL_RADIUS_MM,
         camera,
     };
-    let tables = [setup.moved_table()?, setup.beside_table()?];
-    *made = Some(tables.clone());
-    Ok(tables)
+    let [linear_n, cubic_n] = setup.stiffness_n().map(|part| part as f32);
+    let alone = ForwardSpec {
+        steps: 0,
+        limits: limits(),
+        stiffness: Stiffness { linear_n, cubic_n },
+        rest_image: rest_image(&Film::default(), camera),
+        per_px: None,
+        noise: forward::Noise {
+            rest_px: [[0.0; 2]; DOTS],
+            at_rest_px: [1.0; 2],
+            at_four_areas: [1.0; 2],
+        },
+        tables: setup.tables()?.0,
+        own: None,
+        other: None,
+    };
+    let bytes = alone.to_bytes();
+    let nominal = Nominal {
+        other: others(&parsed(&bytes)?, camera)?,
+        tables: alone.tables,
+    };
+    *made = Some(nominal.clone());
+    Ok(nominal)
+}
+
+fn limits() -> Limits {
+    Limits {
+        size: LARGEST_SIZE as f32,
+        tilt: LARGEST_TILT as f32,
+    }
+}
+
+/// How the markers of a unit move.
+struct Moving<'a> {
+    open: &'a Open,
+    setup: UnitSetup<'a>,
+    film: Film,
+}
+
+impl<'a> Moving<'a> {
+    fn new(open: &'a Open, camera: &'a Camera) -> Result<Self> {
+        let unit = open.unit.film();
+        Ok(Self {
+            open,
+            film: Film::of(unit)?,
+            setup: UnitSetup {
+                unit,
+                tip_radius_mm: open.tip_radius_mm,
+                camera,
+            },
+        })
+    }
+
+    /// Where the markers are seen beside the rest position that was seen, px.
+    fn moved_px(&self, pose: &Pose) -> Result<Moved> {
+        let to_px = self.open.unit.to_px();
+        let mut moved = Moved::default();
+        for (marker, place) in moved.chunks_exact_mut(2).enumerate() {
+            let [x, y] = to_px(self.setup.moved(&self.film, pose, marker)?);
+            let [off_x, off_y] = self.open.rest_px[marker];
+            place.copy_from_slice(&[x - off_x, y - off_y]);
+        }
+        Ok(moved)
+    }
+
+    fn stiffness(&self) -> Stiffness {
+        let [linear_n, cubic_n] = self.setup.stiffness_n().map(|part| part as f32);
+        Stiffness { linear_n, cubic_n }
+    }
+
+    /// The pose that the same force has on another unit.
+    fn same_force(&self, pose: &Pose, other: &Moving<'_>) -> Pose {
+        let magnitude_n = self.stiffness().magnitude_n(pose.size as f32);
+        let size = other.stiffness().size_of(magnitude_n, LARGEST_SIZE as f32);
+        Pose {
+            size: size.into(),
+            ..*pose
+        }
+    }
 }
 
 /// A film as the chip reads it.
@@ -286,28 +380,38 @@ fn parsed(bytes: &[u8]) -> Result<forward::Forward<'_>> {
         .map_err(|error| anyhow!("a film's tables cannot be kept: {error}"))
 }
 
-/// What a film's tables say of a pose, as the chip reads them.
-fn told(forward: &forward::Forward<'_>, pose: &Pose) -> [f64; 8] {
-    let beside_mm = (forward.mounting).map_or([[0.0; 2]; 4], |mounting| mounting.beside_mm);
+/// What a film's tables say of a pose, as the chip reads them, of markers that are glued so far
+/// beside theirs.
+fn told(forward: &forward::Forward<'_>, pose: &Pose, beside_mm: &forward::Markers) -> Moved {
     let pose = forward::Pose {
         size: pose.size as f32,
         tilt: pose.tilt.map(|part| part as f32),
         place_mm: pose.place_mm.map(|part| part as f32),
     };
-    let told = (forward.tables).predict(&pose, &forward.limits, &beside_mm);
+    let told = (forward.tables).predict(&pose, &forward.limits, beside_mm);
     told.moved.map(f64::from)
 }
 
+/// Where a film's markers are seen at rest, focal lengths from the axis.
+fn at_rest(film: &Film, camera: &Camera) -> [[f64; 2]; DOTS] {
+    let middle = [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
+    film.markers_mm().map(|place_mm| {
+        let at = Disc::marker(place_mm).centroid_px(|_| [0.0; 3], camera);
+        [0, 1].map(|i| (at[i] - middle[i]) / camera.focal_px())
+    })
+}
+
 /// What a rest picture says: of the nominal camera, on a film 10 mm away.
-fn rest_image(camera: &Camera) -> RestImage {
-    let [x, _] = MARKERS[2].centroid_px(|_| [0.0; 3], camera);
-    let middle = (f64::from(camera.width()) - 1.0) / 2.0;
-    let (distance, radius) = (FILM_DISTANCE_MM, MARKER_REST_MM * std::f64::consts::SQRT_2);
-    let angle = libm::atan(radius / distance);
-    let away = (distance * distance + radius * radius) / distance;
+fn rest_image(film: &Film, camera: &Camera) -> RestImage {
+    let film_mm = film.markers_mm().map(|[x, y]| {
+        let (distance, radius) = (FILM_DISTANCE_MM, libm::hypot(x, y));
+        let away = (distance * distance + radius * radius) / distance;
+        let across = radius / libm::atan(radius / distance);
+        [away, across].map(|part| part as f32)
+    });
     RestImage {
-        corner: ((x - middle) / camera.focal_px()) as f32,
-        film_mm: [away as f32, (radius / angle) as f32],
+        at: at_rest(film, camera).map(|place| place.map(|part| part as f32)),
+        film_mm,
     }
 }
 
@@ -376,7 +480,7 @@ mod tests {
         let forward = forward::Forward::parse(&bytes).unwrap();
         let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
         for pose in poses() {
-            let chip = told(&forward, &pose);
+            let chip = told(&forward, &pose, &[[0.0; 2]; DOTS]);
             for marker in 0..4 {
                 let truth = setup.moved(&film, &pose, marker).unwrap();
                 for axis in [0, 1] {
@@ -408,12 +512,12 @@ mod tests {
     #[test]
     fn the_chip_predicts_what_a_units_own_film_does() {
         let [rms, worst] = off_px(&film_model(Some(own_unit())));
-        assert!(rms < 0.03 && worst < 0.45, "{rms} {worst} px");
+        eprintln!("own {rms} {worst}"); assert!(rms < 0.03 && worst < 0.45, "{rms} {worst} px");
     }
 
     #[test]
     fn the_chip_predicts_what_the_film_does() {
         let [rms, worst] = off_px(&film_model(None));
-        assert!(rms < 0.003 && worst < 0.03, "{rms} {worst} px");
+        eprintln!("{rms} {worst}"); assert!(rms < 0.003 && worst < 0.03, "{rms} {worst} px");
     }
 }

@@ -69,11 +69,11 @@ impl Nearest {
     }
 }
 
-/// The coefficients of splines through rows of numbers at an axis' nodes along y and, within, along
-/// x.
-pub fn splines(axis: &Axis, rows: &[Vec<Vec<f64>>]) -> Result<Vec<Vec<Vec<f64>>>> {
-    let through = Nearest::new(&collocation(axis))?;
-    Ok(turned(&through, &turned(&through, rows)))
+/// The coefficients of splines through rows of numbers at the nodes of axes along x and y: by node
+/// along y and, within, along x.
+pub fn splines([x, y]: [&Axis; 2], rows: &[Vec<Vec<f64>>]) -> Result<Vec<Vec<Vec<f64>>>> {
+    let [x, y] = [x, y].map(|axis| Nearest::new(&collocation(axis)));
+    Ok(turned(&y?, &turned(&x?, rows)))
 }
 
 /// What the splines' coefficients give at each node.
@@ -90,8 +90,8 @@ fn collocation(axis: &Axis) -> Vec<Vec<f64>> {
 
 /// Solves along the inner axis, and makes the outer one of it.
 fn turned(through: &Nearest, rows: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
-    let (count, numbers) = (rows.len(), rows[0][0].len());
-    let mut all = vec![vec![vec![0.0; numbers]; count]; count];
+    let (outer, inner, numbers) = (rows.len(), rows[0].len(), rows[0][0].len());
+    let mut all = vec![vec![vec![0.0; numbers]; outer]; inner];
     for (outer, line) in rows.iter().enumerate() {
         for number in 0..numbers {
             let samples: Vec<f64> = line.iter().map(|at| at[number]).collect();
@@ -135,13 +135,14 @@ mod tests {
 
     #[test]
     fn splines_go_through_their_nodes() {
-        let axis = Axis::new(&[-2.0, -1.0, 0.0, 0.5, 1.5, 3.0]);
+        let x_axis = Axis::new(&[-2.0, -1.0, 0.0, 0.5, 1.5, 3.0]);
+        let y_axis = Axis::new(&[-1.5, -1.0, 0.0, 0.5, 1.0, 2.0, 3.0]);
         let value = |x: f64, y: f64| vec![x * x * y + y, x.sin() * y.cos()];
-        let line = |y: &f64| axis.nodes().iter().map(|x| value(*x, *y)).collect();
-        let rows: Vec<_> = axis.nodes().iter().map(line).collect();
-        let found = splines(&axis, &rows).unwrap();
+        let line = |y: &f64| x_axis.nodes().iter().map(|x| value(*x, *y)).collect();
+        let rows: Vec<_> = y_axis.nodes().iter().map(line).collect();
+        let found = splines([&x_axis, &y_axis], &rows).unwrap();
         for (x, y) in [(0.5, -1.0), (-2.0, 3.0), (1.5, 0.0)] {
-            let [along_x, along_y] = [x, y].map(|part| axis.at(part));
+            let (along_x, along_y) = (x_axis.at(x), y_axis.at(y));
             for (k, expected) in value(x, y).into_iter().enumerate() {
                 let mut sum = 0.0;
                 for (j, down) in along_y.values.iter().enumerate() {

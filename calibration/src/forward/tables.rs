@@ -1,30 +1,30 @@
 //! The tables of a film run forwards, from the simulated sensor.
 
 use anyhow::Result;
-use hivtac_film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
+use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
 use hivtac_film::{Film, MAX_PLACE_MM};
 use hivtac_scene::{Camera, Disc, Load};
 use hivtac_sensing::forward::MOST_TILTS;
-use hivtac_sensing::model::TableSpec;
+use hivtac_sensing::model::TablesSpec;
 use rayon::prelude::*;
 
-use super::nearest::{Nearest, splines};
+use super::functions::{Sampled, compressed};
+use super::nearest::Nearest;
 
-/// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the
-/// marker is.
-const NODES_MM: [f64; 16] = [
+/// Places of the tip along an axis at which the simulated film knows the motion of a marker to the
+/// right of the middle, or below it, mm: close where the marker is.
+const FILM_NODES_MM: [f64; 16] = [
     -5.0, -3.8, -2.5, -1.4, 0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0,
 ];
-/// Those at which it is known what gluing does, mm.
-const BESIDE_NODES_MM: [f64; 11] = [-5.0, -3.8, -2.5, -1.4, 0.0, 1.4, 2.5, 3.2, 3.8, 4.5, 5.0];
-/// Those at which it is known what else one unit does, mm.
-const OWN_NODES_MM: [f64; 9] = [-5.0, -3.8, -2.6, -1.3, 0.0, 1.3, 2.6, 3.8, 5.0];
+/// The distance of other nodes grows with that from the marker: it is twice as large this far away,
+/// mm.
+const TWICE_MM: f64 = 2.0;
 /// How many sizes there are without tilt, with its first degree, and so on.
 const TERMS: [u8; MOST_TILTS] = [8, 6, 5, 4, 3];
-const BESIDE_TERMS: [u8; MOST_TILTS] = [5, 4, 3, 2, 0];
-const OWN_TERMS: [u8; MOST_TILTS] = [4, 3, 2, 0, 0];
-/// How far a marker is glued beside its place to see what that does, mm.
-const STEP_MM: f64 = 0.15;
+/// What functions of size and tilt may leave, root mean square, focal lengths: 0.0022 px at 320×240.
+const LEFT: f64 = 0.0022 / 175.0;
+/// As many as there are at most, for files that a device has room for.
+const FUNCTIONS: usize = 18;
 /// How much less samples of the largest tilt count than those of none, less one.
 const STEEP_COUNTS_LESS: f64 = 12.0;
 /// Loads lie within the film's own limits, to a rounding.
@@ -62,14 +62,6 @@ impl UnitSetup<'_> {
         Ok([0, 1].map(|i| (there[i] - here[i]) / focal_px))
     }
 
-    /// The film with its markers glued so far beside their places, mm.
-    fn film(&self, markers_mm: [[f64; 2]; 4]) -> Result<Film> {
-        Ok(Film::of(Unit {
-            markers_mm,
-            ..self.unit
-        })?)
-    }
-
     /// The force of a pose on this unit's film, N.
     fn force_n(&self, pose: &Pose) -> [f64; 3] {
         let [linear_n, cubic_n] = self.stiffness_n();
@@ -88,115 +80,130 @@ impl UnitSetup<'_> {
         [LINEAR_N * stretching * thickness * thickness, stretching]
     }
 
-    /// How marker 2 moves along x on a film whose posts and markers are where they should be.
-    pub fn moved_table(&self) -> Result<TableSpec> {
-        let even = UnitSetup {
-            unit: self.even(),
-            ..*self
-        };
-        let film = even.film([[0.0; 2]; 4])?;
-        table(&NODES_MM, TERMS, |pose| {
-            Ok(vec![even.moved(&film, pose, 2)?[0]])
-        })
+    /// Tables of how all markers move, and what they leave of that, focal lengths.
+    ///
+    /// # Errors
+    /// When the unit cannot be made, or its motion not kept.
+    pub fn tables(&self) -> Result<(TablesSpec, f64)> {
+        let film = Film::of(self.unit)?;
+        let dots = film.markers_mm().map(Dot::of_film);
+        tables(&dots, |pose, dot| self.moved(&film, pose, dot))
     }
+}
 
-    /// What gluing it beside its place along x and along y does to that, per mm, when the tip is as
-    /// far beside its own.
-    pub fn beside_table(&self) -> Result<TableSpec> {
-        let even = UnitSetup {
-            unit: self.even(),
-            ..*self
-        };
-        let glued = |axis: usize, step: f64| {
-            let mut markers_mm = [[0.0; 2]; 4];
-            markers_mm[2][axis] = step;
-            even.film(markers_mm)
-        };
-        let mut films = Vec::new();
-        for axis in [0, 1] {
-            films.push([glued(axis, -STEP_MM)?, glued(axis, STEP_MM)?]);
+/// A marker of which a table is made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dot {
+    /// Where it is at rest, mm.
+    pub place_mm: [f64; 2],
+    /// Places of the tip along x and along y at which its motion is sampled, mm, growing.
+    pub nodes_mm: [Vec<f64>; 2],
+}
+
+impl Dot {
+    /// At a place, with so many nodes (6 to 16) along each axis, close where it is.
+    pub fn new(place_mm: [f64; 2], count: usize) -> Dot {
+        Dot {
+            place_mm,
+            nodes_mm: place_mm.map(|part| nodes_near(part, count)),
         }
-        table(&BESIDE_NODES_MM, BESIDE_TERMS, |pose| {
-            let mut slopes = Vec::new();
-            for (axis, [back, forth]) in films.iter().enumerate() {
-                let beside = |film: &Film, step: f64| {
-                    let mut beside = *pose;
-                    let inside = MAX_PLACE_MM - STEP_MM;
-                    let place_mm = &mut beside.place_mm[axis];
-                    *place_mm = place_mm.clamp(-inside, inside) + step;
-                    even.moved(film, &beside, 2)
-                };
-                let (back, forth) = (beside(back, -STEP_MM)?, beside(forth, STEP_MM)?);
-                slopes.push((forth[0] - back[0]) / (2.0 * STEP_MM));
-            }
-            Ok(slopes)
-        })
     }
 
-    /// What the unit's markers do beside what the first two tables say: x and y of markers 0–3, by
-    /// what these say of a pose.
-    pub fn own_table(&self, told: impl Fn(&Pose) -> [f64; 8] + Sync) -> Result<TableSpec> {
-        let film = self.film(self.unit.markers_mm)?;
-        table(&OWN_NODES_MM, OWN_TERMS, |pose| {
-            let told = told(pose);
-            let mut more = Vec::new();
-            for marker in 0..4 {
-                let moved = self.moved(&film, pose, marker)?;
-                more.extend([0, 1].map(|axis| moved[axis] - told[2 * marker + axis]));
+    /// With the nodes that the simulated film's own tables have.
+    fn of_film(place_mm: [f64; 2]) -> Dot {
+        let nodes = |part: f64| {
+            let mut nodes = FILM_NODES_MM;
+            if part < 0.0 {
+                nodes.reverse();
+                nodes = nodes.map(|node| -node);
             }
-            Ok(more)
-        })
+            nodes.to_vec()
+        };
+        Dot {
+            place_mm,
+            nodes_mm: place_mm.map(nodes),
+        }
     }
 
-    /// The unit without what makes its film uneven.
-    fn even(&self) -> Unit {
-        Unit {
-            posts_mm: [[0.0; 2]; 4],
-            markers_mm: [[0.0; 2]; 4],
-            ..self.unit
+    /// The direction from the film's middle; along x in the middle.
+    fn away(&self) -> [f64; 2] {
+        let [x, y] = self.place_mm;
+        let far = libm::hypot(x, y);
+        match far > 0.0 {
+            true => [x / far, y / far],
+            false => [1.0, 0.0],
         }
     }
 }
 
-/// A table of what is seen at every node, at loads that tell all terms apart.
-fn table(
-    nodes_mm: &[f64],
-    sizes: [u8; MOST_TILTS],
-    seen: impl Fn(&Pose) -> Result<Vec<f64>> + Sync,
-) -> Result<TableSpec> {
-    let (axis, terms) = (Axis::new(nodes_mm), Terms::with_sizes(sizes));
-    let loads = loads();
+/// Even steps of a measure of which there is most at a place.
+fn nodes_near(place_mm: f64, count: usize) -> Vec<f64> {
+    let measure = |at_mm: f64| {
+        let far = (at_mm - place_mm).abs() / TWICE_MM;
+        libm::log1p(far).copysign(at_mm - place_mm)
+    };
+    let (last, [from, to]) = (count - 1, [-MAX_PLACE_MM, MAX_PLACE_MM].map(measure));
+    let at = |k: usize| match k {
+        0 => -MAX_PLACE_MM,
+        k if k == last => MAX_PLACE_MM,
+        k => {
+            let measure = from + (to - from) * k as f64 / last as f64;
+            place_mm + (TWICE_MM * libm::expm1(measure.abs())).copysign(measure)
+        }
+    };
+    (0..count).map(at).collect()
+}
+
+/// The tables of markers that move so under a load, by a marker's number, in focal lengths; and what
+/// they leave, root mean square over loads and places, focal lengths.
+///
+/// # Errors
+/// When a sample cannot be had, or the tables cannot hold what the markers do.
+pub fn tables(
+    dots: &[Dot],
+    moved: impl Fn(&Pose, usize) -> Result<[f64; 2]> + Sync,
+) -> Result<(TablesSpec, f64)> {
+    let (terms, loads) = (Terms::with_sizes(TERMS), loads());
     let weighted_row = |pose: &Pose| -> Vec<f64> {
         let [values, ..] = terms.rows(pose);
         values.into_iter().map(|part| weight(pose) * part).collect()
     };
     let rows: Vec<Vec<f64>> = loads.iter().map(weighted_row).collect();
     let nearest = Nearest::new(&rows)?;
-    let at = |place_mm: [f64; 2]| -> Result<Vec<f64>> {
-        let seen = loads.iter().map(|pose| seen(&Pose { place_mm, ..*pose }));
-        let seen: Vec<Vec<f64>> = seen.collect::<Result<_>>()?;
-        let of_output = |output: usize| {
-            let samples = seen.iter().zip(&loads);
-            let samples = samples.map(|(outputs, pose)| weight(pose) * outputs[output]);
-            let samples: Vec<f64> = samples.collect();
-            nearest.coefficients(&samples)
+    let sampled = |(number, dot): (usize, &Dot)| -> Result<Sampled> {
+        let away = dot.away();
+        let at = |place_mm: [f64; 2]| -> Result<[Vec<f64>; 2]> {
+            let seen = loads.iter().map(|pose| {
+                let tilt = turned(away, pose.tilt);
+                let pose = Pose {
+                    tilt,
+                    place_mm,
+                    ..*pose
+                };
+                moved(&pose, number)
+            });
+            let seen: Vec<[f64; 2]> = seen.collect::<Result<_>>()?;
+            Ok([0, 1].map(|output| {
+                let samples = seen.iter().zip(&loads);
+                let samples = samples.map(|(moved, pose)| weight(pose) * moved[output]);
+                nearest.coefficients(&samples.collect::<Vec<f64>>())
+            }))
         };
-        Ok((0..seen[0].len()).flat_map(of_output).collect())
+        let [along_x, along_y] = &dot.nodes_mm;
+        let line = |y: &f64| along_x.iter().map(|x| at([*x, *y])).collect();
+        Ok(Sampled {
+            nodes_mm: dot.nodes_mm.clone(),
+            away,
+            coefficients: along_y.par_iter().map(line).collect::<Result<_>>()?,
+        })
     };
-    let line = |y: &f64| nodes_mm.iter().map(|x| at([*x, *y])).collect::<Result<_>>();
-    let rows = nodes_mm
-        .par_iter()
-        .map(line)
-        .collect::<Result<Vec<Vec<_>>>>()?;
-    Ok(TableSpec {
-        nodes_mm: nodes_mm.iter().map(|node| *node as f32).collect(),
-        terms: sizes,
-        coefficients: splines(&axis, &rows)?
-            .into_iter()
-            .flatten()
-            .flatten()
-            .collect(),
-    })
+    let sampled = dots.iter().enumerate().map(sampled);
+    compressed(TERMS, &sampled.collect::<Result<Vec<_>>>()?, LEFT, FUNCTIONS)
+}
+
+/// (a + ib)·(x + iy).
+pub fn turned([a, b]: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
+    [a * x - b * y, b * x + a * y]
 }
 
 /// What a sample counts: those of little tilt more, as most presses have.

@@ -9,8 +9,7 @@ use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_scene::{Camera, Disc, Load, Preset};
 
 use super::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
-use super::left_open::{Open, STEP as OPEN_STEP};
-use super::{OwnUnit, UnitSetup};
+use super::{Open, OwnUnit, STEP as OPEN_STEP, UnitSetup};
 
 /// A load that was put on, and what was seen of it.
 #[derive(Clone, Copy, Debug)]

@@ -2,8 +2,7 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::forward::{
-    Column, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Systematic,
-    Tolerance,
+    Column, DOTS, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma,
 };
 use crate::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::network::Output;
@@ -18,11 +17,10 @@ use hivtac_terms::units::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resting {
     mounting: Mounting,
-    /// How far the unit may differ from the one that the model was made on; `None` when it is that
-    /// one.
-    other: Option<Tolerance>,
+    /// Whether it is the unit that the model was made on.
+    is_own: bool,
     px: Markers,
-    areas: [f32; 4],
+    areas: [f32; DOTS],
 }
 
 /// A marker that rests this far from where it rested when the model was made is another unit's:
@@ -47,14 +45,13 @@ impl Resting {
     fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest) -> Resting {
         let is_own = is_near(rest, own);
         let told = forward.rest_image.mounting(rest);
-        let mounting = match (is_own, forward.mounting) {
-            (true, Some(known)) => known,
-            // The simulated sensor's markers are where they should be.
-            (true, None) => Mounting {
+        let mounting = match is_own {
+            // The tables are of this unit's own markers.
+            true => Mounting {
+                per_px: forward.per_px.unwrap_or(told.per_px),
                 beside_mm: Markers::default(),
-                ..told
             },
-            (false, _) => told,
+            false => told,
         };
         let centroids = rest.features.centroids;
         let off = match is_own {
@@ -69,7 +66,7 @@ impl Resting {
         };
         Resting {
             mounting,
-            other: (!is_own).then_some(forward.other),
+            is_own,
             px: core::array::from_fn(at),
             areas: rest.areas.map(|area| area as f32),
         }
@@ -82,38 +79,33 @@ impl Resting {
         markers: &[Marker; 4],
         frame: FrameNoise,
     ) -> Observed {
-        let mut moved: Column = [0.0; 8];
-        let mut sigma = [0.0; 8];
+        let (mut moved, mut noise) = (Column::default(), [[0.0; 3]; DOTS]);
         let scale = self.mounting.scale();
         let blur = scale * frame.blur.to_f32();
         for (k, marker) in markers.iter().enumerate() {
             let [x, y] = self.px[k];
-            let [x, y] = self
-                .mounting
-                .moved([marker.x.to_f32() - x, marker.y.to_f32() - y]);
-            [moved[2 * k], moved[2 * k + 1]] = [x, y];
+            let [x, y] = [marker.x.to_f32() - x, marker.y.to_f32() - y];
+            [moved[2 * k], moved[2 * k + 1]] = self.mounting.moved([x, y]);
             let larger = (marker.area as f32 / self.areas[k]).clamp(AREAS[0], AREAS[1]);
             let Noise {
                 at_rest_px,
                 at_four_areas,
                 ..
             } = &forward.noise;
-            for i in [0, 1] {
+            let [away, across] = [0, 1].map(|i| {
                 let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
                 let seen = frame.times * scale * at_rest_px[i] * growth.max(0.1);
-                // What is wrong with another unit is more than noise, and no two markers share it.
-                let unknown = match self.other {
-                    None => blur * blur,
-                    Some(Tolerance { shape, .. }) => shape * shape * (x * x + y * y) + blur * blur,
-                };
-                sigma[2 * k + i] = match unknown > 0.0 {
-                    true => libm::sqrtf(seen * seen + unknown),
-                    false => seen,
-                };
-            }
+                seen * seen + blur * blur
+            });
+            let [ux, uy] = forward.rest_image.away(k);
+            noise[k] = [
+                away * ux * ux + across * uy * uy,
+                (away - across) * ux * uy,
+                away * uy * uy + across * ux * ux,
+            ];
         }
-        Observed { moved, sigma }
+        Observed { moved, noise }
     }
 
     /// The load that explains the markers best, from the network's answer on.
@@ -128,24 +120,27 @@ impl Resting {
         let place_mm = output.place.map(|part| part as f32 * 1e-3);
         let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
         let observed = self.observed(forward, markers, noise);
-        forward.estimate(&observed, &self.mounting, guess)
+        forward.estimate(
+            &observed,
+            &self.mounting,
+            forward.unknown(self.is_own),
+            guess,
+        )
     }
 
     /// What a sample says of a load that was found in a frame of that noise;
     /// [`Status::UNEXPLAINED`] when it explains the markers badly, or is the largest that the
     /// tables hold.
     pub fn told(
-        &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
         noise: FrameNoise,
         estimate: &Estimate,
     ) -> (Force, Status) {
-        let unit = self.systematic(forward, &estimate.pose);
-        let force = force(forward, estimate, &unit);
+        let force = force(forward, estimate);
         let mut status = trust(&force, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
-        if is_blurred || !estimate.is_explained(&unit) {
+        if is_blurred || !estimate.is_explained() {
             status |= Status::UNEXPLAINED;
         }
         // Where the tables end, a larger force may explain the markers better.
@@ -165,19 +160,7 @@ impl Resting {
     ) -> (Force, Status) {
         let noise = FrameNoise::AS_MODELLED;
         let estimate = self.estimate(forward, markers, noise, output);
-        self.told(forward, range, noise, &estimate)
-    }
-
-    /// How well a load is known at best, by what is known of the unit.
-    fn systematic(&self, forward: &Forward<'_>, pose: &Pose) -> Systematic {
-        let Some(Tolerance { stiffness, .. }) = self.other else {
-            return forward.own.at(pose, &forward.limits);
-        };
-        let film = &forward.stiffness;
-        Systematic {
-            size: stiffness * film.magnitude_n(pose.size) / film.per_size_n(pose.size),
-            ..Systematic::default()
-        }
+        Self::told(forward, range, noise, &estimate)
     }
 }
 
@@ -191,7 +174,7 @@ fn is_near(rest: &Rest, own: &Rest) -> bool {
         .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
 }
 
-fn force(forward: &Forward<'_>, estimate: &Estimate, unit: &Systematic) -> Force {
+fn force(forward: &Forward<'_>, estimate: &Estimate) -> Force {
     let pose = &estimate.pose;
     let micronewtons = 1e6 * forward.stiffness.magnitude_n(pose.size);
     let cartesian = pose
@@ -202,7 +185,7 @@ fn force(forward: &Forward<'_>, estimate: &Estimate, unit: &Systematic) -> Force
         beta,
         magnitude,
     } = Polar::of_vector(cartesian);
-    let sigma = estimate.sigma(&forward.stiffness, unit);
+    let sigma = estimate.sigma(&forward.stiffness);
     let [direction, magnitude_sigma, place] = stated(sigma);
     let [x, y] = pose
         .place_mm

@@ -1,10 +1,11 @@
 //! Steps downhill: each to the load that the linearized film says explains the markers best.
 
 use super::Forward;
+use super::covariance::{Covariance, Unknown, Whitening};
 use super::estimate::{Estimate, Observed, UNEXPLAINED};
 use super::mounting::Mounting;
 use super::pose::{Pose, limited};
-use super::predict::{CORNERS, Prediction};
+use super::predict::Prediction;
 use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve, square};
 use crate::kernels::sqrt;
 
@@ -33,22 +34,30 @@ pub struct Descent<'a> {
     looks: u8,
 }
 
-/// What the markers of a frame show.
+/// What the markers of a frame show, and of which unit.
 struct Markers<'a> {
     observed: &'a Observed,
     mounting: &'a Mounting,
-    /// What each coordinate weighs, away from the pattern's middle and across that.
-    weights: Column,
+    unknown: Unknown<'a>,
 }
 
 /// A load, and what the markers say there.
 struct Linearization {
     pose: Pose,
-    /// What the load does not explain of the markers: the sum of squares in parts of their
-    /// variances.
-    unexplained: f32,
-    /// By coordinate.
+    /// What the load does not explain of the markers' motion, and the slopes of what it does, focal
+    /// lengths.
     left: Column,
+    slopes: [Column; UNKNOWNS],
+    /// By the covariance of noise and of what is not known of the unit, at this load; `None` where
+    /// that is none.
+    white: Option<White>,
+}
+
+/// The same in coordinates in which the covariance is the unit matrix.
+struct White {
+    whitening: Whitening,
+    /// The square of what the load does not explain of the markers' motion.
+    unexplained: f32,
     /// That square, and how unlikely the load is.
     square: f32,
     solved: Option<Solved>,
@@ -60,13 +69,13 @@ impl<'a> Descent<'a> {
         forward: &'a Forward<'a>,
         observed: &'a Observed,
         mounting: &'a Mounting,
+        unknown: Unknown<'a>,
         guess: Pose,
     ) -> Self {
-        let half = core::f32::consts::FRAC_1_SQRT_2;
         let markers = Markers {
             observed,
             mounting,
-            weights: observed.sigma.map(|sigma| half / sigma),
+            unknown,
         };
         let here = Linearization::at(forward, &markers, within(forward, guess));
         Self {
@@ -78,16 +87,17 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Tries a step; one that does not lower the residual is not taken, and the next is shorter
-    /// then. False when the markers do not tell where to go.
+    /// Tries a step; one that does not lower the residual, by the covariance where it begins, is not
+    /// taken, and the next is shorter then. False when the markers do not tell where to go.
     pub fn step(&mut self) -> bool {
-        let Some(solved) = &self.here.solved else {
+        let Some((white, solved)) = self.here.solved() else {
             return false;
         };
         let pose = after(self.forward, &self.here.pose, solved, self.part);
         let there = Linearization::at(self.forward, &self.markers, pose);
         self.looks += 1;
-        if there.square < self.here.square {
+        let left = square(&white.whitening.of(&there.left));
+        if left + square(&unlikely(&there.pose)) < white.square {
             (self.here, self.part) = (there, 1.0);
         } else {
             self.part *= SHORTER;
@@ -102,11 +112,14 @@ impl<'a> Descent<'a> {
 
     /// What it has come to.
     pub fn estimate(self) -> Estimate {
+        let left = self.here.by_noise(&self.markers.observed.covariance());
+        let white = self.here.white;
         Estimate {
             pose: self.here.pose,
-            unexplained: self.here.unexplained,
-            left: self.here.left,
-            solved: self.here.solved,
+            // What has no covariance explains nothing.
+            unexplained: white.as_ref().map_or(f32::INFINITY, |white| white.unexplained),
+            left,
+            solved: white.and_then(|white| white.solved),
             looks: self.looks,
         }
     }
@@ -119,22 +132,28 @@ struct Equations {
 }
 
 impl Equations {
-    fn new(columns: &[Column; UNKNOWNS], side: &Column, pose: &Pose) -> Equations {
+    fn new(whitening: &Whitening, slopes: &[Column; UNKNOWNS], left: &Column, pose: &Pose) -> Self {
         let mut all = Equations {
             columns: [[0.0; ROWS]; UNKNOWNS],
             side: [0.0; ROWS],
         };
-        for (column, markers) in all.columns.iter_mut().zip(columns) {
-            column[..EQUATIONS].copy_from_slice(markers);
+        for (column, slope) in all.columns.iter_mut().zip(slopes) {
+            column[..EQUATIONS].copy_from_slice(&whitening.of(slope));
         }
-        all.side[..EQUATIONS].copy_from_slice(side);
-        let ([a, b], [x, y]) = (pose.tilt, pose.place_mm);
-        for (k, (unknown, likely)) in [a, b, x, y].into_iter().zip(LIKELY).enumerate() {
+        all.side[..EQUATIONS].copy_from_slice(&whitening.of(left));
+        all.side[EQUATIONS..].copy_from_slice(&unlikely(pose));
+        for (k, likely) in LIKELY.into_iter().enumerate() {
             all.columns[TILT + k][EQUATIONS + k] = 1.0 / likely;
-            all.side[EQUATIONS + k] = -unknown / likely;
         }
         all
     }
+}
+
+/// How far a load is from what is likely.
+fn unlikely(pose: &Pose) -> [f32; LIKELY.len()] {
+    let ([a, b], [x, y]) = (pose.tilt, pose.place_mm);
+    let parts = [a, b, x, y];
+    core::array::from_fn(|k| -parts[k] / LIKELY[k])
 }
 
 impl Linearization {
@@ -142,26 +161,63 @@ impl Linearization {
         let Markers {
             observed,
             mounting,
-            weights,
+            unknown,
         } = markers;
-        let tables = &forward.tables;
-        let Prediction { moved, slopes } =
-            tables.predict(&pose, &forward.limits, &mounting.beside_mm);
+        let (tables, limits) = (&forward.tables, &forward.limits);
+        let Prediction { moved, slopes } = tables.predict(&pose, limits, &mounting.beside_mm);
         let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
-        let left = from_middle(&left, weights);
-        let slopes = slopes.each_ref().map(|slope| from_middle(slope, weights));
-        let equations = Equations::new(&slopes, &left, &pose);
+        let mut covariance = unknown.covariance(&pose, limits, &moved);
+        observed.add_noise(&mut covariance);
+        let white = White::new(&covariance, &slopes, &left, &pose);
         Linearization {
             pose,
-            unexplained: square(&left),
             left,
-            square: square(&equations.side),
-            solved: solve(equations.columns, equations.side),
+            slopes,
+            white,
         }
     }
 
+    fn solved(&self) -> Option<(&White, &Solved)> {
+        let white = self.white.as_ref()?;
+        Some((white, white.solved.as_ref()?))
+    }
+
     fn is_done(&self) -> bool {
-        is_done(self.unexplained, self.solved.as_ref())
+        let white = self.white.as_ref();
+        white.is_some_and(|white| is_done(white.unexplained, white.solved.as_ref()))
+    }
+
+    /// What no load near this one explains of the markers' motion, in parts of their noise alone.
+    fn by_noise(&self, noise: &Covariance) -> Column {
+        let Some(whitening) = Whitening::new(noise) else {
+            return [f32::INFINITY; EQUATIONS];
+        };
+        let mut equations = Equations::new(&whitening, &self.slopes, &self.left, &self.pose);
+        // Where the markers do not tell the load, all that is left.
+        let left = equations.side;
+        let side = match solve(equations.columns, &mut equations.side) {
+            Some(_) => equations.side,
+            None => left,
+        };
+        core::array::from_fn(|i| side[i])
+    }
+}
+
+impl White {
+    fn new(
+        covariance: &Covariance,
+        slopes: &[Column; UNKNOWNS],
+        left: &Column,
+        pose: &Pose,
+    ) -> Option<White> {
+        let whitening = Whitening::new(covariance)?;
+        let mut equations = Equations::new(&whitening, slopes, left, pose);
+        Some(White {
+            whitening,
+            unexplained: square(&equations.side[..EQUATIONS]),
+            square: square(&equations.side),
+            solved: solve(equations.columns, &mut equations.side),
+        })
     }
 }
 
@@ -196,22 +252,10 @@ fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32) -> Pose
 /// The nearest load that the tables hold.
 fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
     let too_steep = (pose.angle() / forward.limits.tilt).max(1.0);
-    let [from, to] = forward.tables.moved.axis().ends_mm();
+    let [from, to] = forward.tables.ends_mm();
     Pose {
         size: limited(pose.size, 0.0, forward.limits.size),
         tilt: pose.tilt.map(|part| part / too_steep),
         place_mm: pose.place_mm.map(|part| limited(part, from, to)),
     }
-}
-
-/// x and y of markers 0–3, as seen from the pattern's middle: away from it, and across that, as
-/// often as each weighs.
-fn from_middle(column: &Column, weights: &Column) -> Column {
-    let mut turned = *weights;
-    let markers = column.as_chunks::<2>().0.iter().zip(CORNERS);
-    for (([x, y], [cx, cy]), turned) in markers.zip(turned.as_chunks_mut::<2>().0) {
-        turned[0] *= x * cx + y * cy;
-        turned[1] *= y * cx - x * cy;
-    }
-    turned
 }

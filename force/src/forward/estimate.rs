@@ -1,24 +1,19 @@
 //! Gauss–Newton steps from a first guess to the load that explains the markers best.
 
 use super::Forward;
+use super::covariance::{Covariance, Unknown};
 use super::descent::{Descent, is_done};
 use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
+use super::predict::DOTS;
 use super::solve::{Column, Solved};
-use super::systematic::Systematic;
 
 /// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
 /// of three degrees of freedom is more than 17.7 then.
 pub const UNEXPLAINED: f32 = 17.7;
-/// χ² of one degree of freedom is more than this in 1 of 2,000: what is not known of a unit counts
-/// as if all of it lay in one coordinate of what is left over, where it makes the most.
-const UNEXPLAINED_OF_UNIT: f32 = 12.1;
-/// χ² of three degrees of freedom, and of one, is more than these in 1 of 6: what is left over
-/// beyond them is taken for noise that is larger than the model says.
+/// χ² of three degrees of freedom is more than this in 1 of 6: what is left over beyond it is taken
+/// for noise that is larger than the model says.
 const USUAL: f32 = 5.0;
-const USUAL_OF_UNIT: f32 = 1.9;
-/// No less force has a direction, N.
-const LEAST_N: f32 = 1e-9;
 /// Steps that a frame takes at most: more than the model asks for while what they led to does not
 /// explain the markers. Units of which little is known begin far from where they end.
 pub const STEPS_AT_MOST: u8 = 6;
@@ -28,9 +23,27 @@ pub const STEPS_AT_MOST: u8 = 6;
 pub struct Observed {
     /// x and y of markers 0–3, focal lengths along the film's axes.
     pub moved: Column,
-    /// Standard uncertainty of each marker, away from the pattern's middle and across that, focal
-    /// lengths, > 0: what markers weigh by.
-    pub sigma: Column,
+    /// The noise of each marker: covariances of x and x, x and y, y and y, focal lengths squared;
+    /// the first and the last > 0.
+    pub noise: [[f32; 3]; DOTS],
+}
+
+impl Observed {
+    /// The noise of all markers: no two share any.
+    pub(super) fn covariance(&self) -> Covariance {
+        let mut covariance = Covariance::default();
+        self.add_noise(&mut covariance);
+        covariance
+    }
+
+    pub(super) fn add_noise(&self, covariance: &mut Covariance) {
+        for (dot, [xx, xy, yy]) in self.noise.into_iter().enumerate() {
+            let (x, y) = (2 * dot, 2 * dot + 1);
+            covariance[x][x] += xx;
+            covariance[y][x] += xy;
+            covariance[y][y] += yy;
+        }
+    }
 }
 
 /// A load and how well it is known.
@@ -38,10 +51,11 @@ pub struct Observed {
 pub struct Estimate {
     /// The load.
     pub pose: Pose,
-    /// What it does not explain: the sum of squares in parts of their variances.
+    /// What it does not explain: the square of that in parts of its covariance, by noise and by what
+    /// is not known of the unit.
     pub unexplained: f32,
-    /// That by coordinate, in parts of their standard uncertainties: of each marker away from the
-    /// pattern's middle and across that.
+    /// What no load near it explains, in parts of noise alone: what changes of it from frame to
+    /// frame is noise, whatever is not known of the unit.
     pub left: Column,
     /// What the markers say at this load; `None` where they do not tell its parts.
     pub solved: Option<Solved>,
@@ -53,8 +67,15 @@ impl Forward<'_> {
     /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
     /// which they find no way on, from the film's middle, too: from there they find theirs where a
     /// guess was bad.
-    pub fn estimate(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
-        let found = self.descend(observed, mounting, guess);
+    pub fn estimate(
+        &self,
+        observed: &Observed,
+        mounting: &Mounting,
+        unknown: Unknown<'_>,
+        guess: Pose,
+    ) -> Estimate {
+        let descend = |guess| self.descend(Descent::new(self, observed, mounting, unknown, guess));
+        let found = descend(guess);
         if is_done(found.unexplained, found.solved.as_ref()) {
             return found;
         }
@@ -62,7 +83,7 @@ impl Forward<'_> {
             size: guess.size,
             ..Pose::default()
         };
-        let other = self.descend(observed, mounting, middle);
+        let other = descend(middle);
         let looks = found.looks + other.looks;
         let nearer = if other.unexplained < found.unexplained {
             other
@@ -73,8 +94,7 @@ impl Forward<'_> {
     }
 
     /// Takes as many steps as the model asks for, and more where these do not explain the markers.
-    fn descend(&self, observed: &Observed, mounting: &Mounting, guess: Pose) -> Estimate {
-        let mut descent = Descent::new(self, observed, mounting, guess);
+    fn descend(&self, mut descent: Descent<'_>) -> Estimate {
         for step in 0..STEPS_AT_MOST {
             if step >= self.steps && descent.is_done() {
                 break;
@@ -99,46 +119,32 @@ pub struct Sigma {
 }
 
 impl Estimate {
-    /// Whether a load explains the markers, by their noise and what is not known of the unit; what
-    /// is no number explains nothing.
-    pub fn is_explained(&self, unit: &Systematic) -> bool {
-        let of_unit = UNEXPLAINED_OF_UNIT * unit.residual * unit.residual;
-        (0.0..=UNEXPLAINED + of_unit).contains(&self.unexplained)
+    /// Whether a load explains the markers; what is no number explains nothing.
+    pub fn is_explained(&self) -> bool {
+        (0.0..=UNEXPLAINED).contains(&self.unexplained)
     }
 
     /// How many times the markers' stated noise what is left over speaks for, at least 1.
-    fn noisier(&self, unit: &Systematic) -> f32 {
-        let usual = USUAL + USUAL_OF_UNIT * unit.residual * unit.residual;
-        libm::sqrtf(1.0 + (self.unexplained - usual).max(0.0) / USUAL)
+    fn noisier(&self) -> f32 {
+        libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
     }
 
-    /// How well the load is known, by the markers' noise and what is not known of the unit; `None`
-    /// where the markers do not tell its parts. Noise counts as larger where more is left over than
+    /// How well the load is known; `None` where the markers do not tell its parts. The covariance counts as larger where more is left over than
     /// it explains as a rule.
-    pub fn sigma(&self, stiffness: &Stiffness, unit: &Systematic) -> Option<Sigma> {
+    pub fn sigma(&self, stiffness: &Stiffness) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;
         let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);
         let tilt = [(1, 1), (1, 2), (2, 2)].map(covariance);
         let place = [(3, 3), (3, 4), (4, 4)].map(covariance);
-        let noisier = self.noisier(unit);
+        let noisier = self.noisier();
         let place_mm = noisier * stated(place) * core::f32::consts::FRAC_1_SQRT_2;
         let size = noisier * libm::sqrtf(covariance((0, 0)));
-        let per_size_n = stiffness.per_size_n(self.pose.size);
-        let magnitude_n = stiffness.magnitude_n(self.pose.size).max(LEAST_N);
         Some(Sigma {
-            direction: both(
-                noisier * stated(across(&self.pose, tilt)),
-                unit.across_n / magnitude_n,
-            ),
-            magnitude_n: per_size_n * both(size, unit.size),
-            place_mm: both(place_mm, unit.place_mm),
+            direction: noisier * stated(across(&self.pose, tilt)),
+            magnitude_n: stiffness.per_size_n(self.pose.size) * size,
+            place_mm,
         })
     }
-}
-
-/// The standard uncertainty that two independent ones add up to.
-fn both(a: f32, b: f32) -> f32 {
-    libm::sqrtf(a * a + b * b)
 }
 
 /// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across
@@ -205,41 +211,23 @@ mod tests {
         }
     }
 
-    fn parts(unexplained: f32, unit: &Systematic) -> [f32; 3] {
-        let sigma = estimate(unexplained).sigma(&STIFFNESS, unit).unwrap();
+    fn parts(unexplained: f32) -> [f32; 3] {
+        let sigma = estimate(unexplained).sigma(&STIFFNESS).unwrap();
         [sigma.direction, sigma.magnitude_n, sigma.place_mm]
-    }
-
-    fn unit(residual: f32) -> Systematic {
-        Systematic {
-            residual,
-            ..Systematic::default()
-        }
     }
 
     /// Noise of n times what is stated leaves n² times as much over, and is stated n times as
     /// large.
     #[test]
     fn what_is_left_over_beyond_the_usual_widens_all_three() {
-        let stated = parts(1.0, &unit(0.0));
-        assert_eq!(parts(USUAL, &unit(0.0)), stated);
+        let stated = parts(1.0);
+        assert_eq!(parts(USUAL), stated);
         for times in [1.5f32, 1.8] {
-            let wider = parts(USUAL * times * times, &unit(0.0));
+            let wider = parts(USUAL * times * times);
             for (wider, stated) in wider.into_iter().zip(stated) {
                 assert!((wider / stated - times).abs() < 1e-5, "{wider} {stated}");
             }
         }
-    }
-
-    /// What is not known of the unit explains some of what is left over.
-    #[test]
-    fn on_a_unit_of_which_little_is_known_more_is_usual() {
-        let left_over = 4.99 + 9.0 * USUAL_OF_UNIT;
-        assert_eq!(parts(left_over, &unit(3.0)), parts(1.0, &unit(0.0)));
-        assert!(parts(left_over, &unit(2.9))[0] > parts(1.0, &unit(0.0))[0]);
-        let most = UNEXPLAINED + 9.0 * UNEXPLAINED_OF_UNIT;
-        assert!(estimate(most).is_explained(&unit(3.0)));
-        assert!(!estimate(1.001 * most).is_explained(&unit(3.0)));
     }
 
     proptest! {
@@ -248,12 +236,10 @@ mod tests {
         fn more_that_is_left_over_never_makes_a_force_surer(
             less in prop_oneof![0.0f32..100.0, any::<f32>()],
             more in prop_oneof![0.0f32..100.0, any::<f32>()],
-            residual in prop_oneof![0.0f32..10.0, any::<f32>()],
         ) {
-            let unit = unit(residual);
-            let explained = [less, more].map(|part| estimate(part).is_explained(&unit));
+            let explained = [less, more].map(|part| estimate(part).is_explained());
             prop_assert!(!(explained[1] && less < more && less >= 0.0) || explained[0]);
-            let [sure, unsure] = [less.min(more), less.max(more)].map(|left| parts(left, &unit));
+            let [sure, unsure] = [less.min(more), less.max(more)].map(parts);
             for (less, more) in sure.into_iter().zip(unsure) {
                 prop_assert!(more >= less, "{more} {less}");
             }

@@ -12,36 +12,36 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `axis`, `terms`, `table` | splines over the place, polynomials in size and tilt, sums of both |
+//! | `axis`, `terms`, `table` | splines over the place, polynomials in size and tilt, a marker's sums of both |
 //! | `pose` | a load in the variables in which the film is nearly a polynomial |
-//! | `predict` | where the four images go, with slopes |
+//! | `predict` | where all images go, with slopes |
 //! | `mounting` | where this unit's markers are glued, and how its camera sees them |
 //! | `solve` | eight equations, five unknowns |
 //! | `descent` | steps downhill from a guess |
-//! | `systematic` | what is not known of the unit beside the noise |
+//! | `covariance` | what is not known of the unit beside the noise |
 //! | `estimate` | from guesses to a load, what is left over, standard uncertainties |
 
 mod axis;
+mod covariance;
 mod descent;
 mod estimate;
 mod mounting;
 mod pose;
 mod predict;
 mod solve;
-mod systematic;
 mod table;
 mod terms;
 
 pub use axis::{Axis, NODES};
+pub use covariance::{Covariance, CovarianceGrid, KNOTS, LARGEST_STEP, Unknown, Whitening};
 pub use descent::Descent;
 pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED, stated};
 pub use mounting::{Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
-pub use predict::{Markers, Prediction, Tables};
+pub use predict::{DOTS, MOST_FUNCTIONS, Markers, Prediction, Tables};
 pub(crate) use solve::square;
 pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
-pub use systematic::{KNOTS, PARTS, PLACES, SIZES, Systematic, SystematicGrid};
-pub use table::{Answer, Place, Steps, Table};
+pub use table::{Answer, OUTPUTS, Place, Table};
 pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
 
 /// Most steps that a model may ask for.
@@ -59,17 +59,29 @@ pub struct Forward<'a> {
     pub stiffness: Stiffness,
     /// What a rest picture says of a unit.
     pub rest_image: RestImage,
-    /// What is known of the unit that it was made on, beside its rest picture; `None` when nothing
-    /// is.
-    pub mounting: Option<Mounting>,
+    /// How the camera of the unit that it was made on sees the film, focal lengths per px
+    /// ([`Mounting::per_px`]); `None` when nothing beside the rest picture tells it.
+    pub per_px: Option<[f32; 2]>,
     /// How well markers are seen.
     pub noise: Noise,
-    /// What is not known of the unit that it was made on.
-    pub own: SystematicGrid<'a>,
-    /// How far another unit may differ from what the model says of its own.
-    pub other: Tolerance,
     /// The film's tables.
     pub tables: Tables<'a>,
+    /// What they leave of how the images move on the unit that it was made on; `None` when that is
+    /// nothing beside noise.
+    pub own: Option<CovarianceGrid<'a>>,
+    /// On any other unit, of which there is a rest picture; `None` where the file does not say.
+    pub other: Option<CovarianceGrid<'a>>,
+}
+
+impl<'a> Forward<'a> {
+    /// What is not known of the unit that it was made on, or of another one.
+    pub fn unknown(&self, is_own: bool) -> Unknown<'a> {
+        match (is_own, self.own, self.other) {
+            (true, None, _) => Unknown::Nothing,
+            (true, Some(grid), _) | (false, _, Some(grid)) => Unknown::Grid(grid),
+            (false, _, None) => Unknown::Unit,
+        }
+    }
 }
 
 /// How far a marker's coordinates in one frame are from where it is.
@@ -83,13 +95,4 @@ pub struct Noise {
     pub at_rest_px: [f32; 2],
     /// How many times that of one four times as large.
     pub at_four_areas: [f32; 2],
-}
-
-/// Standard uncertainties of what another unit differs in from what a model says of its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tolerance {
-    /// Of each coordinate of a marker's displacement, in parts of the displacement.
-    pub shape: f32,
-    /// Of the film's stiffness, in parts of it.
-    pub stiffness: f32,
 }

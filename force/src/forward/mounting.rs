@@ -1,6 +1,6 @@
 //! Where this unit's markers are on its film, and how its camera sees them.
 
-use super::predict::{CORNERS, Markers};
+use super::predict::{DOTS, Markers};
 use crate::kernels::sqrt;
 use crate::rest::Rest;
 
@@ -17,29 +17,35 @@ pub struct Mounting {
 /// What a rest picture says of a mounting when the camera is as the tables have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RestImage {
-    /// Where marker 2 is seen at rest, along x and along y, focal lengths from the axis.
-    pub corner: f32,
-    /// What a focal length is on the film at a marker: away from the axis, and across that, mm.
-    pub film_mm: [f32; 2],
+    /// Where the tables' markers are seen at rest, focal lengths from the axis.
+    pub at: Markers,
+    /// What a focal length is on the film at each of them: away from the axis, and across that, mm.
+    pub film_mm: Markers,
 }
 
 impl RestImage {
+    /// The direction in which a marker's image lies from the axis, of length one; along x where it
+    /// lies there.
+    pub fn away(&self, dot: usize) -> [f32; 2] {
+        let [x, y] = self.at.get(dot).copied().unwrap_or_default();
+        let far = sqrt(x * x + y * y);
+        match far > 0.0 {
+            true => [x / far, y / far],
+            false => [1.0, 0.0],
+        }
+    }
+
     /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the
     /// whole pattern count as the camera's, which a rest picture cannot tell from gluing; what is
     /// left is gluing.
     pub fn mounting(&self, rest: &Rest) -> Mounting {
         let centroids = rest.features.centroids;
-        let seen = centroids.map(|(x, y)| [x.to_f32(), y.to_f32()]);
-        let mut middle = [0.0; 2];
-        for position in &seen {
-            middle = [0, 1].map(|i| middle[i] + position[i] / 4.0);
-        }
-        let seen = seen.map(|[x, y]| [x - middle[0], y - middle[1]]);
-        let per_px = self.similarity(&seen);
-        let beside = |k: usize| {
-            let [x, y] = turned(per_px, seen[k]);
-            let [sx, sy] = CORNERS[k];
-            self.on_film(CORNERS[k], [x - self.corner * sx, y - self.corner * sy])
+        let seen = about_middle(&centroids.map(|(x, y)| [x.to_f32(), y.to_f32()]));
+        let own = about_middle(&self.at);
+        let per_px = similarity(&seen, &own);
+        let beside = |dot: usize| {
+            let [x, y] = turned(per_px, seen[dot]);
+            self.on_film(dot, [x - own[dot][0], y - own[dot][1]])
         };
         Mounting {
             per_px,
@@ -47,28 +53,36 @@ impl RestImage {
         }
     }
 
-    /// The complex number that brings what is seen nearest to where it would be seen.
-    fn similarity(&self, seen: &Markers) -> [f32; 2] {
-        let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
-        for ([x, y], [cx, cy]) in seen.iter().zip(CORNERS) {
-            along += self.corner * (x * cx + y * cy);
-            across += self.corner * (x * cy - y * cx);
-            square += x * x + y * y;
-        }
-        // Four markers in a sound rest position are not all in one place; if they were, nothing
-        // would be seen to move.
-        let square = if square > 0.0 { square } else { f32::MAX };
-        [along / square, across / square]
+    /// What a shift of a marker's image, focal lengths, is on the film, mm.
+    fn on_film(&self, dot: usize, [x, y]: [f32; 2]) -> [f32; 2] {
+        let ([ux, uy], [away, across]) = (self.away(dot), self.film_mm[dot]);
+        let away = away * (x * ux + y * uy);
+        let across = across * (y * ux - x * uy);
+        [away * ux - across * uy, away * uy + across * ux]
     }
+}
 
-    /// What a shift of the image of the marker in a corner, focal lengths, is on the film, mm.
-    fn on_film(&self, [cx, cy]: [f32; 2], [x, y]: [f32; 2]) -> [f32; 2] {
-        let [away, across] = self.film_mm;
-        // Corners are √2 long.
-        let away = away * (x * cx + y * cy) / 2.0;
-        let across = across * (y * cx - x * cy) / 2.0;
-        [away * cx - across * cy, away * cy + across * cx]
+/// Places as seen from their mean.
+fn about_middle(places: &Markers) -> Markers {
+    let mut middle = [0.0; 2];
+    for place in places {
+        middle = [0, 1].map(|i| middle[i] + place[i] / DOTS as f32);
     }
+    places.map(|[x, y]| [x - middle[0], y - middle[1]])
+}
+
+/// The complex number that brings what is seen nearest to where it would be seen.
+fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
+    let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
+    for ([x, y], [cx, cy]) in seen.iter().zip(own) {
+        along += x * cx + y * cy;
+        across += x * cy - y * cx;
+        square += x * x + y * y;
+    }
+    // The markers in a sound rest position are not all in one place; if they were, nothing would be
+    // seen to move.
+    let square = if square > 0.0 { square } else { f32::MAX };
+    [along / square, across / square]
 }
 
 impl Mounting {
@@ -95,15 +109,22 @@ mod tests {
     use crate::features::Features;
     use hivtac_terms::units::Px;
 
+    const CORNERS: Markers = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    const CORNER: f32 = 0.342;
     const REST: RestImage = RestImage {
-        corner: 0.342,
-        film_mm: [12.76, 10.85],
+        at: [
+            [-CORNER, -CORNER],
+            [CORNER, -CORNER],
+            [CORNER, CORNER],
+            [-CORNER, CORNER],
+        ],
+        film_mm: [[12.76, 10.85]; DOTS],
     };
 
     /// Markers seen at the places of a nominal camera, moved by so many focal lengths each.
     fn rest(moved: Markers, per_focal: [f32; 2], middle: [f32; 2]) -> Rest {
         let seen = |k: usize| {
-            let [x, y] = [0, 1].map(|i| REST.corner * CORNERS[k][i] + moved[k][i]);
+            let [x, y] = [0, 1].map(|i| REST.at[k][i] + moved[k][i]);
             let [x, y] = turned(per_focal, [x, y]);
             let px = |part: f32| Px((65_536.0 * part) as i32);
             (px(x + middle[0]), px(y + middle[1]))

@@ -7,7 +7,7 @@ use crate::kernels::sqrt;
 
 /// Unknowns: size, tilt along x and y, place along x and y.
 pub const UNKNOWNS: usize = 5;
-/// Equations of the markers: four, x and y each.
+/// Equations of the markers: x and y of each.
 pub const EQUATIONS: usize = 8;
 /// A column of which less than this part is left beside those before it says nothing of its own:
 /// the tables' slopes are exact to some 10⁻³ of the largest.
@@ -67,11 +67,11 @@ impl Solved {
     }
 }
 
-/// The unknowns whose combination of `columns` is nearest to `side`; `None` when the columns do not
-/// tell them apart, or a number is no number.
+/// The unknowns whose combination of `columns` is nearest to `side`, of which what they do not
+/// explain is left; `None` when the columns do not tell them apart, or a number is no number.
 pub fn solve<const N: usize>(
     mut columns: [[f32; N]; UNKNOWNS],
-    mut side: [f32; N],
+    side: &mut [f32; N],
 ) -> Option<Solved> {
     let whole = columns.each_ref().map(norm);
     let mut upper = [[0.0; UNKNOWNS]; UNKNOWNS];
@@ -89,10 +89,10 @@ pub fn solve<const N: usize>(
             upper[k][j] = dot(&unit, &columns[j]);
             take(&mut columns[j], &unit, upper[k][j]);
         }
-        along[k] = dot(&unit, &side);
-        take(&mut side, &unit, along[k]);
+        along[k] = dot(&unit, side);
+        take(side, &unit, along[k]);
     }
-    let left_over = dot(&side, &side);
+    let left_over = dot(side, side);
     let inverse = inverse(&upper);
     let mut solved = Solved {
         unknowns: [0.0; UNKNOWNS],
@@ -171,7 +171,7 @@ mod tests {
                 *column = column.map(|part| part * 2f32.powi(scale));
             }
             let side = applied(&columns, unknowns);
-            let Some(solved) = solve(columns, side) else {
+            let Some(solved) = solve(columns, &mut side.clone()) else {
                 return Ok(());
             };
             // What a rounding of the equations may move an unknown by.
@@ -192,7 +192,8 @@ mod tests {
             side in prop::array::uniform8(-1.0f32..1.0),
         ) {
             let columns = columns(parts);
-            let Some(solved) = solve(columns, side) else {
+            let mut over = side;
+            let Some(solved) = solve(columns, &mut over) else {
                 return Ok(());
             };
             let mut left = side;
@@ -200,6 +201,9 @@ mod tests {
                 take(&mut left, column, unknown);
             }
             let largest = solved.unknowns.iter().fold(1.0f32, |most, part| most.max(part.abs()));
+            for (left, over) in left.iter().zip(over) {
+                prop_assert!((left - over).abs() < 1e-4 * largest);
+            }
             for column in &columns {
                 prop_assert!(dot(&left, column).abs() < 1e-4 * largest);
             }
@@ -213,7 +217,7 @@ mod tests {
             parts in prop::array::uniform(any::<f32>()),
             side in prop::array::uniform8(any::<f32>()),
         ) {
-            if let Some(solved) = solve(columns(parts), side) {
+            if let Some(solved) = solve(columns(parts), &mut side.clone()) {
                 prop_assert!(solved.unknowns.iter().all(|part| part.is_finite()));
             }
         }
@@ -226,11 +230,11 @@ mod tests {
             *part = ((i * i) as f32 * 1.7).sin();
         }
         let mut all = columns(parts);
-        assert!(solve(all, [1.0; 8]).is_some());
+        assert!(solve(all, &mut [1.0; 8]).is_some());
         all[4] = all[1].map(|part| -3.0 * part);
-        assert!(solve(all, [1.0; 8]).is_none());
+        assert!(solve(all, &mut [1.0; 8]).is_none());
         all[4] = [0.0; 8];
-        assert!(solve(all, [1.0; 8]).is_none());
+        assert!(solve(all, &mut [1.0; 8]).is_none());
     }
 
     #[test]
@@ -240,7 +244,7 @@ mod tests {
         for (k, column) in all.iter_mut().enumerate() {
             column[k] = (k + 1) as f32;
         }
-        let solved = solve(all, [1.0; 8]).unwrap();
+        let solved = solve(all, &mut [1.0; 8]).unwrap();
         for k in 0..5 {
             let expected = 1.0 / ((k + 1) as f32).powi(2);
             assert!((solved.covariance(k, k) - expected).abs() < 1e-6);

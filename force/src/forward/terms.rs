@@ -7,7 +7,7 @@ pub const MOST_SIZES: usize = 8;
 /// Degrees of tilt, with that of none.
 pub const MOST_TILTS: usize = 5;
 /// Groups of a set at most.
-const MOST_GROUPS: usize = MOST_TILTS * (MOST_TILTS + 1) / 2;
+pub const MOST_GROUPS: usize = MOST_TILTS * (MOST_TILTS + 1) / 2;
 
 /// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the
 /// tilt (a, b) in parts of the largest.

@@ -2,16 +2,14 @@
 
 use super::{ModelError, reader::Reader};
 use crate::forward::{
-    Axis, Forward, KNOTS, Limits, MOST_STEPS, Markers, Mounting, NODES, Noise, PARTS, RestImage,
-    Stiffness, SystematicGrid, Table, Tables, Terms, Tolerance,
+    Axis, CovarianceGrid, DOTS, Forward, Limits, MOST_FUNCTIONS, MOST_STEPS, Markers, NODES, Noise,
+    RestImage, Stiffness, Table, Tables, Terms,
 };
 #[cfg(any(test, feature = "encode"))]
-use alloc::vec::Vec;
-
-/// Outputs of the three tables.
-const MOVED: usize = 1;
-const BESIDE: usize = 2;
-const OWN: usize = 8;
+use {
+    crate::forward::{EQUATIONS, MOST_TILTS, OUTPUTS},
+    alloc::vec::Vec,
+};
 
 impl<'a> Forward<'a> {
     /// Reads the section of a model file alone.
@@ -23,12 +21,15 @@ impl<'a> Forward<'a> {
     }
 }
 
+/// Which covariances a file has: of its own unit, of others.
+const COVARIANCES: [[bool; 2]; 4] = [[false, false], [true, false], [false, true], [true, true]];
+
 /// Reads the section.
 pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelError> {
     let steps = reader.u8_in("steps", MOST_STEPS, "0 to 3")?;
-    let has_mounting = reader.choice("mounting", &[false, true], "0 or 1")?;
-    let has_own = reader.choice("own table", &[false, true], "0 or 1")?;
-    reader.zero("reserved byte")?;
+    let has_camera = reader.choice("camera", &[false, true], "0 or 1")?;
+    dots(reader)?;
+    let [has_own, has_other] = reader.choice("covariances", &COVARIANCES, "0 to 3")?;
     let limits = Limits {
         size: float(reader, "largest size", [1e-3, 10.0], "0.001 to 10")?,
         tilt: float(reader, "largest tilt", [1e-2, 1.0], "0.01 to 1 rad")?,
@@ -38,68 +39,102 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         cubic_n: float(reader, "stiffness", [1e-6, 1e3], "0.000001 to 1000 N")?,
     };
     let rest_image = RestImage {
-        corner: float(reader, "corner", [1e-2, 2.0], "0.01 to 2")?,
-        film_mm: pair(reader, "film", [0.1, 1e3], "0.1 to 1000 mm")?,
+        at: markers(reader, "rest image", [-2.0, 2.0], "-2 to 2")?,
+        film_mm: markers(reader, "film", [0.1, 1e3], "0.1 to 1000 mm")?,
     };
     let noise = Noise {
         rest_px: markers(reader, "rest", [-1.0, 1.0], "-1 to 1 px")?,
         at_rest_px: pair(reader, "noise", [1e-4, 10.0], "0.0001 to 10 px")?,
         at_four_areas: pair(reader, "noise", [0.1, 10.0], "0.1 to 10")?,
     };
-    let other = tolerance(reader)?;
-    let mounting = mounting(reader)?;
-    let own = systematic(reader)?;
-    let tables = Tables {
-        moved: table(reader, MOVED)?,
-        beside: table(reader, BESIDE)?,
-        own: match has_own {
-            true => Some(table(reader, OWN)?),
-            false => None,
-        },
-    };
+    let per_px = pair(reader, "focal lengths per px", [-1.0, 1.0], "-1 to 1")?;
     Ok(Forward {
         steps,
         limits,
         stiffness,
         rest_image,
-        mounting: has_mounting.then_some(mounting),
+        per_px: has_camera.then_some(per_px),
         noise,
-        own,
-        other,
-        tables,
+        tables: tables(reader)?,
+        own: has_own.then(|| covariances(reader)).transpose()?,
+        other: has_other.then(|| covariances(reader)).transpose()?,
     })
 }
 
-fn tolerance(reader: &mut Reader<'_>) -> Result<Tolerance, ModelError> {
-    Ok(Tolerance {
-        shape: float(reader, "tolerance", [0.0, 1.0], "0 to 1")?,
-        stiffness: float(reader, "tolerance", [0.0, 1.0], "0 to 1")?,
-    })
-}
-
-fn systematic<'a>(reader: &mut Reader<'a>) -> Result<SystematicGrid<'a>, ModelError> {
+/// As many as this program is for.
+fn dots(reader: &mut Reader<'_>) -> Result<(), ModelError> {
     let offset = reader.offset;
-    let end_mm = f32::from_le_bytes(reader.array()?);
-    let mut steps = [0.0; PARTS];
-    for step in &mut steps {
-        *step = f32::from_le_bytes(reader.array()?);
+    match usize::from(reader.u8()?) {
+        DOTS => Ok(()),
+        _ => Err(ModelError::Field {
+            name: "markers",
+            offset,
+            allowed: "4",
+        }),
     }
-    let knots = reader.take(2 * PARTS * KNOTS)?;
-    SystematicGrid::new(end_mm, steps, knots).ok_or(ModelError::Field {
-        name: "systematic uncertainty",
-        offset,
-        allowed: "an end of 0.1 to 100 mm and steps of 0 to 1",
-    })
 }
 
-fn mounting(reader: &mut Reader<'_>) -> Result<Mounting, ModelError> {
-    let mut per_px = [0.0; 2];
-    for part in &mut per_px {
-        *part = float(reader, "focal lengths per px", [-1.0, 1.0], "-1 to 1")?;
+fn tables<'a>(reader: &mut Reader<'a>) -> Result<Tables<'a>, ModelError> {
+    let offset = reader.offset;
+    let wrong = |name, allowed| ModelError::Field {
+        name,
+        offset,
+        allowed,
+    };
+    let [sizes @ .., functions, _, _] = reader.array::<8>()?;
+    let count = usize::from(functions);
+    let terms = Terms::new(sizes).filter(|_| (1..=MOST_FUNCTIONS).contains(&count));
+    let terms = terms.ok_or(wrong("tables", "1 to 88 terms and 1 to 24 functions"))?;
+    reader.offset -= 2;
+    reader.zero("reserved byte")?;
+    reader.zero("reserved byte")?;
+    let functions = reader.take(4 * count * terms.count())?;
+    let first = table(reader, count)?;
+    let mut dots = [first; DOTS];
+    for dot in dots.iter_mut().skip(1) {
+        *dot = table(reader, count)?;
     }
-    Ok(Mounting {
-        per_px,
-        beside_mm: markers(reader, "glued beside", [-2.0, 2.0], "-2 to 2 mm")?,
+    Tables::new(terms, functions, dots).ok_or(wrong("functions", "-1000000 to 1000000"))
+}
+
+fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, ModelError> {
+    let offset = reader.offset;
+    let wrong = |name, allowed| ModelError::Field {
+        name,
+        offset,
+        allowed,
+    };
+    let counts = reader.array::<2>()?;
+    reader.zero("reserved byte")?;
+    reader.zero("reserved byte")?;
+    let mut axis = |count: u8| {
+        let mut nodes_mm = [0.0; *NODES.end()];
+        let nodes = nodes_mm.get_mut(..usize::from(count));
+        let nodes = nodes.ok_or(wrong("table", "6 to 16 nodes"))?;
+        for node in nodes.iter_mut() {
+            *node = f32::from_le_bytes(reader.array()?);
+        }
+        let axis = Axis::new(nodes);
+        axis.ok_or(wrong("table's nodes", "6 to 16, growing from -100 to 100 mm"))
+    };
+    let axes = [axis(counts[0])?, axis(counts[1])?];
+    let away = pair(reader, "direction", [-1.0, 1.0], "-1 to 1")?;
+    let [sizes, steps] = Table::lengths(&axes, functions);
+    let (sizes, steps) = (reader.take(sizes)?, reader.take(steps)?);
+    reader.pad()?;
+    Table::new(axes, away, functions, sizes, steps).ok_or(wrong("table's size of a step", "0 to 1"))
+}
+
+fn covariances<'a>(reader: &mut Reader<'a>) -> Result<CovarianceGrid<'a>, ModelError> {
+    let offset = reader.offset;
+    let counts = reader.array::<3>()?;
+    reader.zero("reserved byte")?;
+    let end_mm = f32::from_le_bytes(reader.array()?);
+    let knots = reader.take(CovarianceGrid::length(counts))?;
+    CovarianceGrid::new(counts, end_mm, knots).ok_or(ModelError::Field {
+        name: "covariances",
+        offset,
+        allowed: "2 to 16 knots along each axis, an end of 0.1 to 100 mm and steps of 0 to 0.001",
     })
 }
 
@@ -114,30 +149,6 @@ fn markers(
         *part = float(reader, name, range, allowed)?;
     }
     Ok(markers)
-}
-
-fn table<'a>(reader: &mut Reader<'a>, outputs: usize) -> Result<Table<'a>, ModelError> {
-    let offset = reader.offset;
-    let [count, sizes @ .., _] = reader.array::<8>()?;
-    let count = usize::from(count);
-    let [sizes @ .., zero] = sizes;
-    let terms = Terms::new(sizes).filter(|_| NODES.contains(&count) && zero == 0);
-    let wrong = |name, allowed| ModelError::Field {
-        name,
-        offset,
-        allowed,
-    };
-    let terms = terms.ok_or(wrong("table", "6 to 16 nodes and 1 to 88 terms"))?;
-    let mut nodes_mm = [0.0; *NODES.end()];
-    for node in nodes_mm.iter_mut().take(count) {
-        *node = f32::from_le_bytes(reader.array()?);
-    }
-    let axis = Axis::new(nodes_mm.get(..count).unwrap_or_default());
-    let axis = axis.ok_or(wrong("table's nodes", "growing from -100 to 100 mm"))?;
-    let [sizes, steps] = Table::lengths(&axis, &terms, outputs);
-    let (sizes, steps) = (reader.take(sizes)?, reader.take(steps)?);
-    reader.pad()?;
-    Table::new(axis, terms, outputs, sizes, steps).ok_or(wrong("table's size of a step", "0 to 1"))
 }
 
 fn pair(
@@ -182,43 +193,54 @@ pub struct ForwardSpec {
     pub stiffness: Stiffness,
     /// What a rest picture says of a unit.
     pub rest_image: RestImage,
-    /// What is known of one unit beside its rest picture.
-    pub mounting: Option<Mounting>,
+    /// Focal lengths per px of the unit's own camera.
+    pub per_px: Option<[f32; 2]>,
     /// How well markers are seen.
     pub noise: Noise,
-    /// What is not known of the unit.
-    pub own: SystematicSpec,
-    /// How far another unit may differ.
-    pub other: Tolerance,
-    /// [`Tables::moved`], one output.
-    pub moved: TableSpec,
-    /// [`Tables::beside`], two outputs.
-    pub beside: TableSpec,
-    /// [`Tables::own`], eight outputs.
-    pub own_table: Option<TableSpec>,
+    /// How the images move.
+    pub tables: TablesSpec,
+    /// What the tables leave of its own unit's motion.
+    pub own: Option<CovarianceSpec>,
+    /// What they leave of any other unit's.
+    pub other: Option<CovarianceSpec>,
 }
 
-/// What is not known of a unit, to be written.
+/// The tables of a film, to be written.
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
-pub struct SystematicSpec {
-    /// Places go to so many mm either way.
-    pub end_mm: f32,
-    /// Standard uncertainties by size, place along y and place along x ([`SystematicGrid`]): of the
-    /// force across itself, N, of |F|, as sizes, of the place, mm, and of the residual.
-    pub knots: Vec<[f32; PARTS]>,
+pub struct TablesSpec {
+    /// What [`Terms::new`] takes.
+    pub terms: [u8; MOST_TILTS],
+    /// Functions of size and tilt, each so much of each term.
+    pub functions: Vec<Vec<f32>>,
+    /// A table of each marker.
+    pub dots: Vec<TableSpec>,
 }
 
-/// A table, to be written.
+/// A marker's table, to be written.
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableSpec {
-    /// The nodes of both axes, mm.
-    pub nodes_mm: Vec<f32>,
-    /// What [`Terms::new`] takes.
-    pub terms: [u8; crate::forward::MOST_TILTS],
-    /// By node along y, node along x, output and term.
+    /// The nodes along x and along y, mm.
+    pub nodes_mm: [Vec<f32>; 2],
+    /// The direction along which the first part of its functions' tilt is, of length one.
+    pub away: [f32; 2],
+    /// By node along y, node along x, output (motion along x, along y) and function: B-splines'
+    /// coefficients.
     pub coefficients: Vec<f64>,
+}
+
+/// Covariances of x and y of all images, to be written.
+#[cfg(any(test, feature = "encode"))]
+#[derive(Clone, Debug, PartialEq)]
+pub struct CovarianceSpec {
+    /// Knots along the size, along y and along x.
+    pub counts: [u8; 3],
+    /// Places go to so many mm either way.
+    pub end_mm: f32,
+    /// By size, place along y and place along x: the lower factor of each covariance, focal
+    /// lengths.
+    pub factors: Vec<[[f64; EQUATIONS]; EQUATIONS]>,
 }
 
 #[cfg(any(test, feature = "encode"))]
@@ -231,99 +253,86 @@ impl ForwardSpec {
     }
 
     pub(super) fn push(&self, bytes: &mut Vec<u8>) {
-        bytes.extend([
-            self.steps,
-            u8::from(self.mounting.is_some()),
-            u8::from(self.own_table.is_some()),
-            0,
-        ]);
-        let nothing = Mounting {
-            per_px: [0.0; 2],
-            beside_mm: Markers::default(),
-        };
-        let mounting = self.mounting.unwrap_or(nothing);
-        let before = [
+        let covariances = u8::from(self.own.is_some()) + 2 * u8::from(self.other.is_some());
+        let camera = u8::from(self.per_px.is_some());
+        bytes.extend([self.steps, camera, DOTS as u8, covariances]);
+        let load = [
             self.limits.size,
             self.limits.tilt,
             self.stiffness.linear_n,
             self.stiffness.cubic_n,
-            self.rest_image.corner,
         ];
-        let parts = before.iter().chain(&self.rest_image.film_mm);
+        let parts = load.iter().chain(self.rest_image.at.as_flattened());
+        let parts = parts.chain(self.rest_image.film_mm.as_flattened());
         let parts = parts.chain(self.noise.rest_px.as_flattened());
-        let parts = parts
-            .chain(&self.noise.at_rest_px)
-            .chain(&self.noise.at_four_areas);
-        let other = [self.other.shape, self.other.stiffness];
-        let parts = parts.chain(&other).chain(&mounting.per_px);
-        for part in parts.chain(mounting.beside_mm.as_flattened()) {
+        let parts = parts.chain(&self.noise.at_rest_px);
+        let parts = parts.chain(&self.noise.at_four_areas);
+        for part in parts.chain(&self.per_px.unwrap_or_default()) {
             bytes.extend(part.to_le_bytes());
         }
-        self.own.push(bytes);
-        for (table, outputs) in [(&self.moved, MOVED), (&self.beside, BESIDE)] {
-            table.push(outputs, bytes);
-        }
-        if let Some(own) = &self.own_table {
-            own.push(OWN, bytes);
+        self.tables.push(bytes);
+        for covariances in self.own.iter().chain(&self.other) {
+            covariances.push(bytes);
         }
     }
 }
 
 #[cfg(any(test, feature = "encode"))]
-impl SystematicSpec {
-    /// Each part's step is the largest of its numbers over 65,535; numbers are rounded up, as
-    /// nothing is known better than it is said to be.
+impl TablesSpec {
     fn push(&self, bytes: &mut Vec<u8>) {
-        let mut steps = [0.0_f32; PARTS];
-        for knot in &self.knots {
-            for (step, part) in steps.iter_mut().zip(knot) {
-                *step = step.max(*part / f32::from(u16::MAX));
-            }
-        }
-        for number in [self.end_mm].iter().chain(&steps) {
-            bytes.extend(number.to_le_bytes());
-        }
-        for knot in &self.knots {
-            for (part, step) in knot.iter().zip(steps) {
-                let count = if step > 0.0 {
-                    libm::ceilf(part / step)
-                } else {
-                    0.0
-                };
-                bytes.extend((count as u16).to_le_bytes());
-            }
+        bytes.extend(self.terms);
+        bytes.extend([self.functions.len() as u8, 0, 0]);
+        let parts = self.functions.iter().flatten();
+        bytes.extend(parts.flat_map(|part| part.to_le_bytes()));
+        for table in &self.dots {
+            table.push(self.functions.len(), bytes);
         }
     }
 }
 
 #[cfg(any(test, feature = "encode"))]
 impl TableSpec {
-    /// Each output's and term's step is the largest of its coefficients over 32,767.
-    fn push(&self, outputs: usize, bytes: &mut Vec<u8>) {
-        let nodes = self.nodes_mm.len();
-        bytes.push(u8::try_from(nodes).unwrap_or(u8::MAX));
-        bytes.extend(self.terms);
-        bytes.extend([0; 2]);
-        bytes.extend(self.nodes_mm.iter().flat_map(|node| node.to_le_bytes()));
-        let row = self.coefficients.len() / (nodes * nodes).max(1);
+    /// Each output's and function's step is the largest of its coefficients over 32,767.
+    fn push(&self, functions: usize, bytes: &mut Vec<u8>) {
+        let [nodes_x, nodes_y] = self.nodes_mm.each_ref().map(Vec::len);
+        bytes.extend([nodes_x as u8, nodes_y as u8, 0, 0]);
+        let nodes = self.nodes_mm.iter().flatten();
+        bytes.extend(nodes.chain(&self.away).flat_map(|part| part.to_le_bytes()));
+        let row = OUTPUTS * functions;
         let mut sizes = alloc::vec![0.0_f64; row];
         for of_node in self.coefficients.chunks(row.max(1)) {
             for (size, value) in sizes.iter_mut().zip(of_node) {
                 *size = size.max(value.abs() / f64::from(i16::MAX));
             }
         }
-        debug_assert_eq!(row % outputs, 0);
         let sizes: Vec<f32> = sizes.into_iter().map(|size| size as f32).collect();
         bytes.extend(sizes.iter().flat_map(|size| size.to_le_bytes()));
-        for y in 0..nodes {
+        for y in 0..nodes_y {
             for (k, size) in sizes.iter().enumerate() {
-                for x in 0..nodes {
-                    let value = self.coefficients[(y * nodes + x) * row + k];
+                for x in 0..nodes_x {
+                    let value = self.coefficients[(y * nodes_x + x) * row + k];
                     bytes.extend(step(value, *size).to_le_bytes());
                 }
             }
         }
         bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+}
+
+#[cfg(any(test, feature = "encode"))]
+impl CovarianceSpec {
+    /// As a file has it. Each knot's step is the largest of its entries over 32,767.
+    pub fn push(&self, bytes: &mut Vec<u8>) {
+        bytes.extend(self.counts);
+        bytes.push(0);
+        bytes.extend(self.end_mm.to_le_bytes());
+        for factor in &self.factors {
+            let entries = || (0..EQUATIONS).flat_map(|i| &factor[i][..=i]);
+            let largest = entries().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            let size = (largest / f64::from(i16::MAX)) as f32;
+            bytes.extend(size.to_le_bytes());
+            bytes.extend(entries().flat_map(|entry| step(*entry, size).to_le_bytes()));
+        }
     }
 }
 

@@ -18,7 +18,7 @@ pub(super) const MAGIC: [u8; 4] = *b"HVTM";
 /// The layout of models that tell forces.
 pub(super) const FORCE_VERSION: u16 = 3;
 /// The layout of models that tell forces and their places.
-pub(super) const PLACE_VERSION: u16 = 5;
+pub(super) const PLACE_VERSION: u16 = 7;
 /// How the weights lie: `packing`.
 pub(super) const PACKING: u8 = 1;
 /// What there is beside the layers: nothing, or the film run forwards.
@@ -103,7 +103,7 @@ fn output_kind(reader: &mut Reader<'_>, version: u16) -> Result<OutputKind, Mode
     Err(ModelError::Field {
         name: "output kind",
         offset,
-        allowed: "0 or 1 in version 3, 2 in version 5",
+        allowed: "0 or 1 in version 3, 2 in version 7",
     })
 }
 

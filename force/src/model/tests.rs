@@ -30,7 +30,7 @@ fn a_model_of_places_is_written_and_read() {
     for widths in [&[11, 5][..], &[11, 64, 64, 5]] {
         let spec = place_spec(widths);
         let bytes = spec.encode().unwrap();
-        assert_eq!(bytes[4..6], [5, 0], "its version");
+        assert_eq!(bytes[4..6], [7, 0], "its version");
         let model = Model::parse(&bytes).unwrap();
         assert_eq!(read_back(&model), spec);
         assert_eq!(model.range.place, Micrometres(4_000));

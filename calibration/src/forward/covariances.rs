@@ -1,0 +1,144 @@
+//! What a film's tables leave of how a unit's images move: covariances at even places and sizes.
+
+use anyhow::Result;
+use hivtac_film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_sensing::forward::EQUATIONS;
+use hivtac_sensing::model::CovarianceSpec;
+use rayon::prelude::*;
+
+use super::matrix::cholesky;
+
+/// Places go to so many mm either way.
+const END_MM: f64 = 4.2;
+/// Knots along the size, along y and along x.
+const KNOTS: [u8; 3] = [5, 5, 5];
+/// The same where covariances do not depend on the place.
+const ANYWHERE: [u8; 3] = [5, 2, 2];
+
+/// How much all images move, x and y of each marker, focal lengths along the film's axes.
+pub type Moved = [f64; EQUATIONS];
+
+/// The covariance of images' motion.
+pub type Covariance = [[f64; EQUATIONS]; EQUATIONS];
+
+/// The sum of squares of differences of motion.
+pub fn sum_of_squares(differences: &[Moved]) -> Covariance {
+    let mut sum = Covariance::default();
+    for difference in differences {
+        for (row, a) in sum.iter_mut().zip(difference) {
+            for (sum, b) in row.iter_mut().zip(difference) {
+                *sum += a * b;
+            }
+        }
+    }
+    sum
+}
+
+/// Covariances as a model file has them, each of straight loads of a size at a place.
+///
+/// # Errors
+/// When one of them cannot be had.
+pub fn covariances(at: impl Fn(&Pose) -> Result<Covariance> + Sync) -> Result<CovarianceSpec> {
+    grid(KNOTS, at)
+}
+
+/// Independent errors of every coordinate, everywhere the same, that grow with the size: so large,
+/// focal lengths, at the largest.
+pub fn even(largest: f64) -> CovarianceSpec {
+    let at = |pose: &Pose| {
+        let mut covariance = Covariance::default();
+        for (k, row) in covariance.iter_mut().enumerate() {
+            row[k] = (largest * pose.size / LARGEST_SIZE).powi(2);
+        }
+        covariance
+    };
+    CovarianceSpec {
+        factors: poses(ANYWHERE).map(|pose| factor(&at(&pose))).collect(),
+        counts: ANYWHERE,
+        end_mm: END_MM as f32,
+    }
+}
+
+fn grid(
+    counts: [u8; 3],
+    at: impl Fn(&Pose) -> Result<Covariance> + Sync,
+) -> Result<CovarianceSpec> {
+    let poses: Vec<Pose> = poses(counts).collect();
+    let factors = poses.par_iter().map(|pose| Ok(factor(&at(pose)?)));
+    Ok(CovarianceSpec {
+        factors: factors.collect::<Result<_>>()?,
+        counts,
+        end_mm: END_MM as f32,
+    })
+}
+
+/// The loads of the knots.
+fn poses([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
+    let along = |k: u8, count: u8| f64::from(k) / f64::from(count - 1);
+    let place = move |k: u8, count: u8| END_MM * (2.0 * along(k, count) - 1.0);
+    let of_size = move |i: u8| {
+        let of_line = move |j: u8| {
+            (0..places).map(move |k| Pose {
+                size: LARGEST_SIZE * along(i, sizes).powi(2),
+                tilt: [0.0; 2],
+                place_mm: [place(k, places), place(j, lines)],
+            })
+        };
+        (0..lines).flat_map(of_line)
+    };
+    (0..sizes).flat_map(of_size)
+}
+
+fn factor(covariance: &Covariance) -> Covariance {
+    let rows = covariance.iter().map(|row| row.to_vec()).collect();
+    let factor = cholesky(rows);
+    std::array::from_fn(|i| std::array::from_fn(|j| factor[i][j]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_sensing::forward::{CovarianceGrid, Limits, Pose as ChipPose};
+
+    /// What a chip reads of a grid is what went in, at knots and between them.
+    #[test]
+    fn a_chip_reads_what_was_written() {
+        let wave = |k: usize, pose: &Pose| -> Moved {
+            let [x, y] = pose.place_mm;
+            std::array::from_fn(|i| pose.size * (0.1 + 0.01 * x * ((i + k) as f64).sin() + 0.01 * y))
+        };
+        let truth = |pose: &Pose| sum_of_squares(&[0, 5, 9].map(|k| wave(k, pose)));
+        let spec = covariances(|pose| Ok(truth(pose))).unwrap();
+        let mut bytes = Vec::new();
+        spec.push(&mut bytes);
+        let grid = CovarianceGrid::new(spec.counts, spec.end_mm, &bytes[8..]).unwrap();
+        let limits = Limits {
+            size: LARGEST_SIZE as f32,
+            tilt: 0.6,
+        };
+        for (size, place_mm, part) in [
+            (LARGEST_SIZE, [1.4, -2.8], 1e-4),
+            (LARGEST_SIZE / 4.0, [-4.2, 0.0], 1e-4),
+            (0.45, [0.3, -2.0], 0.1),
+        ] {
+            let pose = Pose {
+                size,
+                place_mm,
+                ..Pose::default()
+            };
+            let chip = ChipPose {
+                size: size as f32,
+                place_mm: place_mm.map(|part| part as f32),
+                ..ChipPose::default()
+            };
+            let (found, truth) = (grid.at(&chip, &limits), truth(&pose));
+            for i in 0..EQUATIONS {
+                for j in 0..=i {
+                    let off = f64::from(found[i][j]) - truth[i][j];
+                    let whole = (truth[i][i] * truth[j][j]).sqrt();
+                    assert!(off.abs() < part * whole, "{pose:?} {i} {j}: {off} {whole}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! The few functions of size and tilt that a film's tables are made of, from coefficients of many
+//! terms: the principal components over places, markers and directions.
+
+use anyhow::Result;
+use hivtac_film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
+use hivtac_sensing::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
+use hivtac_sensing::model::{TableSpec, TablesSpec};
+
+use super::matrix::{cholesky, principal};
+use super::nearest::splines;
+
+/// Loads by which components are judged: so many sizes, evenly from nothing to the largest, and
+/// directions of each, so many at each part of the largest tilt, as many as cover it evenly. Weak
+/// forces are most of them: the same error turns them most.
+const SIZES: u8 = 16;
+const RINGS: [(f64, u8); 4] = [(0.0, 1), (0.4, 6), (0.7, 10), (0.95, 16)];
+
+/// A marker's motion at the nodes of its own axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sampled {
+    /// The nodes along x and along y, mm of the tip's place, growing; 6 to 16 each.
+    pub nodes_mm: [Vec<f64>; 2],
+    /// The direction, of length one, along which the first part of the terms' tilt is; the second is
+    /// across it, from x towards y. Markers that see the load alike, each from its own side, need
+    /// few functions.
+    pub away: [f64; 2],
+    /// By node along y and node along x: coefficients of the terms, of motion along x and of motion
+    /// along y, focal lengths.
+    pub coefficients: Vec<Vec<[Vec<f64>; OUTPUTS]>>,
+}
+
+/// The tables of markers that move so, with as few functions of size and tilt as leave no more than
+/// `left`, root mean square over loads, places and directions, in focal lengths; or with `most`
+/// where it takes more. Also what these leave.
+///
+/// # Errors
+/// When an axis has nodes that are none.
+pub fn compressed(
+    sizes: [u8; MOST_TILTS],
+    dots: &[Sampled],
+    left: f64,
+    most: usize,
+) -> Result<(TablesSpec, f64)> {
+    let terms = Terms::with_sizes(sizes);
+    let metric = cholesky(gram(&terms));
+    let components = principal(squares(dots, &metric, terms.count()));
+    let mut square: f64 = components.iter().map(|(value, _)| value.max(0.0)).sum();
+    let mut count = 0;
+    while square > left * left && count < most.min(MOST_FUNCTIONS) {
+        square -= components[count].0;
+        count += 1;
+    }
+    let kept: Vec<&[f64]> = components[..count.max(1)]
+        .iter()
+        .map(|(_, direction)| &direction[..])
+        .collect();
+    let function = |direction: &&[f64]| -> Vec<f32> {
+        let parts = back(&metric, direction);
+        parts.into_iter().map(|part| part as f32).collect()
+    };
+    let dots = dots.iter().map(|dot| table(dot, &metric, &kept));
+    let tables = TablesSpec {
+        terms: sizes,
+        functions: kept.iter().map(function).collect(),
+        dots: dots.collect::<Result<_>>()?,
+    };
+    Ok((tables, square.max(0.0).sqrt()))
+}
+
+/// A marker's table, of functions along these directions.
+fn table(dot: &Sampled, metric: &[Vec<f64>], kept: &[&[f64]]) -> Result<TableSpec> {
+    let at = |outputs: &[Vec<f64>; OUTPUTS]| -> Vec<f64> {
+        let outputs = outputs.iter().map(|row| along(metric, row));
+        let parts = outputs.flat_map(|row| kept.iter().map(move |own| dot_product(own, &row)));
+        parts.collect()
+    };
+    let line = |line: &Vec<_>| line.iter().map(at).collect();
+    let rows: Vec<Vec<Vec<f64>>> = dot.coefficients.iter().map(line).collect();
+    let [along_x, along_y] = dot.nodes_mm.each_ref().map(|nodes| Axis::new(nodes));
+    let coefficients = splines([&along_x, &along_y], &rows)?;
+    Ok(TableSpec {
+        away: dot.away.map(|part| part as f32),
+        nodes_mm: dot
+            .nodes_mm
+            .each_ref()
+            .map(|nodes| nodes.iter().map(|node| *node as f32).collect()),
+        coefficients: coefficients.into_iter().flatten().flatten().collect(),
+    })
+}
+
+/// Mean products of terms over loads as they come: sums of terms are as large as what they sum up.
+fn gram(terms: &Terms) -> Vec<Vec<f64>> {
+    let count = terms.count();
+    let mut sum = vec![vec![0.0; count]; count];
+    let loads = loads();
+    for pose in &loads {
+        let [values, ..] = terms.rows(pose);
+        for (row, a) in sum.iter_mut().zip(&values) {
+            for (sum, b) in row.iter_mut().zip(&values) {
+                *sum += a * b / loads.len() as f64;
+            }
+        }
+    }
+    sum
+}
+
+fn loads() -> Vec<Pose> {
+    let mut loads = Vec::new();
+    for number in 1..=SIZES {
+        for (ring, count) in RINGS {
+            for k in 0..count {
+                let turn = (f64::from(k) + 0.37 * f64::from(number)) / f64::from(count);
+                let (sin, cos) = libm::sincos(2.0 * std::f64::consts::PI * turn);
+                loads.push(Pose {
+                    size: LARGEST_SIZE * f64::from(number) / f64::from(SIZES),
+                    tilt: [cos, sin].map(|part| ring * LARGEST_TILT * part),
+                    place_mm: [0.0; 2],
+                });
+            }
+        }
+    }
+    loads
+}
+
+/// Lᵀ·c: as long as the sum of terms with coefficients c is large.
+fn along(metric: &[Vec<f64>], coefficients: &[f64]) -> Vec<f64> {
+    let part = |j: usize| {
+        let rows = metric.iter().zip(coefficients).skip(j);
+        rows.map(|(row, c)| row[j] * c).sum()
+    };
+    (0..coefficients.len()).map(part).collect()
+}
+
+/// The coefficients that [`along`] makes this of; nothing of what loads do not tell.
+fn back(metric: &[Vec<f64>], along: &[f64]) -> Vec<f64> {
+    let mut coefficients = along.to_vec();
+    for j in (0..coefficients.len()).rev() {
+        let known: f64 = (j + 1..coefficients.len())
+            .map(|i| metric[i][j] * coefficients[i])
+            .sum();
+        coefficients[j] = match metric[j][j] > 0.0 {
+            true => (coefficients[j] - known) / metric[j][j],
+            false => 0.0,
+        };
+    }
+    coefficients
+}
+
+/// Mean squares of motion over places, markers and directions.
+fn squares(dots: &[Sampled], metric: &[Vec<f64>], count: usize) -> Vec<Vec<f64>> {
+    let mut sum = vec![vec![0.0; count]; count];
+    let outputs = (OUTPUTS * dots.len()) as f64;
+    for dot in dots {
+        let [parts_x, parts_y] = dot.nodes_mm.each_ref().map(|nodes| parts(nodes));
+        for (line, part_y) in dot.coefficients.iter().zip(&parts_y) {
+            for (at, part_x) in line.iter().zip(&parts_x) {
+                for row in at {
+                    add_square(&mut sum, &along(metric, row), part_x * part_y / outputs);
+                }
+            }
+        }
+    }
+    sum
+}
+
+/// Which part of an axis each node stands for.
+fn parts(nodes: &[f64]) -> Vec<f64> {
+    let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
+    let part = |k: usize| {
+        let before = if k == 0 { first } else { nodes[k - 1] };
+        let after = nodes.get(k + 1).copied().unwrap_or(last);
+        (after - before) / 2.0 / (last - first)
+    };
+    (0..nodes.len()).map(part).collect()
+}
+
+fn add_square(sum: &mut [Vec<f64>], row: &[f64], part: f64) {
+    for (sum, a) in sum.iter_mut().zip(row) {
+        for (sum, b) in sum.iter_mut().zip(row) {
+            *sum += part * a * b;
+        }
+    }
+}
+
+fn dot_product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
