@@ -42,6 +42,20 @@ pub fn covariances(at: impl Fn(&Pose) -> Result<Covariance> + Sync) -> Result<Co
     grid(KNOTS, at)
 }
 
+/// The loads of the knots of [`covariances`], in a file's order.
+pub fn knots() -> impl Iterator<Item = Pose> {
+    poses(KNOTS)
+}
+
+/// Covariances that are known at the [`knots`], as a model file has them.
+pub fn covariances_of(knots: Vec<Covariance>) -> CovarianceSpec {
+    CovarianceSpec {
+        factors: knots.iter().map(factor).collect(),
+        counts: KNOTS,
+        end_mm: END_MM as f32,
+    }
+}
+
 /// Independent errors of every coordinate, everywhere the same, that grow with the size: so large,
 /// focal lengths, at the largest.
 pub fn even(largest: f64) -> CovarianceSpec {

@@ -25,7 +25,7 @@ use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
 
 use covariances::{even, sum_of_squares};
-pub use covariances::{Covariance, Moved, covariances};
+pub use covariances::{Covariance, Moved, covariances, covariances_of, knots};
 pub use functions::{Sampled, compressed};
 pub use noise::Noise;
 use others::others;

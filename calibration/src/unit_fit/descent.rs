@@ -3,6 +3,7 @@
 use anyhow::Result;
 
 use super::linear::Matrix;
+use super::own::FoundNumber;
 use super::problem::{At, Problem, Unknowns};
 
 /// Steps at most, and the change of χ² that ends them.
@@ -18,7 +19,26 @@ pub struct Found {
     pub covariance: Matrix,
 }
 
+impl Found {
+    /// χ² over the number of coordinates that were seen; at least 1.
+    pub fn scatter(&self) -> f64 {
+        let seen = self.at.residuals.iter().flatten().count() + 2 * self.at.made.dots_mm.len();
+        (self.at.square() / seen as f64).max(1.0)
+    }
+}
+
 impl Problem<'_> {
+    /// What was found of each number.
+    pub fn found_numbers(&self, found: &Found) -> Vec<FoundNumber> {
+        let parts = self.priors.iter().zip(&found.at.unknowns.numbers).enumerate();
+        let of_number = parts.map(|(k, (prior, part))| FoundNumber {
+            name: prior.number.name(),
+            value: prior.value(*part),
+            sigma: prior.sigma * (found.scatter() * found.covariance[k][k]).sqrt(),
+        });
+        of_number.collect()
+    }
+
     /// Every unknown as it is most likely before there is a load.
     pub fn likeliest(&self) -> Unknowns {
         Unknowns {

@@ -6,5 +6,6 @@ pub mod field;
 pub mod linear;
 pub mod load;
 pub mod numbers;
+pub mod own;
 pub mod problem;
 pub mod seen;

@@ -41,6 +41,39 @@ pub struct Prior {
     pub range: [f64; 2],
 }
 
+impl Number {
+    /// What it is, with its unit.
+    pub fn name(self) -> String {
+        let along = |axis: usize| ["x", "y", "z"][axis];
+        match self {
+            Number::Film(change) => match change {
+                Change::Force(_) | Change::Place(_) => "load".into(),
+                Change::Youngs => "film's Young's modulus, ln".into(),
+                Change::Thickness => "film's thickness, ln".into(),
+                Change::Grip => "posts' grip, ln".into(),
+                Change::TipRadius => "tip's radius, mm".into(),
+                Change::Post(post, axis) => format!("post {post}, {}, mm", along(axis)),
+                Change::Stretch(axis) => format!("film's stretch along {}", along(axis)),
+                Change::NeoHooke => "part of neo-Hooke's law".into(),
+                Change::Stiffening => "stiffening, C2/C1".into(),
+                Change::ThicknessSlope(axis) => format!("thickness's slope along {}", along(axis)),
+                Change::ThicknessCurve(k) => format!("thickness's curve {}", ["xx", "xy", "yy"][k]),
+                Change::DotStiffening => "dots' stiffness in parts of the film's".into(),
+                Change::Down(axis) => format!("gravity along {}, g", along(axis)),
+                Change::PostRadius => "posts' radius, mm".into(),
+                Change::Overhang => "overhang, mm".into(),
+            },
+            Number::Marker(k, axis) => format!("marker {k}, {}, mm", along(axis)),
+            Number::Rest(k, axis) => format!("pixel grid at rest, marker {k}, {}, px", along(axis)),
+            Number::Roll => "camera's roll, °".into(),
+            Number::Focal => "focal length, ln".into(),
+            Number::Distance => "camera's distance beyond the nominal one, mm".into(),
+            Number::Middle(axis) => format!("optical axis, {}, px", along(axis)),
+            Number::Stage(axis) => format!("stage's zero, {}, mm", along(axis)),
+        }
+    }
+}
+
 impl Prior {
     /// With a mean of 0 and a range of four standard deviations.
     pub fn about_zero(number: Number, sigma: f64) -> Prior {

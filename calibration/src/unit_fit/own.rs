@@ -1,0 +1,214 @@
+//! A unit's own film as a model file holds it: tables of its dots, and what is not known of them.
+
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+use anyhow::{Context, Result};
+use hivtac_film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_sensing::forward::{EQUATIONS, MOST_TILTS};
+use hivtac_sensing::model::{CovarianceSpec, TableSpec, TablesSpec};
+use serde::{Deserialize, Serialize};
+
+use super::descent::Found;
+use super::field::{Coefficients, Field};
+use super::linear::{cholesky, dot};
+use super::numbers::Number;
+use super::problem::{Problem, press};
+use crate::forward::{Covariance, Dot, covariances_of, knots, tables};
+
+/// Nodes along each axis of a dot's table.
+const NODES: usize = 13;
+
+/// A unit's film as its loads tell it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnFilm {
+    /// What was found of each number of the unit.
+    pub numbers: Vec<FoundNumber>,
+    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    pub stiffness_n: [f64; 2],
+    /// Focal lengths per px of its camera, a complex number.
+    pub per_px: [f64; 2],
+    /// What a tare takes for the rest position less where the markers rest, px.
+    pub rest_px: Vec<[f64; 2]>,
+    /// How many sizes the tables' terms have without tilt, with its first degree, and so on.
+    terms: [u8; MOST_TILTS],
+    /// The load functions, each so much of each term.
+    functions: Vec<Vec<f32>>,
+    dots: Vec<OwnTable>,
+    covariance: OwnCovariance,
+}
+
+/// A number of a unit that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FoundNumber {
+    /// What it is, with its unit.
+    pub name: String,
+    /// The likeliest value.
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub sigma: f64,
+}
+
+/// A dot's table: as [`TableSpec`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OwnTable {
+    nodes_mm: [Vec<f32>; 2],
+    away: [f32; 2],
+    coefficients: Vec<f64>,
+}
+
+/// As [`CovarianceSpec`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OwnCovariance {
+    counts: [u8; 3],
+    end_mm: f32,
+    /// Row by row, of each knot.
+    factors: Vec<Vec<f64>>,
+}
+
+impl OwnFilm {
+    /// Of a unit that was found.
+    ///
+    /// # Errors
+    /// When its film finds no equilibrium under a load of the tables.
+    pub fn new(problem: &Problem<'_>, found: &Found) -> Result<Self> {
+        let field = Field::new(problem, &found.at)?;
+        let made = &found.at.made;
+        let (tables, left) = tables_of(&field, &made.dots_mm)?;
+        let noise = found.scatter().sqrt();
+        let beside = left.hypot(problem.bench.noise_px * (noise * noise - 1.0).max(0.0).sqrt() / made.focal_px);
+        let covariance = left_open(problem, found, &field, beside)?;
+        let (sin, cos) = libm::sincos(made.roll_deg.to_radians());
+        Ok(Self {
+            numbers: problem.found_numbers(found),
+            stiffness_n: field.stiffness_n(),
+            per_px: [cos, -sin].map(|part| part / made.focal_px),
+            rest_px: made.rest_px.clone(),
+            terms: tables.terms,
+            functions: tables.functions,
+            dots: (tables.dots.into_iter())
+                .map(|table| OwnTable {
+                    nodes_mm: table.nodes_mm,
+                    away: table.away,
+                    coefficients: table.coefficients,
+                })
+                .collect(),
+            covariance: OwnCovariance {
+                counts: covariance.counts,
+                end_mm: covariance.end_mm,
+                factors: covariance.factors.iter().map(|f| f.as_flattened().to_vec()).collect(),
+            },
+        })
+    }
+
+    /// The tables, as a model file has them.
+    pub fn tables(&self) -> TablesSpec {
+        let table = |table: &OwnTable| TableSpec {
+            nodes_mm: table.nodes_mm.clone(),
+            away: table.away,
+            coefficients: table.coefficients.clone(),
+        };
+        TablesSpec {
+            terms: self.terms,
+            functions: self.functions.clone(),
+            dots: self.dots.iter().map(table).collect(),
+        }
+    }
+
+    /// What is not known of the unit's motion, as a model file has it.
+    ///
+    /// # Errors
+    /// When a knot has another number of entries than a covariance.
+    pub fn covariance(&self) -> Result<CovarianceSpec> {
+        let factor = |entries: &Vec<f64>| -> Option<Covariance> {
+            let (rows, rest) = entries.as_chunks::<EQUATIONS>();
+            rest.is_empty().then(|| rows.try_into().ok())?
+        };
+        let factors = self.covariance.factors.iter().map(factor);
+        Ok(CovarianceSpec {
+            counts: self.covariance.counts,
+            end_mm: self.covariance.end_mm,
+            factors: factors.collect::<Option<_>>().context("film.own: a covariance of other markers")?,
+        })
+    }
+}
+
+/// The tables of dots on a film, and what they leave of the motion, root mean square, focal lengths.
+fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64)> {
+    let dots: Vec<Dot> = dots_mm.iter().map(|place| Dot::new(*place, NODES)).collect();
+    // All loads of a node are asked for one after the other.
+    let known: Mutex<HashMap<[u64; 3], Coefficients>> = Mutex::default();
+    tables(&dots, |pose, number| {
+        let [x, y] = pose.place_mm.map(f64::to_bits);
+        let key = [number as u64, x, y];
+        let poisoned = |_| anyhow::anyhow!("a thread stopped");
+        let kept = known.lock().map_err(poisoned)?.get(&key).cloned();
+        let coefficients = match kept {
+            Some(kept) => kept,
+            None => {
+                let made = field.coefficients(dots_mm[number], pose.place_mm);
+                known.lock().map_err(poisoned)?.insert(key, made.clone());
+                made
+            }
+        };
+        let [values, ..] = field.terms().rows(pose);
+        Ok(coefficients.each_ref().map(|row| dot(row, &values)))
+    })
+}
+
+/// What the loads leave open of how the unit's dots move, with errors of each coordinate, focal
+/// lengths, that grow with the size to this at the largest.
+fn left_open(
+    problem: &Problem<'_>,
+    found: &Found,
+    field: &Field<'_>,
+    beside: f64,
+) -> Result<CovarianceSpec> {
+    let at = &found.at;
+    let poses: Vec<Pose> = knots().collect();
+    let mut states = Vec::new();
+    for pose in &poses {
+        let at_mm = at.film.material_point(&at.rest, pose.place_mm);
+        let state = match pose.size > 0.0 {
+            true => press(&at.film, at_mm, field.force_n(pose), states.last().unwrap_or(&at.rest))?,
+            false => at.rest.clone(),
+        };
+        states.push(state);
+    }
+    let rates = problem.rates(at, &states)?;
+    let is_held = |k: &usize| !matches!(problem.priors[*k].number, Number::Stage(_) | Number::Middle(_));
+    let held: Vec<usize> = (0..problem.priors.len()).filter(is_held).collect();
+    let scatter = found.scatter();
+    let row = |i: &usize| held.iter().map(|j| scatter * found.covariance[*i][*j]).collect();
+    let spread = cholesky(held.iter().map(row).collect())?;
+    let per_px = 1.0 / at.made.focal_px;
+    let (sin, cos) = libm::sincos(at.made.roll_deg.to_radians());
+    let covariances = rates.pressed.iter().zip(&poses).map(|(rates, pose)| {
+        let mut covariance = Covariance::default();
+        for column in 0..held.len() {
+            let mut moved = [0.0; EQUATIONS];
+            for (k, row) in held.iter().zip(&spread) {
+                for (sum, rate) in moved.iter_mut().zip(&rates.numbers[*k]) {
+                    *sum += row[column] * rate;
+                }
+            }
+            for [x, y] in moved.as_chunks_mut::<2>().0 {
+                (*x, *y) = (per_px * (cos * *x + sin * *y), per_px * (cos * *y - sin * *x));
+            }
+            for (row, a) in covariance.iter_mut().zip(&moved) {
+                for (sum, b) in row.iter_mut().zip(&moved) {
+                    *sum += a * b;
+                }
+            }
+        }
+        for (k, row) in covariance.iter_mut().enumerate() {
+            row[k] += (beside * pose.size / LARGEST_SIZE).powi(2);
+        }
+        covariance
+    });
+    Ok(covariances_of(covariances.collect()))
+}
