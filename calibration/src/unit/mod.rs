@@ -11,7 +11,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::quantize::export;
 use crate::weights::Weights;
-use hivtac_data::collect::assemble::{Gauge, assemble};
+use hivtac_data::collect::assemble::{Gauge, How, assemble};
 use hivtac_data::collect::folder::{self, Recording};
 use hivtac_data::collect::gauge::Unit;
 use hivtac_data::collect::gauge_port::GaugeArgs;
@@ -132,7 +132,12 @@ impl GuideArgs {
             files if files.is_empty() => Gauge::AtThePort,
             files => Gauge::Files(files),
         };
-        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, true)?;
+        let how = How {
+            unit: self.gauge_unit,
+            holds: true,
+            ..How::default()
+        };
+        let (dataset, report) = assemble(&recording, &gauge, how)?;
         println!("All loads are recorded.\n{report}");
         eprintln!("Fitting the unit, and judging it on loads left out: half a minute or so.");
         let Known { gauge_n, stage_mm } = known;

@@ -35,7 +35,7 @@ pub fn usual() -> Vec<Planned> {
     let planned = USUAL.map(|(angles_deg, place_mm, force_mn)| Planned {
         pose: Pose {
             angles_deg,
-            place_mm,
+            place_mm: Some(place_mm),
         },
         force_mn,
     });
@@ -78,14 +78,15 @@ pub fn tasks(planned: &[Planned], seconds: f64) -> Vec<Task> {
 
 /// A pose for somebody who has a stage before them.
 fn words(pose: &Pose) -> String {
-    let ([alpha, beta], [x, y]) = (pose.angles_deg, pose.place_mm);
+    let [alpha, beta] = pose.angles_deg;
     let tilt = match pose.angles_deg {
         [0.0, 0.0] => "the film level".to_owned(),
         _ => format!("the film tilted by α = {alpha}°, β = {beta}°"),
     };
     let place = match pose.place_mm {
-        [0.0, 0.0] => "the tip over its middle".to_owned(),
-        _ => format!("the tip {x} mm along x and {y} mm along y off its middle"),
+        None => "the tip anywhere".to_owned(),
+        Some([0.0, 0.0]) => "the tip over its middle".to_owned(),
+        Some([x, y]) => format!("the tip {x} mm along x and {y} mm along y off its middle"),
     };
     format!("{tilt}, {place}")
 }

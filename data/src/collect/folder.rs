@@ -99,7 +99,7 @@ impl Folder {
             }),
             None => line += &",".repeat(12),
         }
-        line += &format!(",{}", pair(pose.map(|pose| pose.place_mm)));
+        line += &format!(",{}", pair(pose.and_then(|pose| pose.place_mm)));
         write_line(&mut self.samples, &line, SAMPLES)
     }
 
@@ -110,7 +110,7 @@ impl Folder {
     pub fn take_done(&mut self, pose: Option<Pose>, samples: usize, lost: u32) -> Result<()> {
         let [angles, place] = [
             pose.map(|pose| pose.angles_deg),
-            pose.map(|pose| pose.place_mm),
+            pose.and_then(|pose| pose.place_mm),
         ];
         let line = format!(
             "{},{},{samples},{lost},{}",
@@ -387,12 +387,16 @@ fn on_a_clock(host_s: f64) -> Result<()> {
     Ok(())
 }
 
-/// The pose whose angles and place begin at these columns.
+/// The pose whose angles and place begin at these columns; without a place the tip was anywhere.
 fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Option<Pose>> {
-    if record[angles].is_empty() && record[angles + 1].is_empty() {
+    let is_empty = |first: usize| record[first].is_empty() && record[first + 1].is_empty();
+    if is_empty(angles) {
         return Ok(None);
     }
     let texts = [angles, angles + 1, place, place + 1].map(|column| &record[column]);
+    if is_empty(place) {
+        return poses::parse_axis(&texts[..2].join(",")).map(Some);
+    }
     ensure!(
         texts.iter().all(|text| !text.is_empty()),
         "half a pose: {texts:?}"
@@ -460,7 +464,7 @@ mod tests {
     fn tilted() -> Pose {
         Pose {
             angles_deg: [4.0, -3.5],
-            place_mm: [0.5, -2.0],
+            place_mm: Some([0.5, -2.0]),
         }
     }
 
