@@ -11,6 +11,7 @@
 
 pub mod align;
 pub mod assemble;
+pub mod coverage;
 pub mod folder;
 pub mod gauge;
 pub mod gauge_port;
