@@ -13,7 +13,6 @@ use crate::quantize::export;
 use crate::weights::Weights;
 use hivtac_data::collect::assemble::{Gauge, How, assemble};
 use hivtac_data::collect::folder::{self, Recording};
-use hivtac_data::collect::gauge::Unit;
 use hivtac_data::collect::gauge_port::GaugeArgs;
 use hivtac_data::collect::poses;
 use hivtac_data::collect::record::{self, RecordArgs, seconds};
@@ -56,9 +55,6 @@ pub struct GuideArgs {
     /// What the gauge recorded by itself, once all loads are done, as `collect align` takes it.
     #[arg(long, value_name = "FILE", requires = "into")]
     gauge: Vec<PathBuf>,
-    /// The unit of readings that name none.
-    #[arg(long, default_value = "N")]
-    gauge_unit: Unit,
 }
 
 /// What is known of the bench, for the fit.
@@ -127,13 +123,13 @@ impl GuideArgs {
     fn fit(&self, into: &Path, weights: Weights, known: Known) -> Result<()> {
         let recording = Recording::read(into)?;
         let files = self.gauge.iter();
-        let files = files.map(|path| Series::load(path, self.gauge_unit));
+        let files = files.map(|path| Series::load(path, self.gauge_port.gauge_unit));
         let gauge = match files.collect::<Result<Vec<_>>>()? {
             files if files.is_empty() => Gauge::AtThePort,
             files => Gauge::Files(files),
         };
         let how = How {
-            unit: self.gauge_unit,
+            unit: self.gauge_port.gauge_unit,
             holds: true,
             ..How::default()
         };

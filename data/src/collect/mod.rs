@@ -13,6 +13,7 @@ pub mod align;
 pub mod assemble;
 pub mod coverage;
 pub mod folder;
+mod free;
 pub mod gauge;
 pub mod gauge_port;
 mod holds;

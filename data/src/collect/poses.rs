@@ -148,6 +148,25 @@ impl Task {
             must_be_felt: false,
         }
     }
+
+    /// Presses anywhere, about along the pose's axis, for so many seconds.
+    pub fn anywhere(pose: Pose, seconds: f64) -> Task {
+        let axis = match pose.angles_deg {
+            [0.0, 0.0] => "about straight down".to_owned(),
+            [alpha, beta] => format!("about along α = {alpha}°, β = {beta}°"),
+        };
+        Task {
+            pose,
+            set: format!(
+                "Press the film anywhere within 4 mm of its middle, {axis}, lightly and hard, up \
+                 to 0.25 N, for {seconds} s. What is covered is shown as the camera sees the \
+                 film, ○ is where you press. Press Enter to begin (`done` to end)."
+            ),
+            press: "touch, hold it for a moment, let go, and touch elsewhere".to_owned(),
+            seconds,
+            must_be_felt: false,
+        }
+    }
 }
 
 /// What is left of a list after some poses were done; a pose that is listed twice is done twice.
