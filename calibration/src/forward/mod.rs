@@ -27,6 +27,7 @@ use left_open::left_open;
 pub use noise::Noise;
 pub use tables::UnitSetup;
 pub use ten_loads::{Bench, Fit, KnownLoad, fit};
+pub use unit::Known;
 
 /// What is known of a unit's film and camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
