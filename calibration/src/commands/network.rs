@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::Args;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::forward::Known;
@@ -34,6 +34,11 @@ impl TrainArgs {
             println!(
                 "{anywhere} frames of presses anywhere are left out: no network learns directions \
                  or places that nobody noted"
+            );
+            ensure!(
+                dataset.rows.iter().any(|row| row.force_n != [0.0; 3]),
+                "nothing else is in {}: train on poses that a stage set",
+                self.data.display()
             );
         }
         let options = Options {
