@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `train`, `fit` | networks; from a data set to weights |
 //! | `forward` | the film run forwards, from what is known of a unit |
+//! | `loads` | the loads that a data set shows, and how well each is known |
 //! | `import` | networks trained in PyTorch |
 //! | `network`, `weights` | the network in floats, and its file |
 //! | `quantize` | weights to a model file, the same bytes on every machine |
@@ -18,6 +19,7 @@
 pub mod fit;
 pub mod forward;
 pub mod import;
+pub mod loads;
 pub mod network;
 pub mod progress;
 pub mod quantize;

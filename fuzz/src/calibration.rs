@@ -3,7 +3,7 @@
 use hivtac_calibration::import;
 use hivtac_calibration::quantize;
 use hivtac_calibration::weights::Weights;
-use hivtac_data::collect::assemble::{Gauge, assemble};
+use hivtac_data::collect::assemble::{Gauge, How, assemble};
 use hivtac_data::collect::folder::Recording;
 use hivtac_data::collect::gauge::Unit;
 use hivtac_data::collect::series::Series;
@@ -49,7 +49,11 @@ pub fn recording(input: &[u8]) -> bool {
         _ => Gauge::Files(vec![series]),
     };
     for holds in [false, true] {
-        match assemble(&recording, &gauge, Unit::NEWTON, holds) {
+        let how = How {
+            holds,
+            ..How::default()
+        };
+        match assemble(&recording, &gauge, how) {
             Ok((dataset, report)) => {
                 assert!(!report.sentence().is_empty());
                 let written = dataset.to_text().expect("it can be written");

@@ -64,7 +64,18 @@ impl EvaluateArgs {
     pub fn run(&self) -> Result<()> {
         let Self { model, data, out } = self;
         let bytes = read(model)?;
-        let evaluation = Evaluation::of(&bytes, &Dataset::load(data)?)
+        let dataset = Dataset::load(data)?;
+        if let Some(free) = &dataset.about.free {
+            let anywhere = dataset.rows.iter().filter(|row| dataset.is_free(row));
+            eprintln!(
+                "{} of {} frames are of presses anywhere, whose direction is known to {}° only: \
+                 errors of direction have that in them",
+                anywhere.count(),
+                dataset.rows.len(),
+                free.direction_deg
+            );
+        }
+        let evaluation = Evaluation::of(&bytes, &dataset)
             .with_context(|| format!("cannot judge {} on {}", model.display(), data.display()))?;
         fs::write(out, evaluation.to_html())
             .with_context(|| format!("cannot write {}", out.display()))?;

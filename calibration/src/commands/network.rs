@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use clap::Args;
 use hivtac_calibration::fit::fit;
+use hivtac_calibration::forward::Known;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::progress::bar;
 use hivtac_calibration::train::Options;
-use hivtac_calibration::unit::{GuideArgs, Known};
+use hivtac_calibration::unit::GuideArgs;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Dataset;
 use hivtac_evaluation::errors::{Errors, WEAK_N};
@@ -28,7 +29,18 @@ pub struct TrainArgs {
 
 impl TrainArgs {
     pub fn run(self) -> Result<()> {
-        let dataset = Dataset::load(&self.data)?;
+        let (dataset, anywhere) = Dataset::load(&self.data)?.without_free();
+        if anywhere > 0 {
+            println!(
+                "{anywhere} frames of presses anywhere are left out: no network learns directions \
+                 or places that nobody noted"
+            );
+            ensure!(
+                dataset.rows.iter().any(|row| row.force_n != [0.0; 3]),
+                "nothing else is in {}: train on poses that a stage set",
+                self.data.display()
+            );
+        }
         let options = Options {
             meaning: match dataset.knows_places() {
                 true => Meaning::ForceAndPlace,
@@ -109,8 +121,13 @@ pub struct UnitArgs {
     /// when none is named).
     #[arg(long, required_unless_present = "into")]
     weights: Option<PathBuf>,
+    /// The weights of the same unit with its old film, when only the film was swapped: its camera
+    /// and its dots are known, and three loads are enough.
+    #[arg(long, value_name = "WEIGHTS")]
+    from: Option<PathBuf>,
     /// Fit to this data set of the unit: frames without force, and frames of each load, with its
-    /// place (`x_mm`, `y_mm`); without places, all in the film's middle.
+    /// place (`x_mm`, `y_mm`); without places, all in the film's middle, or where the data set says
+    /// so, pressed anywhere.
     #[arg(
         long,
         required_unless_present = "into",
@@ -124,17 +141,31 @@ pub struct UnitArgs {
     /// Standard uncertainty of where the stage's zero is on the film, mm.
     #[arg(long, default_value_t = 0.1)]
     stage_mm: f64,
+    /// Standard uncertainty of each place on its own, beside the stage's zero, mm: 0 with a stage,
+    /// some tenths where a place was found by eye.
+    #[arg(long, value_name = "MM", default_value_t = 0.0, value_parser = length)]
+    place_mm: f64,
     /// The weights file to write; with `--into` it is `unit.weights` there, beside the model,
     /// `unit.hvtm`.
     #[arg(long, requires = "data")]
     out: Option<PathBuf>,
 }
 
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(mm) if (0.0..=10.0).contains(&mm) => Ok(mm),
+        _ => Err("a number of millimetres from 0 to 10 is needed".to_owned()),
+    }
+}
+
 impl UnitArgs {
     pub fn run(&self) -> Result<()> {
+        let from = self.from.as_deref().map(Weights::load).transpose()?;
         let known = Known {
             gauge_n: self.gauge_n,
             stage_mm: self.stage_mm,
+            place_mm: self.place_mm,
+            from: from.as_ref(),
         };
         let (weights, data, out) = match (self.guide.folder(), &self.weights, &self.data, &self.out)
         {
@@ -143,8 +174,7 @@ impl UnitArgs {
             _ => bail!("--weights, --data and --out are needed, or --into"),
         };
         let dataset = Dataset::load(data)?;
-        let (weights, fit) =
-            Weights::load(weights)?.for_unit(&dataset, known.gauge_n, known.stage_mm)?;
+        let (weights, fit) = Weights::load(weights)?.for_unit(&dataset, known)?;
         print!("{fit}");
         weights.save(out)
     }

@@ -32,6 +32,7 @@ use others::others;
 use tables::turned;
 pub use tables::{Dot, UnitSetup, tables};
 pub use ten_loads::{Bench, Fit, KnownLoad, fit};
+pub use unit::Known;
 
 /// What is known of a unit's film and camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

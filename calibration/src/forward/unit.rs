@@ -3,32 +3,39 @@
 use anyhow::{Context, Result, ensure};
 
 use super::{Bench, FilmModel, Fit, KnownLoad, fit};
+use crate::loads::{Certainty, SeenLoad, loads_of};
 use crate::weights::Weights;
 use hivtac_data::conditions::Conditions;
-use hivtac_data::dataset::{Dataset, Observation};
+use hivtac_data::dataset::Dataset;
 use hivtac_data::rest::Rest;
 
 /// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
 /// left of noise. With it χ² of simulated units is 1 over its degrees of freedom, on average.
 const MEAN_PX: f64 = 0.008;
-/// More loads than this tell nothing that fewer do not, and take long.
-const MOST_LOADS: usize = 40;
+/// Fewer loads tell no unit; nor a film in a unit whose camera and dots are known.
+const FEWEST_LOADS: usize = 4;
+const FEWEST_SWAPPED: usize = 3;
+
+/// What is known before a unit is fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// Standard uncertainty of a load's |F|, N.
+    pub gauge_n: f64,
+    /// That of the stage's zero on the film along x and y, mm.
+    pub stage_mm: f64,
+    /// That of each noted place on its own, beside the zero, mm.
+    pub place_mm: f64,
+    /// The same unit with another film: its camera and its dots are known.
+    pub from: Option<&'a Weights>,
+}
 
 impl Weights {
     /// These weights for the unit that a data set shows: its rest position, and its film and camera
     /// as its loads tell them.
     ///
-    /// `gauge_n` and `stage_mm` are the standard uncertainties of the loads' |F|, N, and of the
-    /// stage's zero, mm.
-    ///
     /// # Errors
     /// When the data set has other conditions, or as with [`Self::fitted`].
-    pub fn for_unit(
-        self,
-        dataset: &Dataset,
-        gauge_n: f64,
-        stage_mm: f64,
-    ) -> Result<(Weights, Fit)> {
+    pub fn for_unit(self, dataset: &Dataset, known: Known<'_>) -> Result<(Weights, Fit)> {
         let [own, other] = [&self.conditions, &dataset.about.conditions];
         ensure!(
             own.to_model()?.geometry == other.to_model()?.geometry
@@ -50,8 +57,10 @@ impl Weights {
         );
         let (origin, threshold, dilations) =
             (other.origin.clone(), other.threshold, other.dilations);
-        let (mut weights, found) =
-            self.fitted(dataset.rest()?, &loads(dataset)?, gauge_n, stage_mm)?;
+        let rest = dataset.rest()?;
+        let loads = self.loads(dataset, known)?;
+        let loads = with_noted_places(&loads, known)?;
+        let (mut weights, found) = self.fitted(rest, &loads, known.gauge_n, known.stage_mm)?;
         weights.conditions = Conditions {
             origin,
             threshold,
@@ -60,6 +69,23 @@ impl Weights {
         };
         weights.check()?;
         Ok((weights, found))
+    }
+
+    /// The loads of a data set, as they are known.
+    fn loads(&self, dataset: &Dataset, known: Known<'_>) -> Result<Vec<SeenLoad>> {
+        let certainty = Certainty::of(self, known.gauge_n, known.place_mm);
+        let rest_px = dataset.rest()?.features_px();
+        let loads = loads_of(dataset, &certainty, |seen| {
+            self.rough_place_mm(&rest_px, seen)
+        })?;
+        let fewest = known.from.map_or(FEWEST_LOADS, |_| FEWEST_SWAPPED);
+        ensure!(
+            loads.len() >= fewest,
+            "the data set shows {} loads: {fewest} at least are needed, with different forces or \
+             places",
+            loads.len()
+        );
+        Ok(loads)
     }
 
     /// These weights for the unit that rests so and answers loads so.
@@ -97,51 +123,25 @@ impl Weights {
     }
 }
 
-/// The loads of a data set: rows of the same force at the same place are frames of one. Where
-/// nobody noted places, the tip was set on the film's middle.
-fn loads(dataset: &Dataset) -> Result<Vec<KnownLoad>> {
-    let mut loads: Vec<(KnownLoad, f64)> = Vec::new();
-    for sample in dataset.samples() {
-        if sample.force_n == [0.0; 3] {
-            continue;
-        }
-        let place_mm = sample.tip_mm.unwrap_or_default();
-        let same = |(load, _): &&mut (KnownLoad, f64)| {
-            load.force_n == sample.force_n && load.place_mm == place_mm
-        };
-        let seen_px = seen(sample.seen);
-        match loads.iter_mut().find(same) {
-            Some((load, frames)) => {
-                *frames += 1.0;
-                for (mean, now) in load
-                    .seen_px
-                    .as_flattened_mut()
-                    .iter_mut()
-                    .zip(seen_px.as_flattened())
-                {
-                    *mean += (now - *mean) / *frames;
-                }
-            }
-            None => loads.push((
-                KnownLoad {
-                    force_n: sample.force_n,
-                    place_mm,
-                    seen_px,
-                },
-                1.0,
-            )),
-        }
-    }
+/// The loads as the fit takes them: of noted places, in a unit of which nothing is known.
+fn with_noted_places(loads: &[SeenLoad], known: Known<'_>) -> Result<Vec<KnownLoad>> {
     ensure!(
-        loads.len() <= MOST_LOADS,
-        "{} different loads: use at most {MOST_LOADS}, several frames of each",
-        loads.len()
+        known.from.is_none(),
+        "no film is fitted yet to a unit whose camera is known (--from): fit it to ten loads"
     );
-    Ok(loads.into_iter().map(|(load, _)| load).collect())
-}
-
-fn seen(observation: &Observation) -> [[f64; 2]; 4] {
-    places(&observation.features_px())
+    let load = |load: &SeenLoad| {
+        ensure!(
+            load.each_place_mm == 0.0 && load.direction_rad == 0.0,
+            "no unit is fitted yet to presses of which nobody noted the place, or not exactly: put \
+             on ten loads on a stage"
+        );
+        Ok(KnownLoad {
+            force_n: load.force_n,
+            place_mm: load.place_mm,
+            seen_px: load.seen_px,
+        })
+    };
+    loads.iter().map(load).collect()
 }
 
 /// Markers 0–3 of a frame's features.
@@ -160,6 +160,13 @@ mod tests {
     use hivtac_data::dataset::{Loads, Recipe, generate};
     use hivtac_data::range::Range;
 
+    const KNOWN: Known<'static> = Known {
+        gauge_n: 1e-3,
+        stage_mm: 0.1,
+        place_mm: 0.0,
+        from: None,
+    };
+
     fn default_weights() -> Weights {
         let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
         Weights::load(&models.join("default.weights")).unwrap()
@@ -176,11 +183,11 @@ mod tests {
         let mut dataset = generate(&recipe, || ()).unwrap();
         let threshold = [165, 12, 90, 255, 40, 255];
         dataset.about.conditions.threshold = threshold;
-        let (own, _) = default_weights().for_unit(&dataset, 1e-3, 0.1).unwrap();
+        let (own, _) = default_weights().for_unit(&dataset, KNOWN).unwrap();
         assert_eq!(own.conditions.threshold, threshold);
         dataset.about.conditions.pixel_format = PixelFormat::Yuv422;
         dataset.about.conditions.threshold = [162, 0, 0, 0, 0, 0];
-        let refused = default_weights().for_unit(&dataset, 1e-3, 0.1);
+        let refused = default_weights().for_unit(&dataset, KNOWN);
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("rgb565") && error.contains("yuv422"),
@@ -198,7 +205,8 @@ mod tests {
             ..Recipe::default()
         };
         let dataset = generate(&recipe, || ()).unwrap();
-        let mut loads = loads(&dataset).unwrap();
+        let loads = default_weights().loads(&dataset, KNOWN).unwrap();
+        let mut loads = with_noted_places(&loads, KNOWN).unwrap();
         let fitted = |loads: &[KnownLoad]| {
             let (_, fit) = default_weights()
                 .fitted(dataset.rest().unwrap(), loads, 1e-3, 0.1)
@@ -231,7 +239,7 @@ mod tests {
             ..Recipe::default()
         };
         let dataset = generate(&recipe, || ()).unwrap();
-        let refused = default_weights().for_unit(&dataset, 1e-3, 0.1);
+        let refused = default_weights().for_unit(&dataset, KNOWN);
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("reading `force`") && error.contains("`stick`"),

@@ -9,21 +9,23 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
+use crate::forward::Known;
 use crate::quantize::export;
 use crate::weights::Weights;
-use hivtac_data::collect::assemble::{Gauge, assemble};
+use hivtac_data::collect::assemble::{DIRECTION_DEG, Gauge, How, assemble};
+use hivtac_data::collect::direction_deg;
 use hivtac_data::collect::folder::{self, Recording};
-use hivtac_data::collect::gauge::Unit;
 use hivtac_data::collect::gauge_port::GaugeArgs;
-use hivtac_data::collect::poses;
-use hivtac_data::collect::record::{self, RecordArgs, seconds};
+use hivtac_data::collect::poses::{self, Task};
+use hivtac_data::collect::record::{self, FreeArgs, RecordArgs, seconds};
 use hivtac_data::collect::series::Series;
-use plan::{MOST_LOADS, Planned};
+use plan::MOST_LOADS;
 use verdict::Verdict;
 
 /// What the model of the firmware was made of: the simulated sensor.
 const DEFAULT_WEIGHTS: &str = include_str!("../../models/default.weights");
-/// In the recording's folder: the unit's weights and its model.
+/// In the recording's folder: the loads, the unit's weights and its model.
+const LOADS: &str = "loads.csv";
 const WEIGHTS: &str = "unit.weights";
 const MODEL: &str = "unit.hvtm";
 
@@ -52,22 +54,15 @@ pub struct GuideArgs {
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     rest_seconds: f64,
     #[command(flatten)]
+    free: FreeArgs,
+    /// Standard uncertainty of the direction of presses anywhere, degrees.
+    #[arg(long, value_name = "DEG", default_value_t = DIRECTION_DEG, value_parser = direction_deg)]
+    direction_deg: f64,
+    #[command(flatten)]
     gauge_port: GaugeArgs,
     /// What the gauge recorded by itself, once all loads are done, as `collect align` takes it.
     #[arg(long, value_name = "FILE", requires = "into")]
     gauge: Vec<PathBuf>,
-    /// The unit of readings that name none.
-    #[arg(long, default_value = "N")]
-    gauge_unit: Unit,
-}
-
-/// What is known of the bench, for the fit.
-#[derive(Clone, Copy, Debug)]
-pub struct Known {
-    /// Standard uncertainty of a load's |F|, N.
-    pub gauge_n: f64,
-    /// That of the stage's zero on the film along x and y, mm.
-    pub stage_mm: f64,
 }
 
 impl GuideArgs {
@@ -81,9 +76,40 @@ impl GuideArgs {
     /// # Errors
     /// When sensor, gauge or folder fail; what was recorded until then stays. When the loads cannot
     /// be joined with the gauge, or no unit explains them.
-    pub fn lead(&self, into: &Path, weights: Option<&Path>, known: Known) -> Result<()> {
+    pub fn lead(&self, into: &Path, weights: Option<&Path>, known: Known<'_>) -> Result<()> {
+        let tasks = self.tasks(known.from.is_some())?;
+        let weights = match weights {
+            Some(file) => Weights::load(file)?,
+            None => Weights::parse(DEFAULT_WEIGHTS)?,
+        };
+        let left =
+            || Ok::<_, anyhow::Error>(poses::left(&tasks, &folder::done(into)?, |it| it.pose));
+        if !left()?.is_empty() {
+            self.record(into, &tasks)?;
+        }
+        match (left()?.len(), self.free.free) {
+            (0, _) => return self.fit(into, weights, known),
+            (_, Some(_)) => println!(
+                "Pressing anywhere is not done: the same command goes on with the time that is \
+                 left."
+            ),
+            (count, None) => println!(
+                "{count} of {} loads are left: the same command goes on with them.",
+                tasks.len()
+            ),
+        }
+        Ok(())
+    }
+
+    /// What a person is to do: press anywhere, or put on loads, fewer for a film in a unit whose
+    /// camera is known.
+    fn tasks(&self, is_swapped: bool) -> Result<Vec<Task>> {
+        if let Some(task) = self.free.task() {
+            return Ok(vec![task]);
+        }
         let planned = match &self.poses {
             Some(file) => plan::of_poses(&poses::load(file)?),
+            None if is_swapped => plan::swapped(),
             None => plan::usual(),
         };
         ensure!(
@@ -91,60 +117,50 @@ impl GuideArgs {
             "{} loads are listed: {MOST_LOADS} are enough",
             planned.len()
         );
-        let weights = match weights {
-            Some(file) => Weights::load(file)?,
-            None => Weights::parse(DEFAULT_WEIGHTS)?,
-        };
-        let left = plan::left(&planned, &folder::done(into)?);
-        if !left.is_empty() {
-            self.record(into, &planned)?;
-        }
-        let left = plan::left(&planned, &folder::done(into)?);
-        if left.is_empty() {
-            return self.fit(into, weights, known);
-        }
-        println!(
-            "{} of {} loads are left: the same command goes on with them.",
-            left.len(),
-            planned.len()
-        );
-        Ok(())
+        Ok(plan::tasks(&planned, self.seconds))
     }
 
-    fn record(&self, into: &Path, planned: &[Planned]) -> Result<()> {
+    fn record(&self, into: &Path, tasks: &[Task]) -> Result<()> {
         let args = RecordArgs {
             into: into.to_owned(),
             port: self.port.clone(),
             timeout: self.timeout,
             poses: None,
             seconds: self.seconds,
+            free: self.free,
             rest_seconds: self.rest_seconds,
             gauge: self.gauge_port.clone(),
         };
-        record::record_tasks(&args, Some(plan::tasks(planned, self.seconds)))
+        record::record_tasks(&args, Some(tasks.to_vec()))
     }
 
-    fn fit(&self, into: &Path, weights: Weights, known: Known) -> Result<()> {
+    fn fit(&self, into: &Path, weights: Weights, known: Known<'_>) -> Result<()> {
         let recording = Recording::read(into)?;
         let files = self.gauge.iter();
-        let files = files.map(|path| Series::load(path, self.gauge_unit));
+        let files = files.map(|path| Series::load(path, self.gauge_port.gauge_unit));
         let gauge = match files.collect::<Result<Vec<_>>>()? {
             files if files.is_empty() => Gauge::AtThePort,
             files => Gauge::Files(files),
         };
-        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, true)?;
+        let how = How {
+            unit: self.gauge_port.gauge_unit,
+            holds: true,
+            direction_deg: self.direction_deg,
+        };
+        let (dataset, report) = assemble(&recording, &gauge, how)?;
         println!("All loads are recorded.\n{report}");
+        dataset.save(&into.join(LOADS))?;
+        println!("they are in {}", into.join(LOADS).display());
         eprintln!("Fitting the unit, and judging it on loads left out: half a minute or so.");
-        let Known { gauge_n, stage_mm } = known;
-        let (own, found) = weights.clone().for_unit(&dataset, gauge_n, stage_mm)?;
+        let (own, found) = weights.clone().for_unit(&dataset, known)?;
         print!("{found}");
         own.save(&into.join(WEIGHTS))?;
         let model = into.join(MODEL);
         fs::write(&model, export(&own)?)
             .with_context(|| format!("cannot write {}", model.display()))?;
         println!("the unit's model is {}", model.display());
-        let judged = weights.judged_on_others(&dataset, gauge_n, stage_mm)?;
-        println!("{}", Verdict::of(&judged));
+        let judged = weights.judged_on_others(&dataset, known)?;
+        println!("{}", Verdict::of(&judged, dataset.about.free));
         println!(
             "Next: give the model to the sensor, `hivtac update model {}`; then `hivtac tare \
              --keep`.",

@@ -1,6 +1,6 @@
 //! The loads that a person puts on, in words.
 
-use hivtac_data::collect::poses::{self, Pose, Task};
+use hivtac_data::collect::poses::{Pose, Task};
 
 /// More loads tell hardly more of a unit (`docs/results/units.md`).
 pub const MOST_LOADS: usize = 10;
@@ -19,6 +19,13 @@ const USUAL: [([f64; 2], [f64; 2], u32); MOST_LOADS] = [
     ([0.0, 0.0], [0.0, 3.0], 100),
     ([0.0, 0.0], [0.0, -3.0], 100),
 ];
+/// Those for another film in a unit whose camera and dots are known: its stiffness, its thickness
+/// and where its middle is are left.
+const SWAPPED: [([f64; 2], [f64; 2], u32); 3] = [
+    ([0.0, 0.0], [0.0, 0.0], 200),
+    ([0.0, 0.0], [3.0, 0.0], 100),
+    ([0.0, 0.0], [0.0, 3.0], 100),
+];
 /// |F| that is asked for where nobody says, mN.
 const USUAL_MN: u32 = 100;
 
@@ -32,14 +39,25 @@ pub struct Planned {
 
 /// The usual ten.
 pub fn usual() -> Vec<Planned> {
-    let planned = USUAL.map(|(angles_deg, place_mm, force_mn)| Planned {
-        pose: Pose {
-            angles_deg,
-            place_mm,
-        },
-        force_mn,
-    });
-    planned.to_vec()
+    of_list(&USUAL)
+}
+
+/// The three for a film that was swapped.
+pub fn swapped() -> Vec<Planned> {
+    of_list(&SWAPPED)
+}
+
+fn of_list(list: &[([f64; 2], [f64; 2], u32)]) -> Vec<Planned> {
+    let planned = list
+        .iter()
+        .map(|&(angles_deg, place_mm, force_mn)| Planned {
+            pose: Pose {
+                angles_deg,
+                place_mm: Some(place_mm),
+            },
+            force_mn,
+        });
+    planned.collect()
 }
 
 /// Those of a list.
@@ -49,11 +67,6 @@ pub fn of_poses(list: &[Pose]) -> Vec<Planned> {
         force_mn: USUAL_MN,
     });
     planned.collect()
-}
-
-/// Those that are left after some poses were done.
-pub fn left(planned: &[Planned], done: &[Pose]) -> Vec<Planned> {
-    poses::left(planned, done, |it| it.pose)
 }
 
 /// What a person is asked to do for each, in a take of so many seconds.
@@ -78,32 +91,36 @@ pub fn tasks(planned: &[Planned], seconds: f64) -> Vec<Task> {
 
 /// A pose for somebody who has a stage before them.
 fn words(pose: &Pose) -> String {
-    let ([alpha, beta], [x, y]) = (pose.angles_deg, pose.place_mm);
+    let [alpha, beta] = pose.angles_deg;
     let tilt = match pose.angles_deg {
         [0.0, 0.0] => "the film level".to_owned(),
         _ => format!("the film tilted by α = {alpha}°, β = {beta}°"),
     };
     let place = match pose.place_mm {
-        [0.0, 0.0] => "the tip over its middle".to_owned(),
-        _ => format!("the tip {x} mm along x and {y} mm along y off its middle"),
+        None => "the tip anywhere".to_owned(),
+        Some([0.0, 0.0]) => "the tip over its middle".to_owned(),
+        Some([x, y]) => format!("the tip {x} mm along x and {y} mm along y off its middle"),
     };
     format!("{tilt}, {place}")
 }
 
 #[cfg(test)]
 mod tests {
+    use hivtac_data::collect::poses;
+
     use super::*;
 
     #[test]
     fn loads_are_told_in_words_and_those_done_are_left_out() {
         let planned = usual();
         let done = [planned[0].pose, planned[2].pose];
-        let left = left(&planned, &done);
+        let left = poses::left(&planned, &done, |it| it.pose);
         assert_eq!(left.len(), 8);
         assert_eq!(
             left[0].force_mn, 200,
             "the first of the two in the middle is done"
         );
+        assert_eq!(swapped().len(), 3);
         let tasks = tasks(&planned, 8.0);
         assert!(
             tasks[0]

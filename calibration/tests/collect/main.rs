@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 mod fake;
+mod free;
 mod from_file;
 mod guided;
 mod over_serial;

@@ -115,3 +115,48 @@ fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
         "{report}"
     );
 }
+
+/// A gauge set to another output would have ten loads put on for nothing.
+#[test]
+fn a_gauge_that_sends_no_readings_ends_the_guide_at_once() {
+    let sends = |line: &'static str, words: &[&str]| {
+        let directory = tempfile::tempdir().unwrap();
+        let here = directory.path();
+        let begun = Instant::now();
+        let clock = move || {
+            std::thread::sleep(Duration::from_millis(5));
+            begun.elapsed().as_secs_f64()
+        };
+        let sensor = FakeSensor::start(Box::new(clock), usize::MAX);
+        let (mut gauge, _held, name) = pseudo_terminal();
+        let end = Arc::<AtomicBool>::default();
+        let player = std::thread::spawn({
+            let end = end.clone();
+            move || {
+                while !end.load(Ordering::Relaxed) {
+                    std::thread::sleep(Duration::from_millis(20));
+                    let _ = gauge.write_all(line.as_bytes());
+                }
+            }
+        });
+        let unit = ["unit", "--into", "unit", "--port", &sensor.port];
+        let more = ["--gauge-port", &name, "--rest-seconds", "0.3"];
+        let load = ["--seconds", "0.5"];
+        let (output, said) = run(here, &[&unit[..], &more, &load].concat(), "\n\n\n\n");
+        end.store(true, Ordering::Relaxed);
+        player.join().unwrap();
+        assert!(!output.status.success(), "{said}");
+        for words in words {
+            assert!(said.contains(words), "no {words}: {said}");
+        }
+        assert!(!said.contains("Load 2"), "{said}");
+        let takes = std::fs::read_to_string(here.join("unit/takes.csv")).unwrap();
+        assert!(takes.lines().count() <= 2, "{takes}");
+    };
+    let unreadable = [
+        "the first such line is `ID FX-50` (no reading)",
+        "--gauge-unit",
+    ];
+    sends("ID FX-50\r\n", &unreadable);
+    sends("", &["sends nothing", "--gauge-ask", "Load 1"]);
+}

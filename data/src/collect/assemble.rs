@@ -6,11 +6,12 @@ use hivtac_terms::marker::Marker;
 
 use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};
+use super::gauge::Unit;
 use super::holds;
 use super::poses::Pose;
 use super::report::{Report, RunReport};
 use super::series::{Joined, Series};
-use crate::dataset::{About, Dataset, Loads, Observation, Place, Row};
+use crate::dataset::{About, Dataset, Free, Loads, Observation, Place, Row};
 use crate::loads::{PaperPoses, norm};
 use crate::range::Range;
 
@@ -23,6 +24,32 @@ pub enum Gauge {
     /// of them, in order.
     Files(Vec<Series>),
 }
+
+/// How a recording becomes a data set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct How {
+    /// The unit of readings that name none.
+    pub unit: Unit,
+    /// Takes only steady stretches, each one load; of presses anywhere all that there is.
+    pub holds: bool,
+    /// Standard uncertainty of the direction of presses anywhere, degrees.
+    pub direction_deg: f64,
+}
+
+impl Default for How {
+    /// Every frame, of a hand that keeps to the film's normal as well as one does.
+    fn default() -> Self {
+        Self {
+            unit: Unit::NEWTON,
+            holds: false,
+            direction_deg: DIRECTION_DEG,
+        }
+    }
+}
+
+/// How well a hand keeps to a direction along each of the two ways across it, degrees: a standard
+/// uncertainty.
+pub const DIRECTION_DEG: f64 = 3.0;
 
 /// The largest lag of a gauge at a serial port, s.
 const LARGEST_LAG_S: f64 = 2.0;
@@ -40,18 +67,15 @@ pub(super) struct Loaded<'a> {
     pub time_s: f64,
     /// |F|, N.
     pub force_n: f64,
+    /// What clocks leave of it, N, where it was not held.
+    pub clock_n: Option<f64>,
 }
 
-/// Makes the data set, with `holds` only of steady stretches, each one load.
+/// Makes the data set.
 ///
 /// # Errors
 /// When a run has no frames of the untouched film, or its clocks cannot be aligned; names the run.
-pub fn assemble(
-    recording: &Recording,
-    gauge: &Gauge,
-    unit: super::gauge::Unit,
-    holds: bool,
-) -> Result<(Dataset, Report)> {
+pub fn assemble(recording: &Recording, gauge: &Gauge, how: How) -> Result<(Dataset, Report)> {
     ensure!(recording.runs() > 0, "the recording has no samples yet");
     let mut rows = Vec::new();
     let mut report = Report::default();
@@ -69,7 +93,7 @@ pub fn assemble(
         let session = report.runs.len();
         let one = || format!("run {run}");
         let (series, alignment, times) = match gauge {
-            Gauge::AtThePort => at_the_port(recording, &kept, run, unit),
+            Gauge::AtThePort => at_the_port(recording, &kept, run, how.unit),
             Gauge::Files(files) => from_file(files, session, &kept),
         }
         .with_context(one)?;
@@ -78,7 +102,7 @@ pub fn assemble(
             times: &times,
             gauge: series.joined(),
             alignment,
-            holds,
+            holds: how.holds,
         };
         let (more, mut of_run) = done.rows(session).with_context(one)?;
         of_run.run = run;
@@ -95,8 +119,12 @@ pub fn assemble(
             report.runs.len()
         );
     }
-    let about = about(recording, &rows, &report);
-    if !about.range.knows_places() {
+    let mut about = about(recording, &rows, &report);
+    let is_free = |kept: &Kept| kept.pose.is_some_and(|pose| pose.is_free());
+    if recording.samples.iter().any(is_free) {
+        let direction_deg = how.direction_deg;
+        about.free = Some(Free { direction_deg });
+    } else if !about.range.knows_places() {
         rows.iter_mut().for_each(|row| row.tip_mm = None);
     }
     Ok((Dataset { about, rows }, report))
@@ -107,7 +135,7 @@ fn at_the_port(
     recording: &Recording,
     kept: &[&Kept],
     run: usize,
-    unit: super::gauge::Unit,
+    unit: Unit,
 ) -> Result<(Series, Alignment, Vec<f64>)> {
     let mut series = Series::default();
     let lines = recording.gauge_lines.iter().filter(|(r, ..)| *r == run);
@@ -232,7 +260,9 @@ impl Run<'_> {
             least_n,
             ..RunReport::default()
         };
-        let (mut rows, mut loaded) = (Vec::new(), Vec::new());
+        // Presses anywhere are taken as they are; loads of a known place, where it is asked for,
+        // only while they were held.
+        let (mut rows, mut free, mut loaded) = (Vec::new(), Vec::new(), Vec::new());
         for (i, &kept) in self.kept.iter().enumerate() {
             if kept.pose.is_none() {
                 rows.push(row(session, kept, 0.0)?);
@@ -243,11 +273,18 @@ impl Run<'_> {
                 None => report.without_reading += 1,
                 Some(force) if force < -least_n => report.pulled += 1,
                 Some(force) if force < least_n => report.no_contact += 1,
-                Some(force_n) => loaded.push(Loaded {
-                    kept,
-                    time_s: self.times[i],
-                    force_n,
-                }),
+                Some(force_n) => {
+                    let is_free = kept.pose.is_some_and(|pose| pose.is_free());
+                    let time_s = self.times[i];
+                    let clock_n = is_free.then(|| self.alignment.clock_n(self.gauge, time_s));
+                    let frame = Loaded {
+                        kept,
+                        time_s,
+                        force_n,
+                        clock_n: clock_n.flatten(),
+                    };
+                    if is_free { &mut free } else { &mut loaded }.push(frame);
+                }
             }
         }
         if self.holds {
@@ -255,10 +292,15 @@ impl Run<'_> {
             loaded = holds::steady(&loaded, noise_n);
             report.unsteady = before - loaded.len();
         }
-        for loaded in &loaded {
-            rows.push(row(session, loaded.kept, loaded.force_n)?);
+        for loaded in loaded.iter().chain(&free) {
+            let clock_n = loaded.clock_n;
+            rows.push(Row {
+                clock_n,
+                ..row(session, loaded.kept, loaded.force_n)?
+            });
         }
-        report.pressed = loaded.len();
+        report.pressed = loaded.len() + free.len();
+        report.anywhere = free.len();
         for why in rows.iter().filter_map(|row| row.seen.as_ref().err()) {
             *report.rejected.entry(why.clone()).or_default() += 1;
         }
@@ -267,12 +309,12 @@ impl Run<'_> {
 }
 
 fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
-    let [alpha, beta] = kept.pose.unwrap_or_default().angles_deg;
+    let [alpha, beta] = kept.pose.unwrap_or(Pose::MIDDLE).angles_deg;
     let direction = hivtac_scene::Load::from_angles(force_n, alpha, beta)?;
     Ok(Row {
         place: Place {
             session,
-            pose: (kept.pose.filter(|pose| pose.place_mm == [0.0; 2]))
+            pose: (kept.pose.filter(|pose| pose.place_mm == Some([0.0; 2])))
                 .and_then(|pose| PaperPoses::numbered(pose.angles_deg)),
         },
         force_n: if force_n == 0.0 {
@@ -280,7 +322,8 @@ fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
         } else {
             direction.vector_n()
         },
-        tip_mm: (kept.pose.filter(|_| force_n != 0.0)).map(|pose| pose.place_mm),
+        tip_mm: (kept.pose.filter(|_| force_n != 0.0)).and_then(|pose| pose.place_mm),
+        clock_n: None,
         seen: match &kept.seen {
             Ok(markers) => Ok(observation(markers)),
             Err(why) => Err(why.clone()),
@@ -291,7 +334,8 @@ fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
 /// The farthest that a pose's tip is from the film's middle along x or y, mm.
 fn reach_mm(recording: &Recording) -> f64 {
     let poses = recording.samples.iter().filter_map(|kept| kept.pose);
-    let far = poses.flat_map(|pose| pose.place_mm).map(f64::abs);
+    let places = poses.filter_map(|pose| pose.place_mm);
+    let far = places.flatten().map(f64::abs);
     far.fold(0.0, f64::max)
 }
 
@@ -330,6 +374,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
             beta_deg: extreme(1),
             place_mm: reach_mm(recording),
         },
+        free: None,
     }
 }
 

@@ -6,6 +6,7 @@
 //! | `samples.csv` | every sample of the sensor, with the pose it was taken in |
 //! | `gauge.csv` | every line of a gauge at a serial port, as it came |
 //! | `takes.csv` | the takes that were finished |
+//! | `covered.csv` | where and how hard the film was pressed enough, by the sensor's own account, in takes of presses anywhere |
 //!
 //! Every line is written at once, so that an interruption costs at most the line under way, which
 //! the next run removes.
@@ -30,6 +31,7 @@ use crate::dataset::LARGEST_AREA;
 const SAMPLES: &str = "samples.csv";
 const GAUGE: &str = "gauge.csv";
 const TAKES: &str = "takes.csv";
+const COVERED: &str = "covered.csv";
 const UNIT: &str = "unit.json";
 
 const SAMPLE_COLUMNS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status,\
@@ -37,6 +39,7 @@ x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,\
 x3_q16,y3_q16,area3_px,x_mm,y_mm";
 const GAUGE_COLUMNS: &str = "run,host_s,line";
 const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
+const COVERED_COLUMNS: &str = "run,x_mm,y_mm,force_n";
 
 /// No marker lies beyond it along either side of a frame: 2¹⁰ px in 1/65,536 px. Then a pattern is
 /// no larger than a data set can hold.
@@ -49,13 +52,36 @@ const LARGEST_US: u64 = 1 << 51;
 pub struct Folder {
     samples: File,
     takes: File,
+    covered: File,
     /// For whoever listens to the gauge.
     pub gauge: File,
     /// Number of this run, from 0.
     pub run: usize,
     /// Poses whose takes were finished in earlier runs.
     pub done: Vec<Pose>,
+    /// What is known of presses anywhere in earlier runs.
+    pub before: Before,
 }
+
+/// What earlier runs left of takes of presses anywhere.
+#[derive(Clone, Debug, Default)]
+pub struct Before {
+    /// How long was recorded in each pose, s.
+    lasted_s: Vec<(Pose, f64)>,
+    /// Where the film was pressed enough, mm, and how hard, N.
+    pub covered: Vec<([f64; 2], f64)>,
+}
+
+impl Before {
+    /// How long was recorded in a pose, s.
+    pub fn lasted_s(&self, pose: Pose) -> f64 {
+        let same = self.lasted_s.iter().find(|(other, _)| *other == pose);
+        same.map_or(0.0, |(_, seconds)| *seconds)
+    }
+}
+
+/// Frames farther apart than this have a pause between them, s.
+const PAUSE_S: f64 = 1.0;
 
 impl Folder {
     /// Opens a recording to go on with it, or begins one.
@@ -68,15 +94,30 @@ impl Folder {
         let samples = append(&path.join(SAMPLES), SAMPLE_COLUMNS)?;
         let gauge = append(&path.join(GAUGE), GAUGE_COLUMNS)?;
         let takes = append(&path.join(TAKES), TAKE_COLUMNS)?;
+        let covered = append(&path.join(COVERED), COVERED_COLUMNS)?;
         let before = Recording::read(path)?;
         let done = done(path)?;
         Ok(Self {
             samples,
             takes,
+            covered,
             gauge,
             run: before.runs(),
             done,
+            before: Before {
+                lasted_s: before.lasted_s(),
+                covered: read_covered(&path.join(COVERED))?,
+            },
         })
+    }
+
+    /// Notes that the film was pressed enough about there, about so hard.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn covered(&mut self, [x_mm, y_mm]: [f64; 2], force_n: f64) -> Result<()> {
+        let line = format!("{},{x_mm:.3},{y_mm:.3},{force_n:.6}", self.run);
+        write_line(&mut self.covered, &line, COVERED)
     }
 
     /// Keeps a sample.
@@ -99,7 +140,7 @@ impl Folder {
             }),
             None => line += &",".repeat(12),
         }
-        line += &format!(",{}", pair(pose.map(|pose| pose.place_mm)));
+        line += &format!(",{}", pair(pose.and_then(|pose| pose.place_mm)));
         write_line(&mut self.samples, &line, SAMPLES)
     }
 
@@ -110,7 +151,7 @@ impl Folder {
     pub fn take_done(&mut self, pose: Option<Pose>, samples: usize, lost: u32) -> Result<()> {
         let [angles, place] = [
             pose.map(|pose| pose.angles_deg),
-            pose.map(|pose| pose.place_mm),
+            pose.and_then(|pose| pose.place_mm),
         ];
         let line = format!(
             "{},{},{samples},{lost},{}",
@@ -316,6 +357,27 @@ impl Recording {
         Ok(recording)
     }
 
+    /// How long presses anywhere were recorded in each pose, s.
+    fn lasted_s(&self) -> Vec<(Pose, f64)> {
+        let mut lasted: Vec<(Pose, f64)> = Vec::new();
+        for frames in self.samples.windows(2) {
+            let [first, second] = [&frames[0], &frames[1]];
+            let Some(pose) = second.pose.filter(Pose::is_free) else {
+                continue;
+            };
+            let us = second.device_us.saturating_sub(first.device_us);
+            let seconds = us as f64 / 1e6;
+            if (first.run, first.pose) != (second.run, second.pose) || seconds > PAUSE_S {
+                continue;
+            }
+            match lasted.iter_mut().find(|(other, _)| *other == pose) {
+                Some((_, sum)) => *sum += seconds,
+                None => lasted.push((pose, seconds)),
+            }
+        }
+        lasted
+    }
+
     /// How many runs there are.
     pub fn runs(&self) -> usize {
         let after = |run: usize| run.saturating_add(1);
@@ -387,17 +449,32 @@ fn on_a_clock(host_s: f64) -> Result<()> {
     Ok(())
 }
 
-/// The pose whose angles and place begin at these columns.
+/// The pose whose angles and place begin at these columns; without a place the tip was anywhere.
 fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Option<Pose>> {
-    if record[angles].is_empty() && record[angles + 1].is_empty() {
+    let is_empty = |first: usize| record[first].is_empty() && record[first + 1].is_empty();
+    if is_empty(angles) {
         return Ok(None);
     }
     let texts = [angles, angles + 1, place, place + 1].map(|column| &record[column]);
+    if is_empty(place) {
+        return poses::parse_axis(&texts[..2].join(",")).map(Some);
+    }
     ensure!(
         texts.iter().all(|text| !text.is_empty()),
         "half a pose: {texts:?}"
     );
     poses::parse(&texts.join(",")).map(Some)
+}
+
+/// What [`Folder::covered`] noted.
+fn read_covered(path: &Path) -> Result<Vec<([f64; 2], f64)>> {
+    let text =
+        fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let press = |record: &csv::StringRecord| {
+        let number = |column: usize| -> Result<f64> { Ok(record[column].parse()?) };
+        Ok(([number(1)?, number(2)?], number(3)?))
+    };
+    rows([COVERED, &text], press, COVERED_COLUMNS)
 }
 
 /// The poses whose takes were finished in a folder; none where nothing was recorded yet.
@@ -460,7 +537,7 @@ mod tests {
     fn tilted() -> Pose {
         Pose {
             angles_deg: [4.0, -3.5],
-            place_mm: [0.5, -2.0],
+            place_mm: Some([0.5, -2.0]),
         }
     }
 
@@ -503,6 +580,29 @@ mod tests {
         assert_eq!(recording.samples[1].pose, Some(tilted()));
         assert_eq!(recording.samples[1].seen, Err("markers_missing".into()));
         assert_eq!(recording.gauge_lines, [(0, 0.55, "+0.1\u{fffd}2,N".into())]);
+    }
+
+    #[test]
+    fn presses_anywhere_go_on_after_an_interruption() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut folder = Folder::open(directory.path(), &conditions()).unwrap();
+        let anywhere = Pose::anywhere([4.0, -3.5]);
+        folder.sample(0.1, None, &sample(1, true)).unwrap();
+        for (host_s, frame) in [(0.5, 2), (0.6, 12), (0.7, 13), (9.0, 400), (9.1, 402)] {
+            folder
+                .sample(host_s, Some(anywhere), &sample(frame, true))
+                .unwrap();
+        }
+        folder.covered([-3.2, 1.6], 0.15).unwrap();
+        drop(folder);
+        let again = Folder::open(directory.path(), &conditions()).unwrap();
+        assert_eq!(again.before.covered, [([-3.2, 1.6], 0.15)]);
+        let lasted_s = again.before.lasted_s(anywhere);
+        assert!((lasted_s - 13.0 * 0.0256).abs() < 1e-9, "{lasted_s}");
+        assert_eq!(again.before.lasted_s(tilted()), 0.0);
+        assert!(again.done.is_empty());
+        let recording = Recording::read(directory.path()).unwrap();
+        assert_eq!(recording.samples[1].pose, Some(anywhere));
     }
 
     #[test]
@@ -609,6 +709,7 @@ mod tests {
         refused(",4,-3.5,", ",NaN,-3.5,", "line 2: `NaN");
         refused(",4,-3.5,", ",4,-93.5,", "angles are within");
         refused(",0.5,-2\n", ",1e9,-2\n", "places within");
+        refused(",0.5,-2\n", ",,-2\n", "half a pose");
         let gauge = format!("{gauge}0,inf,0.1N\n");
         let error = Recording::parse(&unit, &samples, &gauge).unwrap_err();
         assert!(format!("{error:#}").contains("gauge.csv is damaged: line 2"));

@@ -2,15 +2,15 @@
 
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
 use super::folder::keep_gauge_line;
-use super::gauge::{Unit, reading};
+use super::gauge::{Bad, Unit, reading};
 
 /// Where a gauge is and how it is made to talk.
 #[derive(Clone, Debug, clap::Args)]
@@ -25,6 +25,9 @@ pub struct GaugeArgs {
     /// C).
     #[arg(long, value_name = "TEXT", requires = "gauge_port")]
     pub gauge_ask: Option<String>,
+    /// The unit of readings that name none.
+    #[arg(long, value_name = "UNIT", default_value = "N")]
+    pub gauge_unit: Unit,
 }
 
 /// How often a gauge is asked that only answers.
@@ -42,6 +45,8 @@ pub struct GaugePort {
     readings: Arc<AtomicUsize>,
     /// The newest, the bits of an `f64` in N.
     newest: Arc<AtomicU64>,
+    unread: Arc<Mutex<Option<(String, Bad)>>>,
+    name: String,
 }
 
 impl GaugePort {
@@ -69,6 +74,7 @@ impl GaugePort {
             })?;
         let (end, readings) = (Arc::<AtomicBool>::default(), Arc::<AtomicUsize>::default());
         let newest = Arc::new(AtomicU64::new(f64::NAN.to_bits()));
+        let unread = Arc::<Mutex<_>>::default();
         let listener = Listener {
             port,
             name: name.clone(),
@@ -79,6 +85,8 @@ impl GaugePort {
             end: end.clone(),
             readings: readings.clone(),
             newest: newest.clone(),
+            unread: unread.clone(),
+            unit: args.gauge_unit,
         };
         let thread = std::thread::spawn(move || listener.run());
         Ok(Some(Self {
@@ -86,6 +94,8 @@ impl GaugePort {
             end,
             readings,
             newest,
+            unread,
+            name: name.clone(),
         }))
     }
 
@@ -100,7 +110,35 @@ impl GaugePort {
         Ok(self.readings.load(Ordering::Relaxed))
     }
 
-    /// What it shows, N, where it names no unit in N; nothing before its first reading.
+    /// The first line that was no reading, and why it was none.
+    fn unread(&self) -> Option<(String, Bad)> {
+        let unread = self.unread.lock();
+        unread.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Why nothing is heard of it: what it sends instead, or that it sends nothing.
+    pub fn silence(&self) -> String {
+        let name = &self.name;
+        match self.unread() {
+            Some((line, why)) => format!(
+                "the gauge at {name} sends nothing that can be read: the first such line is \
+                 `{line}` ({}); set it to send a number with its unit, or none and --gauge-unit, \
+                 and look at --gauge-baud",
+                why.words()
+            ),
+            None => format!(
+                "the gauge at {name} sends nothing: is it switched on and set to send, does it \
+                 only answer (--gauge-ask), and is --gauge-baud right?"
+            ),
+        }
+    }
+
+    /// Whether it sent lines, and none of them was a reading.
+    pub fn is_unreadable(&self) -> bool {
+        self.readings.load(Ordering::Relaxed) == 0 && self.unread().is_some()
+    }
+
+    /// What it shows, N; nothing before its first reading.
     pub fn newest_n(&self) -> Option<f64> {
         let newest = f64::from_bits(self.newest.load(Ordering::Relaxed));
         (!newest.is_nan()).then_some(newest)
@@ -130,6 +168,8 @@ struct Listener {
     end: Arc<AtomicBool>,
     readings: Arc<AtomicUsize>,
     newest: Arc<AtomicU64>,
+    unread: Arc<Mutex<Option<(String, Bad)>>>,
+    unit: Unit,
 }
 
 impl Listener {
@@ -175,9 +215,16 @@ impl Listener {
             let text = String::from_utf8_lossy(line).into_owned();
             line.clear();
             keep_gauge_line(&mut self.file, self.run, host_s, &text)?;
-            if let Ok(force_n) = reading(&text, Unit::NEWTON) {
-                self.readings.fetch_add(1, Ordering::Relaxed);
-                self.newest.store(force_n.to_bits(), Ordering::Relaxed);
+            match reading(&text, self.unit) {
+                Ok(force_n) => {
+                    self.readings.fetch_add(1, Ordering::Relaxed);
+                    self.newest.store(force_n.to_bits(), Ordering::Relaxed);
+                }
+                Err(why) => {
+                    let unread = self.unread.lock();
+                    let mut unread = unread.unwrap_or_else(PoisonError::into_inner);
+                    unread.get_or_insert((text, why));
+                }
             }
         }
         Ok(())

@@ -64,7 +64,7 @@ mod tests {
     fn pose(angles_deg: [f64; 2]) -> Pose {
         Pose {
             angles_deg,
-            ..Pose::default()
+            ..Pose::MIDDLE
         }
     }
 
@@ -92,6 +92,7 @@ mod tests {
                 kept: if i < 120 { &one } else { &two },
                 time_s: i as f64 / 40.0,
                 force_n: force(i),
+                clock_n: None,
             })
             .collect();
         let found = steady(&frames, 0.000_1);

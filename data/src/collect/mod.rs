@@ -11,7 +11,9 @@
 
 pub mod align;
 pub mod assemble;
+pub mod coverage;
 pub mod folder;
+mod free;
 pub mod gauge;
 pub mod gauge_port;
 mod holds;
@@ -26,7 +28,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use hivtac_scene::Contact;
 
-use assemble::{Gauge, assemble};
+use assemble::{DIRECTION_DEG, Gauge, How, assemble};
 use folder::Recording;
 use gauge::Unit;
 use series::Series;
@@ -66,9 +68,23 @@ pub struct AlignArgs {
     /// Take only stretches in which the force was held, each as one load: for `unit`.
     #[arg(long)]
     holds: bool,
+    /// Standard uncertainty of the direction of presses anywhere (`record --free`), degrees.
+    #[arg(long, value_name = "DEG", default_value_t = DIRECTION_DEG, value_parser = direction_deg)]
+    direction_deg: f64,
     /// The CSV file to write.
     #[arg(long)]
     out: PathBuf,
+}
+
+/// How well a direction is known, of a command line: a standard uncertainty, degrees.
+///
+/// # Errors
+/// When it is none that a press can have.
+pub fn direction_deg(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(degrees) if degrees > 0.0 && degrees <= 45.0 => Ok(degrees),
+        _ => Err("a number of degrees above 0 is needed, up to 45".to_owned()),
+    }
 }
 
 impl CollectCommand {
@@ -97,7 +113,12 @@ impl AlignArgs {
             files => Gauge::Files(files),
         };
         recording.conditions.contact = self.contact;
-        let (dataset, report) = assemble(&recording, &gauge, self.gauge_unit, self.holds)?;
+        let how = How {
+            unit: self.gauge_unit,
+            holds: self.holds,
+            direction_deg: self.direction_deg,
+        };
+        let (dataset, report) = assemble(&recording, &gauge, how)?;
         dataset.save(&self.out)?;
         println!("{report}");
         println!(

@@ -16,21 +16,44 @@ const LARGEST_DEG: f64 = 60.0;
 const LARGEST_MM: f64 = hivtac_film::MAX_PLACE_MM;
 
 /// How the tip is set against the film.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// α and β, degrees.
     pub angles_deg: [f64; 2],
-    /// Where the stage has the tip, from the film's middle along x and y, mm.
-    pub place_mm: [f64; 2],
+    /// Where the stage has the tip, from the film's middle along x and y, mm; nothing where
+    /// somebody presses anywhere and nobody notes where.
+    pub place_mm: Option<[f64; 2]>,
+}
+
+impl Pose {
+    /// Straight down on the film's middle.
+    pub const MIDDLE: Pose = Pose {
+        angles_deg: [0.0; 2],
+        place_mm: Some([0.0; 2]),
+    };
+
+    /// Anywhere on the film, about along such an axis.
+    pub fn anywhere(angles_deg: [f64; 2]) -> Pose {
+        Pose {
+            angles_deg,
+            place_mm: None,
+        }
+    }
+
+    /// Whether the tip may be anywhere.
+    pub fn is_free(&self) -> bool {
+        self.place_mm.is_none()
+    }
 }
 
 impl fmt::Display for Pose {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ([alpha, beta], [x, y]) = (self.angles_deg, self.place_mm);
-        write!(
-            f,
-            "α = {alpha}°, β = {beta}°, the tip at x = {x} mm, y = {y} mm"
-        )
+        let [alpha, beta] = self.angles_deg;
+        write!(f, "α = {alpha}°, β = {beta}°, the tip ")?;
+        match self.place_mm {
+            Some([x, y]) => write!(f, "at x = {x} mm, y = {y} mm"),
+            None => write!(f, "anywhere"),
+        }
     }
 }
 
@@ -80,8 +103,23 @@ pub fn parse(text: &str) -> Result<Pose> {
     );
     Ok(Pose {
         angles_deg,
-        place_mm,
+        place_mm: Some(place_mm),
     })
+}
+
+/// α and β, degrees, of a tip that may be anywhere.
+///
+/// # Errors
+/// When the text is not two such numbers of a press.
+pub fn parse_axis(text: &str) -> Result<Pose> {
+    let pose = parse(text)?;
+    let numbers = text.split([',', ';', '\t', ' ']);
+    let numbers = numbers.filter(|part| !part.is_empty()).count();
+    ensure!(
+        numbers == 2,
+        "`{text}` is no axis: write α and β in degrees, such as `4,-3`"
+    );
+    Ok(Pose::anywhere(pose.angles_deg))
 }
 
 /// What a person is asked for: a pose, and a force in it.
@@ -106,6 +144,25 @@ impl Task {
             pose,
             set: format!("Set {pose}, and press Enter (`done` to end)."),
             press: "press and release, in no even rhythm".to_owned(),
+            seconds,
+            must_be_felt: false,
+        }
+    }
+
+    /// Presses anywhere, about along the pose's axis, for so many seconds.
+    pub fn anywhere(pose: Pose, seconds: f64) -> Task {
+        let axis = match pose.angles_deg {
+            [0.0, 0.0] => "about straight down".to_owned(),
+            [alpha, beta] => format!("about along α = {alpha}°, β = {beta}°"),
+        };
+        Task {
+            pose,
+            set: format!(
+                "Press the film anywhere within 4 mm of its middle, {axis}, lightly and hard, up \
+                 to 0.25 N, for {seconds} s. What is covered is shown as the camera sees the \
+                 film, ○ is where you press. Press Enter to begin (`done` to end)."
+            ),
+            press: "touch, hold it for a moment, let go, and touch elsewhere".to_owned(),
             seconds,
             must_be_felt: false,
         }
@@ -169,14 +226,16 @@ mod tests {
         let [alpha, beta, x, y] = parts;
         Pose {
             angles_deg: [alpha, beta],
-            place_mm: [x, y],
+            place_mm: Some([x, y]),
         }
     }
 
     #[test]
     fn poses_are_read_from_text_and_lists() {
         assert_eq!(parse("4, -3.5").unwrap(), pose([4.0, -3.5, 0.0, 0.0]));
-        assert_eq!(parse("0 0").unwrap(), Pose::default());
+        assert_eq!(parse("0 0").unwrap(), Pose::MIDDLE);
+        assert_eq!(parse_axis("4,-3").unwrap(), Pose::anywhere([4.0, -3.0]));
+        assert!(parse_axis("4,-3,0,0").is_err() && parse_axis("4").is_err());
         assert_eq!(parse("0 0 3 -0.5").unwrap(), pose([0.0, 0.0, 3.0, -0.5]));
         for text in [
             "4",
@@ -195,7 +254,7 @@ mod tests {
         std::fs::write(&path, "alpha,beta\n# first\n0,0\n\n8;-4;1;2\n").unwrap();
         assert_eq!(
             load(&path).unwrap(),
-            [Pose::default(), pose([8.0, -4.0, 1.0, 2.0])]
+            [Pose::MIDDLE, pose([8.0, -4.0, 1.0, 2.0])]
         );
         std::fs::write(&path, "0,0\n8,x\n").unwrap();
         let error = format!("{:#}", load(&path).unwrap_err());
@@ -209,7 +268,7 @@ mod tests {
 
     #[test]
     fn what_was_done_is_left_out_once() {
-        let [rest, other] = [Pose::default(), pose([1.0, 0.0, 0.0, 0.0])];
+        let [rest, other] = [Pose::MIDDLE, pose([1.0, 0.0, 0.0, 0.0])];
         let list = [rest, other, rest];
         let left = |done: &[Pose]| left(&list, done, |pose| *pose);
         assert_eq!(left(&[]), list);

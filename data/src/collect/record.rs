@@ -12,6 +12,7 @@ use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 
 use super::folder::{Folder, conditions_of};
+use super::free::FreeTake;
 use super::gauge_port::{GaugeArgs, GaugePort};
 use super::poses::{self, Person, Pose, Task};
 
@@ -35,12 +36,46 @@ pub struct RecordArgs {
     /// Length of a take, s of the sensor's clock.
     #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = seconds)]
     pub seconds: f64,
+    /// One take of presses anywhere instead, of so many seconds, 20 to 1800.
+    #[command(flatten)]
+    pub free: FreeArgs,
     /// Length of the take of the untouched film that begins every run, s.
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub rest_seconds: f64,
     /// The gauge at a serial port.
     #[command(flatten)]
     pub gauge: GaugeArgs,
+}
+
+/// Presses anywhere, for commands that record.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct FreeArgs {
+    /// Press anywhere within ±4 mm, with any force to 0.25 N, for so many seconds, 20 to 1800: by
+    /// hand with a gauge on a stick, or by a robot. Nobody notes where.
+    #[arg(long, value_name = "S", value_parser = free_seconds, conflicts_with = "poses")]
+    pub free: Option<f64>,
+    /// The axis that such presses are about along: α and β in degrees, such as `0,0`.
+    #[arg(long, value_name = "α,β", value_parser = axis, default_value = "0,0")]
+    #[arg(allow_hyphen_values = true, requires = "free")]
+    pub axis: Pose,
+}
+
+impl FreeArgs {
+    /// The one task of presses anywhere, when they are asked for.
+    pub fn task(&self) -> Option<Task> {
+        Some(Task::anywhere(self.axis, self.free?))
+    }
+}
+
+fn axis(text: &str) -> Result<Pose, String> {
+    poses::parse_axis(text).map_err(|error| error.to_string())
+}
+
+fn free_seconds(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if (20.0..=1800.0).contains(&seconds) => Ok(seconds),
+        _ => Err("a number of seconds from 20 to 1800 is needed".to_owned()),
+    }
 }
 
 /// A number of seconds of a command line.
@@ -79,7 +114,8 @@ pub fn record(args: &RecordArgs) -> Result<()> {
             .map(|pose| Task::any_force(pose, args.seconds))
             .collect()
     });
-    record_tasks(args, tasks)
+    let free = args.free.task().map(|task| vec![task]);
+    record_tasks(args, free.or(tasks))
 }
 
 /// Records these tasks but those that were done; without any, poses that are typed. `args.poses`
@@ -103,6 +139,8 @@ pub fn record_tasks(args: &RecordArgs, tasks: Option<Vec<Task>>) -> Result<()> {
         begun,
         person: Person::at_the_terminal(),
         shown: begun,
+        zero_n: None,
+        free: None,
     };
     let result = recorder.run(args, tasks.as_deref());
     let gauge = recorder.gauge.as_mut().map_or(Ok(()), GaugePort::finish);
@@ -124,6 +162,10 @@ struct Recorder {
     person: Person,
     /// When live numbers were last shown.
     shown: Instant,
+    /// What the gauge showed while nothing touched the film, N.
+    zero_n: Option<f64>,
+    /// The take of presses anywhere that goes on.
+    free: Option<FreeTake>,
 }
 
 /// What a take gave.
@@ -137,6 +179,44 @@ struct Take {
     last_sequence: Option<u32>,
     /// The largest |F| that the sensor felt, N; nothing without a force.
     felt_n: Option<f64>,
+    /// What the gauge showed, N: sum and number.
+    gauge: (f64, f64),
+}
+
+/// No gauge is silent for longer while it is listened to.
+const SILENT: Duration = Duration::from_secs(10);
+
+/// What is heard of a gauge during a take.
+#[derive(Clone, Copy, Debug)]
+struct Heard {
+    /// Readings before it.
+    before: Option<usize>,
+    /// Readings so far, and when they were last more.
+    last: Option<usize>,
+    at: Instant,
+}
+
+impl Heard {
+    fn from(readings: Option<usize>) -> Self {
+        Self {
+            before: readings,
+            last: readings,
+            at: Instant::now(),
+        }
+    }
+
+    /// Whether there was no reading for too long, now that there are so many.
+    fn is_silent(&mut self, readings: Option<usize>) -> bool {
+        if readings != self.last {
+            (self.last, self.at) = (readings, Instant::now());
+        }
+        readings.is_some() && self.at.elapsed() > SILENT
+    }
+
+    /// How many came.
+    fn since(&self, readings: Option<usize>) -> Option<usize> {
+        Some(readings? - self.before?)
+    }
 }
 
 impl Recorder {
@@ -147,6 +227,7 @@ impl Recorder {
         }
         self.tare()?;
         let rest = self.take(None, args.rest_seconds)?;
+        self.zero_n = rest.gauge_n();
         self.folder.take_done(None, rest.samples, rest.lost)?;
         ensure!(
             rest.good >= FEWEST_AT_REST,
@@ -157,10 +238,19 @@ impl Recorder {
         );
         let mut left = list.map(|list| poses::left(list, &self.folder.done, |task| task.pose));
         if let (Some(list), Some(left)) = (list, &left) {
-            eprintln!("{} of {} poses are left.", left.len(), list.len());
+            match left.as_slice() {
+                [task] if task.pose.is_free() => {}
+                _ => eprintln!("{} of {} poses are left.", left.len(), list.len()),
+            }
         }
         while let Some(task) = self.next_task(left.as_mut(), args.seconds)? {
-            let take = self.take(Some(&task), task.seconds)?;
+            self.free = task.pose.is_free().then(|| self.anywhere(&task));
+            let take = self.take(Some(&task), task.seconds);
+            let free = self.free.take();
+            let take = take?;
+            if let Some(free) = free {
+                eprintln!("{}", free.end());
+            }
             let is_felt = take.felt_n.is_none_or(|force_n| force_n >= LEAST_FELT_N);
             if task.must_be_felt && !is_felt {
                 eprintln!("Nothing pressed the film: once more.");
@@ -197,6 +287,19 @@ impl Recorder {
         Ok(answer.filter(|text| text != "done").map(|_| task))
     }
 
+    /// What is left of a take of presses anywhere.
+    fn anywhere(&self, task: &Task) -> FreeTake {
+        let before = &self.folder.before;
+        let before_s = before.lasted_s(task.pose);
+        if before_s > 0.0 {
+            eprintln!(
+                "{before_s:.0} s of {:.0} s were recorded before.",
+                task.seconds
+            );
+        }
+        FreeTake::new(task.seconds, before_s, &before.covered)
+    }
+
     fn typed_task(&self, seconds: f64) -> Result<Option<Task>> {
         loop {
             let question = "Set a pose and type α and β in degrees, such as `4, -3`, and where the \
@@ -216,10 +319,11 @@ impl Recorder {
     fn take(&mut self, task: Option<&Task>, seconds: f64) -> Result<Take> {
         let pose = task.map(|task| task.pose);
         match task {
+            Some(task) if self.free.is_some() => eprintln!("Recording: {}.", task.press),
             Some(task) => eprintln!("Recording for {seconds} s: {}.", task.press),
             None => eprintln!("Recording the untouched film for {seconds} s."),
         }
-        let heard = self.gauge_readings()?;
+        let mut heard = Heard::from(self.gauge_readings()?);
         let mut take = Take::default();
         let mut early = Vec::new();
         self.link
@@ -229,10 +333,10 @@ impl Recorder {
         }
         let length_us = (seconds * 1e6) as u64;
         let mut deadline = Instant::now() + self.patience;
-        while take
-            .first_us
-            .is_none_or(|first| take.last_us < first + length_us)
-        {
+        while !self.is_over(&take, length_us) {
+            if heard.is_silent(self.gauge_readings()?) {
+                bail!("{}", self.silence());
+            }
             let Some(message) = self.link.receive(deadline)? else {
                 bail!(
                     "no frame for {} s: does the camera run? (hivtac info)",
@@ -250,15 +354,36 @@ impl Recorder {
         for message in late {
             self.keep(message, pose, &mut take)?;
         }
-        let heard = match (heard, self.gauge_readings()?) {
-            (Some(before), Some(after)) => format!(", {} gauge readings", after - before),
-            _ => String::new(),
-        };
+        let readings = heard.since(self.gauge_readings()?);
+        let heard = readings.map_or(String::new(), |count| format!(", {count} gauge readings"));
         eprintln!(
             "{} samples ({} with markers, {} lost){heard}.",
             take.samples, take.good, take.lost
         );
+        // A gauge that is asked for its readings may be slow to begin; one whose lines are none
+        // stays as it is.
+        let is_unreadable = self.gauge.as_ref().is_some_and(GaugePort::is_unreadable);
+        ensure!(
+            readings != Some(0) || task.is_none() && !is_unreadable,
+            "{}",
+            self.silence()
+        );
         Ok(take)
+    }
+
+    /// Whether a take has what it was to have.
+    fn is_over(&self, take: &Take, length_us: u64) -> bool {
+        match (&self.free, take.first_us) {
+            (_, None) => false,
+            (Some(free), _) => free.is_over(),
+            (None, Some(first)) => take.last_us >= first + length_us,
+        }
+    }
+
+    /// Why nothing is heard of the gauge.
+    fn silence(&self) -> String {
+        let gauge = self.gauge.as_ref();
+        gauge.map_or(String::new(), GaugePort::silence)
     }
 
     fn gauge_readings(&mut self) -> Result<Option<usize>> {
@@ -272,8 +397,19 @@ impl Recorder {
                 self.folder
                     .sample(host_s, pose, &sample)
                     .context("the recording")?;
-                take.count(&sample);
-                self.show(&sample);
+                let gauge_n = self.gauge.as_ref().and_then(GaugePort::newest_n);
+                take.count(&sample, gauge_n);
+                match &mut self.free {
+                    Some(free) => {
+                        let pressed_n = gauge_n.map(|n| n - self.zero_n.unwrap_or(0.0));
+                        let covered = free.sample(&sample, pressed_n);
+                        free.show(&sample);
+                        if let Some((place_mm, force_n)) = covered {
+                            self.folder.covered(place_mm, force_n)?;
+                        }
+                    }
+                    None => self.show(&sample, gauge_n),
+                }
             }
             DeviceMessage::Log(line) => eprintln!("{}", log_text(&line)),
             _ => {}
@@ -282,13 +418,12 @@ impl Recorder {
     }
 
     /// Live numbers on one line of a terminal, a few times a second.
-    fn show(&mut self, sample: &Sample) {
+    fn show(&mut self, sample: &Sample, gauge_n: Option<f64>) {
         let mut terminal = std::io::stderr();
         if self.shown.elapsed() < SHOW_EVERY || !terminal.is_terminal() {
             return;
         }
         self.shown = Instant::now();
-        let gauge_n = self.gauge.as_ref().and_then(GaugePort::newest_n);
         let _ = write!(terminal, "\r{}\r", live(gauge_n, sample));
     }
 }
@@ -305,7 +440,16 @@ fn live(gauge_n: Option<f64>, sample: &Sample) -> String {
 }
 
 impl Take {
-    fn count(&mut self, sample: &Sample) {
+    /// What the gauge showed on average, N.
+    fn gauge_n(&self) -> Option<f64> {
+        let (sum, count) = self.gauge;
+        (count > 0.0).then(|| sum / count)
+    }
+
+    fn count(&mut self, sample: &Sample, gauge_n: Option<f64>) {
+        if let Some(gauge_n) = gauge_n {
+            self.gauge = (self.gauge.0 + gauge_n, self.gauge.1 + 1.0);
+        }
         self.samples += 1;
         let implausible = Status::MARKERS_IMPLAUSIBLE;
         self.good += usize::from(sample.markers.is_some() && !sample.status.contains(implausible));

@@ -31,6 +31,8 @@ pub struct RunReport {
     pub at_rest: usize,
     /// Frames under a force.
     pub pressed: usize,
+    /// Those of them that were pressed anywhere.
+    pub anywhere: usize,
     /// Frames in a pose without contact.
     pub no_contact: usize,
     /// Frames in a pose while the gauge pulled.
@@ -87,10 +89,14 @@ impl fmt::Display for RunReport {
         )?;
         write!(
             f,
-            "  {} frames at rest, {} under a force; left out: {} without contact, {} without a \
+            "  {} frames at rest, {} under a force{}; left out: {} without contact, {} without a \
              gauge reading, {} while the gauge pulled, {} not held",
             self.at_rest,
             self.pressed,
+            match self.anywhere {
+                0 => String::new(),
+                anywhere => format!(" ({anywhere} of them anywhere)"),
+            },
             self.no_contact,
             self.without_reading,
             self.pulled,

@@ -21,8 +21,10 @@ const FORMAT: &str =
     "# hivtac-dataset 2; forces in N in the film frame, features in px (area in px²), areas in px";
 /// Of every data set, before and after [`PLACE_COLUMNS`].
 const FIRST_COLUMNS: [&str; 5] = ["session", "pose", "fx_n", "fy_n", "fz_n"];
-/// Of a data set that knows where the tip is.
+/// Of a data set that knows where the tip is, of some rows at least.
 const PLACE_COLUMNS: [&str; 2] = ["x_mm", "y_mm"];
+/// Of one with presses of which nobody knows the place.
+const FREE_COLUMNS: [&str; 1] = ["clock_n"];
 const LAST_COLUMNS: [&str; 16] = [
     "x0_px",
     "y0_px",
@@ -51,24 +53,29 @@ pub const LARGEST_AREA: u32 = 1 << 20;
 
 const FORCE_AT: usize = 2;
 const PLACE_AT: usize = FORCE_AT + 3;
+const CLOCK_AT: usize = PLACE_AT + PLACE_COLUMNS.len();
+/// A direction that is known worse is not known, degrees.
+const LARGEST_DEG: f64 = 90.0;
 
 /// The columns of a data set, and where they are.
 struct Columns {
     names: Vec<&'static str>,
     knows_places: bool,
+    has_free: bool,
 }
 
 impl Columns {
     fn of(about: &About) -> Self {
-        let knows_places = about.range.knows_places();
-        let places = if knows_places {
-            &PLACE_COLUMNS[..]
-        } else {
-            &[]
-        };
+        let has_free = about.free.is_some();
+        let knows_places = has_free || about.range.knows_places();
+        let (mut names, last) = (FIRST_COLUMNS.to_vec(), &LAST_COLUMNS);
+        names.extend(PLACE_COLUMNS.iter().filter(|_| knows_places));
+        names.extend(FREE_COLUMNS.iter().filter(|_| has_free));
+        names.extend(last);
         Self {
-            names: [&FIRST_COLUMNS, places, &LAST_COLUMNS].concat(),
+            names,
             knows_places,
+            has_free,
         }
     }
 
@@ -127,6 +134,13 @@ impl Dataset {
             .and_then(|line| line.strip_prefix("# "))
             .context("line 2 says nothing about it")?;
         let about: About = serde_json::from_str(about).context("line 2")?;
+        if let Some(free) = &about.free {
+            ensure!(
+                free.direction_deg > 0.0 && free.direction_deg <= LARGEST_DEG,
+                "line 2: direction_deg is {}: above 0 and up to {LARGEST_DEG} it must be",
+                free.direction_deg
+            );
+        }
         let columns = Columns::of(&about);
         let mut table = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
@@ -186,6 +200,9 @@ fn fields(row: &Row, columns: &Columns) -> Vec<String> {
         };
         fields.extend([0, 1].map(part));
     }
+    if columns.has_free {
+        fields.push(row.clock_n.map_or(String::new(), |n| n.to_string()));
+    }
     match &row.seen {
         Ok(seen) => {
             fields.extend(seen.features_px().iter().map(f64::to_string));
@@ -224,8 +241,20 @@ impl Record<'_> {
             place,
             force_n,
             tip_mm: self.tip()?,
+            clock_n: self.clock()?,
             seen,
         })
+    }
+
+    fn clock(&self) -> Result<Option<f64>> {
+        let is_said = self.columns.has_free && self.filled(CLOCK_AT);
+        is_said
+            .then(|| {
+                let clock_n = self.number(CLOCK_AT, LARGEST_N)?;
+                ensure!(clock_n >= 0.0, "column clock_n: {clock_n} is below 0");
+                Ok(clock_n)
+            })
+            .transpose()
     }
 
     fn tip(&self) -> Result<Option<[f64; 2]>> {
@@ -324,6 +353,39 @@ mod tests {
         let half = text.replace("-0.1,-0.1,4.2,", "-0.1,-0.1,,");
         let error = format!("{:#}", Dataset::parse(&half).unwrap_err());
         assert!(error.contains("column y_mm"), "{error}");
+    }
+
+    #[test]
+    fn rows_with_and_without_a_place_come_back() {
+        let mut dataset = example();
+        dataset.about.free = Some(super::super::Free { direction_deg: 3.0 });
+        dataset.rows[2].tip_mm = Some([0.0, 0.0]);
+        dataset.rows[3].clock_n = Some(0.000_25);
+        let text = saved(&dataset);
+        assert!(text.contains("fz_n,x_mm,y_mm,clock_n,x0_px"), "{text}");
+        assert!(text.contains("\"free\":{\"direction_deg\":3.0}"), "{text}");
+        assert!(text.contains("0,,0,0.1,-0.1,0,0,,"), "{text}");
+        assert!(text.contains("0,,0,0,-0.1,,,0.00025,"), "{text}");
+        let free: Vec<bool> = dataset
+            .rows
+            .iter()
+            .map(|row| dataset.is_free(row))
+            .collect();
+        assert_eq!(free, [false, false, false, true]);
+        let (known, left_out) = dataset.without_free();
+        assert_eq!((known.rows.len(), left_out), (3, 1));
+        let refused = |bad: String, words: &str| {
+            let error = format!("{:#}", Dataset::parse(&bad).unwrap_err());
+            assert!(error.contains(words), "{error}");
+        };
+        refused(
+            text.replace(",0.00025,", ",-1,"),
+            "column clock_n: -1 is below",
+        );
+        refused(
+            text.replace("deg\":3.0", "deg\":0.0"),
+            "line 2: direction_deg",
+        );
     }
 
     #[test]

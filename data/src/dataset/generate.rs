@@ -62,6 +62,7 @@ impl<'a> Renderer<'a> {
                 place,
                 force_n: frame.truth.force.vector_n(),
                 tip_mm: frame.truth.touches_mm.filter(|_| known),
+                clock_n: None,
                 seen,
             };
             Ok(seen.into_iter().map(row).collect())

@@ -51,6 +51,16 @@ pub struct About {
     pub seed: u64,
     /// The limits of its forces.
     pub range: Range,
+    /// What is known of rows whose place is not: without it, that the tip was on the film's middle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub free: Option<Free>,
+}
+
+/// Presses of which nobody knows the place: the tip was anywhere on the film.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Free {
+    /// Standard uncertainty of the direction along each of the two ways across it, degrees.
+    pub direction_deg: f64,
 }
 
 /// Where a row stands.
@@ -73,6 +83,9 @@ pub struct Row {
     /// Which point of the film the tip is on, by where that rests, mm from the middle; `None`
     /// without a force, and where nobody knows.
     pub tip_mm: Option<[f64; 2]>,
+    /// Standard uncertainty of |F| because clocks are known so well and the force changed so fast,
+    /// N; `None` where it was held, or is known from elsewhere.
+    pub clock_n: Option<f64>,
     /// What was seen, or the status names that say why nothing was.
     pub seen: Result<Observation, String>,
 }
@@ -86,6 +99,10 @@ pub struct Sample<'a> {
     pub force_n: [f64; 3],
     /// Where the tip is, mm: [`Row::tip_mm`].
     pub tip_mm: Option<[f64; 2]>,
+    /// What clocks leave of |F|, N: [`Row::clock_n`].
+    pub clock_n: Option<f64>,
+    /// Its session.
+    pub session: usize,
 }
 
 impl<'a> Sample<'a> {
@@ -94,6 +111,8 @@ impl<'a> Sample<'a> {
             seen: row.seen.as_ref().ok()?,
             force_n: row.force_n,
             tip_mm: row.tip_mm,
+            clock_n: row.clock_n,
+            session: row.place.session,
         })
     }
 }
@@ -133,9 +152,25 @@ impl Dataset {
         self.rows.iter().filter_map(Sample::of)
     }
 
-    /// Whether its rows know where the tip is.
+    /// Whether all its rows know where the tip is, and it may be anywhere.
     pub fn knows_places(&self) -> bool {
-        self.about.range.knows_places()
+        self.about.range.knows_places() && self.about.free.is_none()
+    }
+
+    /// Whether a row is of a press of which nobody knows the place.
+    pub fn is_free(&self, row: &Row) -> bool {
+        self.about.free.is_some() && row.tip_mm.is_none() && row.force_n != [0.0; 3]
+    }
+
+    /// Without the presses of which nobody knows the place, and their number.
+    pub fn without_free(mut self) -> (Self, usize) {
+        let (of_all, free) = (self.rows.len(), self.about.free.take());
+        if free.is_some() {
+            let is_known = |row: &Row| row.tip_mm.is_some() || row.force_n == [0.0; 3];
+            self.rows.retain(is_known);
+        }
+        let left = self.rows.len();
+        (self, of_all - left)
     }
 
     /// How many rows were rejected, by status.
@@ -223,30 +258,35 @@ mod tests {
             sessions: 1,
             seed: 3,
             range: Range::default(),
+            free: None,
         };
         let rows = vec![
             Row {
                 place: Place::default(),
                 force_n: [0.0; 3],
                 tip_mm: None,
+                clock_n: None,
                 seen: Ok(seen(10)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0; 3],
                 tip_mm: None,
+                clock_n: None,
                 seen: Ok(seen(11)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0, 0.1, -0.1],
                 tip_mm: None,
+                clock_n: None,
                 seen: Ok(seen(1 << 32)),
             },
             Row {
                 place: Place::default(),
                 force_n: [0.0, 0.0, -0.1],
                 tip_mm: None,
+                clock_n: None,
                 seen: Err("markers_missing".into()),
             },
         ];
@@ -259,6 +299,7 @@ mod tests {
             place: Place { session, pose },
             force_n: [0.0, 0.0, pose.map_or(0.0, |_| -0.01 * (i + 1) as f64)],
             tip_mm: None,
+            clock_n: None,
             seen: Ok(Observation {
                 features_q16: std::array::from_fn(|f| {
                     Q::from_bits((1000 * session + 10 * i + f) as i64)

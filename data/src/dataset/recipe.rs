@@ -262,6 +262,7 @@ impl Recipe {
             sessions: self.sessions,
             seed: self.seed,
             range: self.range,
+            free: None,
         })
     }
 }

@@ -231,6 +231,7 @@ fn add(datasets: &mut [Dataset; 2], recipe: &Recipe, looked: Vec<Looked>) -> Res
                 place,
                 force_n,
                 tip_mm,
+                clock_n: None,
                 seen,
             });
         }

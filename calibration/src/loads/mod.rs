@@ -1,0 +1,176 @@
+//! The loads that a data set shows, for a fit of a unit: each with what was seen of it, and how well
+//! its size, direction and place are known.
+//!
+//! | rows | loads |
+//! |---|---|
+//! | of one force at one noted place | frames of one load |
+//! | pressed anywhere, nobody noted where | some of them, spread over places and sizes: [`representative`] |
+
+mod representative;
+
+use anyhow::Result;
+use hivtac_data::dataset::{Dataset, Observation, Sample};
+use hivtac_data::loads::norm;
+use hivtac_sensing::features::FEATURES;
+
+use crate::weights::Weights;
+
+pub use representative::{LoadFrames, representative};
+
+/// So many loads are taken of presses anywhere.
+pub const MOST_FREE: usize = 120;
+/// Standard uncertainty of a marker's mean coordinates over many frames, px: what the pixel grid
+/// does.
+const GRID_PX: f64 = 0.008;
+/// That of a single frame, where the weights have none.
+const FRAME_PX: f64 = 0.025;
+
+/// What was seen of a load, and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenLoad {
+    /// The force as the gauge or the weight tells it along the pose's direction, N.
+    pub force_n: [f64; 3],
+    /// Standard uncertainty of |F|, N.
+    pub size_n: f64,
+    /// That of the direction along each of the two ways across it, radians; 0 where a stage set it.
+    pub direction_rad: f64,
+    /// Where the tip was as somebody noted it, mm, and otherwise about where.
+    pub place_mm: [f64; 2],
+    /// Standard uncertainty of this place along x and y, beside what is the same for all places,
+    /// mm; infinite where nobody noted it.
+    pub each_place_mm: f64,
+    /// Where markers 0–3 were seen, mean of the frames, px.
+    pub seen_px: [[f64; 2]; 4],
+    /// Standard uncertainty of these coordinates, px.
+    pub noise_px: f64,
+    /// How many frames there are of it.
+    pub frames: usize,
+}
+
+/// How well a bench knows its loads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certainty {
+    /// Standard uncertainty of a load's |F|, N.
+    pub gauge_n: f64,
+    /// That of each noted place on its own, mm; 0 with a stage.
+    pub place_mm: f64,
+    /// That of a marker's coordinates in one frame, px.
+    pub frame_px: f64,
+}
+
+impl Certainty {
+    /// With the noise of frames that weights know.
+    pub fn of(weights: &Weights, gauge_n: f64, place_mm: f64) -> Self {
+        let noise_px = weights.film.as_ref().map(|film| film.noise_px);
+        let frame_px = noise_px.map_or(FRAME_PX, |[away, across]| {
+            ((away * away + across * across) / 2.0).sqrt()
+        });
+        Self {
+            gauge_n,
+            place_mm,
+            frame_px,
+        }
+    }
+
+    /// Standard uncertainty of the mean of so many frames, px: noise becomes less, the pixel grid's
+    /// part stays.
+    fn mean_px(&self, frames: usize) -> f64 {
+        let noise = (self.frame_px.powi(2) - GRID_PX.powi(2)).max(0.0);
+        (GRID_PX.powi(2) + noise / frames.max(1) as f64).sqrt()
+    }
+}
+
+/// The loads of a data set, its sessions tared. `rough_place_mm` says about where a press was that
+/// nobody noted, by what was seen of it ([`Weights::rough_place_mm`]).
+///
+/// # Errors
+/// When a session has no frame of the untouched film.
+pub fn loads_of(
+    dataset: &Dataset,
+    certainty: &Certainty,
+    rough_place_mm: impl Fn(&Observation) -> [f64; 2],
+) -> Result<Vec<SeenLoad>> {
+    let tared = dataset.clone().tared()?;
+    let is_free = |sample: &Sample<'_>| tared.about.free.is_some() && sample.tip_mm.is_none();
+    let pressed = tared.samples().filter(|sample| sample.force_n != [0.0; 3]);
+    let (free, known): (Vec<_>, Vec<_>) = pressed.partition(is_free);
+    let mut loads = noted(&known, certainty);
+    if let Some(about) = &tared.about.free {
+        let direction_rad = about.direction_deg.to_radians();
+        let chosen = representative(&free, MOST_FREE, rough_place_mm);
+        loads.extend(chosen.iter().map(|load| SeenLoad {
+            force_n: load.force_n,
+            size_n: certainty.gauge_n.hypot(load.clock_n),
+            direction_rad,
+            place_mm: load.place_mm,
+            each_place_mm: f64::INFINITY,
+            seen_px: load.seen_px,
+            noise_px: certainty.mean_px(load.frames),
+            frames: load.frames,
+        }));
+    }
+    Ok(loads)
+}
+
+/// Rows of the same force at the same place are frames of one load. Where nobody noted places, the
+/// tip was set on the film's middle.
+fn noted(samples: &[Sample<'_>], certainty: &Certainty) -> Vec<SeenLoad> {
+    let mut loads: Vec<SeenLoad> = Vec::new();
+    for sample in samples {
+        let place_mm = sample.tip_mm.unwrap_or_default();
+        let same =
+            |load: &&mut SeenLoad| load.force_n == sample.force_n && load.place_mm == place_mm;
+        let seen_px = markers_px(sample.seen);
+        match loads.iter_mut().find(same) {
+            Some(load) => load.add(&seen_px),
+            None => loads.push(SeenLoad {
+                force_n: sample.force_n,
+                size_n: certainty.gauge_n.hypot(sample.clock_n.unwrap_or(0.0)),
+                direction_rad: 0.0,
+                place_mm,
+                each_place_mm: certainty.place_mm,
+                seen_px,
+                noise_px: 0.0,
+                frames: 1,
+            }),
+        }
+    }
+    for load in &mut loads {
+        load.noise_px = certainty.mean_px(load.frames);
+    }
+    loads
+}
+
+impl SeenLoad {
+    /// |F|, N.
+    pub fn magnitude_n(&self) -> f64 {
+        norm(self.force_n)
+    }
+
+    fn add(&mut self, seen_px: &[[f64; 2]; 4]) {
+        self.frames += 1;
+        let now = seen_px.as_flattened();
+        for (mean, now) in self.seen_px.as_flattened_mut().iter_mut().zip(now) {
+            *mean += (now - *mean) / self.frames as f64;
+        }
+    }
+}
+
+/// Markers 0–3 of a frame, px.
+fn markers_px(seen: &Observation) -> [[f64; 2]; 4] {
+    let features = seen.features_px();
+    std::array::from_fn(|k| [features[2 * k], features[2 * k + 1]])
+}
+
+impl Weights {
+    /// About where a press was, mm, by the network alone: of a film that rests so. The middle where
+    /// the network tells no places.
+    pub fn rough_place_mm(&self, rest_px: &[f64; FEATURES], seen: &Observation) -> [f64; 2] {
+        let (own, seen) = (self.rest.features_px(), seen.features_px());
+        let features = std::array::from_fn(|i| seen[i] - rest_px[i] + own[i]);
+        self.network.place_mm(&features).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests;

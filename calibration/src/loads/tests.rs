@@ -1,0 +1,211 @@
+use hivtac_data::conditions::Conditions;
+use hivtac_data::dataset::{About, Free, Loads, Place, Row};
+use hivtac_data::range::Range;
+use hivtac_terms::fixed::Q;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
+
+use super::*;
+
+const CERTAINTY: Certainty = Certainty {
+    gauge_n: 0.001,
+    place_mm: 0.2,
+    frame_px: 0.03,
+};
+
+/// A film that is a formula: markers go apart with the force, and aside with the place.
+fn seen(force_n: f64, [x, y]: [f64; 2], off_px: f64) -> Observation {
+    let mut features_px = [0.0; FEATURES];
+    for (k, [right, down]) in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+        .into_iter()
+        .enumerate()
+    {
+        let apart = 44.0 + 40.0 * force_n.sqrt();
+        features_px[2 * k] = 160.0 + right * apart + 2.0 * x + off_px;
+        features_px[2 * k + 1] = 120.0 + down * apart + 2.0 * y + off_px;
+    }
+    Observation {
+        features_q16: features_px.map(|px| Q::from_bits((px * 65_536.0).round() as i64)),
+        areas_px: [190; 4],
+    }
+}
+
+/// Where a press was, by that formula.
+fn place_mm(seen: &Observation) -> [f64; 2] {
+    let px = markers_px(seen);
+    [(0, 160.0), (1, 120.0)].map(|(axis, middle)| {
+        let mean = px.iter().map(|at| at[axis]).sum::<f64>() / 4.0;
+        (mean - middle) / 2.0
+    })
+}
+
+fn row(session: usize, force_n: f64, tip_mm: Option<[f64; 2]>, seen: Observation) -> Row {
+    Row {
+        place: Place {
+            session,
+            pose: None,
+        },
+        force_n: [0.0, 0.0, -force_n],
+        tip_mm,
+        clock_n: None,
+        seen: Ok(seen),
+    }
+}
+
+fn dataset(rows: Vec<Row>, free: Option<Free>, sessions: usize) -> Dataset {
+    let about = About {
+        conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
+        scene: "a formula".to_owned(),
+        loads: Loads::Measured(1),
+        rest: 1,
+        sessions,
+        seed: 0,
+        range: Range::default(),
+        free,
+    };
+    Dataset { about, rows }
+}
+
+/// A hand that goes over the film for so many frames, holds now and then, and is fast in between;
+/// how fast, N for the clocks.
+fn hand(frames: usize) -> Vec<Row> {
+    let mut rows = vec![row(0, 0.0, None, seen(0.0, [0.0; 2], 0.0))];
+    for i in 0..frames {
+        let (touch, part) = (i / 100, (i % 100) as f64 / 100.0);
+        let spread = |by: f64| 2.0 * (touch as f64 * by).fract() - 1.0;
+        let at = [spread(0.618_03), spread(0.754_88)].map(|part| 3.9 * part);
+        let most_n = 0.125 + 0.11 * spread(0.324_7);
+        let rise = (part / 0.3).min((1.0 - part) / 0.3).min(1.0);
+        let force_n = most_n * rise;
+        let is_held = rise == 1.0;
+        rows.push(Row {
+            clock_n: Some(if is_held { 0.0 } else { 0.002 }),
+            ..row(0, force_n, None, seen(force_n, at, 0.0))
+        });
+    }
+    rows.retain(|row| row.force_n[2] <= 0.0);
+    rows
+}
+
+const FREE: Option<Free> = Some(Free { direction_deg: 3.0 });
+
+#[test]
+fn rows_of_one_force_and_place_are_frames_of_one_load() {
+    let mut rows = vec![row(0, 0.0, None, seen(0.0, [0.0; 2], 0.0))];
+    for number in 0..4 {
+        let at = [f64::from(number), 0.0];
+        for off_px in [0.02, -0.02] {
+            rows.push(row(0, 0.1, Some(at), seen(0.1, at, off_px)));
+        }
+    }
+    // Another day, on which the camera was bent by a pixel.
+    rows.push(row(1, 0.0, None, seen(0.0, [0.0; 2], 1.0)));
+    rows.push(row(1, 0.1, Some([3.0, 0.0]), seen(0.1, [3.0, 0.0], 1.0)));
+    let mut dataset = dataset(rows, None, 2);
+    dataset.about.range.place_mm = 3.0;
+    let loads = loads_of(&dataset, &CERTAINTY, |_| panic!("places are known")).unwrap();
+    let frames: Vec<usize> = loads.iter().map(|load| load.frames).collect();
+    assert_eq!(frames, [2, 2, 2, 3]);
+    for (number, load) in loads.iter().enumerate() {
+        let expected = markers_px(&seen(0.1, [number as f64, 0.0], 0.0));
+        let off = expected
+            .as_flattened()
+            .iter()
+            .zip(load.seen_px.as_flattened());
+        assert!(
+            off.into_iter().all(|(a, b)| (a - b).abs() < 1e-4),
+            "{load:?}"
+        );
+        assert_eq!((load.each_place_mm, load.direction_rad), (0.2, 0.0));
+        assert_eq!(load.size_n, 0.001);
+        assert!(load.noise_px > 0.008 && load.noise_px < 0.03);
+    }
+}
+
+#[test]
+fn places_that_nobody_noted_are_the_middle_where_nobody_pressed_anywhere() {
+    let rows = (0..5).map(|i| {
+        let force_n = 0.05 * f64::from(i);
+        row(0, force_n, None, seen(force_n, [0.0; 2], 0.0))
+    });
+    let dataset = dataset(rows.collect(), None, 1);
+    let loads = loads_of(&dataset, &CERTAINTY, place_mm).unwrap();
+    assert_eq!(loads.len(), 4);
+    assert!(
+        loads
+            .iter()
+            .all(|load| load.place_mm == [0.0; 2] && load.each_place_mm == 0.2)
+    );
+}
+
+#[test]
+fn presses_anywhere_are_loads_of_unknown_places_beside_known_ones() {
+    let mut rows = hand(30_000);
+    rows.push(row(0, 0.1, Some([0.0; 2]), seen(0.1, [0.0; 2], 0.0)));
+    let dataset = dataset(rows, FREE, 1);
+    let loads = loads_of(&dataset, &CERTAINTY, place_mm).unwrap();
+    assert_eq!(loads.len(), MOST_FREE + 1);
+    let known: Vec<&SeenLoad> = loads
+        .iter()
+        .filter(|load| load.direction_rad == 0.0)
+        .collect();
+    assert!(known.len() == 1 && known[0].each_place_mm == 0.2);
+    for load in loads.iter().filter(|load| load.direction_rad > 0.0) {
+        assert!((load.direction_rad - 3_f64.to_radians()).abs() < 1e-12);
+        assert_eq!(load.each_place_mm, f64::INFINITY);
+        let there = markers_px(&seen(load.magnitude_n(), load.place_mm, 0.0));
+        let off = there.as_flattened().iter().zip(load.seen_px.as_flattened());
+        assert!(
+            off.into_iter().all(|(a, b)| (a - b).abs() < 0.05),
+            "{load:?}"
+        );
+    }
+}
+
+/// Held presses are taken, fast ones where there is nothing else; places and sizes are spread.
+#[test]
+fn steady_frames_are_chosen_from_everywhere() {
+    let dataset = dataset(hand(30_000), FREE, 1);
+    let rows: Vec<Sample<'_>> = dataset.samples().filter(|s| s.force_n[2] < 0.0).collect();
+    let chosen = representative(&rows, 120, place_mm);
+    assert_eq!(chosen.len(), 120);
+    let held = chosen
+        .iter()
+        .filter(|load| load.frames == 8 && load.clock_n < 1e-6);
+    assert!(held.count() > 100, "{chosen:?}");
+    let corner = |load: &&LoadFrames| load.place_mm[0] > 2.0 && load.place_mm[1] < -2.0;
+    assert!(chosen.iter().filter(corner).count() >= 4);
+    let strong = chosen.iter().filter(|load| load.force_n[2] < -0.19);
+    assert!(strong.count() >= 15);
+    let weak = chosen.iter().filter(|load| load.force_n[2] > -0.04);
+    assert!(weak.count() >= 15);
+    assert_eq!(representative(&rows, 7, place_mm).len(), 7);
+    assert!(representative(&[], 120, place_mm).is_empty());
+    assert_eq!(
+        representative(&rows, 120, place_mm),
+        chosen,
+        "the same each time"
+    );
+}
+
+/// A gauge that changes fast while clocks are known to some milliseconds says less of the force.
+#[test]
+fn what_clocks_leave_is_part_of_a_loads_uncertainty() {
+    let mut dataset = dataset(hand(3_000), FREE, 1);
+    for row in &mut dataset.rows {
+        row.clock_n = Some(0.003);
+    }
+    let loads = loads_of(&dataset, &CERTAINTY, place_mm).unwrap();
+    for load in &loads {
+        assert!(load.size_n >= 0.001_f64.hypot(0.003) - 1e-12, "{load:?}");
+    }
+    for row in &mut dataset.rows {
+        row.clock_n = None;
+    }
+    let unknown = loads_of(&dataset, &CERTAINTY, place_mm).unwrap();
+    assert!(
+        unknown
+            .iter()
+            .all(|load| load.size_n >= 0.05 * load.magnitude_n())
+    );
+}
