@@ -135,13 +135,10 @@ fn add(sum: &mut Covariance, knot: Option<&[u8; KNOT]>, part: f32) {
     }
     let step = step(knot);
     let part = part * step * step;
-    for i in 0..EQUATIONS {
-        for j in 0..=i {
-            let mut product = 0.0;
-            for k in 0..=j {
-                product += factor[i][k] * factor[j][k];
-            }
-            sum[i][j] += part * product;
+    for (i, (row, sum)) in factor.iter().zip(sum).enumerate() {
+        for (j, (other, sum)) in factor.iter().zip(&mut sum[..=i]).enumerate() {
+            let products = row[..=j].iter().zip(other);
+            *sum += part * products.fold(0.0, |sum, (a, b)| sum + a * b);
         }
     }
 }

@@ -80,7 +80,7 @@ impl<'a> Tables<'a> {
         let mut prediction = Prediction::default();
         for (dot, (table, beside_mm)) in self.dots.iter().zip(beside_mm).enumerate() {
             let [a, b] = table.tilt(pose.tilt).map(|part| Powers::at(part, limits));
-            let functions = tilted(&sized, &Tilts::of(&a, &b));
+            let functions = tilted(&sized, &Tilts::of(&a, &b).0[..self.terms.groups()]);
             let [x, y] = [0, 1].map(|i| pose.place_mm[i] - beside_mm[i]);
             let at = table.place([x, y]);
             for axis in [0, 1] {
@@ -118,10 +118,10 @@ impl<'a> Tables<'a> {
 type Sized = Vec<[[f32; 2]; MOST_GROUPS], MOST_FUNCTIONS>;
 
 /// Functions under a tilt.
-fn tilted(sized: &Sized, tilts: &Tilts) -> Functions {
+fn tilted(sized: &Sized, tilts: &[[f32; 3]]) -> Functions {
     let function = |groups: &[[f32; 2]; MOST_GROUPS]| {
         let mut sums = Factors::default();
-        for ([value, slope], [whole, by_a, by_b]) in groups.iter().zip(&tilts.0) {
+        for ([value, slope], [whole, by_a, by_b]) in groups.iter().zip(tilts) {
             let products = [value * whole, slope * whole, value * by_a, value * by_b];
             for (sum, product) in sums.iter_mut().zip(products) {
                 *sum += product;

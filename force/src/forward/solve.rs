@@ -36,7 +36,8 @@ pub struct Solved {
 }
 
 impl Solved {
-    /// The covariance of two unknowns.
+    /// The covariance of two unknowns. Once in the near memory, which is scarce.
+    #[inline(never)]
     pub fn covariance(&self, a: usize, b: usize) -> f32 {
         let [Some(a), Some(b)] = [a, b].map(|unknown| self.spread.get(unknown)) else {
             return 0.0;

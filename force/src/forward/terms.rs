@@ -70,6 +70,12 @@ impl Terms {
         self.count.into()
     }
 
+    /// How many groups there are, up to the last of which there is a term.
+    pub fn groups(&self) -> usize {
+        let last = self.sizes.iter().rposition(|sizes| *sizes > 0);
+        last.map_or(0, |degree| (degree + 1) * (degree + 2) / 2)
+    }
+
     /// For each degree of tilt how many sizes its groups have, and how many groups it has.
     pub fn sizes_of_degrees(&self) -> impl Iterator<Item = (usize, usize)> {
         self.sizes.iter().map(|sizes| usize::from(*sizes)).zip(1..)
@@ -150,6 +156,7 @@ mod tests {
         assert_eq!(terms.count(), 4 + 2 * 3 + 3);
         let sizes: std::vec::Vec<_> = terms.sizes_of_degrees().collect();
         assert_eq!(sizes, [(4, 1), (3, 2), (1, 3), (0, 4), (0, 5)]);
+        assert_eq!(terms.groups(), 6);
         let values = at([0.335, 0.67]).0.map(|[value, ..]| value);
         assert_eq!(&values[..6], &[1.0, 0.5, 1.0, 0.25, 0.5, 1.0]);
         for wrong in [[9, 0, 0, 0, 0], [0; 5], [8, 8, 8, 8, 8], [255; 5]] {
