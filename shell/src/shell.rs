@@ -482,9 +482,7 @@ impl WithSimd for BySheet<'_> {
         for cell in shell.cells() {
             let local = shell.grid.gather(u, cell.origin);
             let moved = contracted(&local, cell.x);
-            for line in &mut lines {
-                *line = NO_LINES;
-            }
+            lines.fill(NO_LINES);
             for (j, (_, y)) in cell.y.iter().enumerate() {
                 for i in 0..cell.x.len() {
                     let x = shell.vectors(&moved[i], y);
