@@ -10,7 +10,10 @@ use hivtac_shell::{Design, Film, markers, paper_camera, press_load};
 
 const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact \
                      force|stick|slip:0.6] [--offset-x-mm 0] [--offset-y-mm 0] [--overhang-mm 0] \
-                     [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1]";
+                     [--post-radius-mm 1.5] [--post-grip 20] [--tip-radius-mm 0.5] [--fineness 1] \
+                     [--stretch 0.012,0.01] [--neo-hooke 1] [--stiffening 0.1] [--thickness-slope \
+                     0.05,0] [--thickness-curve 0,0,0.05] [--down 0,0,-1] [--dot-stiffening 0.5] \
+                     [--gauss-points 3]";
 
 /// What to press, and how.
 struct Request {
@@ -58,17 +61,34 @@ impl Request {
             self.contact = value.parse().map_err(|why: FilmError| why.to_string())?;
             return Ok(());
         }
+        let design = &mut self.design;
+        match name {
+            "--stretch" => return numbers(name, value, &mut design.stretch),
+            "--thickness-slope" => return numbers(name, value, &mut design.thickness_slope),
+            "--thickness-curve" => return numbers(name, value, &mut design.thickness_curve),
+            "--down" => return numbers(name, value, &mut design.down),
+            "--gauss-points" => {
+                design.gauss_points = value
+                    .parse()
+                    .map_err(|_| format!("{name} {value}: not a number of points"))?;
+                return Ok(());
+            }
+            _ => {}
+        }
         let slot = match name {
             "--force-n" => &mut self.force_n,
             "--alpha-deg" => &mut self.alpha_deg,
             "--beta-deg" => &mut self.beta_deg,
             "--offset-x-mm" => &mut self.offset_mm[0],
             "--offset-y-mm" => &mut self.offset_mm[1],
-            "--overhang-mm" => &mut self.design.overhang_mm,
-            "--post-radius-mm" => &mut self.design.post_radius_mm,
-            "--post-grip" => &mut self.design.post_grip_n_per_mm3,
+            "--overhang-mm" => &mut design.overhang_mm,
+            "--post-radius-mm" => &mut design.post_radius_mm,
+            "--post-grip" => &mut design.post_grip_n_per_mm3,
+            "--neo-hooke" => &mut design.law.neo_hooke,
+            "--stiffening" => &mut design.law.stiffening,
+            "--dot-stiffening" => &mut design.dot_stiffening,
             "--tip-radius-mm" => &mut self.tip_radius_mm,
-            "--fineness" => &mut self.design.fineness,
+            "--fineness" => &mut design.fineness,
             _ => return Err(format!("{name}: unknown\n{USAGE}")),
         };
         *slot = value
@@ -95,8 +115,11 @@ impl Request {
         let camera = paper_camera().map_err(|error| error.to_string())?;
 
         let three = |v: [f64; 3]| format!("({:9.4}, {:9.4}, {:9.4})", v[0], v[1], v[2]);
-        println!("tip depth      {:.4} mm", -state.tip_mm[2]);
-        println!("tip moved      {} mm", three(state.tip_mm));
+        let rest = film.rest();
+        let since_rest = [0, 1, 2].map(|c| state.tip_mm[c] - rest.tip_mm[c]);
+        println!("tip depth      {:.4} mm since rest", -since_rest[2]);
+        println!("tip rested at  {} mm", three(rest.tip_mm));
+        println!("tip moved      {} mm", three(since_rest));
         let [x, y] = loaded.touches_mm;
         println!("tip touches    ({x:9.4}, {y:9.4}) mm of the film at rest");
         println!("force on film  {} N", three(state.force_n));
@@ -117,4 +140,16 @@ impl Request {
         );
         Ok(())
     }
+}
+
+/// Numbers with commas between them.
+fn numbers<const N: usize>(name: &str, value: &str, slots: &mut [f64; N]) -> Result<(), String> {
+    let read: Result<Vec<f64>, _> = value.split(',').map(str::parse).collect();
+    *slots = read
+        .ok()
+        .and_then(|read| read.try_into().ok())
+        .ok_or(format!(
+            "{name} {value}: not {N} numbers with commas between them"
+        ))?;
+    Ok(())
 }

@@ -526,6 +526,7 @@ mod tests {
             thickness_curve: [0.03, 0.02, -0.05],
             down: [0.3, -0.2, -0.9],
             dot_stiffening: 0.7,
+            gauss_points: 2,
             ..Design::default()
         };
         answers_are_differences(&design, [0.06, -0.03, -0.15]);

@@ -9,6 +9,8 @@ use crate::spline::{Axis, SUPPORT};
 pub struct Grid {
     /// Along x and along y.
     pub axes: [Axis; 2],
+    /// Gauss points along one side of a cell, 2 or 3.
+    pub points: usize,
 }
 
 /// A point of the film, by the functions that are not zero there.

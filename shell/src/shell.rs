@@ -11,14 +11,18 @@ use crate::grid::Grid;
 use crate::point::{Laws, Point, Share, V3, VECTORS};
 use crate::sheet::{Sheet, TERMS};
 use crate::sparse::{COMPONENTS, Pattern};
-use crate::spline::{Axis, Basis, SUPPORT};
+use crate::spline::{Basis, SUPPORT};
 
 /// Functions that are not zero on a cell.
 pub const LOCAL: usize = SUPPORT * SUPPORT;
-/// Gauss points along one side of a cell.
+/// At most so many Gauss points along one side of a cell.
 const GAUSS: usize = 3;
-/// Their places in [−1, 1] and weights: √(3/5), 5/9 and 8/9.
-const GAUSS_POINTS: [(f64, f64); GAUSS] = [
+/// Places in [−1, 1] and weights of two, 1/√3, and of three, √(3/5), 5/9 and 8/9.
+const TWO: [(f64, f64); 2] = [
+    (-0.577_350_269_189_625_8, 1.0),
+    (0.577_350_269_189_625_8, 1.0),
+];
+const THREE: [(f64, f64); 3] = [
     (-0.774_596_669_241_483_4, 5.0 / 9.0),
     (0.0, 8.0 / 9.0),
     (0.774_596_669_241_483_4, 5.0 / 9.0),
@@ -30,13 +34,18 @@ const STRETCH_STEP: f64 = 1e-4;
 
 /// A span's Gauss points: weight (mm before the film was stretched) and functions with their
 /// derivatives by the place before it was stretched.
-type Samples = [(f64, Basis); GAUSS];
+type Samples = Vec<(f64, Basis)>;
 /// A vector in space and a zero: as wide as what is added at once.
 type Wide = [f64; 4];
 /// Sums along x at one of its Gauss points: for each line of functions and derivative by x.
 type Line = [[Wide; 3]; SUPPORT];
 /// At all of them.
 type Lines = [Line; GAUSS];
+/// No stiffness.
+const NOTHING: Share = Share {
+    membrane: 0.0,
+    bending: 0.0,
+};
 const NO_LINES: Lines = [[[[0.0; 4]; 3]; SUPPORT]; GAUSS];
 
 /// A film on springs: the sum of the points' energy over the cells and of what holds the film, less
@@ -130,7 +139,7 @@ impl Shell {
     /// The same with the pattern that such grids have.
     pub fn of(grid: Grid, sheet: &Sheet, pattern: Arc<Pattern>) -> Shell {
         let scales = sheet.scales();
-        let samples = [0, 1].map(|way| samples(&grid.axes[way], scales[way]));
+        let samples = [0, 1].map(|way| samples(&grid, way, scales[way]));
         let mut shell = Shell {
             laws: Laws::new(&sheet.material, sheet.law),
             shares: shares(&grid, &samples, sheet),
@@ -335,10 +344,10 @@ impl Shell {
         self.spots.get(&origin).map_or(&[], |spots| spots)
     }
 
-    fn cells(&self) -> impl Iterator<Item = Cell<'_>> {
+    fn cells<'a>(&'a self) -> impl Iterator<Item = Cell<'a>> {
         let [across, down] = &self.samples;
         down.iter().enumerate().flat_map(move |(j, y)| {
-            let cell = move |(i, x)| Cell {
+            let cell = move |(i, x): (usize, &'a Samples)| Cell {
                 origin: [i, j],
                 x,
                 y,
@@ -353,8 +362,8 @@ impl Shell {
 /// One cell of the grid: its first coefficient, the Gauss points along its sides and their shares.
 struct Cell<'a> {
     origin: [usize; 2],
-    x: &'a Samples,
-    y: &'a Samples,
+    x: &'a [(f64, Basis)],
+    y: &'a [(f64, Basis)],
     shares: &'a [[Share; GAUSS]; GAUSS],
     grid: &'a Grid,
 }
@@ -363,8 +372,8 @@ impl Cell<'_> {
     /// Where Gauss point (i, j) is, mm.
     fn at(&self, i: usize, j: usize) -> [f64; 2] {
         [
-            place_of(&self.grid.axes[0], self.origin[0], i),
-            place_of(&self.grid.axes[1], self.origin[1], j),
+            place_of(self.grid, 0, self.origin[0], i),
+            place_of(self.grid, 1, self.origin[1], j),
         ]
     }
 }
@@ -388,7 +397,7 @@ impl WithSimd for First<'_> {
             let moved = contracted(&local, cell.x);
             let mut lines = NO_LINES;
             for (j, (_, y)) in cell.y.iter().enumerate() {
-                for i in 0..GAUSS {
+                for i in 0..cell.x.len() {
                     let x = shell.vectors(&moved[i], y);
                     let (part, gradient) = shell.laws.first(&x, cell.shares[j][i]);
                     energy += part;
@@ -473,11 +482,9 @@ impl WithSimd for BySheet<'_> {
         for cell in shell.cells() {
             let local = shell.grid.gather(u, cell.origin);
             let moved = contracted(&local, cell.x);
-            for line in &mut lines {
-                *line = NO_LINES;
-            }
+            lines.fill(NO_LINES);
             for (j, (_, y)) in cell.y.iter().enumerate() {
-                for i in 0..GAUSS {
+                for i in 0..cell.x.len() {
                     let x = shell.vectors(&moved[i], y);
                     let rates = Rates::new(shell, &x, cell.shares[j][i], cell.at(i, j), asked);
                     for (line, change) in lines.iter_mut().zip(changes) {
@@ -668,21 +675,31 @@ fn times(share: Share, factor: f64) -> Share {
     }
 }
 
-fn samples(axis: &Axis, scale: f64) -> Vec<Samples> {
+fn samples(grid: &Grid, way: usize, scale: f64) -> Vec<Samples> {
+    let axis = &grid.axes[way];
     let span_samples = |span| {
         let [from, to] = axis.ends(span);
-        let half = (to - from) / 2.0;
-        std::array::from_fn(|k| {
-            let basis = axis.basis(span, place_of(axis, span, k));
-            (GAUSS_POINTS[k].1 * half / scale, stretched(basis, scale))
-        })
+        let sample = |k: usize| {
+            let basis = axis.basis(span, place_of(grid, way, span, k));
+            let weight = gauss(grid.points)[k].1 * (to - from) / 2.0;
+            (weight / scale, stretched(basis, scale))
+        };
+        (0..grid.points).map(sample).collect()
     };
     (0..axis.spans()).map(span_samples).collect()
 }
 
-fn place_of(axis: &Axis, span: usize, k: usize) -> f64 {
-    let [from, to] = axis.ends(span);
-    (from + to) / 2.0 + (to - from) / 2.0 * GAUSS_POINTS[k].0
+fn gauss(points: usize) -> &'static [(f64, f64)] {
+    match points {
+        2 => &TWO,
+        _ => &THREE,
+    }
+}
+
+/// Where Gauss point `k` of a span along x or y is, mm.
+fn place_of(grid: &Grid, way: usize, span: usize, k: usize) -> f64 {
+    let [from, to] = grid.axes[way].ends(span);
+    (from + to) / 2.0 + (to - from) / 2.0 * gauss(grid.points)[k].0
 }
 
 /// Derivatives by the place before the film was stretched.
@@ -699,15 +716,14 @@ fn shares(grid: &Grid, samples: &[Vec<Samples>; 2], sheet: &Sheet) -> Vec<[[Shar
     let mut shares = Vec::with_capacity(across.len() * down.len());
     for (row, y) in down.iter().enumerate() {
         for (column, x) in across.iter().enumerate() {
-            shares.push(std::array::from_fn(|j| {
-                std::array::from_fn(|i| {
-                    let at = [
-                        place_of(&grid.axes[0], column, i),
-                        place_of(&grid.axes[1], row, j),
-                    ];
-                    sheet.share(at, x[i].0 * y[j].0)
-                })
-            }));
+            let mut own = [[NOTHING; GAUSS]; GAUSS];
+            for (j, (height, _)) in y.iter().enumerate() {
+                for (i, (width, _)) in x.iter().enumerate() {
+                    let at = [place_of(grid, 0, column, i), place_of(grid, 1, row, j)];
+                    own[j][i] = sheet.share(at, width * height);
+                }
+            }
+            shares.push(own);
         }
     }
     shares
@@ -746,7 +762,7 @@ fn slopes(x: &Basis, y: &Basis) -> [Row; VECTORS] {
 
 /// Sums of a cell's coefficients along x.
 #[inline(always)]
-fn contracted(local: &[V3; LOCAL], x: &Samples) -> Lines {
+fn contracted(local: &[V3; LOCAL], x: &[(f64, Basis)]) -> Lines {
     let mut wide = [[0.0; 4]; LOCAL];
     for (wide, local) in wide.iter_mut().zip(local) {
         wide[..3].copy_from_slice(local);
@@ -768,7 +784,7 @@ fn contracted(local: &[V3; LOCAL], x: &Samples) -> Lines {
 
 /// The other way round: the force on each coefficient.
 #[inline(always)]
-fn gathered(lines: &Lines, x: &Samples) -> [V3; LOCAL] {
+fn gathered(lines: &Lines, x: &[(f64, Basis)]) -> [V3; LOCAL] {
     let mut wide = [[0.0; 4]; LOCAL];
     for (line, (_, basis)) in lines.iter().zip(x) {
         for j in 0..SUPPORT {

@@ -32,7 +32,8 @@ fn sheet_rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], sheet: &Sheet)
         Axis::new(&breaks)
     };
     let axes = [axis(a, columns), axis(b, rows)];
-    Shell::new(Grid { axes }, sheet)
+    let points = 3;
+    Shell::new(Grid { axes, points }, sheet)
 }
 
 /// How far coefficient `k` is from the film's edges, in coefficients: along x and along y.

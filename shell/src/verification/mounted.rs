@@ -283,6 +283,28 @@ fn points_of_the_film_are_found_again() {
     }
 }
 
+/// Fewer points are no worse: nearer to the solution of a finer mesh, as the mesh itself is.
+#[test]
+fn two_points_are_as_near_as_three() {
+    let depth = |fineness, gauss_points| {
+        let (film, rest) = film(Design {
+            fineness,
+            gauss_points,
+            ..mounted()
+        });
+        let state = film
+            .press(Contact::Force([0.02, 0.0, -0.2]), &rest)
+            .unwrap();
+        film.displacement(&state, [3.7, 3.7])[2]
+    };
+    let exact = depth(1.0, 3);
+    for fineness in [0.25, 0.4] {
+        let [two, three] = [2, 3].map(|points| depth(fineness, points) - exact);
+        println!("fineness {fineness}: off by {two:.5} mm of 2 points, {three:.5} of 3");
+        assert!(two.abs() < 1.1 * three.abs() + 1e-3, "{two} {three}");
+    }
+}
+
 /// Dots stiffen by what their area is of the film, wherever cells are.
 #[test]
 fn dots_stiffen_by_their_area() {

@@ -15,7 +15,7 @@ fn uneven() -> Shell {
         Axis::new(&[0.0, 0.7, 1.0, 2.2, 3.0, 5.0]),
         Axis::new(&[0.0, 1.1, 1.3, 2.0, 4.0]),
     ];
-    Shell::new(Grid { axes }, &Sheet::of(&FILM))
+    Shell::new(Grid { axes, points: 3 }, &Sheet::of(&FILM))
 }
 
 /// The largest force on a function that vanishes with its slope on the edges: none in a state of
