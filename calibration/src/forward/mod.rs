@@ -5,13 +5,11 @@ pub mod building;
 mod covariances;
 mod functions;
 mod honest;
-mod left_out;
 mod matrix;
 mod nearest;
 mod noise;
 mod others;
 mod tables;
-mod ten_loads;
 mod unit;
 
 use std::sync::Mutex;
@@ -24,14 +22,13 @@ use hivtac_sensing::forward::{self, DOTS, Limits, RestImage, Stiffness};
 use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
 
-use covariances::{even, sum_of_squares};
+use crate::unit_fit::OwnFilm;
+use covariances::even;
 pub use covariances::{Covariance, Moved, covariances, covariances_of, knots};
 pub use functions::{Sampled, compressed};
 pub use noise::Noise;
 use others::others;
-use tables::turned;
 pub use tables::{Dot, UnitSetup, tables};
-pub use ten_loads::{Bench, Fit, KnownLoad, fit};
 pub use unit::Known;
 
 /// What is known of a unit's film and camera.
@@ -40,8 +37,6 @@ pub use unit::Known;
 pub struct FilmModel {
     /// Gauss–Newton steps from the network's answer, 0–3.
     pub steps: u8,
-    /// The tip's radius, mm.
-    pub tip_radius_mm: f64,
     /// What a tare takes for the rest position less where markers 0–3 rest, px: what the pixel grid
     /// does there.
     pub rest_px: [[f64; 2]; 4],
@@ -54,108 +49,25 @@ pub struct FilmModel {
     /// uncertainty, px at 320×240; less in parts of the size under smaller ones.
     #[serde(default)]
     pub beside_px: f64,
-    /// The unit; without it the film is the nominal one, and the rest picture tells the markers'
-    /// places.
+    /// The unit's own film; without it the film is the nominal one, and the rest picture tells the
+    /// markers' places.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unit: Option<OwnUnit>,
-    /// What its calibration leaves open of it: the unit moved along each column of its numbers'
-    /// factor, by a quarter.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub open: Vec<Open>,
+    pub own: Option<Box<OwnFilm>>,
 }
 
-/// A calibration leaves fewer directions open than this.
-const MOST_OPEN: usize = 64;
-/// How far an open unit is moved, in parts of what is not known of it.
-pub const STEP: f64 = 0.25;
 /// The focal length at 320×240, px.
 const FOCAL_PX: f64 = 175.0;
-
-/// A unit that is as likely as the one that was found, but for [`STEP`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Open {
-    /// Its film and camera.
-    pub unit: OwnUnit,
-    /// Its tip's radius, mm.
-    pub tip_radius_mm: f64,
-    /// What a tare takes for its rest position less where its markers rest, px.
-    pub rest_px: [[f64; 2]; 4],
-}
-
-/// A unit as its calibration found it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OwnUnit {
-    /// Young's modulus in parts of the nominal one.
-    pub stiffness: f64,
-    /// Thickness in parts of the nominal one.
-    pub thickness: f64,
-    /// The posts' grip in parts of the nominal one.
-    pub grip: f64,
-    /// How far each post is off its place, by the marker beside it, mm.
-    pub posts_mm: [[f64; 2]; 4],
-    /// How far each marker is glued beside its place, mm.
-    pub markers_mm: [[f64; 2]; 4],
-    /// The camera's focal length, px.
-    pub focal_px: f64,
-    /// How far the camera is rolled, x towards y, degrees.
-    pub roll_deg: f64,
-}
-
-impl OwnUnit {
-    fn check(&self) -> Result<()> {
-        self.film().check()?;
-        ensure!(
-            (10.0..=10_000.0).contains(&self.focal_px) && self.roll_deg.abs() <= 45.0,
-            "film.unit: a focal length of {} px and a roll of {}° are no camera's",
-            self.focal_px,
-            self.roll_deg
-        );
-        Ok(())
-    }
-
-    fn film(&self) -> Unit {
-        Unit {
-            stiffness: self.stiffness,
-            thickness: self.thickness,
-            grip: self.grip,
-            posts_mm: self.posts_mm,
-            markers_mm: self.markers_mm,
-        }
-    }
-
-    /// Turns what the camera sees, in focal lengths, into px by its roll and its focal length.
-    fn to_px(&self) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
-        let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
-        let focal_px = self.focal_px;
-        move |[x, y]| {
-            [
-                focal_px * (cos * x - sin * y),
-                focal_px * (sin * x + cos * y),
-            ]
-        }
-    }
-
-    /// Focal lengths per px, a complex number.
-    fn per_px(&self) -> [f64; 2] {
-        let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
-        [cos, -sin].map(|part| part / self.focal_px)
-    }
-}
 
 impl FilmModel {
     /// The nominal film, for units of which nothing is known.
     pub fn nominal(steps: u8, noise: &Noise) -> Self {
         Self {
             steps,
-            tip_radius_mm: NOMINAL_RADIUS_MM,
             rest_px: noise.rest_px,
             noise_px: noise.at_rest_px,
             noise_at_four_areas: noise.at_four_areas,
             beside_px: 0.0,
-            unit: None,
-            open: Vec::new(),
+            own: None,
         }
     }
 
@@ -170,7 +82,6 @@ impl FilmModel {
             self.steps
         );
         for (name, value, [low, high]) in [
-            ("tip_radius_mm", self.tip_radius_mm, [0.25, 2.0]),
             ("beside_px", self.beside_px, [0.0, 1.0]),
             ("noise_px", self.noise_px[0], [1e-4, 10.0]),
             ("noise_px", self.noise_px[1], [1e-4, 10.0]),
@@ -190,13 +101,7 @@ impl FilmModel {
                 "film.{name} is {value}: use {low} to {high}"
             );
         }
-        ensure!(
-            self.open.len() <= MOST_OPEN,
-            "film.open has {} units: use at most {MOST_OPEN}",
-            self.open.len()
-        );
-        let open = self.open.iter().map(|open| &open.unit);
-        self.unit.iter().chain(open).try_for_each(OwnUnit::check)
+        self.own.as_deref().map_or(Ok(()), OwnFilm::check)
     }
 
     /// What a model file holds of it.
@@ -207,78 +112,34 @@ impl FilmModel {
         self.check()?;
         // Tables are in focal lengths: all cameras have this lens.
         let camera = Camera::new(Preset::Ov7725, 320, 240)?;
-        let setup = UnitSetup {
-            unit: self.unit.as_ref().map_or_else(Unit::default, OwnUnit::film),
-            tip_radius_mm: self.tip_radius_mm,
-            camera: &camera,
+        let nominal = nominal(&camera)?;
+        let noise = forward::Noise {
+            rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
+            at_rest_px: self.noise_px.map(|part| part as f32),
+            at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
         };
-        let stiffness_n = setup.stiffness_n().map(|part| part as f32);
-        let is_nominal = self.unit.is_none() && self.tip_radius_mm == NOMINAL_RADIUS_MM;
-        let (tables, left) = match is_nominal {
-            true => (nominal(&camera)?.tables, 0.0),
-            false => setup.tables()?,
-        };
-        let [own, other] = match &self.unit {
-            Some(unit) => [Some(self.left_open(unit, left, &camera)?), None],
-            None => [
-                (self.beside_px > 0.0).then(|| even(self.beside_px / FOCAL_PX)),
-                Some(nominal(&camera)?.other),
-            ],
-        };
-        Ok(ForwardSpec {
+        let spec = ForwardSpec {
             steps: self.steps,
             limits: limits(),
-            stiffness: Stiffness {
-                linear_n: stiffness_n[0],
-                cubic_n: stiffness_n[1],
-            },
-            rest_image: rest_image(&Film::of(setup.unit)?, &camera),
-            per_px: (self.unit.as_ref()).map(|unit| unit.per_px().map(|part| part as f32)),
-            noise: forward::Noise {
-                rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
-                at_rest_px: self.noise_px.map(|part| part as f32),
-                at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
-            },
-            tables,
-            own,
-            other,
-        })
-    }
-
-    /// What its calibration leaves open of a unit, and what the chip's tables leave of it.
-    fn left_open(&self, unit: &OwnUnit, left: f64, camera: &Camera) -> Result<CovarianceSpec> {
-        let found = Open {
-            unit: unit.clone(),
-            tip_radius_mm: self.tip_radius_mm,
-            rest_px: self.rest_px,
+            stiffness: nominal.stiffness,
+            rest_image: rest_image(&Film::default(), &camera),
+            per_px: None,
+            noise,
+            tables: nominal.tables,
+            own: (self.beside_px > 0.0).then(|| even(self.beside_px / FOCAL_PX)),
+            other: Some(nominal.other),
         };
-        let here = Moving::new(&found, camera)?;
-        let open = self.open.iter().map(|open| Moving::new(open, camera));
-        let open: Vec<Moving<'_>> = open.collect::<Result<_>>()?;
-        covariances(|pose| {
-            let moved = here.moved_px(pose)?;
-            let difference = |there: &Moving<'_>| -> Result<Moved> {
-                let more = there.moved_px(&here.same_force(pose, there))?;
-                let mut focal: Moved = std::array::from_fn(|i| (more[i] - moved[i]) / STEP);
-                for marker in focal.as_chunks_mut().0 {
-                    *marker = turned(unit.per_px(), *marker);
-                }
-                Ok(focal)
-            };
-            let differences = open.iter().map(difference).collect::<Result<Vec<_>>>()?;
-            let mut covariance = sum_of_squares(&differences);
-            let left = left.hypot(self.beside_px / FOCAL_PX) * pose.size / LARGEST_SIZE;
-            for (k, row) in covariance.iter_mut().enumerate() {
-                row[k] += left * left;
-            }
-            Ok(covariance)
-        })
+        match &self.own {
+            None => Ok(spec),
+            Some(own) => own.spec(spec),
+        }
     }
 }
 
 /// What every file of the nominal film under the nominal tip has: made once.
 #[derive(Clone)]
 struct Nominal {
+    stiffness: Stiffness,
     tables: TablesSpec,
     other: CovarianceSpec,
 }
@@ -312,6 +173,7 @@ fn nominal(camera: &Camera) -> Result<Nominal> {
     };
     let bytes = alone.to_bytes();
     let nominal = Nominal {
+        stiffness: alone.stiffness,
         other: others(&parsed(&bytes)?, camera)?,
         tables: alone.tables,
     };
@@ -323,55 +185,6 @@ fn limits() -> Limits {
     Limits {
         size: LARGEST_SIZE as f32,
         tilt: LARGEST_TILT as f32,
-    }
-}
-
-/// How the markers of a unit move.
-struct Moving<'a> {
-    open: &'a Open,
-    setup: UnitSetup<'a>,
-    film: Film,
-}
-
-impl<'a> Moving<'a> {
-    fn new(open: &'a Open, camera: &'a Camera) -> Result<Self> {
-        let unit = open.unit.film();
-        Ok(Self {
-            open,
-            film: Film::of(unit)?,
-            setup: UnitSetup {
-                unit,
-                tip_radius_mm: open.tip_radius_mm,
-                camera,
-            },
-        })
-    }
-
-    /// Where the markers are seen beside the rest position that was seen, px.
-    fn moved_px(&self, pose: &Pose) -> Result<Moved> {
-        let to_px = self.open.unit.to_px();
-        let mut moved = Moved::default();
-        for (marker, place) in moved.chunks_exact_mut(2).enumerate() {
-            let [x, y] = to_px(self.setup.moved(&self.film, pose, marker)?);
-            let [off_x, off_y] = self.open.rest_px[marker];
-            place.copy_from_slice(&[x - off_x, y - off_y]);
-        }
-        Ok(moved)
-    }
-
-    fn stiffness(&self) -> Stiffness {
-        let [linear_n, cubic_n] = self.setup.stiffness_n().map(|part| part as f32);
-        Stiffness { linear_n, cubic_n }
-    }
-
-    /// The pose that the same force has on another unit.
-    fn same_force(&self, pose: &Pose, other: &Moving<'_>) -> Pose {
-        let magnitude_n = self.stiffness().magnitude_n(pose.size as f32);
-        let size = other.stiffness().size_of(magnitude_n, LARGEST_SIZE as f32);
-        Pose {
-            size: size.into(),
-            ..*pose
-        }
     }
 }
 
@@ -421,18 +234,13 @@ mod tests {
     use super::*;
     use hivtac_film::Film;
 
-    fn film_model(unit: Option<OwnUnit>) -> FilmModel {
-        FilmModel {
-            unit,
-            ..FilmModel::nominal(
-                2,
-                &Noise {
-                    rest_px: [[0.0; 2]; 4],
-                    at_rest_px: [0.01; 2],
-                    at_four_areas: [1.0; 2],
-                },
-            )
-        }
+    fn film_model() -> FilmModel {
+        let noise = Noise {
+            rest_px: [[0.0; 2]; 4],
+            at_rest_px: [0.01; 2],
+            at_four_areas: [1.0; 2],
+        };
+        FilmModel::nominal(2, &noise)
     }
 
     /// The number's digits in a base, mirrored at the point: fills 0 to 1 evenly.
@@ -469,11 +277,8 @@ mod tests {
     fn off_px(model: &FilmModel) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
         let setup = UnitSetup {
-            unit: model
-                .unit
-                .as_ref()
-                .map_or_else(Unit::default, OwnUnit::film),
-            tip_radius_mm: model.tip_radius_mm,
+            unit: Unit::default(),
+            tip_radius_mm: NOMINAL_RADIUS_MM,
             camera: &camera,
         };
         let film = Film::of(setup.unit).unwrap();
@@ -495,30 +300,9 @@ mod tests {
         [(sum / count).sqrt(), worst]
     }
 
-    /// Glued, held and made otherwise than it should be, as far as hands do.
-    fn own_unit() -> OwnUnit {
-        OwnUnit {
-            stiffness: 1.3,
-            thickness: 0.9,
-            grip: 1.0,
-            posts_mm: [[0.4, -0.3], [0.2, 0.5], [-0.6, 0.1], [0.3, 0.3]],
-            markers_mm: [[0.2, 0.1], [-0.15, 0.2], [0.1, -0.25], [-0.2, -0.1]],
-            focal_px: 175.0,
-            roll_deg: 0.0,
-        }
-    }
-
-    /// Where the tip is right beside a marker that is glued beside its place, steps between the
-    /// places of the tables' tip are coarse, and it is some tenths of a pixel.
-    #[test]
-    fn the_chip_predicts_what_a_units_own_film_does() {
-        let [rms, worst] = off_px(&film_model(Some(own_unit())));
-        eprintln!("own {rms} {worst}"); assert!(rms < 0.03 && worst < 0.45, "{rms} {worst} px");
-    }
-
     #[test]
     fn the_chip_predicts_what_the_film_does() {
-        let [rms, worst] = off_px(&film_model(None));
-        eprintln!("{rms} {worst}"); assert!(rms < 0.003 && worst < 0.03, "{rms} {worst} px");
+        let [rms, worst] = off_px(&film_model());
+        assert!(rms < 0.003 && worst < 0.03, "{rms} {worst} px");
     }
 }

@@ -15,7 +15,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
 use super::covariances::{Moved, covariances, sum_of_squares};
-use super::{OwnUnit, UnitSetup, at_rest, told};
+use super::{UnitSetup, at_rest, told};
+use hivtac_film::reduced::Unit;
 
 /// Units that are drawn: their covariance is known to a tenth.
 const UNITS: u64 = 200;
@@ -29,12 +30,33 @@ const FOCAL_PX: f64 = 175.0;
 
 /// A unit, and what a chip makes of its rest picture.
 struct Other<'a> {
-    unit: OwnUnit,
+    unit: DrawnUnit,
     film: Film,
     setup: UnitSetup<'a>,
     mounting: Mounting,
     /// How the forces are tilted that press it.
     tilt: [f64; 2],
+}
+
+/// A film and its camera, as somebody built them.
+struct DrawnUnit {
+    film: Unit,
+    focal_px: f64,
+    roll_deg: f64,
+}
+
+impl DrawnUnit {
+    /// Turns what the camera sees, in focal lengths, into px.
+    fn to_px(&self) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
+        let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
+        let focal_px = self.focal_px;
+        move |[x, y]| {
+            [
+                focal_px * (cos * x - sin * y),
+                focal_px * (sin * x + cos * y),
+            ]
+        }
+    }
 }
 
 /// What the tables of the nominal film leave of how other units' images move under the same force
@@ -59,18 +81,20 @@ impl<'a> Other<'a> {
     fn drawn(number: u64, chip: &Forward<'_>, camera: &'a Camera) -> Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(number);
         let mut usual = |sigma: f64| sigma * normal(&mut random);
-        let unit = OwnUnit {
-            stiffness: 1.0 + usual(STIFFNESS),
-            thickness: 1.0 + usual(THICKNESS),
-            grip: 1.0,
-            posts_mm: [(); DOTS].map(|()| [usual(POST_MM), usual(POST_MM)]),
-            markers_mm: [(); DOTS].map(|()| [usual(MARKER_MM), usual(MARKER_MM)]),
+        let unit = DrawnUnit {
+            film: Unit {
+                stiffness: 1.0 + usual(STIFFNESS),
+                thickness: 1.0 + usual(THICKNESS),
+                grip: 1.0,
+                posts_mm: [(); DOTS].map(|()| [usual(POST_MM), usual(POST_MM)]),
+                markers_mm: [(); DOTS].map(|()| [usual(MARKER_MM), usual(MARKER_MM)]),
+            },
             focal_px: FOCAL_PX * (1.0 + usual(FOCAL)),
             roll_deg: usual(ROLL_DEG),
         };
         let [from, to] = TIP_RADIUS_MM;
         let setup = UnitSetup {
-            unit: unit.film(),
+            unit: unit.film,
             tip_radius_mm: random.random_range(from..to),
             camera,
         };
@@ -118,7 +142,7 @@ impl<'a> Other<'a> {
 }
 
 /// What its rest picture shows.
-fn rest(unit: &OwnUnit, film: &Film, camera: &Camera) -> Rest {
+fn rest(unit: &DrawnUnit, film: &Film, camera: &Camera) -> Rest {
     let to_px = unit.to_px();
     let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
     let seen = at_rest(film, camera).map(|place| {

@@ -2,12 +2,15 @@
 
 use anyhow::{Context, Result, ensure};
 
-use super::{Bench, FilmModel, Fit, KnownLoad, fit};
+use super::FilmModel;
 use crate::loads::{Certainty, SeenLoad, loads_of};
+use crate::unit_fit::{Bench, Fit, OwnFilm, fit};
 use crate::weights::Weights;
 use hivtac_data::conditions::Conditions;
 use hivtac_data::dataset::Dataset;
 use hivtac_data::rest::Rest;
+use hivtac_film::MARKER_CENTRES_MM;
+use hivtac_scene::{Camera, Preset};
 
 /// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
 /// left of noise. With it χ² of simulated units is 1 over its degrees of freedom, on average.
@@ -59,8 +62,7 @@ impl Weights {
             (other.origin.clone(), other.threshold, other.dilations);
         let rest = dataset.rest()?;
         let loads = self.loads(dataset, known)?;
-        let loads = with_noted_places(&loads, known)?;
-        let (mut weights, found) = self.fitted(rest, &loads, known.gauge_n, known.stage_mm)?;
+        let (mut weights, found) = self.fitted(rest, &loads, known)?;
         weights.conditions = Conditions {
             origin,
             threshold,
@@ -91,13 +93,12 @@ impl Weights {
     /// These weights for the unit that rests so and answers loads so.
     ///
     /// # Errors
-    /// When the weights have no film, there are fewer than 4 loads, or no unit explains them.
+    /// When the weights have no film, or no unit explains the loads.
     pub fn fitted(
         mut self,
         rest: Rest,
-        loads: &[KnownLoad],
-        gauge_n: f64,
-        stage_mm: f64,
+        loads: &[SeenLoad],
+        known: Known<'_>,
     ) -> Result<(Weights, Fit)> {
         let film = self.film.take();
         let film =
@@ -106,42 +107,26 @@ impl Weights {
         let bench = Bench {
             focal_px: camera.focal_px(),
             middle_px: [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0),
+            rest_px: places(&rest.features_px()).to_vec(),
             noise_px: MEAN_PX,
-            gauge_n,
-            stage_mm,
+            dots_mm: MARKER_CENTRES_MM.to_vec(),
+            // Tables are in focal lengths: all cameras have this lens.
+            camera: Camera::new(Preset::Ov7725, 320, 240)?,
         };
-        let found = fit(&bench, &places(&rest.features_px()), loads)?;
+        let from = known.from.map(Weights::own_film).transpose()?;
+        let found = fit(&bench, loads, known.stage_mm, from)?;
         self.film = Some(FilmModel {
-            tip_radius_mm: found.tip_radius_mm,
-            rest_px: found.rest_px,
-            unit: Some(found.unit.clone()),
-            open: found.open.clone(),
+            own: Some(Box::new(found.own.clone())),
             ..film
         });
         self.rest = rest;
         Ok((self, found))
     }
-}
 
-/// The loads as the fit takes them: of noted places, in a unit of which nothing is known.
-fn with_noted_places(loads: &[SeenLoad], known: Known<'_>) -> Result<Vec<KnownLoad>> {
-    ensure!(
-        known.from.is_none(),
-        "no film is fitted yet to a unit whose camera is known (--from): fit it to ten loads"
-    );
-    let load = |load: &SeenLoad| {
-        ensure!(
-            load.each_place_mm == 0.0 && load.direction_rad == 0.0,
-            "no unit is fitted yet to presses of which nobody noted the place, or not exactly: put \
-             on ten loads on a stage"
-        );
-        Ok(KnownLoad {
-            force_n: load.force_n,
-            place_mm: load.place_mm,
-            seen_px: load.seen_px,
-        })
-    };
-    loads.iter().map(load).collect()
+    fn own_film(&self) -> Result<&OwnFilm> {
+        let own = self.film.as_ref().and_then(|film| film.own.as_deref());
+        own.context("the weights of the old film (--from) are no unit's own")
+    }
 }
 
 /// Markers 0–3 of a frame's features.
@@ -205,13 +190,12 @@ mod tests {
             ..Recipe::default()
         };
         let dataset = generate(&recipe, || ()).unwrap();
-        let loads = default_weights().loads(&dataset, KNOWN).unwrap();
-        let mut loads = with_noted_places(&loads, KNOWN).unwrap();
-        let fitted = |loads: &[KnownLoad]| {
+        let mut loads = default_weights().loads(&dataset, KNOWN).unwrap();
+        let fitted = |loads: &[SeenLoad]| {
             let (_, fit) = default_weights()
-                .fitted(dataset.rest().unwrap(), loads, 1e-3, 0.1)
+                .fitted(dataset.rest().unwrap(), loads, KNOWN)
                 .unwrap();
-            let sigmas = fit.numbers.iter().map(|(_, _, sigma)| sigma);
+            let sigmas = fit.own.numbers.iter().map(|number| number.sigma);
             (fit.chi_square, sigmas.sum::<f64>())
         };
         let (usual, known) = fitted(&loads);

@@ -152,15 +152,14 @@ impl GuideArgs {
         dataset.save(&into.join(LOADS))?;
         println!("they are in {}", into.join(LOADS).display());
         eprintln!("Fitting the unit, and judging it on loads left out: half a minute or so.");
-        let (own, found) = weights.clone().for_unit(&dataset, known)?;
+        let (own, found) = weights.for_unit(&dataset, known)?;
         print!("{found}");
         own.save(&into.join(WEIGHTS))?;
         let model = into.join(MODEL);
         fs::write(&model, export(&own)?)
             .with_context(|| format!("cannot write {}", model.display()))?;
         println!("the unit's model is {}", model.display());
-        let judged = weights.judged_on_others(&dataset, known)?;
-        println!("{}", Verdict::of(&judged, dataset.about.free));
+        println!("{}", Verdict::of(&found.left_out));
         println!(
             "Next: give the model to the sensor, `hivtac update model {}`; then `hivtac tare \
              --keep`.",

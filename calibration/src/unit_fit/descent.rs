@@ -2,9 +2,8 @@
 
 use anyhow::Result;
 
-use super::linear::Matrix;
 use super::own::FoundNumber;
-use super::problem::{At, Problem, Unknowns};
+use super::problem::{At, Problem, Solved, Unknowns};
 
 /// Steps at most, and the change of χ² that ends them.
 const ROUNDS: usize = 12;
@@ -14,16 +13,22 @@ const LENGTHS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 
 /// Where a descent ended.
 pub struct Found {
+    /// The values, and what they explain.
     pub at: At,
-    /// Of the numbers, in parts of their standard deviations before.
-    pub covariance: Matrix,
+    /// The equations there, and what is known of the numbers.
+    pub solved: Solved,
 }
 
 impl Found {
-    /// χ² over the number of coordinates that were seen; at least 1.
-    pub fn scatter(&self) -> f64 {
+    /// χ² over the number of coordinates that were seen.
+    pub fn chi_square(&self) -> f64 {
         let seen = self.at.residuals.iter().flatten().count() + 2 * self.at.made.dots_mm.len();
-        (self.at.square() / seen as f64).max(1.0)
+        self.at.square() / seen as f64
+    }
+
+    /// How many times larger variances are than they were thought to be, at least 1.
+    pub fn scatter(&self) -> f64 {
+        self.chi_square().max(1.0)
     }
 }
 
@@ -34,7 +39,7 @@ impl Problem<'_> {
         let of_number = parts.map(|(k, (prior, part))| FoundNumber {
             name: prior.number.name(),
             value: prior.value(*part),
-            sigma: prior.sigma * (found.scatter() * found.covariance[k][k]).sqrt(),
+            sigma: prior.sigma * (found.scatter() * found.solved.covariance[k][k]).sqrt(),
         });
         of_number.collect()
     }
@@ -69,11 +74,10 @@ impl Problem<'_> {
                     }
                 }
             }
-            if std::env::var("TRACE").is_ok() { eprintln!("round {round} square {:.1} fell {fell:.2} {:?}", here.square(), here.made.design.stretch); }
             if fell < SETTLED {
                 return Ok(Found {
                     at: here,
-                    covariance: solved.covariance,
+                    solved,
                 });
             }
         }

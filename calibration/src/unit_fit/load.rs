@@ -1,55 +1,48 @@
-//! A load that was put on, and what is known of it.
+//! The unknowns of a load that was put on: how far it is from what is told of it.
+
+use crate::loads::SeenLoad;
 
 /// Unknowns of a load: its force along and across what is told (3), its place (2).
 pub const UNKNOWNS: usize = 5;
 
-/// A load that was put on, what is known of its force and place, and what was seen of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KnownLoad {
-    /// The force as it is told, N; F_z < 0.
-    pub force_n: [f64; 3],
-    /// Standard uncertainty of its size, N, > 0.
-    pub size_n: f64,
-    /// Standard uncertainty of its direction, on each of the two axes across it, rad, > 0.
-    pub direction_rad: f64,
-    /// Where it is told that the tip touches the film, mm.
-    pub place_mm: [f64; 2],
-    /// Standard uncertainty of each coordinate of the place, mm, > 0.
-    pub each_place_mm: f64,
-    /// Where markers were seen, mean of some frames, px.
-    pub seen_px: Vec<[f64; 2]>,
-    /// Standard uncertainty of each of these coordinates, px, > 0.
-    pub noise_px: f64,
-}
+/// No direction is known better, rad, nor any place, mm: a stage's.
+const BEST_DIRECTION_RAD: f64 = 1e-4;
+const BEST_PLACE_MM: f64 = 1e-3;
+/// How well a place is known that nobody noted, by what is seen of it, mm.
+const ROUGH_PLACE_MM: f64 = 1.5;
 
 /// A force, N, and a place, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressed {
+    /// The force on the film, N.
     pub force_n: [f64; 3],
+    /// Where the tip touches the film, by the stage, mm.
     pub place_mm: [f64; 2],
 }
 
-impl KnownLoad {
+impl SeenLoad {
     /// The force and the place so many standard uncertainties beside what is told.
     pub fn at(&self, parts: &[f64; UNKNOWNS]) -> Pressed {
-        let directions = self.directions();
         let mut force_n = self.force_n;
-        for (direction, part) in directions.iter().zip(parts) {
+        for (direction, part) in self.directions().iter().zip(parts) {
             for (sum, along) in force_n.iter_mut().zip(direction) {
                 *sum += part * along;
             }
         }
+        // A tip presses, whatever a step asks for.
+        force_n[2] = force_n[2].min(-1e-6);
+        let sigma_mm = self.place_sigma_mm();
         Pressed {
             force_n,
-            place_mm: [0, 1].map(|i| self.place_mm[i] + self.each_place_mm * parts[3 + i]),
+            place_mm: [0, 1].map(|i| self.place_mm[i] + sigma_mm * parts[3 + i]),
         }
     }
 
-    /// What a standard uncertainty of each of the force's unknowns adds to it, N.
+    /// What a standard uncertainty of each of the force's unknowns adds to it, N: along it, and
+    /// both ways across.
     pub fn directions(&self) -> [[f64; 3]; 3] {
-        let [x, y, z] = self.force_n;
-        let size = (x * x + y * y + z * z).sqrt();
-        let along = [x / size, y / size, z / size];
+        let size = self.magnitude_n();
+        let along = self.force_n.map(|part| part / size);
         // Two unit vectors across a force that is not along x.
         let side = along[1].hypot(along[2]);
         let first = [0.0, -along[2] / side, along[1] / side];
@@ -58,11 +51,24 @@ impl KnownLoad {
             -along[0] * along[1] / side,
             -along[0] * along[2] / side,
         ];
-        let turn = size * self.direction_rad;
+        let turn = size * self.direction_sigma_rad();
         [
             along.map(|part| self.size_n * part),
             first.map(|part| turn * part),
             second.map(|part| turn * part),
         ]
+    }
+
+    /// Standard uncertainty of its direction each way, rad, > 0.
+    pub fn direction_sigma_rad(&self) -> f64 {
+        self.direction_rad.max(BEST_DIRECTION_RAD)
+    }
+
+    /// That of each coordinate of its place, mm, > 0.
+    pub fn place_sigma_mm(&self) -> f64 {
+        match self.each_place_mm.is_finite() {
+            true => self.each_place_mm.max(BEST_PLACE_MM),
+            false => ROUGH_PLACE_MM,
+        }
     }
 }

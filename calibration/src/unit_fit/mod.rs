@@ -1,11 +1,86 @@
 //! A unit's film and camera from known loads: least squares over the numbers in which units differ,
 //! each drawn to its mean as strongly as units scatter, with the film solved by finite elements.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `numbers` | the numbers, and what is known of them before there is a load |
+//! | `load` | what is not known of a load |
+//! | `seen` | where a camera sees the dots of a solved film |
+//! | `problem` | numbers and loads held against what is seen |
+//! | `equations` | that linearized, as normal equations |
+//! | `descent` | Gauss–Newton steps to what explains it best |
+//! | `left_out` | how good the fit is on loads left out of it |
+//! | `field` | from few solved places of the tip to every place |
+//! | `own` | the unit's tables and what is not known of them, for its model file |
 
-pub mod descent;
-pub mod field;
-pub mod linear;
-pub mod load;
-pub mod numbers;
-pub mod own;
-pub mod problem;
-pub mod seen;
+mod descent;
+mod equations;
+mod field;
+mod left_out;
+mod linear;
+mod load;
+mod numbers;
+mod own;
+mod problem;
+mod seen;
+
+use std::fmt;
+
+use anyhow::Result;
+
+use crate::loads::SeenLoad;
+pub use left_out::LeftOut;
+pub use own::{FoundNumber, OwnFilm};
+pub use problem::Bench;
+use problem::Problem;
+
+/// How fine the film's mesh is. A finer one explains simulated films no better.
+const FINENESS: f64 = 0.3;
+
+/// What a fit found.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The unit's film, as a model file holds it.
+    pub own: OwnFilm,
+    /// χ² of what is seen and of what was known before, over the coordinates that are seen.
+    pub chi_square: f64,
+    /// Each load, left out of the fit.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Fits a unit to its rest position and to loads.
+///
+/// # Errors
+/// When the film finds no equilibrium under a load, or the loads contradict each other.
+pub fn fit(
+    bench: &Bench,
+    loads: &[SeenLoad],
+    stage_mm: f64,
+    from: Option<&OwnFilm>,
+) -> Result<Fit> {
+    let problem = Problem {
+        bench,
+        loads,
+        priors: numbers::priors(bench.dots_mm.len(), stage_mm, from),
+    };
+    let found = problem.descend(problem.likeliest())?;
+    Ok(Fit {
+        chi_square: found.chi_square(),
+        left_out: found.left_out(&problem)?,
+        own: OwnFilm::new(&problem, &found)?,
+    })
+}
+
+impl fmt::Display for Fit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "χ² of what is seen, over its coordinates: {:.2}",
+            self.chi_square
+        )?;
+        for FoundNumber { name, value, sigma } in &self.own.numbers {
+            writeln!(f, "{name:<46} {value:>9.4} ± {sigma:.4}")?;
+        }
+        Ok(())
+    }
+}

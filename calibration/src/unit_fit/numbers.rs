@@ -2,6 +2,7 @@
 
 use hivtac_shell::{Change, Design};
 
+use super::own::{FoundNumber, OwnFilm};
 use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
 /// Standard deviations of what the pixel grid does to a marker at rest, px, and of how far the
@@ -42,6 +43,15 @@ pub struct Prior {
 }
 
 impl Number {
+    /// Whether it stays what it is when the unit gets another film.
+    fn stays(self) -> bool {
+        use Number::{Film, Focal, Middle, Roll};
+        matches!(
+            self,
+            Roll | Focal | Middle(_) | Film(Change::Post(..) | Change::PostRadius | Change::Grip)
+        )
+    }
+
     /// What it is, with its unit.
     pub fn name(self) -> String {
         let along = |axis: usize| ["x", "y", "z"][axis];
@@ -85,6 +95,17 @@ impl Prior {
         }
     }
 
+    /// Takes what was found of the number for what is known.
+    fn narrow(&mut self, known: &OwnFilm) {
+        let name = self.number.name();
+        let found = known.numbers.iter().find(|found| found.name == name);
+        if let Some(FoundNumber { value, sigma, .. }) = found {
+            let [least, largest] = self.range;
+            self.mean = value.clamp(least, largest);
+            self.sigma = sigma.clamp(1e-3 * self.sigma, self.sigma);
+        }
+    }
+
     /// The nearest number of standard deviations beside the mean that is within the range.
     pub fn within(&self, part: f64) -> f64 {
         let [least, largest] = self.range.map(|end| (end - self.mean) / self.sigma);
@@ -119,8 +140,9 @@ const FILM: [(Change, [f64; 4]); 17] = [
     (Change::Down(2), [0.0, 0.6, -1.2, 1.2]),
 ];
 
-/// The numbers of units whose stage's zero is known to so many mm, with this many dots.
-pub fn priors(dots: usize, stage_mm: f64) -> Vec<Prior> {
+/// The numbers of units with this many dots whose stage's zero is known to so many mm; the camera and
+/// the posts of a unit whose old film was fitted are known.
+pub fn priors(dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
     let film = FILM.map(|(change, [mean, sigma, least, largest])| Prior {
         number: Number::Film(change),
         mean,
@@ -144,6 +166,11 @@ pub fn priors(dots: usize, stage_mm: f64) -> Vec<Prior> {
     add(Number::Roll, ROLL_DEG);
     add(Number::Focal, FOCAL);
     add(Number::Distance, DISTANCE_MM);
+    for prior in &mut all {
+        if let Some(known) = from.filter(|_| prior.number.stays()) {
+            prior.narrow(known);
+        }
+    }
     all
 }
 

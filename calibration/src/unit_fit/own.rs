@@ -3,10 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Mutex;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_sensing::forward::{EQUATIONS, MOST_TILTS};
-use hivtac_sensing::model::{CovarianceSpec, TableSpec, TablesSpec};
+use hivtac_sensing::forward::{DOTS, EQUATIONS, MOST_TILTS, Stiffness};
+use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
 
 use super::descent::Found;
@@ -105,8 +105,47 @@ impl OwnFilm {
         })
     }
 
+    /// Checks that it can be a unit's.
+    ///
+    /// # Errors
+    /// Says what cannot.
+    pub fn check(&self) -> Result<()> {
+        let numbers = self.stiffness_n.iter().chain(&self.per_px);
+        ensure!(
+            numbers.clone().all(|part| part.is_finite()) && self.stiffness_n[0] > 0.0,
+            "film.own: {numbers:?} are no stiffness and no camera's scale"
+        );
+        ensure!(
+            self.dots.len() == DOTS && self.rest_px.len() == DOTS,
+            "film.own: {} markers: this program knows {DOTS}",
+            self.dots.len()
+        );
+        self.covariance().map(|_| ())
+    }
+
+    /// A model's film with this one in the nominal one's place.
+    ///
+    /// # Errors
+    /// When the covariance is of other markers.
+    pub fn spec(&self, nominal: ForwardSpec) -> Result<ForwardSpec> {
+        let [linear_n, cubic_n] = self.stiffness_n.map(|part| part as f32);
+        let mut noise = nominal.noise;
+        for (place, own) in noise.rest_px.iter_mut().zip(&self.rest_px) {
+            *place = own.map(|part| part as f32);
+        }
+        Ok(ForwardSpec {
+            stiffness: Stiffness { linear_n, cubic_n },
+            per_px: Some(self.per_px.map(|part| part as f32)),
+            noise,
+            tables: self.tables(),
+            own: Some(self.covariance()?),
+            other: None,
+            ..nominal
+        })
+    }
+
     /// The tables, as a model file has them.
-    pub fn tables(&self) -> TablesSpec {
+    fn tables(&self) -> TablesSpec {
         let table = |table: &OwnTable| TableSpec {
             nodes_mm: table.nodes_mm.clone(),
             away: table.away,
@@ -123,7 +162,7 @@ impl OwnFilm {
     ///
     /// # Errors
     /// When a knot has another number of entries than a covariance.
-    pub fn covariance(&self) -> Result<CovarianceSpec> {
+    fn covariance(&self) -> Result<CovarianceSpec> {
         let factor = |entries: &Vec<f64>| -> Option<Covariance> {
             let (rows, rest) = entries.as_chunks::<EQUATIONS>();
             rest.is_empty().then(|| rows.try_into().ok())?
@@ -183,7 +222,7 @@ fn left_open(
     let is_held = |k: &usize| !matches!(problem.priors[*k].number, Number::Stage(_) | Number::Middle(_));
     let held: Vec<usize> = (0..problem.priors.len()).filter(is_held).collect();
     let scatter = found.scatter();
-    let row = |i: &usize| held.iter().map(|j| scatter * found.covariance[*i][*j]).collect();
+    let row = |i: &usize| held.iter().map(|j| scatter * found.solved.covariance[*i][*j]).collect();
     let spread = cholesky(held.iter().map(row).collect())?;
     let per_px = 1.0 / at.made.focal_px;
     let (sin, cos) = libm::sincos(at.made.roll_deg.to_radians());

@@ -5,10 +5,13 @@ use hivtac_scene::Camera;
 use hivtac_shell::{Change, Contact, Design, Equilibrium, Film, ShellError};
 use rayon::prelude::*;
 
-use super::linear::{Matrix, dot, inverse, times};
-use super::load::{KnownLoad, UNKNOWNS};
+use super::equations::{LoadEquations, LoadSlopes, Normal};
+use super::linear::{Matrix, inverse};
+use super::FINENESS;
+use super::load::UNKNOWNS;
 use super::numbers::{self, Number, Prior};
 use super::seen::View;
+use crate::loads::SeenLoad;
 
 /// What is known of the camera and the rest position before there is a load.
 #[derive(Clone, Debug)]
@@ -25,14 +28,12 @@ pub struct Bench {
     pub dots_mm: Vec<[f64; 2]>,
     /// The camera whose lens sees the film; images count in its focal lengths.
     pub camera: Camera,
-    /// How fine the film's mesh is.
-    pub fineness: f64,
 }
 
 /// A unit's numbers, what is known of them, and loads to hold them against.
 pub struct Problem<'a> {
     pub bench: &'a Bench,
-    pub loads: &'a [KnownLoad],
+    pub loads: &'a [SeenLoad],
     pub priors: Vec<Prior>,
 }
 
@@ -81,13 +82,6 @@ struct Slopes {
     loads: Vec<LoadSlopes>,
 }
 
-struct LoadSlopes {
-    /// By number.
-    numbers: Vec<Vec<f64>>,
-    /// By the load's own unknowns.
-    own: Vec<Vec<f64>>,
-}
-
 /// Images of the dots, focal lengths.
 struct Images {
     rest: Vec<[f64; 2]>,
@@ -123,6 +117,10 @@ pub struct Solved {
     pub step: Unknowns,
     /// Of the numbers, in parts of their standard deviations before.
     pub covariance: Matrix,
+    /// All equations of the numbers, and each load's.
+    pub whole: Normal,
+    /// By load.
+    pub loads: Vec<LoadEquations>,
 }
 
 impl Made {
@@ -161,7 +159,7 @@ impl Problem<'_> {
         let bench = self.bench;
         let mut made = Made {
             design: Design {
-                fineness: bench.fineness,
+                fineness: FINENESS,
                 ..Design::default()
             },
             dots_mm: bench.dots_mm.clone(),
@@ -269,7 +267,7 @@ impl Problem<'_> {
         let bench = self.bench;
         let should = self.seen(&at.made, &self.images(at, &at.made, &at.states));
         let rest = bench.rest_px.as_flattened().iter().zip(&should.rest);
-        let of_load = |(load, should): (&KnownLoad, &Vec<f64>)| -> Vec<f64> {
+        let of_load = |(load, should): (&SeenLoad, &Vec<f64>)| -> Vec<f64> {
             let seen = load.seen_px.as_flattened().iter();
             let moved = seen.zip(bench.rest_px.as_flattened()).map(|(seen, rest)| seen - rest);
             let off = moved.zip(should).map(|(moved, should)| moved - should);
@@ -285,14 +283,14 @@ impl Problem<'_> {
     fn slopes(&self, at: &At) -> Result<Slopes> {
         let rates = self.rates(at, &at.states)?;
         let scaled = |column: &[f64], by: f64| column.iter().map(|part| by * part).collect();
-        let of_load = |(load, rates): (&KnownLoad, &Rates)| {
+        let of_load = |(load, rates): (&SeenLoad, &Rates)| {
             let column = |parts: &[f64; 3]| {
                 let sum = (0..rates.force[0].len()).map(|i| {
                     (0..3).map(|axis| parts[axis] * rates.force[axis][i]).sum::<f64>()
                 });
                 sum.map(|part| -part / load.noise_px).collect()
             };
-            let of_place = |column: &Vec<f64>| scaled(column, -load.each_place_mm / load.noise_px);
+            let of_place = |column: &Vec<f64>| scaled(column, -load.place_sigma_mm() / load.noise_px);
             let numbers = rates.numbers.iter();
             LoadSlopes {
                 numbers: numbers.map(|column| scaled(column, -1.0 / load.noise_px)).collect(),
@@ -408,101 +406,26 @@ impl Problem<'_> {
     /// When a state is not stable.
     pub fn solve(&self, at: &At) -> Result<Solved> {
         let slopes = self.slopes(at)?;
-        let count = self.priors.len();
-        let mut matrix: Matrix = (0..count)
-            .map(|i| (0..count).map(|j| f64::from(u8::from(i == j))).collect())
-            .collect();
-        let mut side: Vec<f64> = at.unknowns.numbers.iter().map(|part| -part).collect();
-        add_normal(&mut matrix, &mut side, &slopes.rest, &at.rest_residual, 1.0);
-        // Each load's own unknowns are eliminated.
-        let mut eliminated = Vec::new();
-        for (k, load) in slopes.loads.iter().enumerate() {
-            let residual = &at.residuals[k];
-            add_normal(&mut matrix, &mut side, &load.numbers, residual, 1.0);
-            let own = (0..UNKNOWNS)
-                .map(|i| {
-                    (0..UNKNOWNS)
-                        .map(|j| {
-                            dot(&load.own[i], &load.own[j]) + f64::from(u8::from(i == j))
-                        })
-                        .collect()
-                })
-                .collect();
-            let own = inverse(own)?;
-            let own_side: Vec<f64> = (0..UNKNOWNS)
-                .map(|i| -dot(&load.own[i], residual) - at.unknowns.loads[k][i])
-                .collect();
-            // Rows by number: products with the load's own unknowns.
-            let mixed: Matrix = (0..count)
-                .map(|i| {
-                    let row = load.own.iter();
-                    row.map(|own| dot(&load.numbers[i], own)).collect()
-                })
-                .collect();
-            let taken: Matrix = mixed.iter().map(|row| times(&own, row)).collect();
-            for i in 0..count {
-                for j in 0..count {
-                    matrix[i][j] -= dot(&taken[i], &mixed[j]);
-                }
-                side[i] -= dot(&taken[i], &own_side);
-            }
-            eliminated.push((own, own_side, mixed));
+        let mut whole = Normal::before(&at.unknowns.numbers);
+        whole.add(&slopes.rest, &at.rest_residual);
+        let own = at.unknowns.loads.iter();
+        let loads = slopes.loads.into_iter().zip(&at.residuals).zip(own);
+        let loads: Vec<LoadEquations> = loads
+            .map(|((slopes, residual), own)| LoadEquations::new(slopes, residual, own))
+            .collect::<Result<_>>()?;
+        for load in &loads {
+            whole.take(load, 1.0);
         }
-        let numbers = self.step_within(&matrix, &side, &at.unknowns.numbers)?;
-        let covariance = inverse(matrix)?;
-        let loads = eliminated.iter().map(|(own, own_side, mixed)| {
-            let mut left = own_side.clone();
-            for (row, step) in mixed.iter().zip(&numbers) {
-                for (left, part) in left.iter_mut().zip(row) {
-                    *left -= part * step;
-                }
-            }
-            let step = times(own, &left);
-            std::array::from_fn(|i| step[i])
-        });
+        let numbers = whole.step_within(&self.priors, &at.unknowns.numbers)?;
         Ok(Solved {
             step: Unknowns {
-                loads: loads.collect(),
+                loads: loads.iter().map(|load| load.step(&numbers)).collect(),
                 numbers,
             },
-            covariance,
+            covariance: inverse(whole.matrix.clone())?,
+            whole,
+            loads,
         })
-    }
-}
-
-impl Problem<'_> {
-    /// The solution of normal equations in which no number leaves its range: one that would is held
-    /// at its end, and the others are solved for anew.
-    fn step_within(&self, matrix: &Matrix, side: &[f64], at: &[f64]) -> Result<Vec<f64>> {
-        let mut held: Vec<Option<f64>> = vec![None; side.len()];
-        loop {
-            let (mut matrix, mut side) = (matrix.clone(), side.to_vec());
-            for k in 0..side.len() {
-                let Some(step) = held[k] else { continue };
-                for i in 0..side.len() {
-                    side[i] -= matrix[i][k] * step;
-                    matrix[i][k] = 0.0;
-                    matrix[k][i] = 0.0;
-                }
-                matrix[k][k] = 1.0;
-            }
-            for (side, held) in side.iter_mut().zip(&held) {
-                *side = held.unwrap_or(*side);
-            }
-            let step = times(&inverse(matrix)?, &side);
-            let mut is_within = true;
-            for (k, prior) in self.priors.iter().enumerate() {
-                let there = at[k] + step[k];
-                let within = prior.within(there);
-                if held[k].is_none() && within != there {
-                    held[k] = Some(within - at[k]);
-                    is_within = false;
-                }
-            }
-            if is_within {
-                return Ok(step);
-            }
-        }
     }
 }
 
@@ -521,22 +444,6 @@ pub fn press(
         film.press_at(at_mm, radius_mm, Contact::Force(force_n), start)
     };
     from(start).or_else(|_| from(&film.rest()))
-}
-
-/// Adds the normal equations of some columns to a matrix and its right side.
-fn add_normal(
-    matrix: &mut Matrix,
-    side: &mut [f64],
-    columns: &[Vec<f64>],
-    residual: &[f64],
-    weight: f64,
-) {
-    for (i, left) in columns.iter().enumerate() {
-        for (j, right) in columns.iter().enumerate() {
-            matrix[i][j] += weight * dot(left, right);
-        }
-        side[i] -= weight * dot(left, residual);
-    }
 }
 
 impl Unknowns {

@@ -12,7 +12,7 @@ use drawn::Drawn;
 pub use drawn::{normal, seeded};
 pub use held::{Held, noise_of};
 pub use real::{RealFilm, dots_mm};
-pub use rows::{Errors, Off, Row};
+pub use rows::{Errors, Off, Row, Tally};
 pub use unit::{Answer, Tared, TestedUnit};
 
 use hivtac_scene::{FilmError, Load};

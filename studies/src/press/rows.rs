@@ -39,6 +39,12 @@ impl Off {
         })
     }
 
+    /// Whether an error is beyond three standard uncertainties: so much more than its 95 % bound.
+    pub fn is_far(&self) -> bool {
+        let far = 3.0 / MAGNITUDE_BOUND;
+        (0..3).any(|k| self.errors[k] > far * self.bounds[k])
+    }
+
     /// Which errors lie within their bounds.
     pub fn within(&self) -> [bool; 3] {
         std::array::from_fn(|k| self.errors[k] <= self.bounds[k])
@@ -56,6 +62,35 @@ pub struct Errors {
     squares: [f64; 3],
     /// How many of them are within their 95 % bounds.
     within: [u32; 3],
+}
+
+/// Errors, and how many forces are far beyond what they state.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    /// The errors.
+    pub errors: Errors,
+    /// Forces of which direction, |F| or place is beyond three stated standard uncertainties.
+    pub beyond: u32,
+}
+
+impl Tally {
+    /// Takes an answer.
+    ///
+    /// # Errors
+    /// When the force comes without a place.
+    pub fn add(&mut self, force: Option<&Force>, truth: &Load) -> Result<()> {
+        self.errors.add(force, truth)?;
+        if let Some(force) = force {
+            self.beyond += u32::from(Off::of(force, truth)?.is_far());
+        }
+        Ok(())
+    }
+
+    /// Takes another tally with its own.
+    pub fn merge(&mut self, other: &Tally) {
+        self.errors.merge(&other.errors);
+        self.beyond += other.beyond;
+    }
 }
 
 /// Root mean squares at a force.

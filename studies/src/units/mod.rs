@@ -1,43 +1,24 @@
-//! Units as people build them: with a tare alone, and after ten loads.
+//! Units as people build them: with a tare alone, and after they were calibrated.
+
+mod bench;
+mod real;
 
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use hivtac_calibration::forward::KnownLoad;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_data::rest::Rest;
-use hivtac_scene::Load;
-use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
-use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
 use crate::page;
-use crate::press::{Errors, FORCES_MN, REACH_MM, Row, Tared, TestedUnit, normal, press, seeded};
+use crate::press::{Errors, FORCES_MN, REACH_MM, Row, Tared, TestedUnit, press};
+use bench::Bench;
 
-/// The loads of a calibration: |F|, N, α and β, degrees, and the tip's place, mm.
-const LOADS: [(f64, f64, f64, [f64; 2]); 10] = [
-    (0.1, 0.0, 0.0, [0.0, 0.0]),
-    (0.2, 0.0, 0.0, [0.0, 0.0]),
-    (0.1, 8.0, 0.0, [0.0, 0.0]),
-    (0.1, -8.0, 0.0, [0.0, 0.0]),
-    (0.1, 0.0, 8.0, [0.0, 0.0]),
-    (0.1, 0.0, -8.0, [0.0, 0.0]),
-    (0.1, 0.0, 0.0, [3.0, 0.5]),
-    (0.1, 0.0, 0.0, [-0.5, 3.0]),
-    (0.1, 0.0, 0.0, [-3.0, -0.5]),
-    (0.1, 0.0, 0.0, [0.5, -3.0]),
-];
-/// Frames of each.
-const FRAMES: u64 = 4;
-/// Standard deviations of its gauge, N, and of its stage's zero, mm.
-const GAUGE_N: f64 = 1e-3;
-const STAGE_MM: f64 = 0.1;
 /// What a calibrated unit shall be within: direction, degrees, |F|, mN, place, µm, root mean
 /// squares.
 const GOOD: [f64; 3] = [0.45, 1.0, 30.0];
@@ -54,9 +35,21 @@ pub struct Units {
     /// Presses of each force on each of them.
     #[arg(long, default_value_t = 100)]
     presses: u32,
+    /// Whose films: of today's tables, or as people mount them.
+    #[arg(long, value_enum, default_value_t = Films::Nominal)]
+    films: Films,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
+}
+
+/// Whose films units have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Films {
+    /// The simulated film's tables, a little stiffer, thicker, held elsewhere.
+    Nominal,
+    /// Solved by finite elements: stretched, cut otherwise, of other rubber.
+    Real,
 }
 
 /// One unit's errors at each force.
@@ -86,6 +79,9 @@ impl Units {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+        if self.films == Films::Real {
+            return real::run(&weights, &model, self.units, self.presses, self.json);
+        }
         let units = (0..self.units).into_par_iter();
         let tested = units.map(|number| self.test(&weights, &model, number));
         let tested: Vec<Tested> = tested.collect::<Result<_>>()?;
@@ -171,35 +167,7 @@ pub fn own_weights(
     tared: &mut Tared<'_>,
     number: u64,
 ) -> Result<Weights> {
-    let rest = tared.rest().context("no rest position")?;
-    let rest = Rest {
-        features_q16: Features::to_array(&rest.features),
-        areas_px: rest.areas,
-    };
-    let loads = known_loads(unit, tared, &mut seeded(7_000 + number))?;
-    let (own, _) = weights.clone().fitted(rest, &loads, GAUGE_N, STAGE_MM)?;
-    Ok(own)
-}
-
-/// The ten loads as somebody's gauge and stage tell them.
-fn known_loads(
-    unit: &TestedUnit,
-    tared: &mut Tared<'_>,
-    random: &mut ChaCha8Rng,
-) -> Result<Vec<KnownLoad>> {
-    let zero = [normal(random), normal(random)].map(|part| STAGE_MM * part);
-    let mut loads = Vec::new();
-    for (number, (force_n, alpha, beta, place_mm)) in (0..).zip(LOADS) {
-        let there = [0, 1].map(|i| place_mm[i] + zero[i]);
-        let load = Load::from_angles(force_n, alpha, beta)?.with_offset_mm(there)?;
-        let told = 1.0 + GAUGE_N * normal(random) / force_n;
-        loads.push(KnownLoad {
-            force_n: load.vector_n().map(|part| told * part),
-            place_mm,
-            seen_px: tared.seen_px(unit, load, FRAMES, 50_000 + 10 * number)?,
-        });
-    }
-    Ok(loads)
+    Bench::Ten.calibrate(weights, unit, tared, number)
 }
 
 /// All units together at the force with this index.

@@ -1,0 +1,197 @@
+//! The loads by which somebody calibrates a unit, as their gauge, their stage or their hand tells
+//! them.
+
+use anyhow::{Context, Result};
+use hivtac_calibration::forward::Known;
+use hivtac_calibration::loads::SeenLoad;
+use hivtac_calibration::weights::Weights;
+use hivtac_data::dataset::Observation;
+use hivtac_data::rest::Rest;
+use hivtac_scene::Load;
+use hivtac_sensing::features::Features;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::press::{ANGLE_DEG, REACH_MM, Tared, TestedUnit, normal, seeded};
+
+/// The loads of a calibration: |F|, N, α and β, degrees, and the tip's place, mm.
+const TEN: [(f64, f64, f64, [f64; 2]); 10] = [
+    (0.1, 0.0, 0.0, [0.0, 0.0]),
+    (0.2, 0.0, 0.0, [0.0, 0.0]),
+    (0.1, 8.0, 0.0, [0.0, 0.0]),
+    (0.1, -8.0, 0.0, [0.0, 0.0]),
+    (0.1, 0.0, 8.0, [0.0, 0.0]),
+    (0.1, 0.0, -8.0, [0.0, 0.0]),
+    (0.1, 0.0, 0.0, [3.0, 0.5]),
+    (0.1, 0.0, 0.0, [-0.5, 3.0]),
+    (0.1, 0.0, 0.0, [-3.0, -0.5]),
+    (0.1, 0.0, 0.0, [0.5, -3.0]),
+];
+/// Frames of each.
+const FRAMES: u64 = 4;
+/// Forces of presses anywhere, N.
+const ANYWHERE_N: [f64; 2] = [0.02, 0.22];
+/// How many loads there are of them with places, and by hand.
+const SEVENTY: usize = 70;
+const BY_HAND: usize = 120;
+/// Standard deviations: of the gauge, N, of a stage's zero, mm, of a place that is noted, mm, and
+/// of a hand's direction each way, degrees.
+const GAUGE_N: f64 = 1e-3;
+const STAGE_MM: f64 = 0.1;
+const PLACE_MM: f64 = 0.1;
+const HAND_DEG: f64 = 3.0;
+/// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
+/// left of noise.
+const MEAN_PX: f64 = 0.008;
+
+/// How somebody calibrates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bench {
+    /// Ten loads on a stage.
+    Ten,
+    /// Seventy loads anywhere, each place known to 0.1 mm.
+    Seventy,
+    /// Three minutes by hand: no place is noted, the direction is the film's normal to 3°.
+    ByHand,
+}
+
+impl Bench {
+    /// All, with their names.
+    pub const ALL: [(Bench, &'static str); 3] = [
+        (Bench::Ten, "ten loads"),
+        (Bench::Seventy, "seventy loads, places to 0.1 mm"),
+        (Bench::ByHand, "three minutes by hand"),
+    ];
+
+    /// The weights for a unit after these loads; the number draws gauge and stage.
+    ///
+    /// # Errors
+    /// When markers are not found, or no unit explains the loads.
+    pub fn calibrate(
+        self,
+        weights: &Weights,
+        unit: &TestedUnit,
+        tared: &mut Tared<'_>,
+        number: u64,
+    ) -> Result<Weights> {
+        let rest = tared.rest().context("no rest position")?;
+        let rest = Rest {
+            features_q16: Features::to_array(&rest.features),
+            areas_px: rest.areas,
+        };
+        let known = Known {
+            gauge_n: GAUGE_N,
+            stage_mm: STAGE_MM,
+            place_mm: 0.0,
+            from: None,
+        };
+        let mut random = seeded(7_000 + number);
+        let loads = self.loads(weights, &rest, unit, tared, &mut random)?;
+        let (own, _) = weights.clone().fitted(rest, &loads, known)?;
+        Ok(own)
+    }
+
+    fn loads(
+        self,
+        weights: &Weights,
+        rest: &Rest,
+        unit: &TestedUnit,
+        tared: &mut Tared<'_>,
+        random: &mut ChaCha8Rng,
+    ) -> Result<Vec<SeenLoad>> {
+        let zero = [normal(random), normal(random)].map(|part| STAGE_MM * part);
+        let there = |[x, y]: [f64; 2]| [x + zero[0], y + zero[1]];
+        let mut loads = Vec::new();
+        if self == Bench::Ten {
+            for (number, (force_n, alpha, beta, place_mm)) in (0..).zip(TEN) {
+                let load = Load::from_angles(force_n, alpha, beta)?;
+                let load = load.with_offset_mm(there(place_mm))?;
+                let seen = Seen::of(unit, tared, load, 50_000 + 10 * number)?;
+                loads.push(seen.told(load.vector_n(), place_mm, random));
+            }
+            return Ok(loads);
+        }
+        let most = match self {
+            Bench::Seventy => SEVENTY,
+            _ => BY_HAND,
+        };
+        let rest_px = rest.features_px();
+        let mut number = 60_000;
+        while loads.len() < most {
+            number += 10;
+            let force_n = random.random_range(ANYWHERE_N[0]..ANYWHERE_N[1]);
+            let place_mm = [(); 2].map(|()| random.random_range(-REACH_MM..REACH_MM));
+            let angles = match self {
+                Bench::ByHand => [(); 2].map(|()| HAND_DEG * normal(random)),
+                _ => [(); 2].map(|()| random.random_range(-ANGLE_DEG..ANGLE_DEG)),
+            };
+            let load = Load::from_angles(force_n, angles[0], angles[1])?;
+            let load = load.with_offset_mm(there(place_mm))?;
+            if !unit.shows_all(&load)? {
+                continue;
+            }
+            let seen = Seen::of(unit, tared, load, number)?;
+            loads.push(match self {
+                Bench::ByHand => {
+                    let rough_mm = weights.rough_place_mm(&rest_px, &seen.observation());
+                    SeenLoad {
+                        direction_rad: HAND_DEG.to_radians(),
+                        each_place_mm: f64::INFINITY,
+                        ..seen.told([0.0, 0.0, -force_n], rough_mm, random)
+                    }
+                }
+                _ => {
+                    let noted = place_mm.map(|part| part + PLACE_MM * normal(random));
+                    SeenLoad {
+                        each_place_mm: PLACE_MM,
+                        ..seen.told(load.vector_n(), noted, random)
+                    }
+                }
+            });
+        }
+        Ok(loads)
+    }
+}
+
+/// Where markers are seen under a load, px.
+struct Seen {
+    px: [[f64; 2]; 4],
+}
+
+impl Seen {
+    fn of(unit: &TestedUnit, tared: &mut Tared<'_>, load: Load, number: u64) -> Result<Self> {
+        let px = tared.seen_px(unit, load, FRAMES, number)?;
+        Ok(Self { px })
+    }
+
+    fn observation(&self) -> Observation {
+        let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
+        let markers = self.px.map(|[x, y]| Marker {
+            x: px(x),
+            y: px(y),
+            area: 1,
+        });
+        Observation {
+            features_q16: Features::of_markers(&markers).to_array(),
+            areas_px: [1; 4],
+        }
+    }
+
+    /// A load that is told to have this force, N, but for the gauge's error, and this place, mm.
+    fn told(&self, force_n: [f64; 3], place_mm: [f64; 2], random: &mut ChaCha8Rng) -> SeenLoad {
+        let size_n = force_n.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let told = 1.0 + GAUGE_N * normal(random) / size_n;
+        SeenLoad {
+            force_n: force_n.map(|part| told * part),
+            size_n: GAUGE_N,
+            direction_rad: 0.0,
+            place_mm,
+            each_place_mm: 0.0,
+            seen_px: self.px,
+            noise_px: MEAN_PX,
+            frames: FRAMES as usize,
+        }
+    }
+}
