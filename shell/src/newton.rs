@@ -5,7 +5,7 @@
 //! Cholesky's factors, with the guides by their Schur complement; a stiffness that is not positive
 //! definite is shifted until it is. Once the guides are met (after one full step: they are linear),
 //! a step is shortened until the energy falls. Near the equilibrium the last factors serve again,
-//! which costs a fifth of a step, as long as each use brings the film ten times nearer.
+//! which costs a tenth of a step, as long as each use brings the film much nearer.
 
 use crate::ShellError;
 use crate::shell::Shell;
@@ -13,6 +13,8 @@ use crate::sparse::{Factors, Solver};
 
 /// Less left over than this is near: there the energy needs no watching, N.
 const NEAR_N: f64 = 1e-4;
+/// Factors serve again as long as each use leaves less than this part over.
+const NEARER: f64 = 0.25;
 /// Equilibrium: no unknown has more force left over, N.
 pub const FORCE_TOLERANCE_N: f64 = 1e-10;
 const TARGET_TOLERANCE_MM: f64 = 1e-11;
@@ -87,7 +89,7 @@ impl Problem<'_> {
                     steps,
                 });
             }
-            let serves = met && left_over_n < NEAR_N && left_over_n < 0.1 * before_n;
+            let serves = met && left_over_n < NEAR_N && left_over_n < NEARER * before_n;
             let again = factors.is_some() && serves;
             let known = match factors.filter(|_| serves) {
                 Some(known) => known,

@@ -120,63 +120,53 @@ fn displacement(shell: &Shell, u: &[f64], at: [f64; 2]) -> [f64; 3] {
     shell.grid().interpolate(u, &shell.grid().place(at))
 }
 
-/// Prints what the parts of a Newton step take, ms: the least of several tries.
+/// Prints what a film's parts take, ms: the least of several tries.
 #[test]
 #[ignore = "a measurement"]
 fn speed() {
-    use std::time::Instant;
-    let least = |tries: usize, mut work: Box<dyn FnMut() + '_>| {
-        let mut best = f64::INFINITY;
-        for _ in 0..tries {
-            let begin = Instant::now();
-            work();
-            best = best.min(begin.elapsed().as_secs_f64());
-        }
-        1e3 * best
-    };
-    for fineness in [0.3, 0.5, 0.7, 1.0] {
-        let design = crate::Design {
-            fineness,
-            ..Default::default()
+    use crate::{Change, Contact, Design, Equilibrium, Film};
+
+    fn least<T>(work: impl Fn() -> T) -> f64 {
+        let timed = |_| {
+            let begin = std::time::Instant::now();
+            std::hint::black_box(work());
+            1e3 * begin.elapsed().as_secs_f64()
         };
-        let film = crate::Film::new(&design).unwrap();
-        let shell = film.shell();
-        let state = film
-            .press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest())
-            .unwrap();
-        let u = state.unknowns();
+        (0..9).map(timed).fold(f64::INFINITY, f64::min)
+    }
+
+    for (fineness, gauss_points) in [0.3, 0.5, 0.7].into_iter().flat_map(|f| [(f, 3), (f, 2)]) {
+        let design = Design {
+            fineness,
+            gauss_points,
+            ..Design::default()
+        };
+        let film = Film::new(&design).unwrap();
+        let press =
+            |force: f64, start: &Equilibrium| film.press(Contact::Force([0.02, 0.0, force]), start);
+        let (rest, near) = (film.rest(), press(-0.11, &film.rest()).unwrap());
+        let state = press(-0.1, &rest).unwrap();
+        let (shell, u) = (film.shell(), state.unknowns());
+        let stiffness = shell.stiffness(u);
         let solver = Solver::new(shell.pattern()).unwrap();
-        let at = shell.derivatives(u);
-        let factors = solver.factor(shell.pattern(), &at.stiffness).unwrap();
-        let mut sides = vec![1.0; 30 * u.len()];
+        let factors = solver.factor(shell.pattern(), &stiffness).unwrap();
+        let changes: Vec<Change> = Change::all().collect();
         println!(
-            "{fineness}: {} unknowns: new {:.2}, stiffness {:.2}, gradient {:.2}, changes {:.2}, factor {:.2}, solve 1 {:.2}, solve 30 {:.2}, press ({} steps) {:.2}",
+            "fineness {fineness}, {} unknowns, {gauss_points} x {gauss_points} points: film {:.2}, \
+             stiffness {:.2}, factors {:.2}, solution {:.2}, gradient {:.2}, press in {} steps \
+             {:.1}, from a neighbour in {} {:.1}, {} answers {:.1} ms",
             u.len(),
-            least(5, Box::new(|| drop(crate::Film::new(&design)))),
-            least(15, Box::new(|| drop(shell.stiffness(u)))),
-            least(15, Box::new(|| drop(shell.first(u)))),
-            least(
-                15,
-                Box::new(|| {
-                    shell.by_sheet(u, &crate::Change::all().collect::<Vec<_>>());
-                })
-            ),
-            least(
-                15,
-                Box::new(|| drop(solver.factor(shell.pattern(), &at.stiffness)))
-            ),
-            least(15, Box::new(|| factors.solve(&mut sides[..u.len()], 1))),
-            least(
-                15,
-                Box::new(|| factors.solve(&mut vec![1.0; 30 * u.len()], 30))
-            ),
+            least(|| Film::new(&design)),
+            least(|| shell.stiffness(u)),
+            least(|| solver.factor(shell.pattern(), &stiffness)),
+            least(|| factors.solve(&mut vec![1.0; u.len()], 1)),
+            least(|| shell.first(u)),
             state.steps,
-            least(
-                7,
-                Box::new(|| drop(
-                    film.press(crate::Contact::Force([0.02, 0.0, -0.1]), &film.rest())
-                ))
-            ),
+            least(|| press(-0.1, &rest)),
+            press(-0.1, &near).unwrap().steps,
+            least(|| press(-0.1, &near)),
+            changes.len(),
+            least(|| film.linearize(&state, &changes)),
         );
     }
 }
