@@ -141,9 +141,8 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
 impl Cell {
     fn take(&mut self, forward: &Forward<'_>, truth: &Contact<'_>, off_px: f64, found: &Estimate) {
         let errors = errors(forward, &found.pose, truth.pose());
-        let unit = forward.own.at(&found.pose, &forward.limits);
-        let refused = !found.is_explained(&unit) || found.pose.size >= forward.limits.size;
-        let matters = found.sigma(&forward.stiffness, &unit).is_none_or(|sigma| {
+        let refused = !found.is_explained() || found.pose.size >= forward.limits.size;
+        let matters = found.sigma(&forward.stiffness).is_none_or(|sigma| {
             let stated = [
                 f64::from(sigma.direction).to_degrees(),
                 1e3 * f64::from(sigma.magnitude_n),

@@ -226,10 +226,10 @@ fn damaged_sections_do_no_harm() {
     let mut read = 0;
     for _ in 0..4_000 {
         let mut damaged = section.to_vec();
-        // Half of the damage in what is neither a table's steps nor the systematic uncertainty's.
+        // Half of the damage in what is neither a table's steps nor a covariance.
         let at = match random.next() % 4 {
             0 => random.next() as usize % 148,
-            1 => 3_388 + random.next() as usize % 560,
+            1 => 148 + random.next() as usize % 5_000,
             _ => random.next() as usize % damaged.len(),
         };
         damaged[at] ^= 1 << (random.next() % 8);
@@ -244,9 +244,11 @@ fn damaged_sections_do_no_harm() {
                 let beside = [[0.2, -0.1]; 4];
                 let moved = forward.tables.predict(&pose, &forward.limits, &beside);
                 assert!(moved.moved.iter().all(|part| part.is_finite()));
-                let unit = forward.own.at(&pose, &forward.limits);
-                let parts = [unit.across_n, unit.size, unit.place_mm, unit.residual];
-                assert!(parts.iter().all(|part| (0.0..=65_536.0).contains(part)));
+                for is_own in [true, false] {
+                    let unknown = forward.unknown(is_own);
+                    let covariance = unknown.covariance(&pose, &forward.limits, &moved.moved);
+                    assert!((0..8).all(|k| covariance[k][k] >= 0.0));
+                }
             }
             Err(ModelError::Field { .. } | ModelError::TooShort { .. }) => {}
             Err(error) => panic!("{error}"),
@@ -255,33 +257,18 @@ fn damaged_sections_do_no_harm() {
     assert!(read > 1_000);
 }
 
-/// What is not known of the unit has an end and steps that are numbers.
+/// A section says how many markers it is for, and whose covariances it has.
 #[test]
-fn a_systematic_uncertainty_of_no_size_is_refused() {
+fn a_section_of_other_markers_is_refused() {
     let file = models::anywhere(1);
     let section = &file[FORWARD_OFFSET..file.len() - 4];
-    let field = |at: usize, value: f32| {
+    for (at, value, name) in [(2, 8, "markers"), (3, 4, "covariances")] {
         let mut changed = section.to_vec();
-        changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
-        Forward::parse(&changed).err()
-    };
-    // The end of its places, and the four steps.
-    assert_eq!(field(128, 5.0), None);
-    assert_eq!(field(144, 1.0), None);
-    for (at, value) in [
-        (128, 0.0),
-        (128, f32::NAN),
-        (128, 1e3),
-        (132, -1e-3),
-        (136, f32::INFINITY),
-        (140, 1.5),
-        (144, f32::NAN),
-    ] {
-        let refused = field(at, value);
-        let name = "systematic uncertainty";
+        changed[at] = value;
+        let refused = Forward::parse(&changed).err();
         assert!(
-            matches!(refused, Some(ModelError::Field { name: of, offset: 128, .. }) if of == name),
-            "{at} {value}: {refused:?}"
+            matches!(refused, Some(ModelError::Field { name: of, offset, .. }) if of == name && offset == at),
+            "{refused:?}"
         );
     }
 }

@@ -92,18 +92,13 @@ impl Resting {
                 at_four_areas,
                 ..
             } = &forward.noise;
-            let [away, across] = [0, 1].map(|i| {
+            let variances = [0, 1].map(|i| {
                 let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
                 let seen = frame.times * scale * at_rest_px[i] * growth.max(0.1);
                 seen * seen + blur * blur
             });
-            let [ux, uy] = forward.rest_image.away(k);
-            noise[k] = [
-                away * ux * ux + across * uy * uy,
-                (away - across) * ux * uy,
-                away * uy * uy + across * ux * ux,
-            ];
+            noise[k] = forward.rest_image.noise(k, variances);
         }
         Observed { moved, noise }
     }

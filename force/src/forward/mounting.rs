@@ -26,6 +26,7 @@ pub struct RestImage {
 impl RestImage {
     /// The direction in which a marker's image lies from the axis, of length one; along x where it
     /// lies there.
+    #[inline]
     pub fn away(&self, dot: usize) -> [f32; 2] {
         let [x, y] = self.at.get(dot).copied().unwrap_or_default();
         let far = sqrt(x * x + y * y);
@@ -33,6 +34,18 @@ impl RestImage {
             true => [x / far, y / far],
             false => [1.0, 0.0],
         }
+    }
+
+    /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the axis
+    /// and across that.
+    #[inline]
+    pub fn noise(&self, dot: usize, [away, across]: [f32; 2]) -> [f32; 3] {
+        let [x, y] = self.away(dot);
+        [
+            away * x * x + across * y * y,
+            (away - across) * x * y,
+            away * y * y + across * x * x,
+        ]
     }
 
     /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the
@@ -175,6 +188,13 @@ mod tests {
             assert!((x - expected[0]).abs() < 3e-3, "{x} {expected:?}");
             assert!((y - expected[1]).abs() < 3e-3, "{y} {expected:?}");
         }
+    }
+
+    #[test]
+    fn noise_is_along_and_across_what_leads_away() {
+        let [xx, xy, yy] = REST.noise(1, [4.0, 1.0]);
+        assert!((xx - 2.5).abs() < 1e-5 && (xy + 1.5).abs() < 1e-5 && (yy - 2.5).abs() < 1e-5);
+        assert_eq!(REST.noise(4, [4.0, 1.0]), [4.0, 0.0, 1.0]);
     }
 
     #[test]

@@ -102,8 +102,8 @@ impl fmt::Display for ModelError {
             Self::NotAModel => write!(f, "not a model file: it does not begin with HVTM"),
             Self::Version { found } => write!(
                 f,
-                "model file version {found}, this program reads versions {} and {}: export the \
-                 model again",
+                "model file version {found}, this program reads versions {} and {}: export its \
+                 weights again (`hivtac-calibrate export`)",
                 super::layout::FORCE_VERSION,
                 super::layout::PLACE_VERSION
             ),

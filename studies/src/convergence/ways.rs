@@ -113,19 +113,14 @@ impl<'m> Film<'m> {
             .tables
             .predict(&pose, &forward.limits, &self.mounting.beside_mm);
         let mut random = noise.map(seeded);
-        let mut sigma = [away; 8];
-        sigma
-            .iter_mut()
-            .skip(1)
-            .step_by(2)
-            .for_each(|part| *part = across);
+        let variances = [away * away, across * across];
         let observed = Observed {
             moved: shown.moved.map(|part| {
                 // As large both ways as the mean of away and across is.
                 let noise = random.as_mut().map_or(0.0, normal);
                 part + (away + across) / 2.0 * noise as f32
             }),
-            sigma,
+            noise: std::array::from_fn(|k| forward.rest_image.noise(k, variances)),
         };
         let best = descend(forward, &observed, &self.mounting, pose).0;
         Contact {
@@ -212,7 +207,7 @@ impl Contact<'_> {
         for (moved, off) in observed.moved[2 * marker..].iter_mut().zip(off) {
             *moved += off;
         }
-        forward.estimate(&observed, mounting, self.pose)
+        forward.estimate(&observed, mounting, forward.unknown(true), self.pose)
     }
 
     /// The load.
@@ -225,7 +220,7 @@ impl Contact<'_> {
         let Film {
             forward, mounting, ..
         } = self.film;
-        self.end(&forward.estimate(&self.observed, mounting, guess), 0)
+        self.end(&forward.estimate(&self.observed, mounting, forward.unknown(true), guess), 0)
     }
 
     fn end(&self, estimate: &Estimate, steps: u32) -> End {
@@ -251,7 +246,8 @@ fn descend(
     mounting: &Mounting,
     guess: Pose,
 ) -> (Estimate, u32) {
-    let mut descent = Descent::new(forward, observed, mounting, guess);
+    let unknown = forward.unknown(true);
+    let mut descent = Descent::new(forward, observed, mounting, unknown, guess);
     let mut steps = 0;
     while steps < u32::from(STEPS_AT_MOST) && !descent.is_done() && descent.step() {
         steps += 1;
