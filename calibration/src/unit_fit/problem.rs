@@ -160,6 +160,7 @@ impl Problem<'_> {
         let mut made = Made {
             design: Design {
                 fineness: FINENESS,
+                gauss_points: 2,
                 ..Design::default()
             },
             dots_mm: bench.dots_mm.clone(),

@@ -11,7 +11,7 @@ pub use bound::{Bound, Noise};
 use drawn::Drawn;
 pub use drawn::{normal, seeded};
 pub use held::{Held, noise_of};
-pub use real::{RealFilm, dots_mm};
+pub use real::RealFilm;
 pub use rows::{Errors, Off, Row, Tally};
 pub use unit::{Answer, Tared, TestedUnit};
 
