@@ -174,6 +174,25 @@ impl Joined<'_> {
         let (f0, f1) = (f0?, f1?);
         (t1 - t0 <= self.longest_s).then(|| f0 + (f1 - f0) * (time_s - t0) / (t1 - t0))
     }
+
+    /// How far the force may be beside the straight line between two readings, N: by how the lines
+    /// before and after it lie.
+    pub fn bent_n(&self, time_s: f64) -> f64 {
+        let after = self.points.partition_point(|p| p.0 < time_s).max(1);
+        let line = |after: usize| {
+            let (t0, f0) = *self.points.get(after.checked_sub(1)?)?;
+            let (t1, f1) = *self.points.get(after)?;
+            Some(((f1? - f0?) / (t1 - t0), t1 - t0))
+        };
+        let Some((slope, step_s)) = line(after) else {
+            return 0.0;
+        };
+        let beside = [after.checked_sub(1).and_then(line), line(after + 1)];
+        let bends = beside.into_iter().flatten();
+        let bend = bends.map(|(other, _)| (other - slope).abs());
+        // A parabola's arc is an eighth of its bend over the step above its chord.
+        bend.fold(0.0, f64::max) * step_s / 8.0
+    }
 }
 
 #[cfg(test)]
@@ -187,6 +206,21 @@ mod tests {
             series.push(second + 1, Some(second as f64), text, Unit::NEWTON);
         }
         series
+    }
+
+    #[test]
+    fn few_readings_leave_more_open_where_the_force_bends() {
+        let parabola: Vec<String> = (0..9)
+            .map(|i| format!("{}", f64::from(i * i) / 100.0))
+            .collect();
+        let texts: Vec<&str> = parabola.iter().map(String::as_str).collect();
+        let series = series(&texts);
+        let joined = series.joined();
+        // Between 4 and 5 s, 0.16 and 0.25 N, the parabola is at 0.2025 N.
+        let off_n = joined.at(4.5).unwrap() - 0.2025;
+        assert!((joined.bent_n(4.5) - off_n).abs() < 1e-9, "{off_n}");
+        assert!(joined.bent_n(0.5) > 0.0 && joined.bent_n(7.9) > 0.0);
+        assert_eq!(Series::default().joined().bent_n(1.0), 0.0);
     }
 
     #[test]
