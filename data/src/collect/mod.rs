@@ -24,6 +24,7 @@ pub mod record;
 pub mod report;
 pub mod series;
 pub mod simulated;
+mod take;
 
 use std::path::PathBuf;
 
