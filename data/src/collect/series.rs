@@ -95,6 +95,9 @@ impl Series {
         let hint = match Unit::that_would_fit(span_n).as_slice() {
             _ if is_named => "is the unit right, and nothing but the film pressed?".to_owned(),
             [] => "say their unit with --gauge-unit".to_owned(),
+            units if span_n <= LARGEST_SPAN_N => {
+                format!("--gauge-unit {}? Or N, if it is that", units.join(" or "))
+            }
             units => format!("--gauge-unit {}?", units.join(" or ")),
         };
         let unit = if is_named {
@@ -231,6 +234,7 @@ mod tests {
         };
         assert!(asked(&["0", "201.3"], false).ends_with("0.25 N: --gauge-unit mN?"));
         assert!(asked(&["150.0", "170.5"], false).ends_with("--gauge-unit mN or gf?"));
+        assert!(asked(&["0", "0.6"], false).ends_with("ozf? Or N, if it is that"));
         assert!(asked(&["0", "10"], true).contains("is the unit right"));
         assert!(asked(&["0 N", "10 N"], false).contains("is the unit right"));
         for (fine, is_said) in [
