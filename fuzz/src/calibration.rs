@@ -5,8 +5,7 @@ use hivtac_calibration::quantize;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::collect::assemble::{Gauge, How, assemble};
 use hivtac_data::collect::folder::Recording;
-use hivtac_data::collect::gauge::Unit;
-use hivtac_data::collect::series::Series;
+use hivtac_data::collect::gauge_file;
 use hivtac_data::dataset::Dataset;
 use hivtac_sensing::model::Model;
 
@@ -43,10 +42,12 @@ pub fn recording(input: &[u8]) -> bool {
     let Ok(recording) = Recording::parse(file(), file(), file()) else {
         return false;
     };
-    let series = Series::parse(file(), Unit::NEWTON);
-    let gauge = match series.readings() {
-        0 => Gauge::AtThePort,
-        _ => Gauge::Files(vec![series]),
+    let gauge = match gauge_file::parse(file(), None) {
+        Ok(series) => Gauge::Files(series),
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            Gauge::AtThePort
+        }
     };
     for holds in [false, true] {
         let how = How {

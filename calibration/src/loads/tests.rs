@@ -1,5 +1,5 @@
 use hivtac_data::conditions::Conditions;
-use hivtac_data::dataset::{About, Free, Loads, Place, Row};
+use hivtac_data::dataset::{About, Free, Loads, Place, Recipe, Row, generate};
 use hivtac_data::range::Range;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
@@ -207,5 +207,44 @@ fn what_clocks_leave_is_part_of_a_loads_uncertainty() {
         unknown
             .iter()
             .all(|load| load.size_n >= 0.05 * load.magnitude_n())
+    );
+}
+
+/// The default network says about where a press was, on a unit that it does not know: one whose
+/// picture is shifted.
+#[test]
+fn the_network_tells_rough_places() {
+    let recipe = Recipe {
+        loads: Loads::Random(30),
+        rest: 2,
+        ..Recipe::default()
+    };
+    let mut dataset = generate(&recipe, || ()).unwrap();
+    let all_seen = dataset
+        .rows
+        .iter_mut()
+        .filter_map(|row| row.seen.as_mut().ok());
+    for seen in all_seen {
+        for x in seen.features_q16.iter_mut().take(8).step_by(2) {
+            *x += Q::from_bits(3 << 16);
+        }
+        seen.features_q16[8] += Q::from_bits(3 << 16);
+    }
+    let weights = Weights::parse(include_str!("../../models/default.weights")).unwrap();
+    let rest_px = dataset.rest().unwrap().features_px();
+    let strong = |sample: &Sample<'_>| norm(sample.force_n) > 0.03;
+    let mut seen = 0;
+    for sample in dataset.samples().filter(strong) {
+        let [x, y] = weights.rough_place_mm(&rest_px, sample.seen);
+        let [true_x, true_y] = sample.tip_mm.unwrap();
+        let off_mm = (x - true_x).hypot(y - true_y);
+        assert!(off_mm < 0.3, "{off_mm} mm: {sample:?}");
+        seen += 1;
+    }
+    assert!(seen > 15, "{seen}");
+    let certainty = Certainty::of(&weights, 0.001, 0.0);
+    assert!(
+        certainty.frame_px > 0.0 && certainty.frame_px < 0.1,
+        "{certainty:?}"
     );
 }

@@ -18,7 +18,6 @@ use hivtac_data::collect::folder::{self, Recording};
 use hivtac_data::collect::gauge_port::GaugeArgs;
 use hivtac_data::collect::poses::{self, Task};
 use hivtac_data::collect::record::{self, FreeArgs, RecordArgs, seconds};
-use hivtac_data::collect::series::Series;
 use plan::MOST_LOADS;
 use verdict::Verdict;
 
@@ -136,12 +135,7 @@ impl GuideArgs {
 
     fn fit(&self, into: &Path, weights: Weights, known: Known<'_>) -> Result<()> {
         let recording = Recording::read(into)?;
-        let files = self.gauge.iter();
-        let files = files.map(|path| Series::load(path, self.gauge_port.gauge_unit));
-        let gauge = match files.collect::<Result<Vec<_>>>()? {
-            files if files.is_empty() => Gauge::AtThePort,
-            files => Gauge::Files(files),
-        };
+        let gauge = Gauge::of(&self.gauge, self.gauge_port.gauge_unit)?;
         let how = How {
             unit: self.gauge_port.gauge_unit,
             holds: true,

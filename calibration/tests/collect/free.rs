@@ -1,6 +1,8 @@
 //! Presses anywhere: from a hand that covers the film to a data set, through an interruption.
 
+use std::io::{Read, Write};
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use hivtac_data::collect::simulated::SimulatedGauge;
 use hivtac_data::dataset::{Dataset, Row};
@@ -13,6 +15,7 @@ use hivtac_terms::units::{
 use hivtac_wire::message::Sample;
 
 use crate::fake::*;
+use crate::over_serial::pseudo_terminal;
 
 /// Seconds from frame to frame.
 const FRAME_S: f64 = 0.04;
@@ -225,4 +228,37 @@ fn what_cannot_be_pressed_is_refused_before_anything_is_recorded() {
         "up to 45",
     );
     assert!(!here.join("unit").exists());
+}
+
+/// On a terminal there is a map, drawn again over itself.
+#[test]
+fn a_terminal_shows_a_map() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let sensor = sensor(usize::MAX);
+    let (mut person, terminal, _) = pseudo_terminal();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
+        .current_dir(here)
+        .args(record(&sensor.port, "20"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::from(terminal))
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(b"\n\n").unwrap();
+    let mut shown = Vec::new();
+    // Ends with an error once nobody has the terminal any more.
+    let _ = person.read_to_end(&mut shown);
+    assert!(child.wait().unwrap().success());
+    let shown = String::from_utf8(shown).unwrap();
+    assert!(shown.matches("\x1b[8A").count() > 3, "{shown}");
+    for words in [
+        "20–70 mN     70–140 mN",
+        "█ ",
+        "○ ",
+        " mN at x ",
+        "covered; missing",
+    ] {
+        assert!(shown.contains(words), "no {words}: {shown}");
+    }
 }

@@ -13,7 +13,7 @@ use rustix::pty::OpenptFlags;
 use crate::fake::*;
 
 /// Both ends of a new pseudo-terminal, and its name.
-fn pseudo_terminal() -> (File, File, String) {
+pub fn pseudo_terminal() -> (File, File, String) {
     let gauge = rustix::pty::openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)
         .unwrap();
     rustix::pty::grantpt(&gauge).unwrap();

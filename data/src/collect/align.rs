@@ -10,6 +10,7 @@ use anyhow::{Result, bail, ensure};
 use rayon::prelude::*;
 
 use super::series::Joined;
+use crate::dataset::LARGEST_N;
 
 /// What the sensor saw at a time of its own clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,10 +86,12 @@ impl Alignment {
     }
 
     /// Standard uncertainty of the force at a time of the sensor because the lag is known so well,
-    /// N; nothing where the gauge has no readings around it.
+    /// and readings are so far apart, N; nothing where the gauge has none around it.
     pub fn clock_n(&self, gauge: Joined<'_>, time_s: f64) -> Option<f64> {
-        let rate = rate_n_per_s(gauge, self.gauge_time(time_s))?;
-        Some(rate.abs() * self.lag_sigma_s)
+        let time_s = self.gauge_time(time_s);
+        let rate = rate_n_per_s(gauge, time_s)?;
+        let clock_n = (rate * self.lag_sigma_s).hypot(gauge.bent_n(time_s));
+        Some(clock_n.min(LARGEST_N))
     }
 }
 

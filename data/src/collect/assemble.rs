@@ -1,5 +1,7 @@
 //! From a recording to a data set: clocks aligned, each frame with the force that pressed it.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::Features;
 use hivtac_terms::marker::Marker;
@@ -7,6 +9,7 @@ use hivtac_terms::marker::Marker;
 use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};
 use super::gauge::Unit;
+use super::gauge_file;
 use super::holds;
 use super::poses::Pose;
 use super::report::{Report, RunReport};
@@ -25,11 +28,26 @@ pub enum Gauge {
     Files(Vec<Series>),
 }
 
+impl Gauge {
+    /// In these files; at the port where there is none.
+    ///
+    /// # Errors
+    /// When one cannot be used; says why.
+    pub fn of(files: &[PathBuf], unit: Option<Unit>) -> Result<Self> {
+        let series = files.iter().map(|path| gauge_file::load(path, unit));
+        let series = series.collect::<Result<Vec<_>>>()?.concat();
+        Ok(match series.is_empty() {
+            true => Gauge::AtThePort,
+            false => Gauge::Files(series),
+        })
+    }
+}
+
 /// How a recording becomes a data set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct How {
-    /// The unit of readings that name none.
-    pub unit: Unit,
+    /// The unit of readings that name none, where somebody said it.
+    pub unit: Option<Unit>,
     /// Takes only steady stretches, each one load; of presses anywhere all that there is.
     pub holds: bool,
     /// Standard uncertainty of the direction of presses anywhere, degrees.
@@ -40,7 +58,7 @@ impl Default for How {
     /// Every frame, of a hand that keeps to the film's normal as well as one does.
     fn default() -> Self {
         Self {
-            unit: Unit::NEWTON,
+            unit: None,
             holds: false,
             direction_deg: DIRECTION_DEG,
         }
@@ -77,6 +95,9 @@ pub(super) struct Loaded<'a> {
 /// When a run has no frames of the untouched film, or its clocks cannot be aligned; names the run.
 pub fn assemble(recording: &Recording, gauge: &Gauge, how: How) -> Result<(Dataset, Report)> {
     ensure!(recording.runs() > 0, "the recording has no samples yet");
+    if let Gauge::Files(files) = gauge {
+        one_for_each(files, recording)?;
+    }
     let mut rows = Vec::new();
     let mut report = Report::default();
     for run in 0..recording.runs() {
@@ -92,33 +113,26 @@ pub fn assemble(recording: &Recording, gauge: &Gauge, how: How) -> Result<(Datas
         }
         let session = report.runs.len();
         let one = || format!("run {run}");
-        let (series, alignment, times) = match gauge {
+        let aligned = match gauge {
             Gauge::AtThePort => at_the_port(recording, &kept, run, how.unit),
             Gauge::Files(files) => from_file(files, session, &kept),
         }
         .with_context(one)?;
         let done = Run {
             kept: &kept,
-            times: &times,
-            gauge: series.joined(),
-            alignment,
+            times: &aligned.times,
+            gauge: aligned.series.joined(),
+            alignment: aligned.alignment,
             holds: how.holds,
         };
         let (more, mut of_run) = done.rows(session).with_context(one)?;
         of_run.run = run;
-        of_run.complaint = series.complaint();
+        of_run.complaint = aligned.series.complaint();
+        of_run.is_turned = aligned.is_turned;
         report.runs.push(of_run);
         rows.extend(more);
     }
     ensure!(!rows.is_empty(), "the recording has no frame in a pose");
-    if let Gauge::Files(files) = gauge {
-        ensure!(
-            files.len() == 1 || files.len() == report.runs.len(),
-            "{} gauge files were named for {} runs with poses: one for all, or one for each",
-            files.len(),
-            report.runs.len()
-        );
-    }
     let mut about = about(recording, &rows, &report);
     let is_free = |kept: &Kept| kept.pose.is_some_and(|pose| pose.is_free());
     if recording.samples.iter().any(is_free) {
@@ -130,16 +144,43 @@ pub fn assemble(recording: &Recording, gauge: &Gauge, how: How) -> Result<(Datas
     Ok((Dataset { about, rows }, report))
 }
 
+/// Refuses gauge files of which nobody knows to which run they belong.
+fn one_for_each(files: &[Series], recording: &Recording) -> Result<()> {
+    let posed = recording.samples.iter().filter(|kept| kept.pose.is_some());
+    let mut runs: Vec<usize> = posed.map(|kept| kept.run).collect();
+    runs.sort_unstable();
+    runs.dedup();
+    let runs = runs.len();
+    let begins: Vec<String> = (files.iter().filter_map(|file| file.begins))
+        .map(|(line, last_s)| format!("line {line} (after {last_s} s)"))
+        .collect();
+    let again = match begins.is_empty() {
+        true => String::new(),
+        false => format!(
+            "; a clock starts again at {}, and what follows counts as a file of its own: cut the \
+             file there, and name with --gauge what belongs to each run",
+            begins.join(", ")
+        ),
+    };
+    ensure!(
+        files.len() == 1 || files.len() == runs,
+        "{} gauge files for {runs} run(s) with poses: one for all, or one for each{again}",
+        files.len()
+    );
+    Ok(())
+}
+
 /// The gauge's lines of a run, both on the computer's clock.
 fn at_the_port(
     recording: &Recording,
     kept: &[&Kept],
     run: usize,
-    unit: Unit,
-) -> Result<(Series, Alignment, Vec<f64>)> {
+    unit: Option<Unit>,
+) -> Result<Aligned> {
     let mut series = Series::default();
     let lines = recording.gauge_lines.iter().filter(|(r, ..)| *r == run);
     for (number, (_, host_s, text)) in lines.enumerate() {
+        let unit = unit.unwrap_or(Unit::NEWTON);
         series.push(number + 1, Some(*host_s), text, unit);
     }
     ensure!(
@@ -148,13 +189,13 @@ fn at_the_port(
          with --gauge-port",
         series.bad.values().sum::<usize>()
     );
+    series.plausible(unit.is_some())?;
     let times = on_the_computers_clock(kept);
     let search = Search {
         lags_s: [-LARGEST_LAG_S, LARGEST_LAG_S],
         drift: false,
     };
-    let alignment = align(&radius_samples(kept, &times)?, series.joined(), search)?;
-    Ok((series, alignment, times))
+    Aligned::of(series, kept, times, search)
 }
 
 /// When the frames were exposed on the computer's clock, but for a constant: the sensor's clock has
@@ -175,11 +216,7 @@ fn on_the_computers_clock(kept: &[&Kept]) -> Vec<f64> {
         .collect()
 }
 
-fn from_file(
-    files: &[Series],
-    session: usize,
-    kept: &[&Kept],
-) -> Result<(Series, Alignment, Vec<f64>)> {
+fn from_file(files: &[Series], session: usize, kept: &[&Kept]) -> Result<Aligned> {
     let series = match files {
         [series] => series,
         files => files.get(session).context(
@@ -196,8 +233,38 @@ fn from_file(
         lags_s: [first - ends[1], last - ends[0]],
         drift: true,
     };
-    let alignment = align(&radius_samples(kept, &times)?, series.joined(), search)?;
-    Ok((series.clone(), alignment, times))
+    Aligned::of(series.clone(), kept, times, search)
+}
+
+/// A gauge and a sensor on one clock.
+struct Aligned {
+    series: Series,
+    alignment: Alignment,
+    /// The frames' times on the sensor's clock, s.
+    times: Vec<f64>,
+    /// Whether the gauge shows pressing as negative.
+    is_turned: bool,
+}
+
+impl Aligned {
+    /// Where no lag fits, the gauge may show pressing as negative: that is as convincing, or not.
+    fn of(series: Series, kept: &[&Kept], times: Vec<f64>, search: Search) -> Result<Self> {
+        let frames = radius_samples(kept, &times)?;
+        let (series, alignment, is_turned) = match align(&frames, series.joined(), search) {
+            Ok(alignment) => (series, alignment, false),
+            Err(error) => {
+                let turned = series.turned_round();
+                let alignment = align(&frames, turned.joined(), search).map_err(|_| error)?;
+                (turned, alignment, true)
+            }
+        };
+        Ok(Self {
+            series,
+            alignment,
+            times,
+            is_turned,
+        })
+    }
 }
 
 /// Times and mean radii of the frames with markers, from the untouched film on.

@@ -25,9 +25,9 @@ pub struct GaugeArgs {
     /// C).
     #[arg(long, value_name = "TEXT", requires = "gauge_port")]
     pub gauge_ask: Option<String>,
-    /// The unit of readings that name none.
-    #[arg(long, value_name = "UNIT", default_value = "N")]
-    pub gauge_unit: Unit,
+    /// The unit of readings that name none: N when it is not said.
+    #[arg(long, value_name = "UNIT")]
+    pub gauge_unit: Option<Unit>,
 }
 
 /// How often a gauge is asked that only answers.
@@ -86,7 +86,7 @@ impl GaugePort {
             readings: readings.clone(),
             newest: newest.clone(),
             unread: unread.clone(),
-            unit: args.gauge_unit,
+            unit: args.gauge_unit.unwrap_or(Unit::NEWTON),
         };
         let thread = std::thread::spawn(move || listener.run());
         Ok(Some(Self {

@@ -15,13 +15,16 @@ pub mod coverage;
 pub mod folder;
 mod free;
 pub mod gauge;
+pub mod gauge_file;
 pub mod gauge_port;
+mod gauge_unit;
 mod holds;
 pub mod poses;
 pub mod record;
 pub mod report;
 pub mod series;
 pub mod simulated;
+mod take;
 
 use std::path::PathBuf;
 
@@ -31,7 +34,6 @@ use hivtac_scene::Contact;
 use assemble::{DIRECTION_DEG, Gauge, How, assemble};
 use folder::Recording;
 use gauge::Unit;
-use series::Series;
 
 /// Calibration data from a real unit.
 #[derive(Debug, clap::Subcommand)]
@@ -53,13 +55,13 @@ pub struct AlignArgs {
     #[arg(long, value_name = "FOLDER")]
     recording: PathBuf,
     /// What the gauge recorded by itself: a line for each reading, seconds and force. One file for
-    /// all runs, or repeated, one for each run with a pose, in order. Without it, what `record`
-    /// heard of the gauge.
+    /// all runs, or repeated, one for each run with a pose, in order; a file whose clock starts
+    /// again counts as one more from there. Without it, what `record` heard of the gauge.
     #[arg(long, value_name = "FILE")]
     gauge: Vec<PathBuf>,
-    /// The unit of readings that name none.
-    #[arg(long, default_value = "N")]
-    gauge_unit: Unit,
+    /// The unit of readings that name none: N when it is not said.
+    #[arg(long, value_name = "UNIT")]
+    gauge_unit: Option<Unit>,
     /// What the poses' angles say: `force` (the direction of the force, as of a weight that hangs),
     /// or the pressing direction of a tip that sticks (`stick`) or slips from a friction ratio on
     /// (`slip:0.6`).
@@ -104,14 +106,7 @@ impl CollectCommand {
 impl AlignArgs {
     fn run(self) -> Result<()> {
         let mut recording = Recording::read(&self.recording)?;
-        let files = self
-            .gauge
-            .iter()
-            .map(|path| Series::load(path, self.gauge_unit));
-        let gauge = match files.collect::<Result<Vec<_>>>()? {
-            files if files.is_empty() => Gauge::AtThePort,
-            files => Gauge::Files(files),
-        };
+        let gauge = Gauge::of(&self.gauge, self.gauge_unit)?;
         recording.conditions.contact = self.contact;
         let how = How {
             unit: self.gauge_unit,

@@ -8,13 +8,13 @@ use anyhow::{Context, Result, bail, ensure};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
-use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 
 use super::folder::{Folder, conditions_of};
 use super::free::FreeTake;
 use super::gauge_port::{GaugeArgs, GaugePort};
 use super::poses::{self, Person, Pose, Task};
+use super::take::{Heard, Take};
 
 /// Options of `collect record`.
 #[derive(Debug, clap::Args)]
@@ -168,57 +168,6 @@ struct Recorder {
     free: Option<FreeTake>,
 }
 
-/// What a take gave.
-#[derive(Clone, Copy, Debug, Default)]
-struct Take {
-    samples: usize,
-    good: usize,
-    lost: u32,
-    first_us: Option<u64>,
-    last_us: u64,
-    last_sequence: Option<u32>,
-    /// The largest |F| that the sensor felt, N; nothing without a force.
-    felt_n: Option<f64>,
-    /// What the gauge showed, N: sum and number.
-    gauge: (f64, f64),
-}
-
-/// No gauge is silent for longer while it is listened to.
-const SILENT: Duration = Duration::from_secs(10);
-
-/// What is heard of a gauge during a take.
-#[derive(Clone, Copy, Debug)]
-struct Heard {
-    /// Readings before it.
-    before: Option<usize>,
-    /// Readings so far, and when they were last more.
-    last: Option<usize>,
-    at: Instant,
-}
-
-impl Heard {
-    fn from(readings: Option<usize>) -> Self {
-        Self {
-            before: readings,
-            last: readings,
-            at: Instant::now(),
-        }
-    }
-
-    /// Whether there was no reading for too long, now that there are so many.
-    fn is_silent(&mut self, readings: Option<usize>) -> bool {
-        if readings != self.last {
-            (self.last, self.at) = (readings, Instant::now());
-        }
-        readings.is_some() && self.at.elapsed() > SILENT
-    }
-
-    /// How many came.
-    fn since(&self, readings: Option<usize>) -> Option<usize> {
-        Some(readings? - self.before?)
-    }
-}
-
 impl Recorder {
     fn run(&mut self, args: &RecordArgs, list: Option<&[Task]>) -> Result<()> {
         let question = "Nothing may touch the film, and the gauge shows zero: press Enter.";
@@ -355,20 +304,25 @@ impl Recorder {
             self.keep(message, pose, &mut take)?;
         }
         let readings = heard.since(self.gauge_readings()?);
+        self.sum_up(&take, readings, task.is_none())?;
+        Ok(take)
+    }
+
+    /// Says what a take gave, and refuses one of a load of which the gauge said nothing: a gauge
+    /// that is asked may be slow to begin at rest, but one whose lines are no readings stays so.
+    fn sum_up(&self, take: &Take, readings: Option<usize>, is_rest: bool) -> Result<()> {
         let heard = readings.map_or(String::new(), |count| format!(", {count} gauge readings"));
         eprintln!(
             "{} samples ({} with markers, {} lost){heard}.",
             take.samples, take.good, take.lost
         );
-        // A gauge that is asked for its readings may be slow to begin; one whose lines are none
-        // stays as it is.
         let is_unreadable = self.gauge.as_ref().is_some_and(GaugePort::is_unreadable);
         ensure!(
-            readings != Some(0) || task.is_none() && !is_unreadable,
+            readings != Some(0) || is_rest && !is_unreadable,
             "{}",
             self.silence()
         );
-        Ok(take)
+        Ok(())
     }
 
     /// Whether a take has what it was to have.
@@ -437,30 +391,4 @@ fn live(gauge_n: Option<f64>, sample: &Sample) -> String {
         None => "sensor sees NO four markers".to_owned(),
     };
     format!("{:<60}", gauge + &sensor)
-}
-
-impl Take {
-    /// What the gauge showed on average, N.
-    fn gauge_n(&self) -> Option<f64> {
-        let (sum, count) = self.gauge;
-        (count > 0.0).then(|| sum / count)
-    }
-
-    fn count(&mut self, sample: &Sample, gauge_n: Option<f64>) {
-        if let Some(gauge_n) = gauge_n {
-            self.gauge = (self.gauge.0 + gauge_n, self.gauge.1 + 1.0);
-        }
-        self.samples += 1;
-        let implausible = Status::MARKERS_IMPLAUSIBLE;
-        self.good += usize::from(sample.markers.is_some() && !sample.status.contains(implausible));
-        self.first_us.get_or_insert(sample.time_us);
-        self.last_us = sample.time_us;
-        if let Some(force) = &sample.force {
-            let force_n = f64::from(force.magnitude.0) / 1e6;
-            self.felt_n = Some(self.felt_n.map_or(force_n, |most| most.max(force_n)));
-        }
-        if let Some(last) = self.last_sequence.replace(sample.sequence) {
-            self.lost += sample.sequence.wrapping_sub(last).wrapping_sub(1);
-        }
-    }
 }

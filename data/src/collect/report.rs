@@ -43,6 +43,8 @@ pub struct RunReport {
     pub unsteady: usize,
     /// Frames of the data set whose markers were not found, by status.
     pub rejected: BTreeMap<String, usize>,
+    /// Whether the gauge shows pressing as negative, and its sign was turned round.
+    pub is_turned: bool,
     /// What was wrong with the gauge's lines.
     pub complaint: Option<String>,
 }
@@ -104,6 +106,12 @@ impl fmt::Display for RunReport {
         )?;
         for (status, count) in &self.rejected {
             write!(f, "\n  rejected by the sensor and kept: {status}: {count}")?;
+        }
+        if self.is_turned {
+            write!(
+                f,
+                "\n  the gauge shows pressing as negative: its sign was turned round"
+            )?;
         }
         match &self.complaint {
             Some(complaint) => write!(f, "\n  {complaint}"),

@@ -1,11 +1,10 @@
 //! A gauge's readings in time, and what it said between them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, bail};
 
-use super::gauge::{Bad, Unit, reading};
+use super::gauge::{Bad, Unit, read};
 
 /// Readings of a gauge on its own clock. Where a line was bad, the readings around it are not
 /// joined.
@@ -17,11 +16,21 @@ pub struct Series {
     pub bad: BTreeMap<Bad, usize>,
     /// The first of them: line number and text.
     pub first_bad: Option<(usize, String)>,
+    /// How many readings named no unit.
+    unnamed: usize,
+    /// Where its clock started again: the line, and the time before, s.
+    pub begins: Option<(usize, f64)>,
 }
 
 /// No clock counts farther, ± s: three centuries, beyond the seconds since 1970 and what a sensor's
 /// counter holds. Sums and differences of such stay exact to microseconds.
 pub const LARGEST_S: f64 = 1e10;
+/// Readings of presses of a film that holds 0.25 N span no more, N: with a unit, and where none is
+/// said.
+const LARGEST_SPAN_N: f64 = 5.0;
+const UNNAMED_SPAN_N: f64 = 0.5;
+/// One reading in so many may be a knock, either way.
+const RARE: usize = 200;
 /// Readings farther apart than this many usual distances are not joined.
 const GAP: f64 = 5.0;
 
@@ -31,9 +40,13 @@ impl Series {
         let last = self.points.last().map_or(f64::NEG_INFINITY, |p| p.0);
         let time = time_s.filter(|t| t.abs() <= LARGEST_S && *t > last);
         let found = match time {
-            Some(_) => reading(text, unit),
+            Some(_) => read(text, unit),
             None => Err(Bad::Time),
         };
+        let found = found.map(|reading| {
+            self.unnamed += usize::from(!reading.names_unit);
+            reading.force_n
+        });
         if let Err(why) = found {
             *self.bad.entry(why).or_default() += 1;
             self.first_bad
@@ -44,47 +57,64 @@ impl Series {
         }
     }
 
-    /// Reads a gauge's file: one line a reading, time in s and reading, separated by comma,
-    /// semicolon or tab. Empty lines, lines that begin with `#`, and one line of column names at
-    /// the top are passed over.
-    ///
-    /// # Errors
-    /// When it cannot be read, or has no readings.
-    pub fn load(path: &Path, unit: Unit) -> Result<Self> {
-        let text =
-            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-        let series = Self::parse(&String::from_utf8_lossy(&text), unit);
-        let (readings, bad) = (series.readings(), series.bad.values().sum::<usize>());
-        ensure!(
-            readings >= 2,
-            "{} has {readings} readings and {bad} other lines: each line must be \
-             `seconds,reading`, such as `12.34,+0.123N`",
-            path.display()
-        );
-        Ok(series)
+    /// One whose clock started again, at a line of its file, after so many s.
+    pub(super) fn after(line: usize, last_s: f64) -> Self {
+        Self {
+            begins: Some((line, last_s)),
+            ..Self::default()
+        }
     }
 
-    /// Reads the text of such a file; one without readings is as good as any.
-    pub fn parse(text: &str, unit: Unit) -> Self {
-        let mut series = Self::default();
-        let mut first = true;
-        for (index, line) in text.lines().enumerate() {
-            let line = line.trim_start_matches('\u{feff}').trim();
-            if line.is_empty() || line.starts_with('#') {
-                continue;
-            }
-            let (time, value) = line.split_once([',', ';', '\t']).unwrap_or((line, ""));
-            let (time, value) = (
-                time.trim().trim_matches('"'),
-                value.trim().trim_matches('"'),
-            );
-            let is_names = first && !line.contains(|c: char| c.is_ascii_digit());
-            first = false;
-            if !is_names {
-                series.push(index + 1, time.parse().ok(), value, unit);
-            }
+    /// Refuses readings that no press of the film gives: a unit that nobody said, or another than
+    /// was said.
+    ///
+    /// # Errors
+    /// When they span more than the film can be pressed; says which unit would fit. `is_said` is
+    /// whether somebody said the unit of readings that name none.
+    pub fn plausible(&self, is_said: bool) -> Result<()> {
+        let mut forces: Vec<f64> = self.points.iter().filter_map(|point| point.1).collect();
+        forces.sort_by(f64::total_cmp);
+        // A knock against the gauge is no unit.
+        let few = forces.len() / RARE;
+        let [Some(least), Some(most)] = [
+            forces.get(few),
+            forces.get(forces.len().wrapping_sub(few + 1)),
+        ] else {
+            return Ok(());
+        };
+        let span_n = most - least;
+        let is_named = is_said || self.unnamed == 0;
+        let largest_n = if is_named {
+            LARGEST_SPAN_N
+        } else {
+            UNNAMED_SPAN_N
+        };
+        if span_n <= largest_n {
+            return Ok(());
         }
-        series
+        let hint = match Unit::that_would_fit(span_n).as_slice() {
+            _ if is_named => "is the unit right, and nothing but the film pressed?".to_owned(),
+            [] => "say their unit with --gauge-unit".to_owned(),
+            units if span_n <= LARGEST_SPAN_N => {
+                format!("--gauge-unit {}? Or N, if it is that", units.join(" or "))
+            }
+            units => format!("--gauge-unit {}?", units.join(" or ")),
+        };
+        let unit = if is_named {
+            ""
+        } else {
+            "no reading names a unit; taken for newtons "
+        };
+        bail!("{unit}readings span {span_n:.3} N, and the film holds 0.25 N: {hint}");
+    }
+
+    /// The same with the other sign.
+    #[must_use]
+    pub fn turned_round(mut self) -> Self {
+        for (_, force) in &mut self.points {
+            *force = force.map(|force| -force);
+        }
+        self
     }
 
     /// How many readings there are.
@@ -147,36 +177,86 @@ impl Joined<'_> {
         let (f0, f1) = (f0?, f1?);
         (t1 - t0 <= self.longest_s).then(|| f0 + (f1 - f0) * (time_s - t0) / (t1 - t0))
     }
+
+    /// How far the force may be beside the straight line between two readings, N: by how the lines
+    /// before and after it lie.
+    pub fn bent_n(&self, time_s: f64) -> f64 {
+        let after = self.points.partition_point(|p| p.0 < time_s).max(1);
+        let line = |after: usize| {
+            let (t0, f0) = *self.points.get(after.checked_sub(1)?)?;
+            let (t1, f1) = *self.points.get(after)?;
+            Some(((f1? - f0?) / (t1 - t0), t1 - t0))
+        };
+        let Some((slope, step_s)) = line(after) else {
+            return 0.0;
+        };
+        let beside = [after.checked_sub(1).and_then(line), line(after + 1)];
+        let bends = beside.into_iter().flatten();
+        let bend = bends.map(|(other, _)| (other - slope).abs());
+        // A parabola's arc is an eighth of its bend over the step above its chord.
+        bend.fold(0.0, f64::max) * step_s / 8.0
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// A reading a second.
+    fn series(readings: &[&str]) -> Series {
+        let mut series = Series::default();
+        for (second, text) in readings.iter().enumerate() {
+            series.push(second + 1, Some(second as f64), text, Unit::NEWTON);
+        }
+        series
+    }
+
     #[test]
-    fn a_file_is_read_with_its_faults_counted() {
-        let text = "time;force\n# made by hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n\
-                    0.25;0.5N\nx;1\n0.5;1..2N\n0.6\n";
-        let series = Series::parse(text, Unit::NEWTON);
-        assert_eq!(series.readings(), 3);
-        let counts: Vec<_> = series.bad.iter().map(|(why, n)| (*why, *n)).collect();
-        assert_eq!(
-            counts,
-            [(Bad::NoReading, 2), (Bad::Overload, 1), (Bad::Time, 2)]
-        );
-        assert_eq!(series.first_bad, Some((5, "OL".into())));
-        let complaint = series.complaint().unwrap();
-        assert!(
-            complaint.contains("5 gauge lines were not used (no reading 2"),
-            "{complaint}"
-        );
-        assert_eq!(Series::parse("1,2\n2,3", Unit::NEWTON).complaint(), None);
+    fn few_readings_leave_more_open_where_the_force_bends() {
+        let parabola: Vec<String> = (0..9)
+            .map(|i| format!("{}", f64::from(i * i) / 100.0))
+            .collect();
+        let texts: Vec<&str> = parabola.iter().map(String::as_str).collect();
+        let series = series(&texts);
+        let joined = series.joined();
+        // Between 4 and 5 s, 0.16 and 0.25 N, the parabola is at 0.2025 N.
+        let off_n = joined.at(4.5).unwrap() - 0.2025;
+        assert!((joined.bent_n(4.5) - off_n).abs() < 1e-9, "{off_n}");
+        assert!(joined.bent_n(0.5) > 0.0 && joined.bent_n(7.9) > 0.0);
+        assert_eq!(Series::default().joined().bent_n(1.0), 0.0);
+    }
+
+    #[test]
+    fn what_no_film_gives_is_asked_about() {
+        let asked = |readings: &[&str], is_said: bool| {
+            let error = series(readings).plausible(is_said).unwrap_err();
+            error.to_string()
+        };
+        assert!(asked(&["0", "201.3"], false).ends_with("0.25 N: --gauge-unit mN?"));
+        assert!(asked(&["150.0", "170.5"], false).ends_with("--gauge-unit mN or gf?"));
+        assert!(asked(&["0", "0.6"], false).ends_with("ozf? Or N, if it is that"));
+        assert!(asked(&["0", "10"], true).contains("is the unit right"));
+        assert!(asked(&["0 N", "10 N"], false).contains("is the unit right"));
+        for (fine, is_said) in [
+            (&["0", "0.25"][..], false),
+            (&["0 N", "0.6 N"], false),
+            (&["0", "0.6"], true),
+            (&["OL", "OL"], false),
+            (&[], false),
+        ] {
+            assert!(series(fine).plausible(is_said).is_ok(), "{fine:?}");
+        }
+        let mut knocked = vec!["0.1"; 500];
+        knocked[250] = "40";
+        assert!(series(&knocked).plausible(false).is_ok());
     }
 
     #[test]
     fn readings_are_joined_but_not_across_what_was_bad_or_missing() {
-        let text = "0,0\n1,1\n2,OL\n3,3\n4,4\n20,5\n21,6";
-        let series = Series::parse(text, Unit::NEWTON);
+        let mut series = series(&["0", "1", "OL", "3", "4"]);
+        series.push(6, Some(20.0), "5", Unit::NEWTON);
+        series.push(7, Some(21.0), "6", Unit::NEWTON);
+        assert_eq!(series.clone().turned_round().joined().at(3.5), Some(-3.5));
         let joined = series.joined();
         assert_eq!(joined.at(0.0), Some(0.0));
         assert_eq!(joined.at(0.25), Some(0.25));
@@ -185,15 +265,5 @@ mod tests {
         assert_eq!(joined.at(3.5), Some(3.5));
         assert_eq!(joined.at(10.0), None, "a gap");
         assert_eq!((joined.at(-0.1), joined.at(21.1)), (None, None));
-    }
-
-    #[test]
-    fn a_file_without_readings_is_refused_with_an_example() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("gauge.csv");
-        std::fs::write(&path, b"time,force\n\xff\xfe,0.1N\n").unwrap();
-        let error = Series::load(&path, Unit::NEWTON).unwrap_err().to_string();
-        assert!(error.contains("0 readings and 1 other lines"), "{error}");
-        assert!(error.contains("12.34,+0.123N"), "{error}");
     }
 }

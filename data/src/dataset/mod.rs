@@ -83,8 +83,8 @@ pub struct Row {
     /// Which point of the film the tip is on, by where that rests, mm from the middle; `None`
     /// without a force, and where nobody knows.
     pub tip_mm: Option<[f64; 2]>,
-    /// Standard uncertainty of |F| because clocks are known so well and the force changed so fast,
-    /// N; `None` where it was held, or is known from elsewhere.
+    /// Standard uncertainty of |F| because clocks are known so well, readings are so far apart, and
+    /// the force changed so fast, N; `None` where it was held, or is known from elsewhere.
     pub clock_n: Option<f64>,
     /// What was seen, or the status names that say why nothing was.
     pub seen: Result<Observation, String>,

@@ -15,7 +15,7 @@ const WEIGHTS_G: [f64; 4] = [5.0, 10.0, 15.0, 20.0];
 const TIMES_S: [[f64; 2]; 4] = [[6.4, 15.2], [20.7, 27.6], [32.3, 44.9], [49.5, 55.1]];
 const G: f64 = 9.806_65e-3;
 const HOLDS: How = How {
-    unit: Unit::NEWTON,
+    unit: None,
     holds: true,
     direction_deg: DIRECTION_DEG,
 };
@@ -110,6 +110,35 @@ fn weights_and_a_watch_are_a_gauge() {
         frames[weight.unwrap()] += 1;
     }
     assert!(frames.iter().all(|&count| count > 39), "{frames:?}");
+}
+
+/// A gauge that was mounted the other way round is as good.
+#[test]
+fn a_gauge_that_shows_pressing_as_negative_is_turned_round() {
+    let turned = Gauge::Files(vec![notes("g").turned_round()]);
+    let (found, report) = assemble(&recording(), &turned, HOLDS).unwrap();
+    assert!(
+        report.to_string().contains("its sign was turned round"),
+        "{report}"
+    );
+    let upright = Gauge::Files(vec![notes("g")]);
+    let (expected, report) = assemble(&recording(), &upright, HOLDS).unwrap();
+    assert!(!report.to_string().contains("turned round"), "{report}");
+    assert_eq!(found.rows, expected.rows);
+}
+
+/// A clock that starts again in the middle of a run says nothing of when.
+#[test]
+fn a_clock_that_starts_again_is_named() {
+    let mut again = Series::after(31, 155.0);
+    again.push(31, Some(0.0), "0 N", Unit::NEWTON);
+    again.push(32, Some(1.0), "0 N", Unit::NEWTON);
+    let gauge = Gauge::Files(vec![notes("g"), again]);
+    let error = assemble(&recording(), &gauge, HOLDS)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("2 gauge files for 1 run(s)"), "{error}");
+    assert!(error.contains("line 31 (after 155 s)"), "{error}");
 }
 
 /// Forces that no data set could hold never get into one.
