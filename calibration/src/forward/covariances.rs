@@ -105,7 +105,9 @@ mod tests {
     fn a_chip_reads_what_was_written() {
         let wave = |k: usize, pose: &Pose| -> Moved {
             let [x, y] = pose.place_mm;
-            std::array::from_fn(|i| pose.size * (0.1 + 0.01 * x * ((i + k) as f64).sin() + 0.01 * y))
+            std::array::from_fn(|i| {
+                pose.size * (0.1 + 0.01 * x * ((i + k) as f64).sin() + 0.01 * y)
+            })
         };
         let truth = |pose: &Pose| sum_of_squares(&[0, 5, 9].map(|k| wave(k, pose)));
         let spec = covariances(|pose| Ok(truth(pose))).unwrap();
