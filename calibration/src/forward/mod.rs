@@ -9,6 +9,7 @@ mod left_out;
 mod matrix;
 mod nearest;
 mod noise;
+mod open;
 mod others;
 mod tables;
 mod ten_loads;
@@ -24,12 +25,12 @@ use hivtac_sensing::forward::{self, DOTS, Limits, RestImage, Stiffness};
 use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
 
+use covariances::even;
 pub use covariances::{Covariance, Moved, covariances};
-use covariances::{even, sum_of_squares};
 pub use functions::{Sampled, compressed};
 pub use noise::Noise;
+pub use open::{Open, STEP};
 use others::others;
-use tables::turned;
 pub use tables::{Dot, UnitSetup, tables};
 pub use ten_loads::{Bench, Fit, KnownLoad, fit};
 
@@ -65,22 +66,8 @@ pub struct FilmModel {
 
 /// A calibration leaves fewer directions open than this.
 const MOST_OPEN: usize = 64;
-/// How far an open unit is moved, in parts of what is not known of it.
-pub const STEP: f64 = 0.25;
 /// The focal length at 320×240, px.
 const FOCAL_PX: f64 = 175.0;
-
-/// A unit that is as likely as the one that was found, but for [`STEP`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Open {
-    /// Its film and camera.
-    pub unit: OwnUnit,
-    /// Its tip's radius, mm.
-    pub tip_radius_mm: f64,
-    /// What a tare takes for its rest position less where its markers rest, px.
-    pub rest_px: [[f64; 2]; 4],
-}
 
 /// A unit as its calibration found it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -231,7 +218,7 @@ impl FilmModel {
                 linear_n: stiffness_n[0],
                 cubic_n: stiffness_n[1],
             },
-            rest_image: rest_image(&Film::of(setup.unit)?, &camera),
+            rest_image: rest_image(Film::of(setup.unit)?.markers_mm(), &camera),
             per_px: (self.unit.as_ref()).map(|unit| unit.per_px().map(|part| part as f32)),
             noise: forward::Noise {
                 rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
@@ -241,36 +228,6 @@ impl FilmModel {
             tables,
             own,
             other,
-        })
-    }
-
-    /// What its calibration leaves open of a unit, and what the chip's tables leave of it.
-    fn left_open(&self, unit: &OwnUnit, left: f64, camera: &Camera) -> Result<CovarianceSpec> {
-        let found = Open {
-            unit: unit.clone(),
-            tip_radius_mm: self.tip_radius_mm,
-            rest_px: self.rest_px,
-        };
-        let here = Moving::new(&found, camera)?;
-        let open = self.open.iter().map(|open| Moving::new(open, camera));
-        let open: Vec<Moving<'_>> = open.collect::<Result<_>>()?;
-        covariances(|pose| {
-            let moved = here.moved_px(pose)?;
-            let difference = |there: &Moving<'_>| -> Result<Moved> {
-                let more = there.moved_px(&here.same_force(pose, there))?;
-                let mut focal: Moved = std::array::from_fn(|i| (more[i] - moved[i]) / STEP);
-                for marker in focal.as_chunks_mut().0 {
-                    *marker = turned(unit.per_px(), *marker);
-                }
-                Ok(focal)
-            };
-            let differences = open.iter().map(difference).collect::<Result<Vec<_>>>()?;
-            let mut covariance = sum_of_squares(&differences);
-            let left = left.hypot(self.beside_px / FOCAL_PX) * pose.size / LARGEST_SIZE;
-            for (k, row) in covariance.iter_mut().enumerate() {
-                row[k] += left * left;
-            }
-            Ok(covariance)
         })
     }
 }
@@ -298,7 +255,7 @@ fn nominal(camera: &Camera) -> Result<Nominal> {
         steps: 0,
         limits: limits(),
         stiffness: Stiffness { linear_n, cubic_n },
-        rest_image: rest_image(&Film::default(), camera),
+        rest_image: rest_image(Film::default().markers_mm(), camera),
         per_px: None,
         noise: forward::Noise {
             rest_px: [[0.0; 2]; DOTS],
@@ -325,55 +282,6 @@ fn limits() -> Limits {
     }
 }
 
-/// How the markers of a unit move.
-struct Moving<'a> {
-    open: &'a Open,
-    setup: UnitSetup<'a>,
-    film: Film,
-}
-
-impl<'a> Moving<'a> {
-    fn new(open: &'a Open, camera: &'a Camera) -> Result<Self> {
-        let unit = open.unit.film();
-        Ok(Self {
-            open,
-            film: Film::of(unit)?,
-            setup: UnitSetup {
-                unit,
-                tip_radius_mm: open.tip_radius_mm,
-                camera,
-            },
-        })
-    }
-
-    /// Where the markers are seen beside the rest position that was seen, px.
-    fn moved_px(&self, pose: &Pose) -> Result<Moved> {
-        let to_px = self.open.unit.to_px();
-        let mut moved = Moved::default();
-        for (marker, place) in moved.chunks_exact_mut(2).enumerate() {
-            let [x, y] = to_px(self.setup.moved(&self.film, pose, marker)?);
-            let [off_x, off_y] = self.open.rest_px[marker];
-            place.copy_from_slice(&[x - off_x, y - off_y]);
-        }
-        Ok(moved)
-    }
-
-    fn stiffness(&self) -> Stiffness {
-        let [linear_n, cubic_n] = self.setup.stiffness_n().map(|part| part as f32);
-        Stiffness { linear_n, cubic_n }
-    }
-
-    /// The pose that the same force has on another unit.
-    fn same_force(&self, pose: &Pose, other: &Moving<'_>) -> Pose {
-        let magnitude_n = self.stiffness().magnitude_n(pose.size as f32);
-        let size = other.stiffness().size_of(magnitude_n, LARGEST_SIZE as f32);
-        Pose {
-            size: size.into(),
-            ..*pose
-        }
-    }
-}
-
 /// A film as the chip reads it.
 fn parsed(bytes: &[u8]) -> Result<forward::Forward<'_>> {
     forward::Forward::parse(bytes)
@@ -392,25 +300,26 @@ fn told(forward: &forward::Forward<'_>, pose: &Pose, beside_mm: &forward::Marker
     told.moved.map(f64::from)
 }
 
-/// Where a film's markers are seen at rest, focal lengths from the axis.
-fn at_rest(film: &Film, camera: &Camera) -> [[f64; 2]; DOTS] {
+/// Where markers at these places, mm, are seen at rest, focal lengths from the axis.
+fn at_rest(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> [[f64; 2]; DOTS] {
     let middle = [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
-    film.markers_mm().map(|place_mm| {
+    places_mm.map(|place_mm| {
         let at = Disc::marker(place_mm).centroid_px(|_| [0.0; 3], camera);
         [0, 1].map(|i| (at[i] - middle[i]) / camera.focal_px())
     })
 }
 
-/// What a rest picture says: of the nominal camera, on a film 10 mm away.
-fn rest_image(film: &Film, camera: &Camera) -> RestImage {
-    let film_mm = film.markers_mm().map(|[x, y]| {
+/// What a rest picture says of markers at these places, mm: of the nominal camera, on a film 10 mm
+/// away.
+pub fn rest_image(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> RestImage {
+    let film_mm = places_mm.map(|[x, y]| {
         let (distance, radius) = (FILM_DISTANCE_MM, libm::hypot(x, y));
         let away = (distance * distance + radius * radius) / distance;
         let across = radius / libm::atan(radius / distance);
         [away, across].map(|part| part as f32)
     });
     RestImage {
-        at: at_rest(film, camera).map(|place| place.map(|part| part as f32)),
+        at: at_rest(places_mm, camera).map(|place| place.map(|part| part as f32)),
         film_mm,
     }
 }
