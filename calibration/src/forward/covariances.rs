@@ -119,9 +119,9 @@ mod tests {
             tilt: 0.6,
         };
         for (size, place_mm, part) in [
-            (LARGEST_SIZE, [1.4, -2.8], 1e-4),
+            (LARGEST_SIZE, [2.1, -4.2], 1e-4),
             (LARGEST_SIZE / 4.0, [-4.2, 0.0], 1e-4),
-            (0.45, [0.3, -2.0], 0.1),
+            (0.45, [0.3, -2.0], 0.2),
         ] {
             let pose = Pose {
                 size,
