@@ -43,7 +43,8 @@ impl Weights {
         let mut film = FilmModel::nominal(steps, &noise);
         self.film = Some(film.clone());
         let rows = needed(&self, dataset)?;
-        let times = |rows: &[Needed], k: usize| quantile(COVERED, rows.iter().map(|row| row.times[k]));
+        let times =
+            |rows: &[Needed], k: usize| quantile(COVERED, rows.iter().map(|row| row.times[k]));
         let wider = times(&rows, 0).max(times(&rows, 2)).max(1.0);
         film.noise_px = film.noise_px.map(|part| part * wider);
         for beside_px in BESIDE_PX {

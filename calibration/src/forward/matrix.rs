@@ -76,7 +76,7 @@ mod tests {
 
     /// Of rank 3, of five rows.
     fn matrix() -> Matrix {
-        let part = |i: usize, k: usize| ((3 * i + 7 * k) as f64 * 0.83).sin();
+        let part = |i: usize, k: usize| (((3 * i + 1) * (k + 2)) as f64 * 0.83).sin();
         let entry = |i: usize, j: usize| (0..3).map(|k| part(i, k) * part(j, k)).sum();
         (0..5)
             .map(|i| (0..5).map(|j| entry(i, j)).collect())

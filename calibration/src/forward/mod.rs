@@ -122,7 +122,7 @@ impl FilmModel {
             steps: self.steps,
             limits: limits(),
             stiffness: nominal.stiffness,
-            rest_image: rest_image(&Film::default(), &camera),
+            rest_image: rest_image(Film::default().markers_mm(), &camera),
             per_px: None,
             noise,
             tables: nominal.tables,
@@ -160,7 +160,7 @@ fn nominal(camera: &Camera) -> Result<Nominal> {
         steps: 0,
         limits: limits(),
         stiffness: Stiffness { linear_n, cubic_n },
-        rest_image: rest_image(&Film::default(), camera),
+        rest_image: rest_image(Film::default().markers_mm(), camera),
         per_px: None,
         noise: forward::Noise {
             rest_px: [[0.0; 2]; DOTS],
@@ -206,25 +206,26 @@ fn told(forward: &forward::Forward<'_>, pose: &Pose, beside_mm: &forward::Marker
     told.moved.map(f64::from)
 }
 
-/// Where a film's markers are seen at rest, focal lengths from the axis.
-fn at_rest(film: &Film, camera: &Camera) -> [[f64; 2]; DOTS] {
+/// Where markers at these places, mm, are seen at rest, focal lengths from the axis.
+fn at_rest(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> [[f64; 2]; DOTS] {
     let middle = [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
-    film.markers_mm().map(|place_mm| {
+    places_mm.map(|place_mm| {
         let at = Disc::marker(place_mm).centroid_px(|_| [0.0; 3], camera);
         [0, 1].map(|i| (at[i] - middle[i]) / camera.focal_px())
     })
 }
 
-/// What a rest picture says: of the nominal camera, on a film 10 mm away.
-fn rest_image(film: &Film, camera: &Camera) -> RestImage {
-    let film_mm = film.markers_mm().map(|[x, y]| {
+/// What a rest picture says of markers at these places, mm: of the nominal camera, on a film 10 mm
+/// away.
+pub(crate) fn rest_image(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> RestImage {
+    let film_mm = places_mm.map(|[x, y]| {
         let (distance, radius) = (FILM_DISTANCE_MM, libm::hypot(x, y));
         let away = (distance * distance + radius * radius) / distance;
         let across = radius / libm::atan(radius / distance);
         [away, across].map(|part| part as f32)
     });
     RestImage {
-        at: at_rest(film, camera).map(|place| place.map(|part| part as f32)),
+        at: at_rest(places_mm, camera).map(|place| place.map(|part| part as f32)),
         film_mm,
     }
 }

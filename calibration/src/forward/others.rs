@@ -145,7 +145,7 @@ impl<'a> Other<'a> {
 fn rest(unit: &DrawnUnit, film: &Film, camera: &Camera) -> Rest {
     let to_px = unit.to_px();
     let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
-    let seen = at_rest(film, camera).map(|place| {
+    let seen = at_rest(film.markers_mm(), camera).map(|place| {
         let [x, y] = to_px(place);
         (px(x), px(y))
     });

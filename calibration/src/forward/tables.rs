@@ -198,7 +198,12 @@ pub fn tables(
         })
     };
     let sampled = dots.iter().enumerate().map(sampled);
-    compressed(TERMS, &sampled.collect::<Result<Vec<_>>>()?, LEFT, FUNCTIONS)
+    compressed(
+        TERMS,
+        &sampled.collect::<Result<Vec<_>>>()?,
+        LEFT,
+        FUNCTIONS,
+    )
 }
 
 /// (a + ib)·(x + iy).

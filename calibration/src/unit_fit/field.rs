@@ -25,12 +25,12 @@ const SPAN: usize = 4;
 const LARGEST_N: f64 = 0.256;
 /// Loads at each place: sizes in parts of the largest without tilt, and with tilts: radius in parts
 /// of the largest, the turn of the first of four, °, and the size.
-const STRAIGHT: [f64; 5] = [0.1, 0.3, 0.6, 0.85, 1.0];
-const TILTED: [(f64, f64, f64); 4] = [(0.5, 20.0, 0.2), (0.6, 65.0, 0.5), (0.5, 20.0, 0.95), (1.0, 42.0, 0.75)];
+const STRAIGHT: [f64; 4] = [0.1, 0.35, 0.7, 1.0];
+const TILTED: [(f64, f64, f64); 2] = [(0.6, 20.0, 0.4), (0.8, 65.0, 0.9)];
 /// What slopes count for beside values.
 const SLOPES_COUNT: f64 = 0.05;
 /// How many sizes the terms have without tilt, with its first degree, and so on.
-const TERMS: [u8; 5] = [7, 5, 4, 2, 1];
+const TERMS: [u8; 5] = [6, 4, 3, 1, 0];
 
 /// A unit's film, solved under some loads at some places of the tip.
 pub struct Field<'a> {

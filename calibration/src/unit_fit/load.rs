@@ -11,6 +11,9 @@ const BEST_PLACE_MM: f64 = 1e-3;
 /// How well a place is known that nobody noted, by what is seen of it, mm.
 const ROUGH_PLACE_MM: f64 = 1.5;
 
+/// No tip is farther from the film's middle along x or y, mm.
+const FARTHEST_MM: f64 = 6.0;
+
 /// A force, N, and a place, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressed {
@@ -32,9 +35,10 @@ impl SeenLoad {
         // A tip presses, whatever a step asks for.
         force_n[2] = force_n[2].min(-1e-6);
         let sigma_mm = self.place_sigma_mm();
+        let place = |i: usize| self.place_mm[i] + sigma_mm * parts[3 + i];
         Pressed {
             force_n,
-            place_mm: [0, 1].map(|i| self.place_mm[i] + sigma_mm * parts[3 + i]),
+            place_mm: [0, 1].map(|i| place(i).clamp(-FARTHEST_MM, FARTHEST_MM)),
         }
     }
 

@@ -63,7 +63,11 @@ pub fn fit(
         loads,
         priors: numbers::priors(bench.dots_mm.len(), stage_mm, from),
     };
-    let found = problem.descend(problem.likeliest())?;
+    let found = problem.found()?;
+    if std::env::var("TRACE").is_ok() {
+        eprintln!("chi {:.2}", found.chi_square());
+        for n in problem.found_numbers(&found) { if !n.name.contains("pixel") && !n.name.contains("marker") { eprintln!("   {} {:.4} +- {:.4}", n.name, n.value, n.sigma); } }
+    }
     Ok(Fit {
         chi_square: found.chi_square(),
         left_out: found.left_out(&problem)?,

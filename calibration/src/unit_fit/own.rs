@@ -5,6 +5,7 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_scene::{Camera, Preset};
 use hivtac_sensing::forward::{DOTS, EQUATIONS, MOST_TILTS, Stiffness};
 use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
@@ -14,7 +15,7 @@ use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::Number;
 use super::problem::{Problem, press};
-use crate::forward::{Covariance, Dot, covariances_of, knots, tables};
+use crate::forward::{Covariance, Dot, covariances_of, knots, rest_image, tables};
 
 /// Nodes along each axis of a dot's table.
 const NODES: usize = 13;
@@ -55,6 +56,8 @@ pub struct FoundNumber {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OwnTable {
+    /// Where the dot is on the film, mm.
+    place_mm: [f64; 2],
     nodes_mm: [Vec<f32>; 2],
     away: [f32; 2],
     coefficients: Vec<f64>,
@@ -90,8 +93,9 @@ impl OwnFilm {
             rest_px: made.rest_px.clone(),
             terms: tables.terms,
             functions: tables.functions,
-            dots: (tables.dots.into_iter())
-                .map(|table| OwnTable {
+            dots: (tables.dots.into_iter().zip(&made.dots_mm))
+                .map(|(table, place_mm)| OwnTable {
+                    place_mm: *place_mm,
                     nodes_mm: table.nodes_mm,
                     away: table.away,
                     coefficients: table.coefficients,
@@ -128,6 +132,7 @@ impl OwnFilm {
     /// # Errors
     /// When the covariance is of other markers.
     pub fn spec(&self, nominal: ForwardSpec) -> Result<ForwardSpec> {
+        let camera = Camera::new(Preset::Ov7725, 320, 240)?;
         let [linear_n, cubic_n] = self.stiffness_n.map(|part| part as f32);
         let mut noise = nominal.noise;
         for (place, own) in noise.rest_px.iter_mut().zip(&self.rest_px) {
@@ -137,6 +142,7 @@ impl OwnFilm {
             stiffness: Stiffness { linear_n, cubic_n },
             per_px: Some(self.per_px.map(|part| part as f32)),
             noise,
+            rest_image: rest_image(std::array::from_fn(|k| self.dots[k].place_mm), &camera),
             tables: self.tables(),
             own: Some(self.covariance()?),
             other: None,

@@ -6,10 +6,12 @@ use std::f64::consts::PI;
 use hivtac_scene::{Camera, Disc};
 use hivtac_shell::{Equilibrium, Film, Response};
 
-/// Rays and rings of the points over which a rate is averaged: Gauss's two rings, each half of a
-/// disc's area.
+/// Points on a ring within a dot over which a rate is averaged: on this ring, in parts of the radius,
+/// their mean is the disc's for polynomials to the third degree.
 const RAYS: usize = 6;
-const RINGS: [f64; 2] = [0.459_700_843_380_983_1, 0.888_073_833_977_115_3];
+const RING: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Points of a dot's rim at which its displacement is taken; between them it is a sum of waves.
+const RIM: usize = 12;
 /// Steps by which images are differentiated, mm.
 const STEP_MM: f64 = 1e-3;
 
@@ -35,8 +37,9 @@ impl View<'_> {
         dot_mm: [f64; 2],
     ) -> [f64; 2] {
         let disc = Disc::marker(dot_mm);
+        let rim = Rim::of(&disc, displaced);
         let moved = |point: [f64; 2]| {
-            let [x, y, z] = displaced(point);
+            let [x, y, z] = rim.at(point);
             [x, y, z + self.farther_mm]
         };
         self.in_focal_lengths(disc.centroid_px(moved, self.camera))
@@ -111,16 +114,63 @@ pub fn mean(dot_mm: [f64; 2], of: impl Fn([f64; 2]) -> [f64; 3]) -> [f64; 3] {
 }
 
 /// Points of a dot.
-fn points([x, y]: [f64; 2]) -> Vec<[f64; 2]> {
-    let radius_mm = Disc::marker([x, y]).radius_mm;
-    let ring = |part: f64| {
-        (0..RAYS).map(move |ray| {
-            let (sin, cos) = libm::sincos(2.0 * PI * ray as f64 / RAYS as f64);
-            [
-                x + part * radius_mm * cos,
-                y + part * radius_mm * sin,
-            ]
-        })
-    };
-    RINGS.into_iter().flat_map(ring).collect()
+fn points(dot_mm: [f64; 2]) -> [[f64; 2]; RAYS] {
+    let disc = Disc::marker(dot_mm);
+    std::array::from_fn(|ray| on_circle(&disc, RING, ray as f64 / RAYS as f64))
+}
+
+/// The point of a disc at a part of its radius, and a part of the whole turn.
+fn on_circle(disc: &Disc, part: f64, turn: f64) -> [f64; 2] {
+    let (sin, cos) = libm::sincos(2.0 * PI * turn);
+    let radius_mm = part * disc.radius_mm;
+    [
+        disc.centre_mm[0] + radius_mm * cos,
+        disc.centre_mm[1] + radius_mm * sin,
+    ]
+}
+
+/// How a dot's rim is displaced.
+struct Rim {
+    centre_mm: [f64; 2],
+    /// By wave along the rim: its cosine's and its sine's part.
+    waves: [[[f64; 3]; 2]; RIM / 2],
+}
+
+impl Rim {
+    fn of(disc: &Disc, displaced: impl Fn([f64; 2]) -> [f64; 3]) -> Rim {
+        let mut waves = [[[0.0; 3]; 2]; RIM / 2];
+        for k in 0..RIM {
+            let moved = displaced(on_circle(disc, 1.0, k as f64 / RIM as f64));
+            for (wave, parts) in waves.iter_mut().enumerate() {
+                let angle = 2.0 * PI * (wave * k) as f64 / RIM as f64;
+                let (sin, cos) = libm::sincos(angle);
+                let scale = if wave == 0 { 1.0 } else { 2.0 } / RIM as f64;
+                for c in 0..3 {
+                    parts[0][c] += scale * cos * moved[c];
+                    parts[1][c] += scale * sin * moved[c];
+                }
+            }
+        }
+        Rim {
+            centre_mm: disc.centre_mm,
+            waves,
+        }
+    }
+
+    /// At a point of the rim, or just beside it.
+    fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        let (x, y) = (x - self.centre_mm[0], y - self.centre_mm[1]);
+        let radius = libm::hypot(x, y);
+        let (cos, sin) = (x / radius, y / radius);
+        // (cos wφ, sin wφ), one wave after the other.
+        let mut turn = [1.0, 0.0];
+        let mut sum = [0.0; 3];
+        for parts in &self.waves {
+            for (c, sum) in sum.iter_mut().enumerate() {
+                *sum += turn[0] * parts[0][c] + turn[1] * parts[1][c];
+            }
+            turn = [turn[0] * cos - turn[1] * sin, turn[0] * sin + turn[1] * cos];
+        }
+        sum
+    }
 }

@@ -107,8 +107,7 @@ impl Unknown<'_> {
 
 /// What may differ between units where images move so.
 fn of_motion(moved: &Column) -> Covariance {
-    let mut covariance: Covariance =
-        moved.map(|a| moved.map(|b| OF_ALL * OF_ALL * a * b));
+    let mut covariance: Covariance = moved.map(|a| moved.map(|b| OF_ALL * OF_ALL * a * b));
     for (dot, [x, y]) in moved.as_chunks::<2>().0.iter().enumerate() {
         let square = OF_ITSELF * OF_ITSELF * (x * x + y * y);
         for k in [2 * dot, 2 * dot + 1] {
@@ -165,10 +164,7 @@ impl Whitening {
         let mut factor = Covariance::default();
         for i in 0..EQUATIONS {
             for j in 0..=i {
-                let mut left = covariance[i][j];
-                for k in 0..j {
-                    left -= factor[i][k] * factor[j][k];
-                }
+                let left = less(covariance[i][j], &factor[i][..j], &factor[j]);
                 factor[i][j] = match i == j {
                     true if (f32::MIN_POSITIVE..f32::MAX).contains(&left) => 1.0 / sqrt(left),
                     true => return None,
@@ -182,15 +178,17 @@ impl Whitening {
     /// What a column is in these coordinates.
     pub fn of(&self, column: &Column) -> Column {
         let mut white = *column;
-        for i in 0..EQUATIONS {
-            let mut left = white[i];
-            for k in 0..i {
-                left -= self.factor[i][k] * white[k];
-            }
-            white[i] = left * self.factor[i][i];
+        for (i, row) in self.factor.iter().enumerate() {
+            white[i] = less(white[i], &row[..i], &white) * row[i];
         }
         white
     }
+}
+
+/// A number less the products of parts with as many others.
+fn less(whole: f32, parts: &[f32], others: &[f32]) -> f32 {
+    let products = parts.iter().zip(others);
+    products.fold(whole, |left, (part, other)| left - part * other)
 }
 
 #[cfg(test)]
@@ -250,7 +248,10 @@ mod tests {
             let sizes = 2.0 * (size.min(0.8) / 0.8).sqrt();
             let expected = 1e-10 * square(sizes, part(y), 3.0 * part(x));
             let off = (found[0][0] - expected).abs();
-            assert!(off < 2e-3 * expected, "{size} {x} {y}: {found:?} {expected}");
+            assert!(
+                off < 2e-3 * expected,
+                "{size} {x} {y}: {found:?} {expected}"
+            );
             assert_eq!(found[7][7], 0.0);
         }
     }
@@ -328,9 +329,8 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         let bytes = knots(|_, _| 3);
-        let is_sound = |counts, end_mm, bytes: &[u8]| {
-            CovarianceGrid::new(counts, end_mm, bytes).is_some()
-        };
+        let is_sound =
+            |counts, end_mm, bytes: &[u8]| CovarianceGrid::new(counts, end_mm, bytes).is_some();
         assert!(is_sound(COUNTS, 4.0, &bytes[..]));
         assert!(!is_sound(COUNTS, 4.0, &bytes[1..]) && !is_sound(COUNTS, 4.0, &bytes[KNOT..]));
         assert!(!is_sound([1, 6, 4], 4.0, &bytes[..]) && !is_sound([0, 2, 4], 4.0, &[]));

@@ -9,9 +9,9 @@ use super::predict::Prediction;
 use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve, square};
 use crate::kernels::sqrt;
 
-/// A step that would explain no more than this of the residual, in parts of the noise's variance,
-/// is not needed: it would move no unknown by more than a half of its standard uncertainty.
-const LEFT_TO_EXPLAIN: f32 = 0.25;
+/// A step that would explain no more than this of the residual, in parts of its variance, is not
+/// needed: it would move no unknown by more than a fifth of its standard uncertainty.
+const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// The first of the unknowns that are the tilt, which the place follows.
 const TILT: usize = 1;
 /// What is likely before there is a frame: tilt along x and y, rad, and place along x and y, mm,
@@ -117,7 +117,9 @@ impl<'a> Descent<'a> {
         Estimate {
             pose: self.here.pose,
             // What has no covariance explains nothing.
-            unexplained: white.as_ref().map_or(f32::INFINITY, |white| white.unexplained),
+            unexplained: white
+                .as_ref()
+                .map_or(f32::INFINITY, |white| white.unexplained),
             left,
             solved: white.and_then(|white| white.solved),
             looks: self.looks,

@@ -43,11 +43,7 @@ pub struct Prediction {
 impl<'a> Tables<'a> {
     /// Of functions' parts of each term, and tables of as many functions each; `None` where their
     /// numbers do not fit, or a part is not within ±10⁶.
-    pub fn new(
-        terms: Terms,
-        functions: &'a [u8],
-        dots: [Table<'a>; DOTS],
-    ) -> Option<Tables<'a>> {
+    pub fn new(terms: Terms, functions: &'a [u8], dots: [Table<'a>; DOTS]) -> Option<Tables<'a>> {
         let (functions, rest) = functions.as_chunks();
         let count = functions.len() / terms.count();
         let sound = rest.is_empty()

@@ -107,7 +107,10 @@ impl<'a> Table<'a> {
     /// An output (0 along x, 1 along y) with its slopes, by what its functions and their slopes are
     /// under a load: by size, and by the tilt along its direction and across that.
     pub fn answer(&self, output: usize, place: &Place, functions: &[Factors]) -> Answer {
-        let sizes = self.sizes.get(output * self.functions..).unwrap_or_default();
+        let sizes = self
+            .sizes
+            .get(output * self.functions..)
+            .unwrap_or_default();
         let mut factors = [Factors::default(); MOST_FUNCTIONS];
         for ((factors, size), function) in factors.iter_mut().zip(sizes).zip(functions) {
             let size = SUM * f32::from_le_bytes(*size);
@@ -133,8 +136,7 @@ impl<'a> Table<'a> {
     /// The sums of an output's coefficients around a place, times factors.
     fn spline(&self, output: usize, place: &Place, factors: &[Factors]) -> [f32; 6] {
         let node = 2 * self.axes[0].count();
-        let before =
-            (place.y.first * OUTPUTS + output) * self.functions * node + 2 * place.x.first;
+        let before = (place.y.first * OUTPUTS + output) * self.functions * node + 2 * place.x.first;
         let parts = Parts {
             y: core::array::from_fn(|j| [place.y.values[j], place.y.slopes[j]]),
             x: [place.x.values, place.x.slopes],

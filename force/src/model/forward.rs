@@ -115,7 +115,10 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
             *node = f32::from_le_bytes(reader.array()?);
         }
         let axis = Axis::new(nodes);
-        axis.ok_or(wrong("table's nodes", "6 to 16, growing from -100 to 100 mm"))
+        axis.ok_or(wrong(
+            "table's nodes",
+            "6 to 16, growing from -100 to 100 mm",
+        ))
     };
     let axes = [axis(counts[0])?, axis(counts[1])?];
     let away = pair(reader, "direction", [-1.0, 1.0], "-1 to 1")?;

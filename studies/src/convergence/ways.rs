@@ -220,7 +220,10 @@ impl Contact<'_> {
         let Film {
             forward, mounting, ..
         } = self.film;
-        self.end(&forward.estimate(&self.observed, mounting, forward.unknown(true), guess), 0)
+        self.end(
+            &forward.estimate(&self.observed, mounting, forward.unknown(true), guess),
+            0,
+        )
     }
 
     fn end(&self, estimate: &Estimate, steps: u32) -> End {

@@ -13,7 +13,7 @@ use super::seeded;
 /// States that are kept to start others from.
 const MOST_KEPT: usize = 40;
 /// How fine the films' meshes are: another one than that of fits.
-const FINENESS: f64 = 0.6;
+const FINENESS: f64 = 0.45;
 
 /// A film on its posts.
 pub struct RealFilm {

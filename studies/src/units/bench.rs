@@ -101,7 +101,8 @@ impl Bench {
         tared: &mut Tared<'_>,
         random: &mut ChaCha8Rng,
     ) -> Result<Vec<SeenLoad>> {
-        let zero = [normal(random), normal(random)].map(|part| STAGE_MM * part);
+        let zero_mm = if self == Bench::Ten { STAGE_MM } else { 0.0 };
+        let zero = [normal(random), normal(random)].map(|part| zero_mm * part);
         let there = |[x, y]: [f64; 2]| [x + zero[0], y + zero[1]];
         let mut loads = Vec::new();
         if self == Bench::Ten {
@@ -136,6 +137,7 @@ impl Bench {
             loads.push(match self {
                 Bench::ByHand => {
                     let rough_mm = weights.rough_place_mm(&rest_px, &seen.observation());
+                    if std::env::var("TRACE").is_ok() { eprintln!("rough {rough_mm:?} true {place_mm:?} force {force_n}"); }
                     SeenLoad {
                         direction_rad: HAND_DEG.to_radians(),
                         each_place_mm: f64::INFINITY,

@@ -97,9 +97,11 @@ fn test(weights: &Weights, model: &Model<'_>, number: u64, presses: u32) -> Resu
     let unit = TestedUnit::with_real_film(&model.conditions, number)?;
     let mut tared = unit.tare(model)?;
     let of_tare = answers(&unit, &mut tared, number, presses)?;
-    let calibrated = Bench::ALL.map(|(bench, _)| {
+    let calibrated = Bench::ALL.map(|(bench, name)| {
+        let begun = std::time::Instant::now();
         let own = export(&bench.calibrate(weights, &unit, &mut tared, number)?)?;
         let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
+        if std::env::var("TRACE").is_ok() { eprintln!("film {number} {name} {:?}", begun.elapsed()); }
         answers(&unit, &mut unit.tare(&own)?, number, presses)
     });
     if std::env::var("TRACE").is_ok() {
