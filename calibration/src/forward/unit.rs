@@ -3,7 +3,8 @@
 use anyhow::{Context, Result, ensure};
 
 use super::FilmModel;
-use crate::loads::{Certainty, SeenLoad, loads_of};
+use crate::loads::{Certainty, Rough, SeenLoad, loads_of};
+use crate::quantize::export;
 use crate::unit_fit::{Bench, Fit, OwnFilm, fit};
 use crate::weights::Weights;
 use hivtac_data::conditions::Conditions;
@@ -76,10 +77,9 @@ impl Weights {
     /// The loads of a data set, as they are known.
     fn loads(&self, dataset: &Dataset, known: Known<'_>) -> Result<Vec<SeenLoad>> {
         let certainty = Certainty::of(self, known.gauge_n, known.place_mm);
-        let rest_px = dataset.rest()?.features_px();
-        let loads = loads_of(dataset, &certainty, |seen| {
-            self.rough_place_mm(&rest_px, seen)
-        })?;
+        let model = export(self)?;
+        let rough = Rough::new(&model, &dataset.rest()?)?;
+        let loads = loads_of(dataset, &certainty, |seen| rough.place_mm(seen))?;
         let fewest = known.from.map_or(FEWEST_LOADS, |_| FEWEST_SWAPPED);
         ensure!(
             loads.len() >= fewest,

@@ -8,10 +8,14 @@
 
 mod representative;
 
-use anyhow::Result;
+use std::cell::RefCell;
+
+use anyhow::{Result, anyhow};
 use hivtac_data::dataset::{Dataset, Observation, Sample};
 use hivtac_data::loads::norm;
-use hivtac_sensing::features::FEATURES;
+use hivtac_data::rest::Rest;
+use hivtac_evaluation::answer::Chip;
+use hivtac_sensing::model::Model;
 
 use crate::weights::Weights;
 
@@ -19,6 +23,8 @@ pub use representative::{LoadFrames, representative};
 
 /// So many loads are taken of presses anywhere.
 pub const MOST_FREE: usize = 120;
+/// No press is taken to be farther from the middle along x or y, mm.
+const FARTHEST_MM: f64 = 4.5;
 /// Standard uncertainty of a marker's mean coordinates over many frames, px: what the pixel grid
 /// does.
 const GRID_PX: f64 = 0.008;
@@ -81,7 +87,7 @@ impl Certainty {
 }
 
 /// The loads of a data set, its sessions tared. `rough_place_mm` says about where a press was that
-/// nobody noted, by what was seen of it ([`Weights::rough_place_mm`]).
+/// nobody noted, by what was seen of it ([`Rough`]).
 ///
 /// # Errors
 /// When a session has no frame of the untouched film.
@@ -162,13 +168,26 @@ fn markers_px(seen: &Observation) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| [features[2 * k], features[2 * k + 1]])
 }
 
-impl Weights {
-    /// About where a press was, mm, by the network alone: of a film that rests so. The middle where
-    /// the network tells no places.
-    pub fn rough_place_mm(&self, rest_px: &[f64; FEATURES], seen: &Observation) -> [f64; 2] {
-        let (own, seen) = (self.rest.features_px(), seen.features_px());
-        let features = std::array::from_fn(|i| seen[i] - rest_px[i] + own[i]);
-        self.network.place_mm(&features).unwrap_or_default()
+/// About where presses were on a unit, by a model that knows of it only how it rests.
+pub struct Rough<'m>(RefCell<Chip<'m>>);
+
+impl<'m> Rough<'m> {
+    /// Of a model file, and where the unit's markers rest.
+    ///
+    /// # Errors
+    /// When there is no such model, or its numbers do not hold the rest position.
+    pub fn new(model: &'m [u8], rest: &Rest) -> Result<Self> {
+        let model = Model::parse(model).map_err(|error| anyhow!("{error}"))?;
+        Ok(Self(RefCell::new(Chip::new(model, rest)?)))
+    }
+
+    /// About where a press was, mm; the film's middle where nothing is known.
+    pub fn place_mm(&self, seen: &Observation) -> [f64; 2] {
+        let said = self.0.borrow_mut().force(seen);
+        let place = said.ok().and_then(|(force, _)| force.place);
+        place.map_or([0.0; 2], |place| {
+            [place.x, place.y].map(|um| (f64::from(um.0) * 1e-3).clamp(-FARTHEST_MM, FARTHEST_MM))
+        })
     }
 }
 

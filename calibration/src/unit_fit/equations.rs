@@ -71,7 +71,10 @@ impl Normal {
 
     /// Their solution where some steps are given.
     fn step_with(&self, held: &[Option<f64>]) -> Result<Vec<f64>> {
-        let Normal { mut matrix, mut side } = self.clone();
+        let Normal {
+            mut matrix,
+            mut side,
+        } = self.clone();
         for (k, step) in held.iter().enumerate() {
             let Some(step) = step else { continue };
             for (i, side) in side.iter_mut().enumerate() {

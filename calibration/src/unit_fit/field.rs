@@ -7,7 +7,7 @@
 
 use anyhow::{Context, Result};
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
-use hivtac_shell::{Equilibrium, Response};
+use hivtac_shell::{Equilibrium, Film, Response};
 use rayon::prelude::*;
 
 use super::linear::{Matrix, dot, inverse, times};
@@ -77,7 +77,11 @@ impl<'a> Field<'a> {
         let places: Vec<usize> = (0..TIPS * TIPS).collect();
         let solve = |k: usize| field.solve_place([k % TIPS, k / TIPS].map(tip_mm));
         let solved = places.into_par_iter().map(solve);
-        field.solved = solved.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect();
+        field.solved = solved
+            .collect::<Result<Vec<_>>>()?
+            .into_iter()
+            .flatten()
+            .collect();
         Ok(field)
     }
 
@@ -108,13 +112,15 @@ impl<'a> Field<'a> {
                 (pose.size - other.size).abs() + 0.3 * tilt[0].hypot(tilt[1])
             };
             let nearest = (0..k).min_by(|a, b| near(a).total_cmp(&near(b)));
-            let start = nearest.map_or(&self.at.rest, |k| &solved[k].state);
-            let force_n = self.force_n(pose);
-            let state = press(film, place_mm, force_n, start)?;
+            let start = nearest.map_or_else(
+                || self.at.rest.clone(),
+                |other| foretold(film, &solved[other], &self.poses[other], pose),
+            );
+            let state = press(film, place_mm, self.force_n(pose), &start)?;
             let by_load = film.responses(&state)?;
-            let slopes = self.per_pose(pose).map(|[x, y, z]| {
-                Response::to_all(&by_load, [x, y, z, 0.0, 0.0])
-            });
+            let slopes = self
+                .per_pose(pose)
+                .map(|[x, y, z]| Response::to_all(&by_load, [x, y, z, 0.0, 0.0]));
             solved.push(Solved {
                 state,
                 slopes: slopes.into(),
@@ -200,6 +206,19 @@ impl<'a> Field<'a> {
     }
 }
 
+/// The state under a pose that another one's slopes foretell.
+fn foretold(film: &Film, from: &Solved, there: &Pose, pose: &Pose) -> Equilibrium {
+    let steps = [
+        pose.size - there.size,
+        pose.tilt[0] - there.tilt[0],
+        pose.tilt[1] - there.tilt[1],
+    ];
+    let slopes = from.slopes.iter().zip(steps);
+    slopes.fold(from.state.clone(), |state, (slope, step)| {
+        film.beside(&state, slope, step)
+    })
+}
+
 /// The solved places around a place, and what each counts for.
 struct Around {
     first: [usize; 2],
@@ -210,7 +229,8 @@ struct Around {
 impl Around {
     fn new(place_mm: [f64; 2]) -> Around {
         let at = place_mm.map(|part| (part - FIRST_MM) / APART_MM);
-        let first = at.map(|at| (at.floor() as isize - 1).clamp(0, (TIPS - SPAN) as isize) as usize);
+        let first =
+            at.map(|at| (at.floor() as isize - 1).clamp(0, (TIPS - SPAN) as isize) as usize);
         // Lagrange's polynomials.
         let parts = [0, 1].map(|axis| {
             let x = at[axis] - first[axis] as f64;
@@ -276,7 +296,9 @@ fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Matrix> {
     let count = terms.count();
     let column = |k: usize| -> Vec<f64> { rows.iter().map(|row| row[k]).collect() };
     let columns: Matrix = (0..count).map(column).collect();
-    let products = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect());
+    let products = columns
+        .iter()
+        .map(|a| columns.iter().map(|b| dot(a, b)).collect());
     let inverse = inverse(products.collect()).context("the tables' loads")?;
     let row = |own: &Vec<f64>| rows.iter().map(|row| dot(own, row)).collect();
     Ok(inverse.iter().map(row).collect())
@@ -301,7 +323,10 @@ fn stiffness_n(at: &At) -> Result<[f64; 2]> {
     let whole = xx * yy - xy * xy;
     let (a, b) = ((yy * xf - xy * yf) / whole, (xx * yf - xy * xf) / whole);
     // Either may be near nothing, never below.
-    let (a, b) = (a.max(1e-3 * LARGEST_N / deepest), b.max(1e-3 * LARGEST_N / deepest.powi(3)));
+    let (a, b) = (
+        a.max(1e-3 * LARGEST_N / deepest),
+        b.max(1e-3 * LARGEST_N / deepest.powi(3)),
+    );
     let unscaled = [a * deepest, b * deepest.powi(3)];
     let of_largest = LARGEST_N / (unscaled[0] + unscaled[1]);
     let mm = deepest / LARGEST_SIZE;

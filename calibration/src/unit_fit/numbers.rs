@@ -182,7 +182,9 @@ pub fn set(design: &mut Design, number: Number, value: f64) {
     };
     match change {
         Change::Force(_) | Change::Place(_) => {}
-        Change::Youngs => design.material.youngs_mpa = nominal.material.youngs_mpa * libm::exp(value),
+        Change::Youngs => {
+            design.material.youngs_mpa = nominal.material.youngs_mpa * libm::exp(value)
+        }
         Change::Thickness => {
             design.material.thickness_mm = nominal.material.thickness_mm * libm::exp(value);
         }

@@ -14,7 +14,7 @@ use super::descent::Found;
 use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::Number;
-use super::problem::{Problem, press};
+use super::problem::{Problem, mesh_px, press};
 use crate::forward::{Covariance, Dot, covariances_of, knots, rest_image, tables};
 
 /// Nodes along each axis of a dot's table.
@@ -83,7 +83,8 @@ impl OwnFilm {
         let made = &found.at.made;
         let (tables, left) = tables_of(&field, &made.dots_mm)?;
         let noise = found.scatter().sqrt();
-        let beside = left.hypot(problem.bench.noise_px * (noise * noise - 1.0).max(0.0).sqrt() / made.focal_px);
+        let beside = left
+            .hypot(problem.bench.noise_px * (noise * noise - 1.0).max(0.0).sqrt() / made.focal_px);
         let covariance = left_open(problem, found, &field, beside)?;
         let (sin, cos) = libm::sincos(made.roll_deg.to_radians());
         Ok(Self {
@@ -104,7 +105,11 @@ impl OwnFilm {
             covariance: OwnCovariance {
                 counts: covariance.counts,
                 end_mm: covariance.end_mm,
-                factors: covariance.factors.iter().map(|f| f.as_flattened().to_vec()).collect(),
+                factors: covariance
+                    .factors
+                    .iter()
+                    .map(|f| f.as_flattened().to_vec())
+                    .collect(),
             },
         })
     }
@@ -177,14 +182,19 @@ impl OwnFilm {
         Ok(CovarianceSpec {
             counts: self.covariance.counts,
             end_mm: self.covariance.end_mm,
-            factors: factors.collect::<Option<_>>().context("film.own: a covariance of other markers")?,
+            factors: factors
+                .collect::<Option<_>>()
+                .context("film.own: a covariance of other markers")?,
         })
     }
 }
 
 /// The tables of dots on a film, and what they leave of the motion, root mean square, focal lengths.
 fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64)> {
-    let dots: Vec<Dot> = dots_mm.iter().map(|place| Dot::new(*place, NODES)).collect();
+    let dots: Vec<Dot> = dots_mm
+        .iter()
+        .map(|place| Dot::new(*place, NODES))
+        .collect();
     // All loads of a node are asked for one after the other.
     let known: Mutex<HashMap<[u64; 3], Coefficients>> = Mutex::default();
     tables(&dots, |pose, number| {
@@ -219,16 +229,30 @@ fn left_open(
     for pose in &poses {
         let at_mm = at.film.material_point(&at.rest, pose.place_mm);
         let state = match pose.size > 0.0 {
-            true => press(&at.film, at_mm, field.force_n(pose), states.last().unwrap_or(&at.rest))?,
+            true => press(
+                &at.film,
+                at_mm,
+                field.force_n(pose),
+                states.last().unwrap_or(&at.rest),
+            )?,
             false => at.rest.clone(),
         };
         states.push(state);
     }
     let rates = problem.rates(at, &states)?;
-    let is_held = |k: &usize| !matches!(problem.priors[*k].number, Number::Stage(_) | Number::Middle(_));
+    let is_held = |k: &usize| {
+        !matches!(
+            problem.priors[*k].number,
+            Number::Stage(_) | Number::Middle(_)
+        )
+    };
     let held: Vec<usize> = (0..problem.priors.len()).filter(is_held).collect();
     let scatter = found.scatter();
-    let row = |i: &usize| held.iter().map(|j| scatter * found.solved.covariance[*i][*j]).collect();
+    let row = |i: &usize| {
+        held.iter()
+            .map(|j| scatter * found.solved.covariance[*i][*j])
+            .collect()
+    };
     let spread = cholesky(held.iter().map(row).collect())?;
     let per_px = 1.0 / at.made.focal_px;
     let (sin, cos) = libm::sincos(at.made.roll_deg.to_radians());
@@ -242,7 +266,10 @@ fn left_open(
                 }
             }
             for [x, y] in moved.as_chunks_mut::<2>().0 {
-                (*x, *y) = (per_px * (cos * *x + sin * *y), per_px * (cos * *y - sin * *x));
+                (*x, *y) = (
+                    per_px * (cos * *x + sin * *y),
+                    per_px * (cos * *y - sin * *x),
+                );
             }
             for (row, a) in covariance.iter_mut().zip(&moved) {
                 for (sum, b) in row.iter_mut().zip(&moved) {
@@ -251,7 +278,9 @@ fn left_open(
             }
         }
         for (k, row) in covariance.iter_mut().enumerate() {
-            row[k] += (beside * pose.size / LARGEST_SIZE).powi(2);
+            let size = pose.size / LARGEST_SIZE;
+            let mesh = per_px * mesh_px(at.made.dots_mm[k / 2], pose.place_mm) * size.sqrt();
+            row[k] += (beside * size).powi(2) + mesh * mesh;
         }
         covariance
     });

@@ -5,9 +5,9 @@ use hivtac_scene::Camera;
 use hivtac_shell::{Change, Contact, Design, Equilibrium, Film, ShellError};
 use rayon::prelude::*;
 
+use super::FINENESS;
 use super::equations::{LoadEquations, LoadSlopes, Normal};
 use super::linear::{Matrix, inverse};
-use super::FINENESS;
 use super::load::UNKNOWNS;
 use super::numbers::{self, Number, Prior};
 use super::seen::View;
@@ -35,6 +35,9 @@ pub struct Problem<'a> {
     pub bench: &'a Bench,
     pub loads: &'a [SeenLoad],
     pub priors: Vec<Prior>,
+    /// How many times larger than it is what is seen is taken to scatter, ≥ 1: from far away a fit
+    /// that trusts it less finds its way.
+    pub blur: f64,
 }
 
 /// A unit as some values of its numbers make it.
@@ -195,14 +198,15 @@ impl Problem<'_> {
         }
     }
 
-    /// What some values explain, found from what others do.
+    /// What some values explain, found from a film nearby and its states under the loads, as far as
+    /// there are any.
     ///
     /// # Errors
     /// When the film finds no equilibrium.
-    pub fn at(&self, unknowns: Unknowns, near: Option<&At>) -> Result<At> {
+    pub fn at(&self, unknowns: Unknowns, near: Option<(&Film, &[Equilibrium])>) -> Result<At> {
         let made = self.made(&unknowns.numbers);
         let film = match near {
-            Some(near) => near.film.changed(&made.design)?,
+            Some((near, _)) => near.changed(&made.design)?,
             None => Film::new(&made.design)?,
         };
         let rest = film.rest();
@@ -210,7 +214,7 @@ impl Problem<'_> {
             let pressed = self.loads[k].at(&unknowns.loads[k]);
             let place_mm = [0, 1].map(|i| pressed.place_mm[i] + made.stage_mm[i]);
             let at_mm = film.material_point(&rest, place_mm);
-            let start = near.map_or(&rest, |near| &near.states[k]);
+            let start = near.and_then(|(_, states)| states.get(k)).unwrap_or(&rest);
             Ok(press(&film, at_mm, pressed.force_n, start)?)
         };
         let numbers: Vec<usize> = (0..self.loads.len()).collect();
@@ -245,10 +249,14 @@ impl Problem<'_> {
     /// What a unit with these images is seen to do, px: where its dots rest, and how far beside the
     /// rest position that a tare takes they are in each state.
     fn seen(&self, made: &Made, images: &Images) -> Seen {
-        let rest = images.rest.iter().zip(&made.rest_px).flat_map(|(image, off)| {
-            let at = made.to_px(*image);
-            [0, 1].map(|i| made.middle_px[i] + at[i] + off[i])
-        });
+        let rest = images
+            .rest
+            .iter()
+            .zip(&made.rest_px)
+            .flat_map(|(image, off)| {
+                let at = made.to_px(*image);
+                [0, 1].map(|i| made.middle_px[i] + at[i] + off[i])
+            });
         let of_state = |pressed: &Vec<[f64; 2]>| -> Vec<f64> {
             let dots = pressed.iter().zip(&images.rest).zip(&made.rest_px);
             let moved = dots.flat_map(|((there, here), off)| {
@@ -263,6 +271,16 @@ impl Problem<'_> {
         }
     }
 
+    /// Standard uncertainty of each coordinate under a load, px: of what is seen, and of what a mesh
+    /// leaves of the film's shape beside the tip.
+    fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
+        let of_dot = |dot: &[f64; 2]| {
+            let noise_px = load.noise_px.hypot(mesh_px(*dot, load.place_mm));
+            [self.blur * noise_px; 2]
+        };
+        made.dots_mm.iter().flat_map(of_dot).collect()
+    }
+
     /// What is seen less what should be, in parts of its uncertainty.
     fn residuals(&self, at: &At) -> (Vec<f64>, Vec<Vec<f64>>) {
         let bench = self.bench;
@@ -270,39 +288,61 @@ impl Problem<'_> {
         let rest = bench.rest_px.as_flattened().iter().zip(&should.rest);
         let of_load = |(load, should): (&SeenLoad, &Vec<f64>)| -> Vec<f64> {
             let seen = load.seen_px.as_flattened().iter();
-            let moved = seen.zip(bench.rest_px.as_flattened()).map(|(seen, rest)| seen - rest);
+            let moved = seen
+                .zip(bench.rest_px.as_flattened())
+                .map(|(seen, rest)| seen - rest);
+            let noise_px = self.noise_px(load, &at.made).into_iter();
             let off = moved.zip(should).map(|(moved, should)| moved - should);
-            off.map(|off| off / load.noise_px).collect()
+            off.zip(noise_px)
+                .map(|(off, noise_px)| off / noise_px)
+                .collect()
         };
         (
-            rest.map(|(seen, should)| (seen - should) / bench.noise_px).collect(),
-            self.loads.iter().zip(&should.pressed).map(of_load).collect(),
+            rest.map(|(seen, should)| (seen - should) / (self.blur * bench.noise_px))
+                .collect(),
+            self.loads
+                .iter()
+                .zip(&should.pressed)
+                .map(of_load)
+                .collect(),
         )
     }
 
     /// How residuals answer to the unknowns there.
     fn slopes(&self, at: &At) -> Result<Slopes> {
         let rates = self.rates(at, &at.states)?;
-        let scaled = |column: &[f64], by: f64| column.iter().map(|part| by * part).collect();
+        let scaled = |column: &[f64], by: &[f64]| -> Vec<f64> {
+            column.iter().zip(by).map(|(rate, by)| -rate / by).collect()
+        };
         let of_load = |(load, rates): (&SeenLoad, &Rates)| {
-            let column = |parts: &[f64; 3]| {
-                let sum = (0..rates.force[0].len()).map(|i| {
-                    (0..3).map(|axis| parts[axis] * rates.force[axis][i]).sum::<f64>()
+            let noise_px = self.noise_px(load, &at.made);
+            let of_force = |parts: &[f64; 3]| {
+                let sums = (0..noise_px.len()).map(|i| {
+                    (0..3)
+                        .map(|axis| parts[axis] * rates.force[axis][i])
+                        .sum::<f64>()
                 });
-                sum.map(|part| -part / load.noise_px).collect()
+                scaled(&sums.collect::<Vec<_>>(), &noise_px)
             };
-            let of_place = |column: &Vec<f64>| scaled(column, -load.place_sigma_mm() / load.noise_px);
+            let of_place = |column: &Vec<f64>| {
+                let parts = scaled(column, &noise_px);
+                parts
+                    .iter()
+                    .map(|part| load.place_sigma_mm() * part)
+                    .collect()
+            };
             let numbers = rates.numbers.iter();
             LoadSlopes {
-                numbers: numbers.map(|column| scaled(column, -1.0 / load.noise_px)).collect(),
-                own: (load.directions().iter().map(column))
+                numbers: numbers.map(|column| scaled(column, &noise_px)).collect(),
+                own: (load.directions().iter().map(of_force))
                     .chain(rates.place.iter().map(of_place))
                     .collect(),
             }
         };
+        let of_rest = vec![self.blur * self.bench.noise_px; 2 * at.made.dots_mm.len()];
         let at_rest = rates.rest.iter();
         Ok(Slopes {
-            rest: at_rest.map(|column| scaled(column, -1.0 / self.bench.noise_px)).collect(),
+            rest: at_rest.map(|column| scaled(column, &of_rest)).collect(),
             loads: self.loads.iter().zip(&rates.pressed).map(of_load).collect(),
         })
     }
@@ -316,7 +356,9 @@ impl Problem<'_> {
         let units: Vec<f64> = numbers
             .iter()
             .zip(&changes)
-            .map(|(k, change)| self.priors[*k].sigma * numbers::per_number(&at.made.design, *change))
+            .map(|(k, change)| {
+                self.priors[*k].sigma * numbers::per_number(&at.made.design, *change)
+            })
             .collect();
         let at_rest = self.image_rates(at, &at.rest, &changes)?;
         let mut all = changes.clone();
@@ -430,6 +472,15 @@ impl Problem<'_> {
     }
 }
 
+/// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty,
+/// px at 320×240: a finer mesh moves dots beside the tip by so much more than others.
+pub fn mesh_px(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
+    const AT_THE_TIP_PX: f64 = 0.06;
+    const REACH_MM: f64 = 1.3;
+    let apart = libm::hypot(dot_mm[0] - place_mm[0], dot_mm[1] - place_mm[1]) / REACH_MM;
+    AT_THE_TIP_PX * libm::exp(-apart * apart)
+}
+
 /// A film under a force, N, at a point of it, mm, found from a state nearby, or else from rest.
 ///
 /// # Errors
@@ -441,9 +492,8 @@ pub fn press(
     start: &Equilibrium,
 ) -> Result<Equilibrium, ShellError> {
     let radius_mm = film.design().tip_radius_mm;
-    let from = |start: &Equilibrium| {
-        film.press_at(at_mm, radius_mm, Contact::Force(force_n), start)
-    };
+    let from =
+        |start: &Equilibrium| film.press_at(at_mm, radius_mm, Contact::Force(force_n), start);
     from(start).or_else(|_| from(&film.rest()))
 }
 
@@ -451,8 +501,7 @@ impl Unknowns {
     /// So much of a step away.
     pub fn after(&self, step: &Unknowns, length: f64, priors: &[Prior]) -> Unknowns {
         let numbers = self.numbers.iter().zip(&step.numbers).zip(priors);
-        let within =
-            |((at, step), prior): ((&f64, &f64), &Prior)| prior.within(at + length * step);
+        let within = |((at, step), prior): ((&f64, &f64), &Prior)| prior.within(at + length * step);
         let loads = self.loads.iter().zip(&step.loads);
         Unknowns {
             numbers: numbers.map(within).collect(),

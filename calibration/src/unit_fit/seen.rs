@@ -31,11 +31,7 @@ impl View<'_> {
     }
 
     /// The same on a film whose points, mm, are displaced so.
-    pub fn image_of(
-        &self,
-        displaced: impl Fn([f64; 2]) -> [f64; 3],
-        dot_mm: [f64; 2],
-    ) -> [f64; 2] {
+    pub fn image_of(&self, displaced: impl Fn([f64; 2]) -> [f64; 3], dot_mm: [f64; 2]) -> [f64; 2] {
         let disc = Disc::marker(dot_mm);
         let rim = Rim::of(&disc, displaced);
         let moved = |point: [f64; 2]| {

@@ -13,7 +13,7 @@ use super::seeded;
 /// States that are kept to start others from.
 const MOST_KEPT: usize = 40;
 /// How fine the films' meshes are: another one than that of fits.
-const FINENESS: f64 = 0.45;
+const FINENESS: f64 = 0.7;
 
 /// A film on its posts.
 pub struct RealFilm {
@@ -38,8 +38,14 @@ impl RealFilm {
         let curve = [(); 3].map(|()| between(-0.03, 0.03));
         let law = match number % 3 {
             0 => Law::default(),
-            1 => Law { neo_hooke: 1.0, stiffening: 0.0 },
-            _ => Law { neo_hooke: 1.0, stiffening: between(0.02, 0.2) },
+            1 => Law {
+                neo_hooke: 1.0,
+                stiffening: 0.0,
+            },
+            _ => Law {
+                neo_hooke: 1.0,
+                stiffening: between(0.02, 0.2),
+            },
         };
         // Every third is cut at its holes.
         let overhang_mm = match number / 3 % 3 {
@@ -115,7 +121,10 @@ impl RealFilm {
                 + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
         };
         let start = {
-            let kept = self.kept.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+            let kept = self
+                .kept
+                .lock()
+                .unwrap_or_else(|poisoned| poisoned.into_inner());
             let near = kept.iter().min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
             match near {
                 Some((known, state)) if known == load => return Ok(state.clone()),
@@ -128,7 +137,10 @@ impl RealFilm {
         let radius_mm = self.film.design().tip_radius_mm;
         let press = |start: &Equilibrium| self.film.press_at(at_mm, radius_mm, contact, start);
         let state = press(&start).or_else(|_| press(&self.rest))?;
-        let mut kept = self.kept.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut kept = self
+            .kept
+            .lock()
+            .unwrap_or_else(|poisoned| poisoned.into_inner());
         if kept.len() >= MOST_KEPT {
             kept.remove(0);
         }

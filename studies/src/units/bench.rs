@@ -3,7 +3,8 @@
 
 use anyhow::{Context, Result};
 use hivtac_calibration::forward::Known;
-use hivtac_calibration::loads::SeenLoad;
+use hivtac_calibration::loads::{Rough, SeenLoad};
+use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::dataset::Observation;
 use hivtac_data::rest::Rest;
@@ -118,7 +119,8 @@ impl Bench {
             Bench::Seventy => SEVENTY,
             _ => BY_HAND,
         };
-        let rest_px = rest.features_px();
+        let model = export(weights)?;
+        let rough = Rough::new(&model, rest)?;
         let mut number = 60_000;
         while loads.len() < most {
             number += 10;
@@ -136,8 +138,7 @@ impl Bench {
             let seen = Seen::of(unit, tared, load, number)?;
             loads.push(match self {
                 Bench::ByHand => {
-                    let rough_mm = weights.rough_place_mm(&rest_px, &seen.observation());
-                    if std::env::var("TRACE").is_ok() { eprintln!("rough {rough_mm:?} true {place_mm:?} force {force_n}"); }
+                    let rough_mm = rough.place_mm(&seen.observation());
                     SeenLoad {
                         direction_rad: HAND_DEG.to_radians(),
                         each_place_mm: f64::INFINITY,
@@ -160,12 +161,16 @@ impl Bench {
 /// Where markers are seen under a load, px.
 struct Seen {
     px: [[f64; 2]; 4],
+    /// At rest, px: good enough for a rough place.
+    areas: [u32; 4],
 }
 
 impl Seen {
     fn of(unit: &TestedUnit, tared: &mut Tared<'_>, load: Load, number: u64) -> Result<Self> {
-        let px = tared.seen_px(unit, load, FRAMES, number)?;
-        Ok(Self { px })
+        Ok(Self {
+            px: tared.seen_px(unit, load, FRAMES, number)?,
+            areas: tared.rest().map_or([1; 4], |rest| rest.areas),
+        })
     }
 
     fn observation(&self) -> Observation {
@@ -177,7 +182,7 @@ impl Seen {
         });
         Observation {
             features_q16: Features::of_markers(&markers).to_array(),
-            areas_px: [1; 4],
+            areas_px: self.areas,
         }
     }
 

@@ -97,31 +97,18 @@ fn test(weights: &Weights, model: &Model<'_>, number: u64, presses: u32) -> Resu
     let unit = TestedUnit::with_real_film(&model.conditions, number)?;
     let mut tared = unit.tare(model)?;
     let of_tare = answers(&unit, &mut tared, number, presses)?;
-    let calibrated = Bench::ALL.map(|(bench, name)| {
-        let begun = std::time::Instant::now();
+    let calibrated = Bench::ALL.map(|(bench, _)| {
         let own = export(&bench.calibrate(weights, &unit, &mut tared, number)?)?;
         let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
-        if std::env::var("TRACE").is_ok() { eprintln!("film {number} {name} {:?}", begun.elapsed()); }
         answers(&unit, &mut unit.tare(&own)?, number, presses)
     });
-    if std::env::var("TRACE").is_ok() {
-        eprintln!("film {number} {:?} tare {of_tare:?}", unit.real_film().map(|film| film.design()));
-        for tally in &calibrated {
-            eprintln!("   {tally:?}");
-        }
-    }
     Ok(Tested {
         tared: of_tare,
         calibrated: calibrated.into(),
     })
 }
 
-fn answers(
-    unit: &TestedUnit,
-    tared: &mut Tared<'_>,
-    number: u64,
-    presses: u32,
-) -> Result<Tally> {
+fn answers(unit: &TestedUnit, tared: &mut Tared<'_>, number: u64, presses: u32) -> Result<Tally> {
     let mut tally = Tally::default();
     for k in 0..presses {
         let load = press_of_any(k + 1000 * number as u32, FORCES_N, REACH_MM)?;
