@@ -6,7 +6,7 @@ use hivtac_film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use hivtac_sensing::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
 use hivtac_sensing::model::{TableSpec, TablesSpec};
 
-use super::matrix::{cholesky, principal};
+use super::matrix::{Matrix, cholesky, principal};
 use super::nearest::splines;
 
 /// Loads by which components are judged: so many sizes, evenly from nothing to the largest, and
@@ -42,18 +42,18 @@ pub fn compressed(
     most: usize,
 ) -> Result<(TablesSpec, f64)> {
     let terms = Terms::with_sizes(sizes);
-    let metric = cholesky(gram(&terms));
-    let components = principal(squares(dots, &metric, terms.count()));
-    let mut square: f64 = components.iter().map(|(value, _)| value.max(0.0)).sum();
+    let odd = odd_terms(sizes);
+    let metric = cholesky(apart(gram(&terms), &odd));
+    let components = components(apart(squares(dots, &metric, terms.count()), &odd), &odd);
+    let mut square: f64 = components.iter().map(|own| own.square.max(0.0)).sum();
     let mut count = 0;
     while square > left * left && count < most.min(MOST_FUNCTIONS) {
-        square -= components[count].0;
+        square -= components[count].square;
         count += 1;
     }
-    let kept: Vec<&[f64]> = components[..count.max(1)]
-        .iter()
-        .map(|(_, direction)| &direction[..])
-        .collect();
+    let mut kept: Vec<&Component> = components[..count.max(1)].iter().collect();
+    kept.sort_by_key(|own| own.is_odd);
+    let kept: Vec<&[f64]> = kept.iter().map(|own| &own.direction[..]).collect();
     let function = |direction: &&[f64]| -> Vec<f32> {
         let parts = back(&metric, direction);
         parts.into_iter().map(|part| part as f32).collect()
@@ -65,6 +65,58 @@ pub fn compressed(
         dots: dots.collect::<Result<_>>()?,
     };
     Ok((tables, square.max(0.0).sqrt()))
+}
+
+/// What markers' motion is made of.
+struct Component {
+    /// Its mean square.
+    square: f64,
+    direction: Vec<f64>,
+    /// Whether it is of odd powers of the tilt's second part.
+    is_odd: bool,
+}
+
+/// Of a matrix that is apart: even and odd components, the largest first.
+fn components(matrix: Matrix, odd: &[bool]) -> Vec<Component> {
+    let of = |is_odd: bool| {
+        let own: Vec<usize> = (0..odd.len()).filter(|k| odd[*k] == is_odd).collect();
+        let part = |i: &usize| own.iter().map(|j| matrix[*i][*j]).collect();
+        let all = principal(own.iter().map(part).collect());
+        let component = move |(square, parts): (f64, Vec<f64>)| {
+            let mut direction = vec![0.0; odd.len()];
+            for (k, part) in own.iter().zip(parts) {
+                direction[*k] = part;
+            }
+            Component { square, direction, is_odd }
+        };
+        all.into_iter().map(component).collect::<Vec<_>>()
+    };
+    let mut all = of(false);
+    all.extend(of(true));
+    all.sort_by(|a, b| b.square.total_cmp(&a.square));
+    all
+}
+
+/// Which terms are of odd powers of the tilt's second part: a mirror at the first one's axis turns
+/// them.
+fn odd_terms(sizes: [u8; MOST_TILTS]) -> Vec<bool> {
+    let of_degree = |(degree, sizes): (usize, &u8)| {
+        let sizes = usize::from(*sizes);
+        (0..=degree).flat_map(move |k| std::iter::repeat_n(k % 2 == 1, sizes))
+    };
+    sizes.iter().enumerate().flat_map(of_degree).collect()
+}
+
+/// A matrix without what joins even and odd terms.
+fn apart(mut matrix: Matrix, odd: &[bool]) -> Matrix {
+    for (row, of_row) in matrix.iter_mut().zip(odd) {
+        for (entry, of_entry) in row.iter_mut().zip(odd) {
+            if of_row != of_entry {
+                *entry = 0.0;
+            }
+        }
+    }
+    matrix
 }
 
 /// A marker's table, of functions along these directions.

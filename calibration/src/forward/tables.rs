@@ -24,7 +24,7 @@ const TERMS: [u8; MOST_TILTS] = [8, 6, 5, 4, 3];
 /// What functions of size and tilt may leave, root mean square, focal lengths: 0.0022 px at 320×240.
 const LEFT: f64 = 0.0022 / 175.0;
 /// As many as there are at most, for files that a device has room for.
-const FUNCTIONS: usize = 18;
+const FUNCTIONS: usize = 16;
 /// How much less samples of the largest tilt count than those of none, less one.
 const STEEP_COUNTS_LESS: f64 = 12.0;
 /// Loads lie within the film's own limits, to a rounding.
@@ -163,7 +163,16 @@ pub fn tables(
     dots: &[Dot],
     moved: impl Fn(&Pose, usize) -> Result<[f64; 2]> + Sync,
 ) -> Result<(TablesSpec, f64)> {
-    let (terms, loads) = (Terms::with_sizes(TERMS), loads());
+    compressed(TERMS, &samples(dots, moved, TERMS)?, LEFT, FUNCTIONS)
+}
+
+/// The coefficients of terms at the nodes of each marker.
+fn samples(
+    dots: &[Dot],
+    moved: impl Fn(&Pose, usize) -> Result<[f64; 2]> + Sync,
+    sizes: [u8; MOST_TILTS],
+) -> Result<Vec<Sampled>> {
+    let (terms, loads) = (Terms::with_sizes(sizes), loads());
     let weighted_row = |pose: &Pose| -> Vec<f64> {
         let [values, ..] = terms.rows(pose);
         values.into_iter().map(|part| weight(pose) * part).collect()
@@ -198,12 +207,7 @@ pub fn tables(
         })
     };
     let sampled = dots.iter().enumerate().map(sampled);
-    compressed(
-        TERMS,
-        &sampled.collect::<Result<Vec<_>>>()?,
-        LEFT,
-        FUNCTIONS,
-    )
+    sampled.collect()
 }
 
 /// (a + ib)·(x + iy).

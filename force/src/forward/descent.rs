@@ -12,6 +12,9 @@ use crate::kernels::sqrt;
 /// A step that would explain no more than this of the residual, in parts of its variance, is not
 /// needed: it would move no unknown by more than a fifth of its standard uncertainty.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
+/// Where a step that would explain no more than this lowers no residual, what is left is the tables'
+/// rounding.
+const ROUNDING: f32 = 0.5;
 /// The first of the unknowns that are the tilt, which the place follows.
 const TILT: usize = 1;
 /// What is likely before there is a frame: tilt along x and y, rad, and place along x and y, mm,
@@ -30,6 +33,8 @@ pub struct Descent<'a> {
     here: Linearization,
     /// How much of the next step is tried.
     part: f32,
+    /// Whether the step would be no larger than rounding.
+    has_ended: bool,
     /// How often the film was run forwards.
     looks: u8,
 }
@@ -83,6 +88,7 @@ impl<'a> Descent<'a> {
             markers,
             here,
             part: 1.0,
+            has_ended: false,
             looks: 1,
         }
     }
@@ -100,6 +106,7 @@ impl<'a> Descent<'a> {
         if left + square(&unlikely(&there.pose)) < white.square {
             (self.here, self.part) = (there, 1.0);
         } else {
+            self.has_ended = solved.explained <= ROUNDING;
             self.part *= SHORTER;
         }
         true
@@ -107,7 +114,11 @@ impl<'a> Descent<'a> {
 
     /// Whether the load explains the markers, and another step would hardly explain more.
     pub fn is_done(&self) -> bool {
-        self.here.is_done()
+        let Some(white) = &self.here.white else {
+            return false;
+        };
+        let explained = white.solved.map_or(0.0, |solved| solved.explained);
+        white.unexplained <= UNEXPLAINED && (explained <= LEFT_TO_EXPLAIN || self.has_ended)
     }
 
     /// What it has come to.
@@ -184,11 +195,6 @@ impl Linearization {
         Some((white, white.solved.as_ref()?))
     }
 
-    fn is_done(&self) -> bool {
-        let white = self.white.as_ref();
-        white.is_some_and(|white| is_done(white.unexplained, white.solved.as_ref()))
-    }
-
     /// What no load near this one explains of the markers' motion, in parts of their noise alone.
     fn by_noise(&self, noise: &Covariance) -> Column {
         let Some(whitening) = Whitening::new(noise) else {
@@ -221,12 +227,6 @@ impl White {
             solved: solve(equations.columns, &mut equations.side),
         })
     }
-}
-
-/// Whether a load explains the markers, and another step would hardly explain more.
-pub fn is_done(unexplained: f32, solved: Option<&Solved>) -> bool {
-    let explained = solved.map_or(0.0, |solved| solved.explained);
-    unexplained <= UNEXPLAINED && explained <= LEFT_TO_EXPLAIN
 }
 
 /// The load after a part of a step. Where that is too steep for the tables, the other unknowns

@@ -2,7 +2,7 @@
 
 use super::Forward;
 use super::covariance::{Covariance, Unknown};
-use super::descent::{Descent, is_done};
+use super::descent::Descent;
 use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
 use super::predict::DOTS;
@@ -65,8 +65,8 @@ pub struct Estimate {
 
 impl Forward<'_> {
     /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
-    /// which they find no way on, from the film's middle, too: from there they find theirs where a
-    /// guess was bad.
+    /// which they find no way on, from where the markers moved most, too: from there they find theirs
+    /// where a guess was bad.
     pub fn estimate(
         &self,
         observed: &Observed,
@@ -75,15 +75,15 @@ impl Forward<'_> {
         guess: Pose,
     ) -> Estimate {
         let descend = |guess| self.descend(Descent::new(self, observed, mounting, unknown, guess));
-        let found = descend(guess);
-        if is_done(found.unexplained, found.solved.as_ref()) {
+        let (found, is_done) = descend(guess);
+        if is_done {
             return found;
         }
-        let middle = Pose {
+        let (other, _) = descend(Pose {
             size: guess.size,
+            place_mm: self.rest_image.where_most(&observed.moved),
             ..Pose::default()
-        };
-        let other = descend(middle);
+        });
         let looks = found.looks + other.looks;
         let nearer = if other.unexplained < found.unexplained {
             other
@@ -94,7 +94,8 @@ impl Forward<'_> {
     }
 
     /// Takes as many steps as the model asks for, and more where these do not explain the markers.
-    fn descend(&self, mut descent: Descent<'_>) -> Estimate {
+    /// Also whether that came to an end.
+    fn descend(&self, mut descent: Descent<'_>) -> (Estimate, bool) {
         for step in 0..STEPS_AT_MOST {
             if step >= self.steps && descent.is_done() {
                 break;
@@ -103,7 +104,8 @@ impl Forward<'_> {
                 break;
             }
         }
-        descent.estimate()
+        let is_done = descent.is_done();
+        (descent.estimate(), is_done)
     }
 }
 

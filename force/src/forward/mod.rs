@@ -42,6 +42,8 @@ pub use predict::{DOTS, MOST_FUNCTIONS, Markers, Prediction, Tables};
 pub(crate) use solve::square;
 pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
 pub use table::{Answer, OUTPUTS, Place, Table};
+#[cfg(any(test, feature = "encode"))]
+pub use terms::{EVEN, ODD};
 pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
 
 /// Most steps that a model may ask for.

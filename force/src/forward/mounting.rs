@@ -1,6 +1,7 @@
 //! Where this unit's markers are on its film, and how its camera sees them.
 
 use super::predict::{DOTS, Markers};
+use super::solve::Column;
 use crate::kernels::sqrt;
 use crate::rest::Rest;
 
@@ -34,6 +35,18 @@ impl RestImage {
             true => [x / far, y / far],
             false => [1.0, 0.0],
         }
+    }
+
+    /// Where on the film the markers moved most, mm: the mean of their places, each counting as the
+    /// square of its motion, focal lengths; the middle where none moved.
+    pub fn where_most(&self, moved: &Column) -> [f32; 2] {
+        let (mut sum, mut all) = ([0.0; 2], f32::MIN_POSITIVE);
+        for ((at, film_mm), [x, y]) in self.at.iter().zip(&self.film_mm).zip(moved.as_chunks().0) {
+            let counts = x * x + y * y;
+            sum = [0, 1].map(|i| sum[i] + counts * film_mm[1] * at[i]);
+            all += counts;
+        }
+        sum.map(|part| part / all)
     }
 
     /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the axis

@@ -2,14 +2,15 @@
 //!
 //! Each marker has a table of its own, finer where the tip is near it. All are made of the same few
 //! functions of size and tilt, which are sums of the terms. Each marker sees the tilt from its own
-//! side, but the size is the same for all: what follows from that is worked out once.
+//! side, but the size is the same for all: what follows from that is worked out once. Of a function
+//! only those terms are kept that a mirror at the tilt's first axis leaves, or those that it turns:
+//! films are nearly mirrored there, and half of the terms are half of the work.
 
 use super::pose::Pose;
 use super::solve::{Column, EQUATIONS, UNKNOWNS};
 use super::table::{Answer, Table};
-use super::terms::{Limits, MOST_GROUPS, Powers, Sizes, Terms, Tilts};
+use super::terms::{Limits, Powers, Sizes, Terms, Tilts};
 use crate::kernels::Factors;
-use heapless::Vec;
 
 /// Markers.
 pub const DOTS: usize = EQUATIONS / 2;
@@ -19,15 +20,13 @@ pub const MOST_FUNCTIONS: usize = 24;
 /// Positions along x and y for each marker.
 pub type Markers = [[f32; 2]; DOTS];
 
-/// Functions of size and tilt under a load, with their slopes.
-pub type Functions = Vec<Factors, MOST_FUNCTIONS>;
-
 /// The film's tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tables<'a> {
     terms: Terms,
-    /// By function and term, f32 each.
-    functions: &'a [[u8; 4]],
+    /// By function and its terms, f32 each: functions of even powers of the tilt's second part, and
+    /// of odd ones.
+    functions: [&'a [[u8; 4]]; 2],
     dots: [Table<'a>; DOTS],
 }
 
@@ -41,18 +40,32 @@ pub struct Prediction {
 }
 
 impl<'a> Tables<'a> {
-    /// Of functions' parts of each term, and tables of as many functions each; `None` where their
-    /// numbers do not fit, or a part is not within ±10⁶.
-    pub fn new(terms: Terms, functions: &'a [u8], dots: [Table<'a>; DOTS]) -> Option<Tables<'a>> {
-        let (functions, rest) = functions.as_chunks();
-        let count = functions.len() / terms.count();
-        let sound = rest.is_empty()
-            && functions.len() == count * terms.count()
+    /// Of functions' parts of each term, first those of even powers of the tilt's second part, and
+    /// tables of as many functions each; `None` where their numbers do not fit, or a part is not
+    /// within ±1.
+    pub fn new(
+        terms: Terms,
+        functions: [&'a [u8]; 2],
+        dots: [Table<'a>; DOTS],
+    ) -> Option<Tables<'a>> {
+        let functions = functions.map(|bytes| bytes.as_chunks());
+        let whole = functions.iter().all(|(_, rest)| rest.is_empty());
+        let functions = functions.map(|(parts, _)| parts);
+        let mut count = 0;
+        let mut fit = true;
+        for (parts, terms) in functions.iter().zip(terms.counts()) {
+            let own = parts.len() / terms.max(1);
+            fit &= parts.len() == own * terms;
+            count += own;
+        }
+        let parts = functions.iter().copied().flatten();
+        let sound = whole
+            && fit
             && (1..=MOST_FUNCTIONS).contains(&count)
             && dots.iter().all(|table| table.functions() == count)
-            && functions
-                .iter()
-                .all(|part| f32::from_le_bytes(*part).abs() <= 1e6);
+            && parts
+                .map(|part| f32::from_le_bytes(*part))
+                .all(|part| part.abs() <= 1.0);
         sound.then_some(Tables {
             terms,
             functions,
@@ -72,61 +85,60 @@ impl<'a> Tables<'a> {
     /// Where the images of markers go that are glued `beside_mm` of the tables': a marker beside its
     /// place is as one in its place, with the tip as far beside the other way.
     pub fn predict(&self, pose: &Pose, limits: &Limits, beside_mm: &Markers) -> Prediction {
-        let sized = self.sized(&Sizes::at(pose.size, limits));
+        let sizes = Sizes::at(pose.size, limits);
+        let mut tilts = [Tilts::NONE; DOTS];
+        for (table, tilts) in self.dots.iter().zip(&mut tilts) {
+            let [a, b] = table.tilt(pose.tilt);
+            tilts.set(&Powers::at(a, limits), &Powers::at(b, limits));
+        }
+        let mut functions = [[Factors::default(); MOST_FUNCTIONS]; DOTS];
+        self.set_functions(&sizes, &tilts, &mut functions);
         let mut prediction = Prediction::default();
-        for (dot, (table, beside_mm)) in self.dots.iter().zip(beside_mm).enumerate() {
-            let [a, b] = table.tilt(pose.tilt).map(|part| Powers::at(part, limits));
-            let functions = tilted(&sized, &Tilts::of(&a, &b).0[..self.terms.groups()]);
+        let dots = self.dots.iter().zip(&functions).zip(beside_mm);
+        for (dot, ((table, functions), beside_mm)) in dots.enumerate() {
             let [x, y] = [0, 1].map(|i| pose.place_mm[i] - beside_mm[i]);
             let at = table.place([x, y]);
             for axis in [0, 1] {
-                prediction.set(2 * dot + axis, &table.answer(axis, &at, &functions));
+                prediction.set(2 * dot + axis, &table.answer(axis, &at, functions));
             }
         }
         prediction
     }
 
-    /// What each product of powers of the tilt counts in each function under a load of a size.
-    fn sized(&self, sizes: &Sizes) -> Sized {
-        let mut all = Sized::new();
-        for mut parts in self.functions.chunks_exact(self.terms.count()) {
-            let mut of_function = [[0.0; 2]; MOST_GROUPS];
-            let mut groups = of_function.iter_mut();
-            for (count, of_degree) in self.terms.sizes_of_degrees() {
-                for group in groups.by_ref().take(of_degree) {
-                    let (own, rest) = parts.split_at(count.min(parts.len()));
-                    parts = rest;
-                    let sizes = sizes.values.iter().zip(&sizes.slopes);
-                    for (part, (value, slope)) in own.iter().zip(sizes) {
-                        let part = f32::from_le_bytes(*part);
-                        *group = [group[0] + part * value, group[1] + part * slope];
-                    }
-                }
-            }
-            // There is room for all.
-            let _ = all.push(of_function);
+    /// What the functions are under a load of a size, at the tilt as each marker sees it.
+    fn set_functions(
+        &self,
+        sizes: &Sizes,
+        tilts: &[Tilts; DOTS],
+        functions: &mut [Functions; DOTS],
+    ) {
+        let [even, odd] = self.functions;
+        let [terms_even, terms_odd] = self.terms.counts().map(|count| count.max(1));
+        let mut number = 0;
+        for parts in even.chunks_exact(terms_even) {
+            let mut dots = functions.iter_mut();
+            let each = |factors| set(dots.next(), number, factors);
+            self.terms.even(parts, sizes, tilts, each);
+            number += 1;
         }
-        all
+        for parts in odd.chunks_exact(terms_odd) {
+            let mut dots = functions.iter_mut();
+            let each = |factors| set(dots.next(), number, factors);
+            self.terms.odd(parts, sizes, tilts, each);
+            number += 1;
+        }
     }
 }
 
-/// By function and product of powers of the tilt: what it counts, and the slope of that by the size.
-type Sized = Vec<[[f32; 2]; MOST_GROUPS], MOST_FUNCTIONS>;
-
-/// Functions under a tilt.
-fn tilted(sized: &Sized, tilts: &[[f32; 3]]) -> Functions {
-    let function = |groups: &[[f32; 2]; MOST_GROUPS]| {
-        let mut sums = Factors::default();
-        for ([value, slope], [whole, by_a, by_b]) in groups.iter().zip(tilts) {
-            let products = [value * whole, slope * whole, value * by_a, value * by_b];
-            for (sum, product) in sums.iter_mut().zip(products) {
-                *sum += product;
-            }
-        }
-        sums
-    };
-    sized.iter().map(function).collect()
+#[inline]
+fn set(functions: Option<&mut Functions>, number: usize, factors: Factors) {
+    if let Some(place) = functions.and_then(|functions| functions.get_mut(number)) {
+        *place = factors;
+    }
 }
+
+/// Functions of size and tilt under a load, with their slopes.
+type Functions = [Factors; MOST_FUNCTIONS];
 
 impl Prediction {
     fn set(&mut self, equation: usize, answer: &Answer) {

@@ -1,7 +1,7 @@
 //! How one marker's image moves: splines over the tip's place, whose coefficients count as functions
 //! of size and tilt say.
 //!
-//! Coefficients are steps of 16 bits of a size for each output and function. Along both axes they
+//! Coefficients are steps of 16 bits, whose size is in the function's own. Along both axes they
 //! are summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what
 //! is left is single precision.
 
@@ -22,8 +22,6 @@ pub struct Table<'a> {
     /// The direction along which the first part of its functions' tilt is.
     away: [f32; 2],
     functions: usize,
-    /// The size of a step by output and function, f32 each.
-    sizes: &'a [[u8; 4]],
     /// By node along y, output, function and node along x, i16 each.
     steps: &'a [u8],
 }
@@ -47,36 +45,27 @@ pub struct Answer {
 }
 
 impl<'a> Table<'a> {
-    /// Of axes along x and y, a direction of the tilt's first part and these bytes, as many as [`Table::lengths`] says; `None` of others,
-    /// or when the size of a step is no number from 0 to 1.
+    /// Of axes along x and y, a direction of the tilt's first part and these bytes, as many as
+    /// [`Table::length`] says; `None` of others.
     pub fn new(
         axes: [Axis; 2],
         away: [f32; 2],
         functions: usize,
-        sizes: &'a [u8],
         steps: &'a [u8],
     ) -> Option<Table<'a>> {
-        let fits = (1..=MOST_FUNCTIONS).contains(&functions)
-            && Table::lengths(&axes, functions) == [sizes.len(), steps.len()];
-        let sizes = sizes.as_chunks().0;
-        let sound = sizes.iter().all(|size| {
-            let size = f32::from_le_bytes(*size);
-            (0.0..=1.0).contains(&size)
-        });
-        let table = Table {
+        let sound = (1..=MOST_FUNCTIONS).contains(&functions)
+            && Table::length(&axes, functions) == steps.len();
+        sound.then_some(Table {
             axes,
             away,
             functions,
-            sizes,
             steps,
-        };
-        (fits && sound).then_some(table)
+        })
     }
 
-    /// Bytes of a table's sizes and of its steps.
-    pub fn lengths([x, y]: &[Axis; 2], functions: usize) -> [usize; 2] {
-        let rows = OUTPUTS * functions;
-        [4 * rows, 2 * rows * x.count() * y.count()]
+    /// Bytes of a table's steps.
+    pub fn length([x, y]: &[Axis; 2], functions: usize) -> usize {
+        2 * OUTPUTS * functions * x.count() * y.count()
     }
 
     /// Its axes, along x and y.
@@ -107,18 +96,10 @@ impl<'a> Table<'a> {
     /// An output (0 along x, 1 along y) with its slopes, by what its functions and their slopes are
     /// under a load: by size, and by the tilt along its direction and across that.
     pub fn answer(&self, output: usize, place: &Place, functions: &[Factors]) -> Answer {
-        let sizes = self
-            .sizes
-            .get(output * self.functions..)
-            .unwrap_or_default();
-        let mut factors = [Factors::default(); MOST_FUNCTIONS];
-        for ((factors, size), function) in factors.iter_mut().zip(sizes).zip(functions) {
-            let size = SUM * f32::from_le_bytes(*size);
-            *factors = function.map(|part| size * part);
-        }
         let count = self.functions.min(functions.len());
-        let factors = factors.get(..count).unwrap_or_default();
-        let [value, by_size, by_a, by_b, by_x, by_y] = self.spline(output, place, factors);
+        let functions = functions.get(..count).unwrap_or_default();
+        let sums = self.spline(output, place, functions);
+        let [value, by_size, by_a, by_b, by_x, by_y] = sums.map(|sum| SUM * sum);
         let [along_x, along_y] = self.axes.each_ref().map(Axis::slope_unit);
         let [c, s] = self.away;
         Answer {
@@ -150,14 +131,10 @@ impl<'a> Table<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::forward::terms::{Limits, Powers, Sizes, Tilts};
     use std::vec::Vec;
 
-    const LIMITS: Limits = Limits {
-        size: 0.63,
-        tilt: 0.67,
-    };
     const FUNCTIONS: usize = 3;
+    const STEP: f32 = 1e-4;
     /// Of 30°.
     const AWAY: [f32; 2] = [0.866_025_4, 0.5];
 
@@ -167,23 +144,22 @@ mod tests {
         [x.unwrap(), y.unwrap()]
     }
 
-    /// s, s·a² and s·T₁·b, of the tilt as the table sees it.
+    /// s, s·a² and s²·b in steps, of the tilt as the table sees it.
     fn functions(table: &Table, [size, a, b]: [f32; 3]) -> [Factors; FUNCTIONS] {
-        let [a, b] = table.tilt([a, b]).map(|part| Powers::at(part, &LIMITS));
-        let (sizes, tilts) = (Sizes::at(size, &LIMITS), Tilts::of(&a, &b).0);
-        [(0, 0), (0, 3), (1, 2)].map(|(i, group)| {
-            let [whole, by_a, by_b] = tilts[group];
-            let (value, slope) = (sizes.values[i], sizes.slopes[i]);
-            [value * whole, slope * whole, value * by_a, value * by_b]
-        })
+        let [a, b] = table.tilt([a, b]);
+        let all = [
+            [size, 1.0, 0.0, 0.0],
+            [size * a * a, a * a, 2.0 * size * a, 0.0],
+            [size * size * b, 2.0 * size * b, 0.0, size * size],
+        ];
+        all.map(|function| function.map(|part| STEP * part))
     }
 
     /// The steps from a function of their index.
     fn with<R>(step: impl Fn(usize) -> i16, use_it: impl FnOnce(&Table) -> R) -> R {
-        let [sizes, steps] = Table::lengths(&axes(), FUNCTIONS);
-        let sizes: Vec<u8> = (0..sizes / 4).flat_map(|_| 1e-4f32.to_le_bytes()).collect();
+        let steps = Table::length(&axes(), FUNCTIONS);
         let steps: Vec<u8> = (0..steps / 2).flat_map(|k| step(k).to_le_bytes()).collect();
-        use_it(&Table::new(axes(), AWAY, FUNCTIONS, &sizes, &steps).unwrap())
+        use_it(&Table::new(axes(), AWAY, FUNCTIONS, &steps).unwrap())
     }
 
     #[test]
@@ -234,7 +210,7 @@ mod tests {
                         let functions = functions(table, [0.6, 0.6, 0.6]);
                         let sum: f32 = functions.iter().map(|[whole, ..]| whole).sum();
                         let value = table.answer(1, &table.place(place), &functions).value;
-                        let expected = 1e-4 * f32::from(step) * sum;
+                        let expected = f32::from(step) * sum;
                         assert!(
                             (value - expected).abs() < 2e-3 * expected.abs(),
                             "{value} {expected}"
@@ -264,20 +240,13 @@ mod tests {
     }
 
     #[test]
-    fn wrong_lengths_and_sizes_are_refused() {
-        let lengths = Table::lengths(&axes(), FUNCTIONS);
-        assert_eq!(lengths, [4 * 6, 2 * 6 * 42]);
-        let [sizes, steps] = lengths.map(|length| std::vec![0; length]);
-        let new = |functions: usize, sizes: &[u8], steps: &[u8]| {
-            Table::new(axes(), AWAY, functions, sizes, steps).is_some()
-        };
-        assert!(new(FUNCTIONS, &sizes, &steps));
-        assert!(!new(FUNCTIONS, &sizes[4..], &steps) && !new(FUNCTIONS, &sizes, &steps[2..]));
-        assert!(!new(2, &sizes, &steps) && !new(0, &[], &[]));
-        for wrong in [f32::NAN, -1.0, f32::INFINITY, 1.1] {
-            let mut sizes = sizes.clone();
-            sizes[8..12].copy_from_slice(&wrong.to_le_bytes());
-            assert!(!new(FUNCTIONS, &sizes, &steps), "{wrong}");
-        }
+    fn wrong_lengths_are_refused() {
+        let length = Table::length(&axes(), FUNCTIONS);
+        assert_eq!(length, 2 * 6 * 42);
+        let steps = std::vec![0; length];
+        let new =
+            |functions: usize, steps: &[u8]| Table::new(axes(), AWAY, functions, steps).is_some();
+        assert!(new(FUNCTIONS, &steps) && !new(FUNCTIONS, &steps[2..]));
+        assert!(!new(2, &steps) && !new(0, &[]));
     }
 }

@@ -1,13 +1,27 @@
 //! The polynomials in size and tilt that the answer of a film at one place is a sum of.
 
+use crate::kernels::Factors;
+
 /// Terms of a set at most.
 pub const MOST_TERMS: usize = 88;
 /// Sizes of a group at most.
 pub const MOST_SIZES: usize = 8;
 /// Degrees of tilt, with that of none.
 pub const MOST_TILTS: usize = 5;
-/// Groups of a set at most.
-pub const MOST_GROUPS: usize = MOST_TILTS * (MOST_TILTS + 1) / 2;
+/// The powers j and k of the groups of even k: first by j + k, then by k.
+pub const EVEN: [[usize; 2]; 9] = [
+    [0, 0],
+    [1, 0],
+    [2, 0],
+    [0, 2],
+    [3, 0],
+    [1, 2],
+    [4, 0],
+    [2, 2],
+    [0, 4],
+];
+/// The same of odd k.
+pub const ODD: [[usize; 2]; 6] = [[0, 1], [1, 1], [2, 1], [0, 3], [3, 1], [1, 3]];
 
 /// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the
 /// tilt (a, b) in parts of the largest.
@@ -18,7 +32,6 @@ pub const MOST_GROUPS: usize = MOST_TILTS * (MOST_TILTS + 1) / 2;
 pub struct Terms {
     /// For each degree of tilt.
     sizes: [u8; MOST_TILTS],
-    count: u8,
 }
 
 /// The largest size and tilt (rad) of a film's loads: what its terms are scaled by.
@@ -30,14 +43,9 @@ pub struct Limits {
     pub tilt: f32,
 }
 
-/// What terms with a size are, and their slopes by it.
+/// What terms with a size are, s·T_i, and their slopes by it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sizes {
-    /// s·T_i.
-    pub values: [f32; MOST_SIZES],
-    /// Their slopes.
-    pub slopes: [f32; MOST_SIZES],
-}
+pub struct Sizes([[f32; 2]; MOST_SIZES]);
 
 /// The powers of one part of a tilt, in parts of the largest.
 #[derive(Clone, Copy, Debug)]
@@ -48,38 +56,104 @@ pub struct Powers {
     slopes: [f32; MOST_TILTS],
 }
 
-/// What terms with a tilt are, by group: a^j·b^k, and its slopes by the tilt along x and y, 1/rad.
+/// What terms with a tilt are: a^j·b^k of the groups of even k and of odd k, and its slopes by the
+/// tilt along both its parts, 1/rad.
 #[derive(Clone, Copy, Debug)]
-pub struct Tilts(pub [[f32; 3]; MOST_GROUPS]);
+pub struct Tilts {
+    even: [[f32; 3]; EVEN.len()],
+    odd: [[f32; 3]; ODD.len()],
+}
 
 impl Terms {
-    /// `None` when it would be none or more than [`MOST_TERMS`].
+    /// `None` when it would be none or more than [`MOST_TERMS`], or one size has more than
+    /// [`MOST_SIZES`].
     pub fn new(sizes: [u8; MOST_TILTS]) -> Option<Terms> {
         let most = sizes.iter().max().map_or(0, |most| usize::from(*most));
-        let of_degree = |(sizes, groups): (&u8, usize)| usize::from(*sizes) * groups;
-        let count: usize = sizes.iter().zip(1..).map(of_degree).sum();
+        let terms = Terms { sizes };
+        let count = terms.counts().iter().sum();
         let sound = most <= MOST_SIZES && (1..=MOST_TERMS).contains(&count);
-        sound.then_some(Terms {
-            sizes,
-            count: count as u8,
-        })
+        sound.then_some(terms)
     }
 
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        self.count.into()
+    /// How many there are of even k, and of odd k.
+    pub fn counts(&self) -> [usize; 2] {
+        let of = |[j, k]: &[usize; 2]| usize::from(self.sizes[j + k]);
+        [EVEN.iter().map(of).sum(), ODD.iter().map(of).sum()]
     }
 
-    /// How many groups there are, up to the last of which there is a term.
-    pub fn groups(&self) -> usize {
-        let last = self.sizes.iter().rposition(|sizes| *sizes > 0);
-        last.map_or(0, |degree| (degree + 1) * (degree + 2) / 2)
+    /// What a sum of the terms of even k, of these parts, is under a load of a size and of each of
+    /// these tilts.
+    #[inline]
+    pub fn even(
+        &self,
+        parts: &[[u8; 4]],
+        sizes: &Sizes,
+        tilts: &[Tilts],
+        mut each: impl FnMut(Factors),
+    ) {
+        let mut sums = [[0.0; 2]; EVEN.len()];
+        self.sum_up(&EVEN, parts, sizes, &mut sums);
+        for tilts in tilts {
+            each(tilted(&sums, &tilts.even));
+        }
     }
 
-    /// For each degree of tilt how many sizes its groups have, and how many groups it has.
-    pub fn sizes_of_degrees(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.sizes.iter().map(|sizes| usize::from(*sizes)).zip(1..)
+    /// The same of odd k.
+    #[inline]
+    pub fn odd(
+        &self,
+        parts: &[[u8; 4]],
+        sizes: &Sizes,
+        tilts: &[Tilts],
+        mut each: impl FnMut(Factors),
+    ) {
+        let mut sums = [[0.0; 2]; ODD.len()];
+        self.sum_up(&ODD, parts, sizes, &mut sums);
+        for tilts in tilts {
+            each(tilted(&sums, &tilts.odd));
+        }
     }
+
+    /// What each group of terms counts under a load of a size, and the slope of that by the size.
+    #[inline]
+    fn sum_up(
+        &self,
+        groups: &[[usize; 2]],
+        mut parts: &[[u8; 4]],
+        sizes: &Sizes,
+        sums: &mut [[f32; 2]],
+    ) {
+        for ([j, k], group) in groups.iter().zip(sums) {
+            let count = usize::from(self.sizes[j + k]);
+            let (own, rest) = parts.split_at(count.min(parts.len()));
+            parts = rest;
+            *group = sum(own, sizes);
+        }
+    }
+}
+
+/// A sum of terms with a size, and its slope.
+#[inline]
+fn sum(parts: &[[u8; 4]], sizes: &Sizes) -> [f32; 2] {
+    let mut sums = [0.0; 2];
+    for (part, [value, slope]) in parts.iter().zip(&sizes.0) {
+        let part = f32::from_le_bytes(*part);
+        sums = [sums[0] + part * value, sums[1] + part * slope];
+    }
+    sums
+}
+
+/// A function under a tilt, by what its groups count.
+#[inline]
+fn tilted<const G: usize>(groups: &[[f32; 2]; G], tilts: &[[f32; 3]; G]) -> Factors {
+    let mut sums = Factors::default();
+    for ([value, slope], [whole, by_a, by_b]) in groups.iter().zip(tilts) {
+        let products = [value * whole, slope * whole, value * by_a, value * by_b];
+        for (sum, product) in sums.iter_mut().zip(products) {
+            *sum += product;
+        }
+    }
+    sums
 }
 
 impl Sizes {
@@ -93,10 +167,9 @@ impl Sizes {
             t[i] = 2.0 * x * t[i - 1] - t[i - 2];
             slopes[i] = 2.0 * t[i - 1] + 2.0 * x * slopes[i - 1] - slopes[i - 2];
         }
-        Sizes {
-            values: t.map(|t| size * t),
-            slopes: core::array::from_fn(|i| t[i] + size * rate * slopes[i]),
-        }
+        Sizes(core::array::from_fn(|i| {
+            [size * t[i], t[i] + size * rate * slopes[i]]
+        }))
     }
 }
 
@@ -118,79 +191,129 @@ impl Powers {
 }
 
 impl Tilts {
+    /// Before there is a tilt.
+    pub const NONE: Tilts = Tilts {
+        even: [[0.0; 3]; EVEN.len()],
+        odd: [[0.0; 3]; ODD.len()],
+    };
+
     /// Of the powers of both parts of a tilt.
-    pub fn of(x: &Powers, y: &Powers) -> Tilts {
-        let mut tilts = Tilts([[0.0; 3]; MOST_GROUPS]);
-        let mut groups = tilts.0.iter_mut();
-        for degree in 0..MOST_TILTS {
-            for (k, group) in (0..=degree).zip(&mut groups) {
-                let j = degree - k;
-                *group = [
-                    x.values[j] * y.values[k],
-                    x.slopes[j] * y.values[k],
-                    x.values[j] * y.slopes[k],
-                ];
-            }
+    pub fn set(&mut self, a: &Powers, b: &Powers) {
+        let even = EVEN.iter().zip(&mut self.even);
+        for ([j, k], group) in even.chain(ODD.iter().zip(&mut self.odd)) {
+            *group = [
+                a.values[*j] * b.values[*k],
+                a.slopes[*j] * b.values[*k],
+                a.values[*j] * b.slopes[*k],
+            ];
         }
-        tilts
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::Vec;
 
     const LIMITS: Limits = Limits {
         size: 0.63,
         tilt: 0.67,
     };
 
-    fn at(tilt: [f32; 2]) -> Tilts {
-        let [x, y] = tilt.map(|part| Powers::at(part, &LIMITS));
-        Tilts::of(&x, &y)
+    const TERMS: [u8; MOST_TILTS] = [4, 3, 2, 1, 1];
+
+    fn at(tilt: [f32; 2]) -> [Tilts; 1] {
+        let [a, b] = tilt.map(|part| Powers::at(part, &LIMITS));
+        let mut tilts = [Tilts::NONE];
+        tilts[0].set(&a, &b);
+        tilts
+    }
+
+    fn parts(count: usize) -> Vec<[u8; 4]> {
+        (0..count)
+            .map(|k| (1.0 + k as f32).sin().to_le_bytes())
+            .collect()
     }
 
     #[test]
     fn groups_follow_the_degrees() {
         let terms = Terms::new([4, 3, 1, 0, 0]).unwrap();
-        assert_eq!(terms.count(), 4 + 2 * 3 + 3);
-        let sizes: std::vec::Vec<_> = terms.sizes_of_degrees().collect();
-        assert_eq!(sizes, [(4, 1), (3, 2), (1, 3), (0, 4), (0, 5)]);
-        assert_eq!(terms.groups(), 6);
-        let values = at([0.335, 0.67]).0.map(|[value, ..]| value);
-        assert_eq!(&values[..6], &[1.0, 0.5, 1.0, 0.25, 0.5, 1.0]);
+        assert_eq!(terms.counts(), [4 + 3 + 2, 3 + 1]);
+        let [tilts] = at([0.335, 0.67]);
+        assert_eq!(
+            tilts.even.map(|[value, ..]| value)[..4],
+            [1.0, 0.5, 0.25, 1.0]
+        );
+        assert_eq!(tilts.odd.map(|[value, ..]| value)[..2], [1.0, 0.5]);
         for wrong in [[9, 0, 0, 0, 0], [0; 5], [8, 8, 8, 8, 8], [255; 5]] {
             assert_eq!(Terms::new(wrong), None, "{wrong:?}");
         }
     }
 
+    /// Every a^j·b^k to the fourth degree is a group, once.
+    #[test]
+    fn groups_are_all_there_are() {
+        let mut all: Vec<_> = EVEN.iter().chain(&ODD).map(|[j, k]| (j + k, *k)).collect();
+        all.sort_unstable();
+        let every: Vec<_> = (0..MOST_TILTS)
+            .flat_map(|degree| (0..=degree).map(move |k| (degree, k)))
+            .collect();
+        assert_eq!(all, every);
+        assert!(EVEN.iter().all(|[_, k]| k % 2 == 0) && ODD.iter().all(|[_, k]| k % 2 == 1));
+    }
+
     #[test]
     fn slopes_are_the_values_differences() {
         let near = |slope: f32, told: f32| (slope - told).abs() < 2e-2 * (1.0 + told.abs());
-        let step = 1e-2;
-        let [back, here, forth] = [-step, 0.0, step].map(|step| Sizes::at(0.4 + step, &LIMITS));
-        for i in 0..MOST_SIZES {
-            let slope = (forth.values[i] - back.values[i]) / (2.0 * step);
-            assert!(near(slope, here.slopes[i]), "{i}: {slope} {here:?}");
-        }
-        for axis in [0, 1] {
-            let beside = |step: f32| {
-                let mut tilt = [0.3, -0.5];
-                tilt[axis] += step;
-                at(tilt).0
-            };
-            let (back, here, forth) = (beside(-step), beside(0.0), beside(step));
-            for k in 0..MOST_GROUPS {
+        let terms = Terms::new(TERMS).unwrap();
+        let [even, odd] = terms.counts().map(parts);
+        let functions = |[size, a, b]: [f32; 3]| {
+            let (sizes, tilts) = (Sizes::at(size, &LIMITS), at([a, b]));
+            let mut both = Vec::new();
+            terms.even(&even, &sizes, &tilts, |factors| both.push(factors));
+            terms.odd(&odd, &sizes, &tilts, |factors| both.push(factors));
+            both
+        };
+        let here = [0.4, 0.3, -0.5];
+        for axis in 0..3 {
+            let step = 1e-2;
+            let [mut back, mut forth] = [here; 2];
+            back[axis] -= step;
+            forth[axis] += step;
+            let (back, forth, told) = (functions(back), functions(forth), functions(here));
+            for k in [0, 1] {
                 let slope = (forth[k][0] - back[k][0]) / (2.0 * step);
-                assert!(near(slope, here[k][1 + axis]), "{k}: {slope} {here:?}");
+                assert!(near(slope, told[k][1 + axis]), "{axis}: {slope} {told:?}");
             }
+        }
+    }
+
+    /// On the other side of the tilt's first axis functions of even k are the same, and those of
+    /// odd k the opposite.
+    #[test]
+    fn a_mirror_turns_odd_functions() {
+        let terms = Terms::new(TERMS).unwrap();
+        let [even, odd] = terms.counts().map(parts);
+        let sizes = Sizes::at(0.4, &LIMITS);
+        let both = [0.2, -0.2].map(|b| {
+            let tilts = at([0.3, b]);
+            let mut both = Vec::new();
+            terms.even(&even, &sizes, &tilts, |factors| both.push(factors));
+            terms.odd(&odd, &sizes, &tilts, |factors| both.push(factors));
+            both
+        });
+        let [[even, odd], [other_even, other_odd]] =
+            both.map(|both| [0, 1].map(|which| both[which]));
+        for (k, turned) in [1.0, 1.0, 1.0, -1.0].into_iter().enumerate() {
+            assert_eq!(even[k], turned * other_even[k]);
+            assert_eq!(odd[k], -turned * other_odd[k]);
         }
     }
 
     #[test]
     fn without_size_there_is_nothing_but_slopes() {
-        let sizes = Sizes::at(0.0, &LIMITS);
-        assert_eq!(sizes.values, [0.0; MOST_SIZES]);
-        assert_eq!(sizes.slopes[0], 1.0);
+        let Sizes(sizes) = Sizes::at(0.0, &LIMITS);
+        assert!(sizes.iter().all(|[value, _]| *value == 0.0));
+        assert_eq!(sizes[0][1], 1.0);
     }
 }

@@ -7,7 +7,7 @@ use crate::forward::{
 };
 #[cfg(any(test, feature = "encode"))]
 use {
-    crate::forward::{EQUATIONS, MOST_TILTS, OUTPUTS},
+    crate::forward::{EQUATIONS, EVEN, MOST_TILTS, ODD, OUTPUTS},
     alloc::vec::Vec,
 };
 
@@ -81,20 +81,22 @@ fn tables<'a>(reader: &mut Reader<'a>) -> Result<Tables<'a>, ModelError> {
         offset,
         allowed,
     };
-    let [sizes @ .., functions, _, _] = reader.array::<8>()?;
-    let count = usize::from(functions);
+    let [sizes @ .., even, odd, _] = reader.array::<8>()?;
+    let functions = [even, odd].map(usize::from);
+    let count = functions.iter().sum();
     let terms = Terms::new(sizes).filter(|_| (1..=MOST_FUNCTIONS).contains(&count));
     let terms = terms.ok_or(wrong("tables", "1 to 88 terms and 1 to 24 functions"))?;
-    reader.offset -= 2;
+    reader.offset -= 1;
     reader.zero("reserved byte")?;
-    reader.zero("reserved byte")?;
-    let functions = reader.take(4 * count * terms.count())?;
+    let [terms_even, terms_odd] = terms.counts();
+    let even = reader.take(4 * functions[0] * terms_even)?;
+    let odd = reader.take(4 * functions[1] * terms_odd)?;
     let first = table(reader, count)?;
     let mut dots = [first; DOTS];
     for dot in dots.iter_mut().skip(1) {
         *dot = table(reader, count)?;
     }
-    Tables::new(terms, functions, dots).ok_or(wrong("functions", "-1000000 to 1000000"))
+    Tables::new(terms, [even, odd], dots).ok_or(wrong("functions", "-1 to 1"))
 }
 
 fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, ModelError> {
@@ -122,10 +124,9 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
     };
     let axes = [axis(counts[0])?, axis(counts[1])?];
     let away = pair(reader, "direction", [-1.0, 1.0], "-1 to 1")?;
-    let [sizes, steps] = Table::lengths(&axes, functions);
-    let (sizes, steps) = (reader.take(sizes)?, reader.take(steps)?);
+    let steps = reader.take(Table::length(&axes, functions))?;
     reader.pad()?;
-    Table::new(axes, away, functions, sizes, steps).ok_or(wrong("table's size of a step", "0 to 1"))
+    Table::new(axes, away, functions, steps).ok_or(wrong("table", "1 to 24 functions"))
 }
 
 fn covariances<'a>(reader: &mut Reader<'a>) -> Result<CovarianceGrid<'a>, ModelError> {
@@ -214,7 +215,9 @@ pub struct ForwardSpec {
 pub struct TablesSpec {
     /// What [`Terms::new`] takes.
     pub terms: [u8; MOST_TILTS],
-    /// Functions of size and tilt, each so much of each term.
+    /// Functions of size and tilt, each so much of each term: first by the degree of the tilt, then
+    /// by that of its second part, then by that of the size. Each has only terms of even powers of
+    /// the tilt's second part, or, after those, only of odd ones.
     pub functions: Vec<Vec<f32>>,
     /// A table of each marker.
     pub dots: Vec<TableSpec>,
@@ -284,37 +287,71 @@ impl ForwardSpec {
 impl TablesSpec {
     fn push(&self, bytes: &mut Vec<u8>) {
         bytes.extend(self.terms);
-        bytes.extend([self.functions.len() as u8, 0, 0]);
-        let parts = self.functions.iter().flatten();
-        bytes.extend(parts.flat_map(|part| part.to_le_bytes()));
-        for table in &self.dots {
-            table.push(self.functions.len(), bytes);
+        let is_even = |function: &&Vec<f32>| {
+            let mut odd = function
+                .iter()
+                .zip(self.powers())
+                .filter(|(_, [_, k])| k % 2 == 1);
+            odd.all(|(part, _)| *part == 0.0)
+        };
+        let even = self.functions.iter().take_while(is_even).count();
+        bytes.extend([even as u8, (self.functions.len() - even) as u8, 0]);
+        let sizes = self.sizes();
+        for (number, (function, size)) in self.functions.iter().zip(&sizes).enumerate() {
+            let groups: &[[usize; 2]] = if number < even { &EVEN } else { &ODD };
+            for group in groups {
+                let parts = function
+                    .iter()
+                    .zip(self.powers())
+                    .filter(|(_, own)| own == group);
+                let parts = parts.map(|(part, _)| (f64::from(*part) * size) as f32);
+                bytes.extend(parts.flat_map(f32::to_le_bytes));
+            }
         }
+        for table in &self.dots {
+            table.push(&sizes, bytes);
+        }
+    }
+
+    /// The powers of the tilt's parts in each term.
+    fn powers(&self) -> impl Iterator<Item = [usize; 2]> + use<'_> {
+        let of_degree = |(degree, sizes): (usize, &u8)| {
+            let sizes = usize::from(*sizes);
+            (0..=degree).flat_map(move |k| core::iter::repeat_n([degree - k, k], sizes))
+        };
+        self.terms.iter().enumerate().flat_map(of_degree)
+    }
+
+    /// Each function's step: the largest of its coefficients over 32,767.
+    fn sizes(&self) -> Vec<f64> {
+        let count = self.functions.len();
+        let mut sizes = alloc::vec![0.0_f64; count];
+        let outputs = self
+            .dots
+            .iter()
+            .flat_map(|dot| dot.coefficients.chunks(count.max(1)));
+        for of_output in outputs {
+            for (size, value) in sizes.iter_mut().zip(of_output) {
+                *size = size.max(value.abs() / f64::from(i16::MAX));
+            }
+        }
+        sizes
     }
 }
 
 #[cfg(any(test, feature = "encode"))]
 impl TableSpec {
-    /// Each output's and function's step is the largest of its coefficients over 32,767.
-    fn push(&self, functions: usize, bytes: &mut Vec<u8>) {
+    fn push(&self, sizes: &[f64], bytes: &mut Vec<u8>) {
         let [nodes_x, nodes_y] = self.nodes_mm.each_ref().map(Vec::len);
         bytes.extend([nodes_x as u8, nodes_y as u8, 0, 0]);
         let nodes = self.nodes_mm.iter().flatten();
         bytes.extend(nodes.chain(&self.away).flat_map(|part| part.to_le_bytes()));
-        let row = OUTPUTS * functions;
-        let mut sizes = alloc::vec![0.0_f64; row];
-        for of_node in self.coefficients.chunks(row.max(1)) {
-            for (size, value) in sizes.iter_mut().zip(of_node) {
-                *size = size.max(value.abs() / f64::from(i16::MAX));
-            }
-        }
-        let sizes: Vec<f32> = sizes.into_iter().map(|size| size as f32).collect();
-        bytes.extend(sizes.iter().flat_map(|size| size.to_le_bytes()));
+        let row = OUTPUTS * sizes.len();
         for y in 0..nodes_y {
-            for (k, size) in sizes.iter().enumerate() {
+            for k in 0..row {
                 for x in 0..nodes_x {
                     let value = self.coefficients[(y * nodes_x + x) * row + k];
-                    bytes.extend(step(value, *size).to_le_bytes());
+                    bytes.extend(step(value, sizes[k % sizes.len()]).to_le_bytes());
                 }
             }
         }
@@ -334,17 +371,18 @@ impl CovarianceSpec {
             let largest = entries().fold(0.0_f64, |most, entry| most.max(entry.abs()));
             let size = (largest / f64::from(i16::MAX)) as f32;
             bytes.extend(size.to_le_bytes());
-            bytes.extend(entries().flat_map(|entry| step(*entry, size).to_le_bytes()));
+            let steps = entries().map(|entry| step(*entry, size.into()));
+            bytes.extend(steps.flat_map(i16::to_le_bytes));
         }
     }
 }
 
 /// A coefficient in steps of a size, rounded to nearest.
 #[cfg(any(test, feature = "encode"))]
-fn step(value: f64, size: f32) -> i16 {
+fn step(value: f64, size: f64) -> i16 {
     if size == 0.0 {
         return 0;
     }
-    let steps = value / f64::from(size);
+    let steps = value / size;
     (steps + 0.5_f64.copysign(steps)) as i16
 }
