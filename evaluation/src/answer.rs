@@ -14,6 +14,7 @@ use hivtac_data::rest::features_from_q16;
 
 /// A model on the chip, with a rest position.
 pub struct Chip<'m> {
+    areas_px: [u32; 4],
     model: Model<'m>,
     tare: Features,
     resting: Option<Resting>,
@@ -32,11 +33,17 @@ impl<'m> Chip<'m> {
             areas: rest.areas_px,
         };
         Ok(Self {
+            areas_px: rest.areas,
             resting: Resting::of_model(&model, &rest),
             model,
             tare,
             network: Network::new(),
         })
+    }
+
+    /// The markers' areas at rest, px.
+    pub fn areas_px(&self) -> [u32; 4] {
+        self.areas_px
     }
 
     /// The force that it says of what was seen, and how far to trust it.

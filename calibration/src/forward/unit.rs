@@ -80,6 +80,7 @@ impl Weights {
         let model = export(self)?;
         let rough = Rough::new(&model, &dataset.rest()?)?;
         let loads = loads_of(dataset, &certainty, |seen| rough.place_mm(seen))?;
+        rough.check(&loads)?;
         let fewest = known.from.map_or(FEWEST_LOADS, |_| FEWEST_SWAPPED);
         ensure!(
             loads.len() >= fewest,

@@ -6,6 +6,7 @@
 //! | of one force at one noted place | frames of one load |
 //! | pressed anywhere, nobody noted where | some of them, spread over places and sizes: [`representative`] |
 
+mod contradiction;
 mod representative;
 
 use std::cell::RefCell;
@@ -15,10 +16,14 @@ use hivtac_data::dataset::{Dataset, Observation, Sample};
 use hivtac_data::loads::norm;
 use hivtac_data::rest::Rest;
 use hivtac_evaluation::answer::Chip;
+use hivtac_sensing::features::Features;
 use hivtac_sensing::model::Model;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
 
 use crate::weights::Weights;
 
+pub use contradiction::{RoughLoad, check};
 pub use representative::{LoadFrames, representative};
 
 /// So many loads are taken of presses anywhere.
@@ -148,6 +153,20 @@ fn noted(samples: &[Sample<'_>], certainty: &Certainty) -> Vec<SeenLoad> {
 }
 
 impl SeenLoad {
+    /// What was seen, with markers of these areas, px.
+    pub fn observation(&self, areas_px: [u32; 4]) -> Observation {
+        let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
+        let markers = self.seen_px.map(|[x, y]| Marker {
+            x: px(x),
+            y: px(y),
+            area: 1,
+        });
+        Observation {
+            features_q16: Features::of_markers(&markers).to_array(),
+            areas_px,
+        }
+    }
+
     /// |F|, N.
     pub fn magnitude_n(&self) -> f64 {
         norm(self.force_n)
@@ -183,11 +202,31 @@ impl<'m> Rough<'m> {
 
     /// About where a press was, mm; the film's middle where nothing is known.
     pub fn place_mm(&self, seen: &Observation) -> [f64; 2] {
-        let said = self.0.borrow_mut().force(seen);
-        let place = said.ok().and_then(|(force, _)| force.place);
-        place.map_or([0.0; 2], |place| {
-            [place.x, place.y].map(|um| (f64::from(um.0) * 1e-3).clamp(-FARTHEST_MM, FARTHEST_MM))
+        self.load(seen).map_or([0.0; 2], |load| load.place_mm)
+    }
+
+    /// What it makes of a load; `None` where the model tells no places.
+    pub fn load(&self, seen: &Observation) -> Option<RoughLoad> {
+        let (force, _) = self.0.borrow_mut().force(seen).ok()?;
+        let place = force.place?;
+        Some(RoughLoad {
+            magnitude_n: f64::from(force.magnitude.0) * 1e-6,
+            place_mm: [place.x, place.y]
+                .map(|um| (f64::from(um.0) * 1e-3).clamp(-FARTHEST_MM, FARTHEST_MM)),
         })
+    }
+
+    /// Checks loads' notes against what it makes of each.
+    ///
+    /// # Errors
+    /// Says what contradicts what is seen.
+    pub fn check(&self, loads: &[SeenLoad]) -> Result<()> {
+        let areas_px = self.0.borrow().areas_px();
+        let of_load = |load: &SeenLoad| self.load(&load.observation(areas_px));
+        match loads.iter().map(of_load).collect::<Option<Vec<_>>>() {
+            Some(rough) => check(loads, &rough),
+            None => Ok(()),
+        }
     }
 }
 

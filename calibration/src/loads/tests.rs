@@ -5,7 +5,11 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 
+use hivtac_sensing::features::FEATURES;
+
 use super::*;
+use crate::quantize::export;
+use crate::weights::Weights;
 
 const CERTAINTY: Certainty = Certainty {
     gauge_n: 0.001,
@@ -210,10 +214,10 @@ fn what_clocks_leave_is_part_of_a_loads_uncertainty() {
     );
 }
 
-/// The default network says about where a press was, on a unit that it does not know: one whose
+/// The default model says about where a press was, on a unit that it does not know: one whose
 /// picture is shifted.
 #[test]
-fn the_network_tells_rough_places() {
+fn a_model_of_no_unit_tells_rough_places() {
     let recipe = Recipe {
         loads: Loads::Random(30),
         rest: 2,
@@ -231,11 +235,12 @@ fn the_network_tells_rough_places() {
         seen.features_q16[8] += Q::from_bits(3 << 16);
     }
     let weights = Weights::parse(include_str!("../../models/default.weights")).unwrap();
-    let rest_px = dataset.rest().unwrap().features_px();
+    let model = export(&weights).unwrap();
+    let rough = Rough::new(&model, &dataset.rest().unwrap()).unwrap();
     let strong = |sample: &Sample<'_>| norm(sample.force_n) > 0.03;
     let mut seen = 0;
     for sample in dataset.samples().filter(strong) {
-        let [x, y] = weights.rough_place_mm(&rest_px, sample.seen);
+        let [x, y] = rough.place_mm(sample.seen);
         let [true_x, true_y] = sample.tip_mm.unwrap();
         let off_mm = (x - true_x).hypot(y - true_y);
         assert!(off_mm < 0.3, "{off_mm} mm: {sample:?}");

@@ -40,6 +40,14 @@ impl Found {
         self.at.square() / seen as f64
     }
 
+    /// The number of the load that is explained worst.
+    pub fn worst(&self) -> usize {
+        let of_load = |residual: &Vec<f64>| residual.iter().map(|part| part * part).sum::<f64>();
+        let squares: Vec<f64> = self.at.residuals.iter().map(of_load).collect();
+        let worst = (0..squares.len()).max_by(|a, b| squares[*a].total_cmp(&squares[*b]));
+        worst.unwrap_or_default()
+    }
+
     /// How many times larger variances are than they were thought to be, at least 1.
     pub fn scatter(&self) -> f64 {
         self.chi_square().max(1.0)
@@ -85,7 +93,7 @@ impl Problem<'_> {
         };
         let mut best: Result<Found> = Err(anyhow!("no start"));
         for (blurs, down) in STARTS {
-            let found = first.from_start(blurs, down);
+            let found = first.start(blurs, down);
             let is_better = match (&best, &found) {
                 (Ok(best), Ok(found)) => found.chi_square() < best.chi_square(),
                 _ => best.is_err(),
@@ -113,7 +121,7 @@ impl Problem<'_> {
 
     /// Descends as if what is seen scattered so many times more than it does, one after the other,
     /// from what is most likely of a film on which gravity pulls so, g.
-    fn from_start(&mut self, blurs: &[f64], down: f64) -> Result<Found> {
+    fn start(&mut self, blurs: &[f64], down: f64) -> Result<Found> {
         let mut unknowns = self.likeliest();
         let gravity = Number::Film(Change::Down(2));
         for (prior, part) in self.priors.iter().zip(&mut unknowns.numbers) {

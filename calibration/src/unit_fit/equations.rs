@@ -137,8 +137,8 @@ impl LoadEquations {
         let mixed: Matrix = slopes.numbers.iter().map(products).collect();
         for i in 0..count {
             let taken = times(&own, &mixed[i]);
-            for j in 0..count {
-                said.matrix[i][j] -= dot(&taken, &mixed[j]);
+            for (entry, mixed) in said.matrix[i].iter_mut().zip(&mixed) {
+                *entry -= dot(&taken, mixed);
             }
             said.side[i] -= dot(&taken, &own_side);
         }

@@ -26,7 +26,7 @@ mod seen;
 
 use std::fmt;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
 pub use left_out::LeftOut;
@@ -37,6 +37,10 @@ use problem::Problem;
 /// How fine the film's mesh is: coarser ones do not show how the film bends between a tip and a dot
 /// beside it.
 const FINENESS: f64 = 0.5;
+
+/// χ² over the coordinates that are seen beyond which loads contradict each other: they are off by
+/// some tenths of a pixel then, which no film in tolerance is.
+const CONTRADICTED: f64 = 2_500.0;
 
 /// What a fit found.
 #[derive(Clone, Debug)]
@@ -66,6 +70,14 @@ pub fn fit(
         blur: 1.0,
     };
     let found = problem.found()?;
+    ensure!(
+        found.chi_square() <= CONTRADICTED,
+        "no unit explains these loads: what is seen of them is off by {:.1} px, root mean square, \
+         most of all of load {}: check its force, its direction and its place, and that the film \
+         was not touched otherwise",
+        bench.noise_px * found.chi_square().sqrt(),
+        found.worst() + 1
+    );
     Ok(Fit {
         chi_square: found.chi_square(),
         left_out: found.left_out(&problem)?,
@@ -86,3 +98,6 @@ impl fmt::Display for Fit {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

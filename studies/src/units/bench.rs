@@ -6,12 +6,9 @@ use hivtac_calibration::forward::Known;
 use hivtac_calibration::loads::{Rough, SeenLoad};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_data::dataset::Observation;
 use hivtac_data::rest::Rest;
 use hivtac_scene::Load;
 use hivtac_sensing::features::Features;
-use hivtac_terms::marker::Marker;
-use hivtac_terms::units::Px;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -138,11 +135,13 @@ impl Bench {
             let seen = Seen::of(unit, tared, load, number)?;
             loads.push(match self {
                 Bench::ByHand => {
-                    let rough_mm = rough.place_mm(&seen.observation());
+                    let told = seen.told([0.0, 0.0, -force_n], [0.0; 2], random);
+                    let rough_mm = rough.place_mm(&told.observation(seen.areas));
                     SeenLoad {
                         direction_rad: HAND_DEG.to_radians(),
                         each_place_mm: f64::INFINITY,
-                        ..seen.told([0.0, 0.0, -force_n], rough_mm, random)
+                        place_mm: rough_mm,
+                        ..told
                     }
                 }
                 _ => {
@@ -171,19 +170,6 @@ impl Seen {
             px: tared.seen_px(unit, load, FRAMES, number)?,
             areas: tared.rest().map_or([1; 4], |rest| rest.areas),
         })
-    }
-
-    fn observation(&self) -> Observation {
-        let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
-        let markers = self.px.map(|[x, y]| Marker {
-            x: px(x),
-            y: px(y),
-            area: 1,
-        });
-        Observation {
-            features_q16: Features::of_markers(&markers).to_array(),
-            areas_px: self.areas,
-        }
     }
 
     /// A load that is told to have this force, N, but for the gauge's error, and this place, mm.

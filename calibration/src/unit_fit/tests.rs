@@ -1,0 +1,204 @@
+use hivtac_scene::{Camera, MARKERS, Preset};
+use hivtac_sensing::forward::Forward;
+use hivtac_shell::{Design, Equilibrium, Film, Law};
+
+use super::problem::{Made, press};
+use super::seen::View;
+use super::*;
+use crate::forward::{FilmModel, Noise};
+
+const LOADS: [(f64, [f64; 2], [f64; 2]); 10] = [
+    (0.1, [0.0, 0.0], [0.0, 0.0]),
+    (0.2, [0.0, 0.0], [0.0, 0.0]),
+    (0.1, [0.14, 0.0], [0.0, 0.0]),
+    (0.1, [-0.14, 0.0], [0.0, 0.0]),
+    (0.1, [0.0, 0.14], [0.0, 0.0]),
+    (0.1, [0.0, -0.14], [0.0, 0.0]),
+    (0.1, [0.0, 0.0], [3.0, 0.5]),
+    (0.1, [0.0, 0.0], [-0.5, 3.0]),
+    (0.1, [0.0, 0.0], [-3.0, -0.5]),
+    (0.1, [0.0, 0.0], [0.5, -3.0]),
+];
+
+/// Stretched, of rubber, heavy, hanging over, on larger posts, with dots beside their places.
+fn mounted() -> Design {
+    let mut design = Design {
+        fineness: 0.6,
+        stretch: [0.012, 0.004],
+        law: Law {
+            neo_hooke: 1.0,
+            stiffening: 0.1,
+        },
+        overhang_mm: 3.0,
+        post_radius_mm: 2.1,
+        thickness_slope: [0.04, -0.02],
+        dot_stiffening: 0.5,
+        down: [0.0, 0.7, -0.7],
+        tip_radius_mm: 0.6,
+        ..Design::default()
+    };
+    design.post_shift_mm[1] = [0.3, -0.2];
+    design.material.youngs_mpa *= 1.15;
+    design
+}
+
+struct Truth {
+    film: Film,
+    rest: Equilibrium,
+    made: Made,
+    camera: Camera,
+}
+
+impl Truth {
+    fn new() -> Truth {
+        let film = Film::new(&mounted()).unwrap();
+        let off = [[0.1, 0.05], [-0.08, 0.1], [0.0, -0.12], [-0.1, 0.03]];
+        let dot = |k: usize| [0, 1].map(|i| MARKERS[k].centre_mm[i] + off[k][i]);
+        Truth {
+            rest: film.rest(),
+            made: Made {
+                design: film.design().clone(),
+                dots_mm: (0..4).map(dot).collect(),
+                rest_px: vec![[0.0; 2]; 4],
+                roll_deg: 1.2,
+                focal_px: 176.5,
+                farther_mm: 0.0,
+                middle_px: [161.0, 118.0],
+                stage_mm: [0.0; 2],
+            },
+            film,
+            camera: Camera::new(Preset::Ov7725, 320, 240).unwrap(),
+        }
+    }
+
+    fn press(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> Equilibrium {
+        let at_mm = self.film.material_point(&self.rest, place_mm);
+        press(&self.film, at_mm, force_n, &self.rest).unwrap()
+    }
+
+    /// Where dots are seen, px, but for a few thousandths that differ from load to load.
+    fn seen_px(&self, state: &Equilibrium, number: usize) -> [[f64; 2]; 4] {
+        let view = View {
+            film: &self.film,
+            camera: &self.camera,
+            farther_mm: 0.0,
+        };
+        std::array::from_fn(|k| {
+            let [x, y] = self.made.to_px(view.image(state, self.made.dots_mm[k]));
+            let off = |axis: usize| 0.006 * libm::sin((17 * number + 5 * k + 3 * axis) as f64);
+            [
+                self.made.middle_px[0] + x + off(0),
+                self.made.middle_px[1] + y + off(1),
+            ]
+        })
+    }
+
+    fn load(&self, number: usize) -> SeenLoad {
+        let (size_n, [a, b], place_mm) = LOADS[number];
+        let force_n = [a, b, -1.0].map(|part| size_n * part);
+        SeenLoad {
+            force_n,
+            size_n: 1e-3,
+            direction_rad: 0.0,
+            place_mm,
+            each_place_mm: 0.0,
+            seen_px: self.seen_px(&self.press(force_n, place_mm), number + 1),
+            noise_px: 0.008,
+            frames: 4,
+        }
+    }
+
+    fn bench(&self) -> Bench {
+        Bench {
+            focal_px: self.camera.focal_px(),
+            middle_px: [159.5, 119.5],
+            rest_px: self.seen_px(&self.rest, 0).to_vec(),
+            noise_px: 0.008,
+            dots_mm: MARKERS.iter().map(|disc| disc.centre_mm).collect(),
+            camera: self.camera,
+        }
+    }
+}
+
+/// A film that no table holds is found from ten loads, and the chip predicts what it does under
+/// others.
+#[test]
+fn a_mounted_film_is_found_from_ten_loads() {
+    let truth = Truth::new();
+    let loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
+    let fit = fit(&truth.bench(), &loads, 0.1, None).unwrap();
+    assert!(fit.chi_square < 1.5, "{}", fit.chi_square);
+    let value = |name: &str| {
+        let found = fit.own.numbers.iter().find(|number| number.name == name);
+        found.map(|number| (number.value, number.sigma)).unwrap()
+    };
+    for (name, expected) in [
+        ("film's stretch along x", 0.012),
+        ("film's stretch along y", 0.004),
+        ("camera's roll, °", 1.2),
+    ] {
+        let (found, sigma) = value(name);
+        assert!(
+            (found - expected).abs() < 4.0 * sigma,
+            "{name}: {found} ± {sigma}"
+        );
+    }
+    let worst = fit.left_out.iter().map(|load| load.direction_deg);
+    assert!(worst.fold(0.0, f64::max) < 3.0, "{:?}", fit.left_out);
+
+    let noise = Noise {
+        rest_px: [[0.0; 2]; 4],
+        at_rest_px: [0.01; 2],
+        at_four_areas: [1.0; 2],
+    };
+    let model = FilmModel {
+        own: Some(Box::new(fit.own.clone())),
+        ..FilmModel::nominal(1, &noise)
+    };
+    let bytes = model.spec().unwrap().to_bytes();
+    let chip = Forward::parse(&bytes).unwrap();
+    let rest_px = truth.seen_px(&truth.rest, 0);
+    for (force_n, place_mm) in [
+        ([0.01, 0.0, -0.12], [2.0, -1.5]),
+        ([0.0, -0.005, -0.06], [-2.5, 0.5]),
+        ([-0.01, 0.01, -0.18], [0.5, 1.0]),
+    ] {
+        let seen = truth.seen_px(&truth.press(force_n, place_mm), 0);
+        let pose = hivtac_sensing::forward::Pose::of_force(
+            force_n.map(|part| part as f32),
+            place_mm.map(|part| part as f32),
+            &chip.stiffness,
+            &chip.limits,
+        );
+        let told = chip.tables.predict(&pose, &chip.limits, &[[0.0; 2]; 4]);
+        for k in 0..4 {
+            let moved = [told.moved[2 * k], told.moved[2 * k + 1]].map(f64::from);
+            // The numbers found are the unit's camera's, too.
+            let [re, im] = fit.own.per_px;
+            let square = re * re + im * im;
+            let px = [
+                (re * moved[0] + im * moved[1]) / square,
+                (re * moved[1] - im * moved[0]) / square,
+            ];
+            for i in [0, 1] {
+                let off = px[i] - (seen[k][i] - rest_px[k][i]);
+                assert!(
+                    off.abs() < 0.25,
+                    "{force_n:?} {place_mm:?} marker {k}: {off} px"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn loads_that_contradict_each_other_are_refused() {
+    let truth = Truth::new();
+    let mut loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
+    loads[1].force_n = loads[1].force_n.map(|part| part / 3.0);
+    loads[3].force_n = loads[3].force_n.map(|part| 2.0 * part);
+    let error = fit(&truth.bench(), &loads, 0.1, None)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("no unit explains"), "{error}");
+}
