@@ -87,7 +87,11 @@ fn components(matrix: Matrix, odd: &[bool]) -> Vec<Component> {
             for (k, part) in own.iter().zip(parts) {
                 direction[*k] = part;
             }
-            Component { square, direction, is_odd }
+            Component {
+                square,
+                direction,
+                is_odd,
+            }
         };
         all.into_iter().map(component).collect::<Vec<_>>()
     };
