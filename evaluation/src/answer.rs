@@ -75,7 +75,7 @@ impl<'m> Chip<'m> {
         let markers = std::array::from_fn(marker);
         let noise = FrameNoise::AS_MODELLED;
         let estimate = resting.estimate(forward, &markers, noise, &output);
-        let (force, status) = Resting::told(forward, &self.model.range, noise, &estimate);
+        let (force, status) = resting.told(forward, &self.model.range, noise, &estimate);
         Ok((force, status, estimate.looks))
     }
 }

@@ -142,7 +142,7 @@ impl Cell {
     fn take(&mut self, forward: &Forward<'_>, truth: &Contact<'_>, off_px: f64, found: &Estimate) {
         let errors = errors(forward, &found.pose, truth.pose());
         let refused = !found.is_explained() || found.pose.size >= forward.limits.size;
-        let matters = found.sigma(&forward.stiffness).is_none_or(|sigma| {
+        let matters = found.sigma(&forward.strength(true)).is_none_or(|sigma| {
             let stated = [
                 f64::from(sigma.direction).to_degrees(),
                 1e3 * f64::from(sigma.magnitude_n),

@@ -99,6 +99,10 @@ pub struct FilmArgs {
     /// Gauss–Newton steps from the network's answer, 0 to 3.
     #[arg(long, default_value_t = 1)]
     steps: u8,
+    /// Solve the films of other units anew, some minutes; without this what the weights file holds
+    /// of them stays.
+    #[arg(long)]
+    others: bool,
     /// The weights file to write.
     #[arg(long)]
     out: PathBuf,
@@ -108,7 +112,11 @@ impl FilmArgs {
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let dataset = Dataset::load(&self.data)?;
-        weights.with_film(self.steps, &dataset)?.save(&self.out)
+        let mut weights = weights.with_film(self.steps, &dataset)?;
+        if self.others {
+            weights = weights.with_others()?;
+        }
+        weights.save(&self.out)
     }
 }
 

@@ -49,11 +49,21 @@ pub fn knots() -> impl Iterator<Item = Pose> {
 
 /// Covariances that are known at the [`knots`], as a model file has them.
 pub fn covariances_of(knots: Vec<Covariance>) -> CovarianceSpec {
+    spec_of(KNOTS, knots)
+}
+
+/// The same of so many knots along the size, along y and along x.
+pub fn spec_of(counts: [u8; 3], knots: Vec<Covariance>) -> CovarianceSpec {
     CovarianceSpec {
         factors: knots.iter().map(factor).collect(),
-        counts: KNOTS,
+        counts,
         end_mm: END_MM as f32,
     }
+}
+
+/// The loads of so many knots, in a file's order.
+pub fn knots_of(counts: [u8; 3]) -> impl Iterator<Item = Pose> {
+    poses(counts)
 }
 
 /// Independent errors of every coordinate, everywhere the same, that grow with the size: so large,

@@ -34,13 +34,17 @@ impl Weights {
     /// These weights with the nominal film run forwards beside the network, in so many Gauss–Newton
     /// steps, 0–3. The noise of markers is that of a data set of presses anywhere, widened until 96
     /// of 100 errors of direction and place lie within their bounds; where that is not enough for
-    /// large forces, the tables leave something of their markers' motion.
+    /// large forces, the tables leave something of their markers' motion. What is known of other
+    /// units stays.
     ///
     /// # Errors
     /// When the network tells no place, or the data set has too few presses of known places.
     pub fn with_film(mut self, steps: u8, dataset: &Dataset) -> Result<Weights> {
         let noise = Noise::of(dataset, NOMINAL_RADIUS_MM)?;
-        let mut film = FilmModel::nominal(steps, &noise);
+        let mut film = FilmModel {
+            others: self.film.and_then(|film| film.others),
+            ..FilmModel::nominal(steps, &noise)
+        };
         self.film = Some(film.clone());
         let rows = needed(&self, dataset)?;
         let times =

@@ -1,157 +1,391 @@
 //! Units that somebody built and did not calibrate: how far their images move otherwise than the
-//! nominal film's, as the chip reads them by their rest picture.
+//! nominal film's, as the chip reads them by their rest picture, and how strong the force is that
+//! moves them as far.
 
-use anyhow::Result;
-use hivtac_film::Film;
+use anyhow::{Context, Result, anyhow, ensure};
+use hivtac_film::MARKER_CENTRES_MM;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_scene::Camera;
+use hivtac_scene::{Camera, Disc};
 use hivtac_sensing::features::Features;
-use hivtac_sensing::forward::{DOTS, Forward, Mounting};
-use hivtac_sensing::model::CovarianceSpec;
+use hivtac_sensing::forward::{DOTS, EQUATIONS, Forward, Markers, Mounting, Stiffness};
+use hivtac_sensing::forward::{Pose as ChipPose, RELATIVE};
+use hivtac_sensing::model::{CovarianceSpec, OthersSpec};
 use hivtac_sensing::rest::Rest;
+use hivtac_shell::{Contact, Design, Equilibrium, Film, Law, Material};
 use hivtac_terms::units::Px;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
-use super::covariances::{Moved, covariances, sum_of_squares};
-use super::{UnitSetup, at_rest, told};
-use hivtac_film::reduced::Unit;
+use super::covariances::{Moved, knots_of, spec_of, sum_of_squares};
 
-/// Units that are drawn: their covariance is known to a tenth.
-const UNITS: u64 = 200;
+/// Films that are drawn.
+const FILMS: u64 = 120;
 /// Nothing is drawn farther than so many standard deviations.
 const AT_MOST: f64 = 2.5;
+/// The stretch with which films are mounted, along each axis.
+const STRETCH: [f64; 2] = [-0.003, 0.03];
+/// How far they reach beyond the posts, mm; every third not at all.
+const OVERHANG_MM: f64 = 8.0;
+/// The radii of what holds them, mm.
+const POST_RADIUS_MM: [f64; 2] = [1.0, 3.0];
+/// Slopes and curves of their thickness, either way.
+const UNEVEN: f64 = 0.05;
+/// C₂/C₁ of rubber that stiffens.
+const STIFFENING: [f64; 2] = [0.02, 0.2];
 /// Tips' radii are evenly between, mm, and forces tilted by at most this along x and y, rad.
 const TIP_RADIUS_MM: [f64; 2] = [0.25, 1.0];
 const TILT: f64 = 0.2;
 /// The focal length behind which rest pictures are read, px.
 const FOCAL_PX: f64 = 175.0;
+/// How fine the meshes are.
+const FINENESS: f64 = 0.3;
+/// Knots along the size, along y and along x. A grip on places is in the middle and at both ends.
+const KNOTS: [u8; 3] = [RELATIVE as u8, 3, 3];
+/// A force is found when its images' size is as near to the one asked for, in parts of it.
+const NEAR: f64 = 0.02;
+/// Forces that are tried for each size.
+const TRIES: usize = 5;
+/// Newton's steps to the size of images.
+const SIZE_STEPS: usize = 8;
+
+/// What is known of units of which there is a rest picture and nothing else.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OtherUnits {
+    /// |F| = a·s + b·s³ of images that move as far as the nominal film's under the size s: a and b
+    /// of the typical film, N.
+    pub stiffness_n: [f64; 2],
+    /// Standard uncertainty of that, in parts of it, at the squares of even parts of the largest
+    /// size.
+    pub relative: [f64; RELATIVE],
+    /// Knots along the size, y and x of what the motion's shape leaves beside its size.
+    counts: [u8; 3],
+    end_mm: f32,
+    /// Row by row, of each knot.
+    factors: Vec<[[f64; EQUATIONS]; EQUATIONS]>,
+}
+
+impl OtherUnits {
+    /// Of films as people mount them, solved by finite elements, and read by a chip.
+    ///
+    /// # Errors
+    /// When too many of them find no equilibrium.
+    pub(super) fn of_films(chip: &Forward<'_>, camera: &Camera) -> Result<Self> {
+        let drawn = (0..FILMS).into_par_iter().map(|number| {
+            let other = Other::drawn(number, chip, camera)?;
+            other.matches()
+        });
+        let drawn: Vec<Vec<Match>> = drawn
+            .collect::<Vec<_>>()
+            .into_iter()
+            .filter_map(Result::ok)
+            .collect();
+        ensure!(
+            10 * drawn.len() >= 9 * FILMS as usize,
+            "only {} of {FILMS} films find all their equilibria",
+            drawn.len()
+        );
+        let poses: Vec<Pose> = knots_of(KNOTS).collect();
+        let factors = (0..poses.len()).map(|knot| {
+            let part = 1.0 / (drawn.len() as f64).sqrt();
+            let shapes = drawn
+                .iter()
+                .map(|film| film[knot].left.map(|left| part * left));
+            sum_of_squares(&shapes.collect::<Vec<_>>())
+        });
+        let spec = spec_of(KNOTS, factors.collect());
+        let magnitudes = |size: f64| -> Vec<f64> {
+            let of_film = |film: &Vec<Match>| {
+                let own = poses.iter().zip(film).filter(|(pose, _)| pose.size == size);
+                let (count, sum) = own.fold((0.0, 0.0), |(count, sum), (_, own)| {
+                    (count + 1.0, sum + own.magnitude_n.ln())
+                });
+                (sum / count).exp()
+            };
+            drawn.iter().map(of_film).collect()
+        };
+        let sizes: [f64; RELATIVE] =
+            std::array::from_fn(|k| LARGEST_SIZE * (k as f64 / (RELATIVE - 1) as f64).powi(2));
+        // Without size there is no force.
+        let all: Vec<Vec<f64>> = sizes[1..].iter().map(|size| magnitudes(*size)).collect();
+        let means: Vec<f64> = all
+            .iter()
+            .map(|of_size| mean(of_size.iter().copied()))
+            .collect();
+        let stiffness_n = law(&sizes[1..], &means);
+        let [a, b] = stiffness_n;
+        let relative = |k: usize| {
+            let at = k.max(1);
+            let typical = a * sizes[at] + b * sizes[at].powi(3);
+            let square = |own: &f64| (own / typical - 1.0).powi(2);
+            mean(all[at - 1].iter().map(square)).sqrt()
+        };
+        Ok(Self {
+            stiffness_n,
+            relative: std::array::from_fn(relative),
+            counts: spec.counts,
+            end_mm: spec.end_mm,
+            factors: spec.factors,
+        })
+    }
+
+    /// As a model file has it.
+    pub(super) fn spec(&self) -> OthersSpec {
+        let [linear_n, cubic_n] = self.stiffness_n.map(|part| part as f32);
+        OthersSpec {
+            stiffness: Stiffness { linear_n, cubic_n },
+            relative: self.relative.map(|part| part as f32),
+            covariance: CovarianceSpec {
+                counts: self.counts,
+                end_mm: self.end_mm,
+                factors: self.factors.clone(),
+            },
+        }
+    }
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+/// a and b of |F| = a·s + b·s³ nearest to these, in parts of each.
+fn law(sizes: &[f64], magnitudes_n: &[f64]) -> [f64; 2] {
+    let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
+    for (size, magnitude) in sizes.iter().zip(magnitudes_n) {
+        let (x, y) = (size / magnitude, size.powi(3) / magnitude);
+        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+        (xf, yf) = (xf + x, yf + y);
+    }
+    let whole = xx * yy - xy * xy;
+    // Either may be near nothing, never below.
+    [
+        ((yy * xf - xy * yf) / whole).max(1e-3),
+        ((xx * yf - xy * xf) / whole).max(1e-3),
+    ]
+}
 
 /// A unit, and what a chip makes of its rest picture.
 struct Other<'a> {
-    unit: DrawnUnit,
     film: Film,
-    setup: UnitSetup<'a>,
+    rest: Equilibrium,
+    rest_px: Markers,
     mounting: Mounting,
+    camera: &'a Camera,
+    to_px: [f64; 2],
+    chip: &'a Forward<'a>,
+    tip_radius_mm: f64,
     /// How the forces are tilted that press it.
     tilt: [f64; 2],
 }
 
-/// A film and its camera, as somebody built them.
-struct DrawnUnit {
-    film: Unit,
-    focal_px: f64,
-    roll_deg: f64,
-}
-
-impl DrawnUnit {
-    /// Turns what the camera sees, in focal lengths, into px.
-    fn to_px(&self) -> impl Fn([f64; 2]) -> [f64; 2] + use<> {
-        let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
-        let focal_px = self.focal_px;
-        move |[x, y]| {
-            [
-                focal_px * (cos * x - sin * y),
-                focal_px * (sin * x + cos * y),
-            ]
-        }
-    }
-}
-
-/// What the tables of the nominal film leave of how other units' images move under the same force
-/// at the same place.
-///
-/// # Errors
-/// When a unit cannot be made.
-pub fn others(chip: &Forward<'_>, camera: &Camera) -> Result<CovarianceSpec> {
-    let drawn = (0..UNITS).map(|number| Other::drawn(number, chip, camera));
-    let drawn: Vec<Other<'_>> = drawn.collect::<Result<_>>()?;
-    let part = 1.0 / (UNITS as f64).sqrt();
-    covariances(|pose| {
-        let differences = drawn.iter().map(|other| {
-            let difference = other.difference(chip, pose)?;
-            Ok(difference.map(|more| part * more))
-        });
-        Ok(sum_of_squares(&differences.collect::<Result<Vec<_>>>()?))
-    })
+/// The force that moves a unit's images as far as a load the nominal film's.
+struct Match {
+    magnitude_n: f64,
+    /// What remains of their motion, focal lengths.
+    left: Moved,
 }
 
 impl<'a> Other<'a> {
-    fn drawn(number: u64, chip: &Forward<'_>, camera: &'a Camera) -> Result<Self> {
+    fn drawn(number: u64, chip: &'a Forward<'a>, camera: &'a Camera) -> Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(number);
-        let mut usual = |sigma: f64| sigma * normal(&mut random);
-        let unit = DrawnUnit {
-            film: Unit {
-                stiffness: 1.0 + usual(STIFFNESS),
-                thickness: 1.0 + usual(THICKNESS),
-                grip: 1.0,
-                posts_mm: [(); DOTS].map(|()| [usual(POST_MM), usual(POST_MM)]),
-                markers_mm: [(); DOTS].map(|()| [usual(MARKER_MM), usual(MARKER_MM)]),
-            },
-            focal_px: FOCAL_PX * (1.0 + usual(FOCAL)),
-            roll_deg: usual(ROLL_DEG),
-        };
-        let [from, to] = TIP_RADIUS_MM;
-        let setup = UnitSetup {
-            unit: unit.film,
-            tip_radius_mm: random.random_range(from..to),
-            camera,
-        };
-        let film = Film::of(setup.unit)?;
-        Ok(Self {
-            mounting: chip.rest_image.mounting(&rest(&unit, &film, camera)),
-            unit,
+        let design = design(number, &mut random);
+        let (roll_deg, focal) = (ROLL_DEG * normal(&mut random), FOCAL * normal(&mut random));
+        let (sin, cos) = libm::sincos(roll_deg.to_radians());
+        let focal_px = FOCAL_PX * (1.0 + focal);
+        let film = Film::new(&design)?;
+        let mut other = Self {
+            rest: film.rest(),
             film,
-            setup,
+            rest_px: Markers::default(),
+            mounting: Mounting {
+                per_px: [0.0; 2],
+                beside_mm: Markers::default(),
+            },
+            camera,
+            to_px: [cos, sin].map(|part| part * focal_px),
+            chip,
+            tip_radius_mm: design.tip_radius_mm,
             tilt: [(); 2].map(|()| random.random_range(-TILT..TILT)),
+        };
+        other.rest_px = other
+            .seen(&other.rest)
+            .map(|place| place.map(|part| part as f32));
+        other.mounting = chip.rest_image.mounting(&rest(&other.rest_px));
+        Ok(other)
+    }
+
+    /// Where the camera sees the dots, px from its axis.
+    fn seen(&self, state: &Equilibrium) -> [[f64; 2]; DOTS] {
+        let axis =
+            [self.camera.width(), self.camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
+        let [cos, sin] = self.to_px;
+        std::array::from_fn(|dot| {
+            let disc = Disc::marker(self.film.design().dots_mm[dot]);
+            let at = disc.centroid_px(|point| self.film.displacement(state, point), self.camera);
+            let [x, y] = [0, 1].map(|i| (at[i] - axis[i]) / self.camera.focal_px());
+            [cos * x - sin * y, sin * x + cos * y]
         })
     }
 
-    /// How much more its images move than the chip predicts.
-    fn difference(&self, chip: &Forward<'_>, pose: &Pose) -> Result<Moved> {
-        let pose = Pose {
-            tilt: self.tilt,
-            ..*pose
-        };
-        let told = told(chip, &pose, &self.mounting.beside_mm);
-        let size = self.same_force(chip, &pose);
-        // Beyond what its film holds it moves as its size grows.
-        let held = size.min(LARGEST_SIZE);
-        let beyond = if size > held { size / held } else { 1.0 };
-        let to_px = self.unit.to_px();
-        let mut more = Moved::default();
-        for (dot, more) in more.chunks_exact_mut(2).enumerate() {
-            let moved = (self.setup).moved(&self.film, &Pose { size: held, ..pose }, dot)?;
-            let px = to_px(moved.map(|part| beyond * part));
-            let seen = self.mounting.moved(px.map(|part| part as f32));
-            for i in [0, 1] {
-                more[i] = f64::from(seen[i]) - told[2 * dot + i];
+    /// The matches of all knots, in their order.
+    fn matches(&self) -> Result<Vec<Match>> {
+        let poses: Vec<Pose> = knots_of(KNOTS).collect();
+        let places = poses.len() / usize::from(KNOTS[0]);
+        let mut all: Vec<Option<Match>> = poses.iter().map(|_| None).collect();
+        for place in 0..places {
+            let mut state = self.rest.clone();
+            // In parts of the nominal film's force.
+            let mut stiffer = 1.0;
+            for knot in (place..poses.len()).step_by(places) {
+                let pose = Pose {
+                    tilt: self.tilt,
+                    ..poses[knot]
+                };
+                all[knot] = Some(match pose.size > 0.0 {
+                    true => self.matched(&pose, &mut state, &mut stiffer)?,
+                    false => Match {
+                        magnitude_n: 0.0,
+                        left: Moved::default(),
+                    },
+                });
             }
         }
-        Ok(more)
+        all.into_iter()
+            .collect::<Option<_>>()
+            .context("a knot was not asked for")
     }
 
-    /// The size of the force that is of the pose's size on the chip's film.
-    fn same_force(&self, chip: &Forward<'_>, pose: &Pose) -> f64 {
-        let magnitude_n = chip.stiffness.magnitude_n(pose.size as f32);
-        let [linear_n, cubic_n] = self.setup.stiffness_n().map(|part| part as f32);
-        let own = hivtac_sensing::forward::Stiffness { linear_n, cubic_n };
-        own.size_of(magnitude_n, 2.0 * LARGEST_SIZE as f32).into()
+    fn matched(&self, pose: &Pose, state: &mut Equilibrium, stiffer: &mut f64) -> Result<Match> {
+        let law = &self.chip.stiffness;
+        let [size, nominal_n] = [pose.size, f64::from(law.magnitude_n(pose.size as f32))];
+        let steeper = size * f64::from(law.per_size_n(size as f32)) / nominal_n;
+        let mut magnitude_n = *stiffer * nominal_n;
+        let at_mm = self.film.material_point(&self.rest, pose.place_mm);
+        for attempt in 1.. {
+            let force_n = pose.direction().map(|part| magnitude_n * part);
+            let contact = Contact::Force(force_n);
+            let press = |start: &Equilibrium| {
+                self.film
+                    .press_at(at_mm, self.tip_radius_mm, contact, start)
+            };
+            *state = press(state)
+                .or_else(|_| press(&self.rest))
+                .map_err(|error| anyhow!("{error}"))?;
+            let (found, left) = self.nearest(pose, state);
+            let times = (size / found).powf(steeper);
+            let is_near = (found / size - 1.0).abs() < NEAR;
+            magnitude_n *= times.clamp(0.2, 5.0);
+            if is_near || attempt == TRIES {
+                *stiffer = magnitude_n / nominal_n;
+                return Ok(Match {
+                    magnitude_n,
+                    left: left.map(|left| left * size / found),
+                });
+            }
+        }
+        unreachable!("the loop ends at the last attempt")
+    }
+
+    /// The size at which the chip's film moves the images most nearly as far under the same tilt at
+    /// the same place, and what remains.
+    fn nearest(&self, pose: &Pose, state: &Equilibrium) -> (f64, Moved) {
+        let seen = self.seen(state);
+        let mut moved = Moved::default();
+        for (dot, parts) in moved.chunks_exact_mut(2).enumerate() {
+            let px = [0, 1].map(|i| (seen[dot][i] - f64::from(self.rest_px[dot][i])) as f32);
+            parts.copy_from_slice(&self.mounting.moved(px).map(f64::from));
+        }
+        let mut size = pose.size;
+        let mut left = moved;
+        for _ in 0..SIZE_STEPS {
+            let at = ChipPose {
+                size: size as f32,
+                tilt: pose.tilt.map(|part| part as f32),
+                place_mm: pose.place_mm.map(|part| part as f32),
+            };
+            let told = self
+                .chip
+                .tables
+                .predict(&at, &self.chip.limits, &self.mounting.beside_mm);
+            left = std::array::from_fn(|k| moved[k] - f64::from(told.moved[k]));
+            let slopes = told.slopes[0].map(f64::from);
+            let [along, square] = slopes
+                .iter()
+                .zip(&left)
+                .fold([0.0; 2], |[along, square], (slope, left)| {
+                    [along + slope * left, square + slope * slope]
+                });
+            size = (size + along / square)
+                .clamp(0.3 * size, 2.0 * size)
+                .min(1.2 * LARGEST_SIZE);
+        }
+        (size, left)
     }
 }
 
-/// What its rest picture shows.
-fn rest(unit: &DrawnUnit, film: &Film, camera: &Camera) -> Rest {
-    let to_px = unit.to_px();
-    let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
-    let seen = at_rest(film.markers_mm(), camera).map(|place| {
-        let [x, y] = to_px(place);
-        (px(x), px(y))
-    });
+/// A film as somebody mounts it.
+fn design(number: u64, random: &mut ChaCha8Rng) -> Design {
+    let usual = |random: &mut ChaCha8Rng, sigma: f64| sigma * normal(random);
+    let beside = |random: &mut ChaCha8Rng, sigma: f64| [(); 2].map(|()| usual(random, sigma));
+    let nominal = Design::default();
+    let neo_hooke = if number.is_multiple_of(3) { 0.0 } else { 1.0 };
+    let stiffening = match number % 3 {
+        2 => random.random_range(STIFFENING[0]..STIFFENING[1]),
+        _ => 0.0,
+    };
+    // Every third is cut at its holes.
+    let overhang_mm = match number / 3 % 3 {
+        0 => 0.0,
+        _ => random.random_range(0.0..OVERHANG_MM),
+    };
+    let down = loop {
+        let vector = [(); 3].map(|()| random.random_range(-1.0..1.0));
+        let length = vector.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if (0.1..1.0).contains(&length) {
+            break vector.map(|part| part / length);
+        }
+    };
+    Design {
+        material: Material {
+            youngs_mpa: nominal.material.youngs_mpa * (1.0 + usual(random, STIFFNESS)),
+            thickness_mm: nominal.material.thickness_mm * (1.0 + usual(random, THICKNESS)),
+            ..nominal.material
+        },
+        law: Law {
+            neo_hooke,
+            stiffening,
+        },
+        stretch: [(); 2].map(|()| random.random_range(STRETCH[0]..STRETCH[1])),
+        overhang_mm,
+        post_radius_mm: random.random_range(POST_RADIUS_MM[0]..POST_RADIUS_MM[1]),
+        post_shift_mm: [(); DOTS].map(|()| beside(random, POST_MM)),
+        thickness_slope: [(); 2].map(|()| random.random_range(-UNEVEN..UNEVEN)),
+        thickness_curve: [(); 3].map(|()| random.random_range(-UNEVEN..UNEVEN)),
+        dot_stiffening: random.random_range(0.0..1.0),
+        dots_mm: MARKER_CENTRES_MM
+            .map(|[x, y]| {
+                let [right, down] = beside(random, MARKER_MM);
+                [x + right, y + down]
+            })
+            .to_vec(),
+        down,
+        tip_radius_mm: random.random_range(TIP_RADIUS_MM[0]..TIP_RADIUS_MM[1]),
+        fineness: FINENESS,
+        gauss_points: 2,
+        ..nominal
+    }
+}
+
+/// What a rest picture shows.
+fn rest(seen_px: &Markers) -> Rest {
+    let px = |part: f32| Px((part * 65_536.0) as i32);
     Rest {
         features: Features {
-            centroids: seen,
+            centroids: seen_px.map(|[x, y]| (px(x), px(y))),
             ..Features::default()
         },
         areas: [1; DOTS],

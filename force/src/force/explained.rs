@@ -2,7 +2,7 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::forward::{
-    Column, DOTS, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma,
+    Column, DOTS, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Strength,
 };
 use crate::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::network::Output;
@@ -127,12 +127,13 @@ impl Resting {
     /// [`Status::UNEXPLAINED`] when it explains the markers badly, or is the largest that the
     /// tables hold.
     pub fn told(
+        &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
         noise: FrameNoise,
         estimate: &Estimate,
     ) -> (Force, Status) {
-        let force = force(forward, estimate);
+        let force = force(&forward.strength(self.is_own), estimate);
         let mut status = trust(&force, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
         if is_blurred || !estimate.is_explained() {
@@ -155,7 +156,7 @@ impl Resting {
     ) -> (Force, Status) {
         let noise = FrameNoise::AS_MODELLED;
         let estimate = self.estimate(forward, markers, noise, output);
-        Self::told(forward, range, noise, &estimate)
+        self.told(forward, range, noise, &estimate)
     }
 }
 
@@ -169,9 +170,9 @@ fn is_near(rest: &Rest, own: &Rest) -> bool {
         .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
 }
 
-fn force(forward: &Forward<'_>, estimate: &Estimate) -> Force {
+fn force(strength: &Strength, estimate: &Estimate) -> Force {
     let pose = &estimate.pose;
-    let micronewtons = 1e6 * forward.stiffness.magnitude_n(pose.size);
+    let micronewtons = 1e6 * strength.stiffness.magnitude_n(pose.size);
     let cartesian = pose
         .direction()
         .map(|part| MicroNewtons(rounded(micronewtons * part)));
@@ -180,7 +181,7 @@ fn force(forward: &Forward<'_>, estimate: &Estimate) -> Force {
         beta,
         magnitude,
     } = Polar::of_vector(cartesian);
-    let sigma = estimate.sigma(&forward.stiffness);
+    let sigma = estimate.sigma(strength);
     let [direction, magnitude_sigma, place] = stated(sigma);
     let [x, y] = pose
         .place_mm

@@ -74,23 +74,23 @@ impl<'a> CovarianceGrid<'a> {
     }
 
     /// At a load; beyond the last size or place as there. Sizes of knots are the squares of even
-    /// parts, as covariances grow with the size's square. Parts of covariances that add up to one
-    /// are no less a covariance.
+    /// parts. Between knots it is their factors that are interpolated: any sum of those is one of a
+    /// covariance.
     pub fn at(&self, pose: &Pose, limits: &Limits) -> Covariance {
         let [sizes, lines, places] = self.counts.map(usize::from);
         let along = |at_mm: f32| 0.5 + 0.5 * at_mm / self.end_mm;
         let [x, y] = pose.place_mm.map(along);
         let size = sqrt(limited(pose.size / limits.size, 0.0, 1.0));
-        let mut sum = Covariance::default();
+        let mut factor = Covariance::default();
         for (i, of_size) in between(size, sizes) {
             for (j, of_y) in between(y, lines) {
                 for (k, of_x) in between(x, places) {
                     let knot = self.knots.get((i * lines + j) * places + k);
-                    add(&mut sum, knot, of_size * of_y * of_x);
+                    add(&mut factor, knot, of_size * of_y * of_x);
                 }
             }
         }
-        sum
+        squared(&factor)
     }
 }
 
@@ -122,28 +122,33 @@ fn step(knot: &[u8; KNOT]) -> f32 {
     f32::from_le_bytes([a, b, c, d])
 }
 
-/// A part of a knot's covariance more.
-fn add(sum: &mut Covariance, knot: Option<&[u8; KNOT]>, part: f32) {
+/// A part of a knot's factor more.
+fn add(factor: &mut Covariance, knot: Option<&[u8; KNOT]>, part: f32) {
     let Some(knot) = knot else { return };
+    let part = part * step(knot);
     let mut entries = knot.as_chunks::<2>().0[2..].iter();
-    let mut factor = Covariance::default();
     for (i, row) in factor.iter_mut().enumerate() {
         for (entry, bytes) in row[..=i].iter_mut().zip(&mut entries) {
-            *entry = f32::from(i16::from_le_bytes(*bytes));
-        }
-    }
-    let step = step(knot);
-    let part = part * step * step;
-    for (i, (row, sum)) in factor.iter().zip(sum).enumerate() {
-        for (j, (other, sum)) in factor.iter().zip(&mut sum[..=i]).enumerate() {
-            let products = row[..=j].iter().zip(other);
-            *sum += part * products.fold(0.0, |sum, (a, b)| sum + a * b);
+            *entry += part * f32::from(i16::from_le_bytes(*bytes));
         }
     }
 }
 
+/// The covariance of a lower factor.
+fn squared(factor: &Covariance) -> Covariance {
+    let mut covariance = Covariance::default();
+    for (i, (row, of_row)) in factor.iter().zip(&mut covariance).enumerate() {
+        for (j, (other, sum)) in factor.iter().zip(&mut of_row[..=i]).enumerate() {
+            for (a, b) in row[..=j].iter().zip(other) {
+                *sum += a * b;
+            }
+        }
+    }
+    covariance
+}
+
 /// The two of `count` even knots from 0 to 1 that a value lies between, and how much each counts.
-fn between(value: f32, count: usize) -> [(usize, f32); 2] {
+pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
     let last = count - 1;
     let at = limited(value, 0.0, 1.0) * last as f32;
     let first = (at as usize).min(last - 1);
@@ -221,16 +226,16 @@ mod tests {
         bytes
     }
 
-    /// Covariances of one coordinate alone that are linear along each axis, the size's root for the
-    /// size, come out as they are, at knots, between them and beyond.
+    /// Standard deviations of one coordinate alone that are linear along each axis, the size's root
+    /// for the size, come out as they are, at knots, between them and beyond.
     #[test]
     fn planes_come_back() {
-        let square = |size: f32, y: f32, x: f32| 1e6 * (1.0 + size + 2.0 * y + x);
+        let sigma = |size: f32, y: f32, x: f32| 1e3 * (1.0 + size + 2.0 * y + x);
         let entry = |knot: usize, k: usize| {
             let (x, line) = (knot % 4, knot / 4);
             let [size, y] = [line / 2, line % 2].map(|k| k as f32);
             match k {
-                0 => square(size, y, x as f32).sqrt() as i16,
+                0 => sigma(size, y, x as f32) as i16,
                 _ => 0,
             }
         };
@@ -246,7 +251,7 @@ mod tests {
             let found = grid.at(&pose(size, [x, y]), &LIMITS);
             let part = |at: f32| (at.clamp(-3.0, 3.0) + 3.0) / 6.0;
             let sizes = 2.0 * (size.min(0.8) / 0.8).sqrt();
-            let expected = 1e-10 * square(sizes, part(y), 3.0 * part(x));
+            let expected = 1e-10 * sigma(sizes, part(y), 3.0 * part(x)).powi(2);
             let off = (found[0][0] - expected).abs();
             assert!(
                 off < 2e-3 * expected,

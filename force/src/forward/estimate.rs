@@ -1,12 +1,12 @@
 //! Gauss–Newton steps from a first guess to the load that explains the markers best.
 
-use super::Forward;
 use super::covariance::{Covariance, Unknown};
 use super::descent::Descent;
 use super::mounting::Mounting;
-use super::pose::{Pose, Stiffness, sine_over_angle_and_cosine};
+use super::pose::{Pose, sine_over_angle_and_cosine};
 use super::predict::DOTS;
 use super::solve::{Column, Solved};
+use super::{Forward, Strength};
 
 /// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
 /// of three degrees of freedom is more than 17.7 then.
@@ -131,9 +131,9 @@ impl Estimate {
         libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
     }
 
-    /// How well the load is known; `None` where the markers do not tell its parts. The covariance counts as larger where more is left over than
-    /// it explains as a rule.
-    pub fn sigma(&self, stiffness: &Stiffness) -> Option<Sigma> {
+    /// How well the load is known; `None` where the markers do not tell its parts. The covariance counts
+    /// as larger where more is left over than it explains as a rule.
+    pub fn sigma(&self, strength: &Strength) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;
         let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);
         let tilt = [(1, 1), (1, 2), (2, 2)].map(covariance);
@@ -143,7 +143,7 @@ impl Estimate {
         let size = noisier * libm::sqrtf(covariance((0, 0)));
         Some(Sigma {
             direction: noisier * stated(across(&self.pose, tilt)),
-            magnitude_n: stiffness.per_size_n(self.pose.size) * size,
+            magnitude_n: strength.sigma_n(self.pose.size, size),
             place_mm,
         })
     }
@@ -182,11 +182,16 @@ pub fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::forward::{RELATIVE, Stiffness};
     use proptest::prelude::*;
 
-    const STIFFNESS: Stiffness = Stiffness {
-        linear_n: 0.2,
-        cubic_n: 0.1,
+    const STRENGTH: Strength = Strength {
+        stiffness: Stiffness {
+            linear_n: 0.2,
+            cubic_n: 0.1,
+        },
+        relative: [0.0; RELATIVE],
+        largest_size: 0.63,
     };
 
     /// Of a load of which what is left over is as given.
@@ -214,7 +219,7 @@ mod tests {
     }
 
     fn parts(unexplained: f32) -> [f32; 3] {
-        let sigma = estimate(unexplained).sigma(&STIFFNESS).unwrap();
+        let sigma = estimate(unexplained).sigma(&STRENGTH).unwrap();
         [sigma.direction, sigma.magnitude_n, sigma.place_mm]
     }
 
@@ -230,6 +235,26 @@ mod tests {
                 assert!((wider / stated - times).abs() < 1e-5, "{wider} {stated}");
             }
         }
+    }
+
+    /// Uncertain strength of a unit is beside what the markers leave open, by squares; between two
+    /// sizes it is between theirs.
+    #[test]
+    fn a_units_strength_is_uncertain_beside_its_size() {
+        let unsure = Strength {
+            relative: [0.5, 0.4, 0.3, 0.2, 0.1],
+            ..STRENGTH
+        };
+        let force_n = STRENGTH.stiffness.magnitude_n(0.5);
+        let sure = STRENGTH.sigma_n(0.5, 0.01);
+        let both = unsure.sigma_n(0.5, 0.01);
+        let relative = libm::sqrtf(both * both - sure * sure) / force_n;
+        let at = 4.0 * libm::sqrtf(0.5 / 0.63);
+        assert!((relative - (0.5 - 0.1 * at)).abs() < 1e-4, "{relative}");
+        assert_eq!(
+            unsure.sigma_n(2.0, 0.0),
+            0.1 * STRENGTH.stiffness.magnitude_n(2.0)
+        );
     }
 
     proptest! {

@@ -21,6 +21,9 @@
 //! | `covariance` | what is not known of the unit beside the noise |
 //! | `estimate` | from guesses to a load, what is left over, standard uncertainties |
 
+use covariance::between;
+use pose::limited;
+
 mod axis;
 mod covariance;
 mod descent;
@@ -49,6 +52,9 @@ pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
 /// Most steps that a model may ask for.
 pub const MOST_STEPS: u8 = 3;
 
+/// Sizes at which it is told how well other units' strength is known.
+pub const RELATIVE: usize = 5;
+
 /// A film run forwards, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forward<'a> {
@@ -71,8 +77,44 @@ pub struct Forward<'a> {
     /// What they leave of how the images move on the unit that it was made on; `None` when that is
     /// nothing beside noise.
     pub own: Option<CovarianceGrid<'a>>,
-    /// On any other unit, of which there is a rest picture; `None` where the file does not say.
-    pub other: Option<CovarianceGrid<'a>>,
+    /// Any other unit, of which there is a rest picture; `None` where the file does not say.
+    pub other: Option<Others<'a>>,
+}
+
+/// What is known of units beside the one that a model was made on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Others<'a> {
+    /// How strong the force of a size is on the typical one.
+    pub stiffness: Stiffness,
+    /// Standard uncertainty of that, in parts of it, at the squares of even parts of the largest
+    /// size.
+    pub relative: [f32; RELATIVE],
+    /// What the tables leave of how the images move, beside the size.
+    pub covariance: CovarianceGrid<'a>,
+}
+
+/// How strong the force of a size is on a unit, and how well that is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strength {
+    /// How strong it is.
+    pub stiffness: Stiffness,
+    /// As [`Others::relative`].
+    relative: [f32; RELATIVE],
+    largest_size: f32,
+}
+
+impl Strength {
+    /// Standard uncertainty of |F| of a size that is known as well as `size_sigma`, N.
+    pub fn sigma_n(&self, size: f32, size_sigma: f32) -> f32 {
+        let of_size = self.stiffness.per_size_n(size) * size_sigma;
+        let root = libm::sqrtf(limited(size / self.largest_size, 0.0, 1.0));
+        let mut relative = 0.0;
+        for (knot, part) in between(root, RELATIVE) {
+            relative += part * self.relative.get(knot).copied().unwrap_or_default();
+        }
+        let of_unit = relative * self.stiffness.magnitude_n(size);
+        libm::sqrtf(of_size * of_size + of_unit * of_unit)
+    }
 }
 
 impl<'a> Forward<'a> {
@@ -80,8 +122,19 @@ impl<'a> Forward<'a> {
     pub fn unknown(&self, is_own: bool) -> Unknown<'a> {
         match (is_own, self.own, self.other) {
             (true, None, _) => Unknown::Nothing,
-            (true, Some(grid), _) | (false, _, Some(grid)) => Unknown::Grid(grid),
+            (true, Some(grid), _) => Unknown::Grid(grid),
+            (false, _, Some(others)) => Unknown::Grid(others.covariance),
             (false, _, None) => Unknown::Unit,
+        }
+    }
+
+    /// How strong forces are on the unit that it was made on, or on another one.
+    pub fn strength(&self, is_own: bool) -> Strength {
+        let others = self.other.as_ref().filter(|_| !is_own);
+        Strength {
+            stiffness: others.map_or(self.stiffness, |others| others.stiffness),
+            relative: others.map_or([0.0; RELATIVE], |others| others.relative),
+            largest_size: self.limits.size,
         }
     }
 }

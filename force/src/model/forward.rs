@@ -3,7 +3,7 @@
 use super::{ModelError, reader::Reader};
 use crate::forward::{
     Axis, CovarianceGrid, DOTS, Forward, Limits, MOST_FUNCTIONS, MOST_STEPS, Markers, NODES, Noise,
-    RestImage, Stiffness, Table, Tables, Terms,
+    Others, RELATIVE, RestImage, Stiffness, Table, Tables, Terms,
 };
 #[cfg(any(test, feature = "encode"))]
 use {
@@ -34,10 +34,7 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         size: float(reader, "largest size", [1e-3, 10.0], "0.001 to 10")?,
         tilt: float(reader, "largest tilt", [1e-2, 1.0], "0.01 to 1 rad")?,
     };
-    let stiffness = Stiffness {
-        linear_n: float(reader, "stiffness", [1e-6, 1e3], "0.000001 to 1000 N")?,
-        cubic_n: float(reader, "stiffness", [1e-6, 1e3], "0.000001 to 1000 N")?,
-    };
+    let stiffness = stiffness(reader)?;
     let rest_image = RestImage {
         at: markers(reader, "rest image", [-2.0, 2.0], "-2 to 2")?,
         film_mm: markers(reader, "film", [0.1, 1e3], "0.1 to 1000 mm")?,
@@ -57,7 +54,7 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         noise,
         tables: tables(reader)?,
         own: has_own.then(|| covariances(reader)).transpose()?,
-        other: has_other.then(|| covariances(reader)).transpose()?,
+        other: has_other.then(|| others(reader)).transpose()?,
     })
 }
 
@@ -127,6 +124,26 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
     let steps = reader.take(Table::length(&axes, functions))?;
     reader.pad()?;
     Table::new(axes, away, functions, steps).ok_or(wrong("table", "1 to 24 functions"))
+}
+
+fn others<'a>(reader: &mut Reader<'a>) -> Result<Others<'a>, ModelError> {
+    let stiffness = stiffness(reader)?;
+    let mut relative = [0.0; RELATIVE];
+    for part in &mut relative {
+        *part = float(reader, "other units' strength", [0.0, 10.0], "0 to 10")?;
+    }
+    Ok(Others {
+        stiffness,
+        relative,
+        covariance: covariances(reader)?,
+    })
+}
+
+fn stiffness(reader: &mut Reader<'_>) -> Result<Stiffness, ModelError> {
+    Ok(Stiffness {
+        linear_n: float(reader, "stiffness", [1e-6, 1e3], "0.000001 to 1000 N")?,
+        cubic_n: float(reader, "stiffness", [1e-6, 1e3], "0.000001 to 1000 N")?,
+    })
 }
 
 fn covariances<'a>(reader: &mut Reader<'a>) -> Result<CovarianceGrid<'a>, ModelError> {
@@ -205,8 +222,20 @@ pub struct ForwardSpec {
     pub tables: TablesSpec,
     /// What the tables leave of its own unit's motion.
     pub own: Option<CovarianceSpec>,
-    /// What they leave of any other unit's.
-    pub other: Option<CovarianceSpec>,
+    /// Any other unit.
+    pub other: Option<OthersSpec>,
+}
+
+/// What is known of other units, to be written. The fields mean what [`Others`]' do.
+#[cfg(any(test, feature = "encode"))]
+#[derive(Clone, Debug, PartialEq)]
+pub struct OthersSpec {
+    /// How strong the force of a size is on the typical one.
+    pub stiffness: Stiffness,
+    /// Standard uncertainty of that, in parts of it.
+    pub relative: [f32; RELATIVE],
+    /// What the tables leave of the motion beside the size.
+    pub covariance: CovarianceSpec,
 }
 
 /// The tables of a film, to be written.
@@ -277,8 +306,14 @@ impl ForwardSpec {
             bytes.extend(part.to_le_bytes());
         }
         self.tables.push(bytes);
-        for covariances in self.own.iter().chain(&self.other) {
-            covariances.push(bytes);
+        if let Some(own) = &self.own {
+            own.push(bytes);
+        }
+        if let Some(other) = &self.other {
+            let Stiffness { linear_n, cubic_n } = other.stiffness;
+            let parts = [linear_n, cubic_n].into_iter().chain(other.relative);
+            bytes.extend(parts.flat_map(f32::to_le_bytes));
+            other.covariance.push(bytes);
         }
     }
 }

@@ -410,7 +410,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);
                 }
-                Resting::told(forward, &model.range, noise, &estimate)
+                resting.told(forward, &model.range, noise, &estimate)
             }
             None => force::of_outputs(model, &output),
         };
