@@ -49,7 +49,9 @@ impl DefaultModelArgs {
             ..Options::default()
         };
         let weights = trained(&rendered(&recipe)?, &options)?;
-        let weights = weights.with_film(STEPS, &rendered(&noise)?)?.with_others()?;
+        let weights = weights
+            .with_film(STEPS, &rendered(&noise)?)?
+            .with_others()?;
         weights.save(&self.out_dir.join("default.weights"))?;
         let model = self.out_dir.join("default.hvtm");
         exported(&weights, &model)?;
