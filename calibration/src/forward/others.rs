@@ -74,12 +74,9 @@ impl OtherUnits {
     /// # Errors
     /// When too many of them find no equilibrium.
     pub(super) fn of_films(chip: &Forward<'_>, camera: &Camera) -> Result<Self> {
-        let drawn = (0..FILMS).into_par_iter().map(|number| {
-            let other = Other::drawn(number, chip, camera)?;
-            let matches = other.matches();
-            if std::env::var("X").is_ok() { eprintln!("{number} {:?} {:?}", matches.as_ref().map(|all| all.iter().skip(9).step_by(9).map(|m| (m.magnitude_n*1e3, m.left[0]*175.0)).collect::<Vec<_>>()), std::time::SystemTime::now()); }
-            matches
-        });
+        let drawn = (0..FILMS)
+            .into_par_iter()
+            .map(|number| Other::drawn(number, chip, camera)?.matches());
         let drawn: Vec<Vec<Match>> = drawn
             .collect::<Vec<_>>()
             .into_iter()
