@@ -22,7 +22,7 @@ use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS}
 use super::covariances::{Moved, knots_of, spec_of, sum_of_squares};
 
 /// Films that are drawn.
-const FILMS: u64 = 120;
+const FILMS: u64 = 60;
 /// Nothing is drawn farther than so many standard deviations.
 const AT_MOST: f64 = 2.5;
 /// The stretch with which films are mounted, along each axis.
@@ -45,9 +45,9 @@ const FINENESS: f64 = 0.3;
 /// Knots along the size, along y and along x. A grip on places is in the middle and at both ends.
 const KNOTS: [u8; 3] = [RELATIVE as u8, 3, 3];
 /// A force is found when its images' size is as near to the one asked for, in parts of it.
-const NEAR: f64 = 0.02;
+const NEAR: f64 = 0.06;
 /// Forces that are tried for each size.
-const TRIES: usize = 5;
+const TRIES: usize = 3;
 /// Newton's steps to the size of images.
 const SIZE_STEPS: usize = 8;
 
@@ -74,10 +74,9 @@ impl OtherUnits {
     /// # Errors
     /// When too many of them find no equilibrium.
     pub(super) fn of_films(chip: &Forward<'_>, camera: &Camera) -> Result<Self> {
-        let drawn = (0..FILMS).into_par_iter().map(|number| {
-            let other = Other::drawn(number, chip, camera)?;
-            other.matches()
-        });
+        let drawn = (0..FILMS)
+            .into_par_iter()
+            .map(|number| Other::drawn(number, chip, camera)?.matches());
         let drawn: Vec<Vec<Match>> = drawn
             .collect::<Vec<_>>()
             .into_iter()
