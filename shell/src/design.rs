@@ -82,7 +82,8 @@ pub struct Design {
     /// Cells along half of the edge, 4 to 400; none: as many as the fineness asks for. Films of as
     /// many cells can be started from each other's states.
     pub cells: Option<usize>,
-    /// Points along a side of a cell at which the film is summed: 3, or 2, which takes half the time
+    /// Points along a side of a cell at which the film is summed: 3, or 2, which takes half the
+    /// time
     /// and is as near to a finer mesh's solution.
     pub gauss_points: usize,
 }

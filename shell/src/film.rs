@@ -24,7 +24,8 @@ pub enum Contact {
     /// It goes this far (mm, from the flat mounted film) with the film stuck to it, whatever the
     /// force.
     Travel([f64; 3]),
-    /// From the film at rest it moves along a direction (of any length) with the film stuck to it, until the force along
+    /// From the film at rest it moves along a direction (of any length) with the film stuck to it,
+    /// until the force along
     /// that direction is `force_n`, as a gauge on a stage reads it: the `stick` reading.
     Stick {
         /// Where the tip moves; its third part < 0.

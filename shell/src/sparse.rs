@@ -151,7 +151,8 @@ impl Pattern {
             .collect()
     }
 
-    /// The unknowns of the coefficients in a rectangle (from, end along each side), so that two that
+    /// The unknowns of the coefficients in a rectangle (from, end along each side), so that two
+    /// that
     /// do not meet are kept apart by others that come after both.
     fn dissect(&self, [i, k]: [usize; 2], [j, l]: [usize; 2], order: &mut Vec<usize>) {
         let (wide, high) = (k - i, l - j);

@@ -266,9 +266,12 @@ fn a_section_of_other_markers_is_refused() {
         let mut changed = section.to_vec();
         changed[at] = value;
         let refused = Forward::parse(&changed).err();
-        assert!(
-            matches!(refused, Some(ModelError::Field { name: of, offset, .. }) if of == name && offset == at),
-            "{refused:?}"
-        );
+        let Some(ModelError::Field {
+            name: of, offset, ..
+        }) = refused
+        else {
+            panic!("{refused:?}");
+        };
+        assert_eq!((of, offset), (name, at));
     }
 }

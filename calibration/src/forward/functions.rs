@@ -20,7 +20,8 @@ const RINGS: [(f64, u8); 4] = [(0.0, 1), (0.4, 6), (0.7, 10), (0.95, 16)];
 pub struct Sampled {
     /// The nodes along x and along y, mm of the tip's place, growing; 6 to 16 each.
     pub nodes_mm: [Vec<f64>; 2],
-    /// The direction, of length one, along which the first part of the terms' tilt is; the second is
+    /// The direction, of length one, along which the first part of the terms' tilt is; the second
+    /// is
     /// across it, from x towards y. Markers that see the load alike, each from its own side, need
     /// few functions.
     pub away: [f64; 2],

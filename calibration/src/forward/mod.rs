@@ -46,7 +46,8 @@ pub struct FilmModel {
     pub noise_px: [f64; 2],
     /// How many times that it is when the marker is four times as large.
     pub noise_at_four_areas: [f64; 2],
-    /// What the chip's tables leave of each coordinate of a marker under the largest force, standard
+    /// What the chip's tables leave of each coordinate of a marker under the largest force,
+    /// standard
     /// uncertainty, px at 320×240; less in parts of the size under smaller ones.
     #[serde(default)]
     pub beside_px: f64,
@@ -88,7 +89,8 @@ impl FilmModel {
         }
     }
 
-    /// With what is known of other units: films as people mount them, solved by finite elements. Takes
+    /// With what is known of other units: films as people mount them, solved by finite elements.
+    /// Takes
     /// minutes.
     ///
     /// # Errors

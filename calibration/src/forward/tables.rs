@@ -21,7 +21,8 @@ const FILM_NODES_MM: [f64; 16] = [
 const TWICE_MM: f64 = 2.0;
 /// How many sizes there are without tilt, with its first degree, and so on.
 const TERMS: [u8; MOST_TILTS] = [8, 6, 5, 4, 3];
-/// What functions of size and tilt may leave, root mean square, focal lengths: 0.0022 px at 320×240.
+/// What functions of size and tilt may leave, root mean square, focal lengths: 0.0022 px at
+/// 320×240.
 const LEFT: f64 = 0.0022 / 175.0;
 /// As many as there are at most, for files that a device has room for.
 const FUNCTIONS: usize = 16;
@@ -154,7 +155,8 @@ fn nodes_near(place_mm: f64, count: usize) -> Vec<f64> {
     (0..count).map(at).collect()
 }
 
-/// The tables of markers that move so under a load, by a marker's number, in focal lengths; and what
+/// The tables of markers that move so under a load, by a marker's number, in focal lengths; and
+/// what
 /// they leave, root mean square over loads and places, focal lengths.
 ///
 /// # Errors

@@ -1,7 +1,8 @@
 //! Loads whose notes contradict what the sensor saw: axes swapped, a sign or a unit wrong, a place
 //! mistyped.
 //!
-//! A sensor that knows of a unit only how it rests finds places to half a millimetre and forces to a
+//! A sensor that knows of a unit only how it rests finds places to half a millimetre and forces to
+//! a
 //! factor of some units: enough to see such mistakes, and to name them.
 
 use anyhow::{Result, bail};

@@ -1,10 +1,12 @@
-//! The loads that a data set shows, for a fit of a unit: each with what was seen of it, and how well
+//! The loads that a data set shows, for a fit of a unit: each with what was seen of it, and how
+//! well
 //! its size, direction and place are known.
 //!
 //! | rows | loads |
 //! |---|---|
 //! | of one force at one noted place | frames of one load |
-//! | pressed anywhere, nobody noted where | some of them, spread over places and sizes: [`representative`] |
+//! | pressed anywhere, nobody noted where | some of them, spread over places and sizes:
+//! [`representative`] |
 
 mod contradiction;
 mod representative;

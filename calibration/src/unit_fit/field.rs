@@ -1,4 +1,5 @@
-//! How a unit's film moves its dots under any load: from finite elements at few places of the tip to
+//! How a unit's film moves its dots under any load: from finite elements at few places of the tip
+//! to
 //! every place.
 //!
 //! The dimple under a tip moves with it. So the motion of a dot with the tip at a place is that of

@@ -140,7 +140,8 @@ const FILM: [(Change, [f64; 4]); 17] = [
     (Change::Down(2), [0.0, 0.6, -1.2, 1.2]),
 ];
 
-/// The numbers of units with this many dots whose stage's zero is known to so many mm; the camera and
+/// The numbers of units with this many dots whose stage's zero is known to so many mm; the camera
+/// and
 /// the posts of a unit whose old film was fitted are known.
 pub fn priors(dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
     let film = FILM.map(|(change, [mean, sigma, least, largest])| Prior {

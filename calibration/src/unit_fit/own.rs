@@ -189,7 +189,8 @@ impl OwnFilm {
     }
 }
 
-/// The tables of dots on a film, and what they leave of the motion, root mean square, focal lengths.
+/// The tables of dots on a film, and what they leave of the motion, root mean square, focal
+/// lengths.
 fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64)> {
     let dots: Vec<Dot> = dots_mm
         .iter()

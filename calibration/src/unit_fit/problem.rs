@@ -271,7 +271,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Standard uncertainty of each coordinate under a load, px: of what is seen, and of what a mesh
+    /// Standard uncertainty of each coordinate under a load, px: of what is seen, and of what a
+    /// mesh
     /// leaves of the film's shape beside the tip.
     fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
         let of_dot = |dot: &[f64; 2]| {

@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use hivtac_scene::{Camera, Disc};
 use hivtac_shell::{Equilibrium, Film, Response};
 
-/// Points on a ring within a dot over which a rate is averaged: on this ring, in parts of the radius,
+/// Points on a ring within a dot over which a rate is averaged: on this ring, in parts of the
+/// radius,
 /// their mean is the disc's for polynomials to the third degree.
 const RAYS: usize = 6;
 const RING: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -274,8 +274,9 @@ mod tests {
         fn what_a_gauge_writes_is_read(
             steps in -9_999_i32..=9_999,
             (letters, unit) in prop::sample::select(vec![
-                ("N", 1.0), ("NTO", 1.0), ("NTL", 1.0), ("mN", 1e-3), ("", 1.0), (" gF", 9.80665e-3),
-                (" lbF", 4.4482216152605), ("KTO", 9.80665), ("OTH", 4.4482216152605),
+                ("N", 1.0), ("NTO", 1.0), ("NTL", 1.0), ("mN", 1e-3), ("", 1.0),
+                (" gF", 9.80665e-3), (" lbF", 4.4482216152605), ("KTO", 9.80665),
+                ("OTH", 4.4482216152605),
             ]),
             comma in any::<bool>(),
             before in prop::sample::select(vec!["", "ST,", "US,GS,", "S S  "]),

@@ -12,7 +12,8 @@ use crate::kernels::sqrt;
 /// A step that would explain no more than this of the residual, in parts of its variance, is not
 /// needed: it would move no unknown by more than a fifth of its standard uncertainty.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
-/// Where a step that would explain no more than this lowers no residual, what is left is the tables'
+/// Where a step that would explain no more than this lowers no residual, what is left is the
+/// tables'
 /// rounding.
 const ROUNDING: f32 = 0.5;
 /// The first of the unknowns that are the tilt, which the place follows.
@@ -93,7 +94,8 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Tries a step; one that does not lower the residual, by the covariance where it begins, is not
+    /// Tries a step; one that does not lower the residual, by the covariance where it begins, is
+    /// not
     /// taken, and the next is shorter then. False when the markers do not tell where to go.
     pub fn step(&mut self) -> bool {
         let Some((white, solved)) = self.here.solved() else {

@@ -51,7 +51,8 @@ impl Observed {
 pub struct Estimate {
     /// The load.
     pub pose: Pose,
-    /// What it does not explain: the square of that in parts of its covariance, by noise and by what
+    /// What it does not explain: the square of that in parts of its covariance, by noise and by
+    /// what
     /// is not known of the unit.
     pub unexplained: f32,
     /// What no load near it explains, in parts of noise alone: what changes of it from frame to
@@ -65,7 +66,8 @@ pub struct Estimate {
 
 impl Forward<'_> {
     /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
-    /// which they find no way on, from where the markers moved most, too: from there they find theirs
+    /// which they find no way on, from where the markers moved most, too: from there they find
+    /// theirs
     /// where a guess was bad.
     pub fn estimate(
         &self,
@@ -131,7 +133,8 @@ impl Estimate {
         libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
     }
 
-    /// How well the load is known; `None` where the markers do not tell its parts. The covariance counts
+    /// How well the load is known; `None` where the markers do not tell its parts. The covariance
+    /// counts
     /// as larger where more is left over than it explains as a rule.
     pub fn sigma(&self, strength: &Strength) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;

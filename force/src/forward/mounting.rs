@@ -49,7 +49,8 @@ impl RestImage {
         sum.map(|part| part / all)
     }
 
-    /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the axis
+    /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the
+    /// axis
     /// and across that.
     #[inline]
     pub fn noise(&self, dot: usize, [away, across]: [f32; 2]) -> [f32; 3] {

@@ -82,7 +82,8 @@ impl<'a> Tables<'a> {
         })
     }
 
-    /// Where the images of markers go that are glued `beside_mm` of the tables': a marker beside its
+    /// Where the images of markers go that are glued `beside_mm` of the tables': a marker beside
+    /// its
     /// place is as one in its place, with the tip as far beside the other way.
     pub fn predict(&self, pose: &Pose, limits: &Limits, beside_mm: &Markers) -> Prediction {
         let sizes = Sizes::at(pose.size, limits);

@@ -1,4 +1,5 @@
-//! How one marker's image moves: splines over the tip's place, whose coefficients count as functions
+//! How one marker's image moves: splines over the tip's place, whose coefficients count as
+//! functions
 //! of size and tilt say.
 //!
 //! Coefficients are steps of 16 bits, whose size is in the function's own. Along both axes they

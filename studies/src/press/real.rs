@@ -1,4 +1,5 @@
-//! Films as people mount them, solved by finite elements: stretched, cut otherwise, of other rubber.
+//! Films as people mount them, solved by finite elements: stretched, cut otherwise, of other
+//! rubber.
 
 use std::sync::Mutex;
 

@@ -16,7 +16,8 @@ use crate::press::{REACH_MM, Tally, Tared, TestedUnit, press_of_any};
 /// Forces that are pressed, N.
 const FORCES_N: [f64; 2] = [0.05, 0.2];
 
-/// A film with a tare alone, and after each bench's loads; why it could not be calibrated otherwise.
+/// A film with a tare alone, and after each bench's loads; why it could not be calibrated
+/// otherwise.
 struct Tested {
     tared: Tally,
     calibrated: Vec<Result<Tally>>,

@@ -7,7 +7,8 @@
 //! | `columns` | which column is what, and in which unit |
 //! | `clock` | times, and a clock that starts again |
 //!
-//! What can be understood in one way only is read. Otherwise the file is refused, with the line, the
+//! What can be understood in one way only is read. Otherwise the file is refused, with the line,
+//! the
 //! cause, and what helps.
 
 mod clock;

@@ -139,8 +139,8 @@ fn what_is_not_clear_is_refused_with_what_helps() {
 
 #[test]
 fn faults_are_counted_by_cause_and_the_first_is_named() {
-    let text = "time;force\n# made by hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n0.25;0.5N\n\
-                x;1\n0.5;1..2N\n0.6;0.1\n0.7;0.1\n0.8;0.1\n";
+    let text = "time;force\n# made by hand\n0.0;+0.100N\n0.1;0.200\n0.2;OL\n\n0.3;+0.4N\n\
+                0.25;0.5N\nx;1\n0.5;1..2N\n0.6;0.1\n0.7;0.1\n0.8;0.1\n";
     let series = &parse(text, None).unwrap()[0];
     assert_eq!(series.readings(), 6);
     let counts: Vec<_> = series.bad.iter().map(|(why, n)| (*why, *n)).collect();
