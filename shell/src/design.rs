@@ -138,6 +138,11 @@ impl Design {
         self.span_mm / 2.0 + self.overhang_mm
     }
 
+    /// The thickness before the film is mounted of a point of the mounted film (mm), mm.
+    pub fn thickness_mm_at(&self, point_mm: [f64; 2]) -> f64 {
+        self.material.thickness_mm * self.sheet().relative(point_mm)
+    }
+
     /// Whether such a film can be.
     ///
     /// # Errors

@@ -51,6 +51,9 @@ enum Command {
     /// Render black, red and blue markers under a camera that sees no colours, in white and in cyan
     /// light, and find how many rows they reach.
     Mono(mono::MonoStudy),
+    /// Press films as they are mounted in CalculiX, too: stretched, of rubber, heavy, uneven. Needs
+    /// the program `ccx`.
+    MountedFilms(calculix::MountedFilms),
     /// Train the paper's network with the place as two more outputs, and judge it beside ours.
     Paper(paper::Paper),
     /// Compare with the paper's own pipeline (OpenCV, a float network 3×512) on the same rendered
@@ -90,6 +93,7 @@ fn main() -> Result<()> {
         Command::Coverage(study) => study.run(),
         Command::Large(study) => study.run(),
         Command::Mono(study) => study.run(),
+        Command::MountedFilms(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Peers(study) => study.run(),
         Command::Refused(study) => study.run(),

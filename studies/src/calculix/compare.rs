@@ -7,6 +7,8 @@ use hivtac_shell::{Contact, Design, Equilibrium, Film, Marker, markers};
 /// Gauss–Newton steps at most, and how small they are (N, mm) at the end.
 const MAX_STEPS: usize = 20;
 const LAST_STEP: [f64; UNKNOWNS] = [1e-7, 1e-7, 1e-7, 1e-5, 1e-5];
+/// The same of a factor.
+const LAST_FACTOR_STEP: f64 = 1e-5;
 /// Force (N) and place (mm) by which pixels are differentiated.
 const UNITS: [f64; UNKNOWNS] = [1e-5, 1e-5, 1e-5, 1e-4, 1e-4];
 /// Force and place; coordinates of the markers.
@@ -20,6 +22,26 @@ pub struct FilmObservation {
     pub tip_mm: [f64; 3],
     /// The markers' motion and images.
     pub markers: [Marker; 4],
+}
+
+impl FilmObservation {
+    /// The same motion since a film's rest, from the rest of another.
+    pub fn rebased(&self, from: &FilmObservation, to: &FilmObservation) -> FilmObservation {
+        FilmObservation {
+            tip_mm: moved(self.tip_mm, from.tip_mm, to.tip_mm),
+            markers: std::array::from_fn(|id| {
+                let [own, from, to] = [self, from, to].map(|film| &film.markers[id]);
+                Marker {
+                    moved_mm: moved(own.moved_mm, from.moved_mm, to.moved_mm),
+                    seen_px: moved(own.seen_px, from.seen_px, to.seen_px),
+                }
+            }),
+        }
+    }
+}
+
+fn moved<const N: usize>(at: [f64; N], from: [f64; N], to: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|k| at[k] - from[k] + to[k])
 }
 
 /// How far two films are apart.
@@ -44,6 +66,15 @@ pub struct Reading {
     pub place_mm: f64,
     /// What no press explains of the eight coordinates, root mean square, px.
     pub left_px: f64,
+}
+
+/// The project's film with every force scaled by one factor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scaled {
+    /// What each force is multiplied by.
+    pub factor: f64,
+    /// The film under each of them.
+    pub presses: Vec<FilmObservation>,
 }
 
 /// The project's film under a force.
@@ -132,6 +163,44 @@ pub fn read(
         }
     }
     anyhow::bail!("no press of the film comes nearest to the markers")
+}
+
+/// The factor by which forces are to be scaled so that the film comes nearest to the markers seen in
+/// all presses together, by Gauss–Newton from 1.
+///
+/// # Errors
+/// When the film finds no equilibrium on the way, or the steps do not end.
+pub fn scale(
+    film: &Film,
+    camera: &Camera,
+    forces_n: &[[f64; 3]],
+    targets: &[FilmObservation],
+) -> Result<Scaled> {
+    let mut factor = 1.0;
+    for _ in 0..MAX_STEPS {
+        let (mut state, mut presses) = (film.rest(), Vec::new());
+        let (mut along, mut squares) = (0.0, 0.0);
+        for (force_n, target) in forces_n.iter().zip(targets) {
+            let force = force_n.map(|part| factor * part);
+            state = film.press(Contact::Force(force), &state)?;
+            let found = seen(film, &state, camera);
+            let here = pixels(&found.markers);
+            let slopes = slopes(film, &state, camera, &here)?;
+            let target = pixels(&target.markers);
+            for i in 0..COORDINATES {
+                let slope: f64 = (0..3).map(|axis| force_n[axis] * slopes[axis][i]).sum();
+                along += slope * (target[i] - here[i]);
+                squares += slope * slope;
+            }
+            presses.push(found);
+        }
+        let step = along / squares;
+        if step.abs() < LAST_FACTOR_STEP {
+            return Ok(Scaled { factor, presses });
+        }
+        factor += step;
+    }
+    anyhow::bail!("no factor brings the film nearest to the markers")
 }
 
 fn reading(
@@ -226,6 +295,23 @@ mod tests {
     }
 
     #[test]
+    fn a_softer_film_is_the_same_under_larger_forces() {
+        let camera = paper_camera().unwrap();
+        let film = Film::new(&coarse()).unwrap();
+        let forces_n = [[0.0, 0.0, -0.01], [0.01, 0.0, -0.05]];
+        let softer = forces_n.map(|force_n| {
+            let force = Contact::Force(force_n.map(|part| 1.1 * part));
+            let state = film.press(force, &film.rest()).unwrap();
+            seen(&film, &state, &camera)
+        });
+        let scaled = scale(&film, &camera, &forces_n, &softer).unwrap();
+        assert!((scaled.factor - 1.1).abs() < 1e-4, "{}", scaled.factor);
+        for (one, other) in scaled.presses.iter().zip(&softer) {
+            assert!(difference(one, other).picture_px[0] < 1e-2);
+        }
+    }
+
+    #[test]
     fn differences_are_distances() {
         let at = |x: f64, px: f64, depth: f64| FilmObservation {
             tip_mm: [0.0, 0.0, -depth],
@@ -238,5 +324,9 @@ mod tests {
         assert!((found.depth_um - 2.0).abs() < 1e-9);
         assert!((found.space_um[0] - 5f64.sqrt()).abs() < 1e-9);
         assert_eq!(found.picture_px, [0.5, 0.5]);
+        let rebased = at(3.0, 8.0, 2.0).rebased(&at(1.0, 5.0, 1.0), &at(0.5, 4.0, 0.5));
+        assert_eq!(rebased.markers[0].moved_mm, [2.5, 0.0, 5.0]);
+        assert_eq!(rebased.markers[3].seen_px, [7.0, 10.0]);
+        assert_eq!(rebased.tip_mm[2], -1.5);
     }
 }

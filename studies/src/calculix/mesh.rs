@@ -1,7 +1,9 @@
 //! The film cut into CalculiX's quadratic elements: bricks through its thickness, or its shells.
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
+use hivtac_scene::MARKER_REST_MM;
 use hivtac_shell::Design;
 
 /// How fast elements grow away from tip and posts, mm per mm.
@@ -9,6 +11,9 @@ const GROWTH: f64 = 0.25;
 /// Elements' sides at fineness 1, mm: under the tip, at a post, and anywhere.
 const TIP_SIDE_MM: f64 = 0.25;
 const POST_SIDE_MM: f64 = 0.35;
+/// The same within a dot that stiffens the film, and its radius.
+const DOT_SIDE_MM: f64 = 0.15;
+const DOT_RADIUS_MM: f64 = 0.5;
 const LARGEST_SIDE_MM: f64 = 1.6;
 /// Steps along half an edge in which sides are summed up.
 const SAMPLES: usize = 4000;
@@ -61,10 +66,9 @@ pub enum Cut {
 pub struct Mesh {
     /// What the film is cut into.
     pub cut: Cut,
-    /// The film's thickness at rest, mm.
-    pub thickness_mm: f64,
+    /// Borders of elements on the flat mounted film, mm.
     breaks: [Vec<f64>; 2],
-    /// Where the nodes rest, mm.
+    /// Where the nodes are before the film is mounted, mm.
     pub nodes: Vec<[f64; 3]>,
     /// Each element's nodes, counted from 0, in CalculiX's order.
     pub elements: Vec<Vec<usize>>,
@@ -79,12 +83,11 @@ impl Mesh {
             .map(|tip| breaks(design, tip, fineness));
         let mut mesh = Mesh {
             cut,
-            thickness_mm: design.material.thickness_mm,
             breaks,
             nodes: Vec::new(),
             elements: Vec::new(),
         };
-        mesh.fill();
+        mesh.fill(design);
         mesh
     }
 
@@ -102,13 +105,13 @@ impl Mesh {
         [across, down, self.layers()]
     }
 
-    /// The nodes that move the point which rests at (x, y) mm, z mm above the middle surface, with
-    /// their weights.
-    pub fn place(&self, [x, y, z]: [f64; 3]) -> Vec<(usize, f64)> {
+    /// The nodes that move a point, with their weights: where it is on the flat mounted film, mm,
+    /// and what part of the thickness it is above the middle surface, −½ to ½.
+    pub fn place(&self, [x, y, side]: [f64; 3]) -> Vec<(usize, f64)> {
         let [across, _, layers] = self.counts();
         let (i, x) = within(&self.breaks[0], x);
         let (j, y) = within(&self.breaks[1], y);
-        let height = (z / self.thickness_mm + 0.5) * layers as f64;
+        let height = (side + 0.5) * layers as f64;
         let layer = (height.max(0.0) as usize).min(layers - 1);
         let point = [x, y, 2.0 * (height - layer as f64) - 1.0];
         let element = &self.elements[(j * across + i) * layers + layer];
@@ -118,6 +121,28 @@ impl Mesh {
         element.iter().copied().zip(weights).collect()
     }
 
+    /// Which elements are on a design's dots, and how many times larger they are together.
+    pub fn on_dots(&self, design: &Design) -> (Vec<bool>, f64) {
+        let [across, _, layers] = self.counts();
+        let mut area_mm2 = 0.0;
+        let on_dot = |element: usize| {
+            let column = element / layers;
+            let ends = [column % across, column / across];
+            let [x, y] = [0, 1].map(|axis| &self.breaks[axis][ends[axis]..ends[axis] + 2]);
+            let near = |[cx, cy]: &[f64; 2]| {
+                ((x[0] + x[1]) / 2.0 - cx).hypot((y[0] + y[1]) / 2.0 - cy) < DOT_RADIUS_MM
+            };
+            let on_dot = design.dots_mm.iter().any(near);
+            if on_dot {
+                area_mm2 += (x[1] - x[0]) * (y[1] - y[0]) / layers as f64;
+            }
+            on_dot
+        };
+        let on_dots = (0..self.elements.len()).map(on_dot).collect();
+        let discs_mm2 = PI * DOT_RADIUS_MM * DOT_RADIUS_MM * design.dots_mm.len() as f64;
+        (on_dots, area_mm2 / discs_mm2)
+    }
+
     fn layers(&self) -> usize {
         match self.cut {
             Cut::Bricks(layers) => layers,
@@ -125,7 +150,7 @@ impl Mesh {
         }
     }
 
-    fn fill(&mut self) {
+    fn fill(&mut self, design: &Design) {
         let mut known = HashMap::new();
         let [across, down, layers] = self.counts();
         for j in 0..down {
@@ -136,7 +161,7 @@ impl Mesh {
                             .map(|axis| 2 * [i, j, layer][axis] + (node[axis] + 1) as usize);
                         *known.entry(key).or_insert_with(|| {
                             self.nodes
-                                .push(rest(&self.breaks, self.cut, self.thickness_mm, key));
+                                .push(cut_place(&self.breaks, self.cut, design, key));
                             self.nodes.len() - 1
                         })
                     });
@@ -147,17 +172,20 @@ impl Mesh {
     }
 }
 
-/// Where the node at so many half elements along each axis rests, mm.
-fn rest(breaks: &[Vec<f64>; 2], cut: Cut, thickness_mm: f64, key: [usize; 3]) -> [f64; 3] {
+/// Where the node at so many half elements along each axis is before the film is mounted, mm.
+fn cut_place(breaks: &[Vec<f64>; 2], cut: Cut, design: &Design, key: [usize; 3]) -> [f64; 3] {
     let [x, y] = [0, 1].map(|axis| {
         let (at, breaks) = (key[axis], &breaks[axis]);
         (breaks[at / 2] + breaks[at.div_ceil(2)]) / 2.0
     });
     let z = match cut {
-        Cut::Bricks(layers) => thickness_mm * (key[2] as f64 / (2 * layers) as f64 - 0.5),
+        Cut::Bricks(layers) => {
+            design.thickness_mm_at([x, y]) * (key[2] as f64 / (2 * layers) as f64 - 0.5)
+        }
         Cut::Shells => 0.0,
     };
-    [x, y, z]
+    let [along_x, along_y] = design.stretch;
+    [x / (1.0 + along_x), y / (1.0 + along_y), z]
 }
 
 fn corners(cut: Cut) -> &'static [[i8; 3]] {
@@ -228,7 +256,12 @@ fn side_mm(design: &Design, tip_mm: f64, at_mm: f64) -> f64 {
     let beyond = |distance: f64, radius: f64| GROWTH * (distance.abs() - radius).max(0.0);
     let tip = TIP_SIDE_MM + beyond(at_mm - tip_mm, design.tip_radius_mm);
     let post = POST_SIDE_MM + beyond(at_mm.abs() - design.span_mm / 2.0, design.post_radius_mm);
-    tip.min(post).min(LARGEST_SIDE_MM)
+    let dot = if design.dot_stiffening == 0.0 {
+        LARGEST_SIDE_MM
+    } else {
+        DOT_SIDE_MM + beyond(at_mm.abs() - MARKER_REST_MM, DOT_RADIUS_MM)
+    };
+    tip.min(post).min(dot).min(LARGEST_SIDE_MM)
 }
 
 #[cfg(test)]
@@ -260,7 +293,7 @@ mod tests {
     #[test]
     fn weights_find_a_point_again() {
         for mesh in meshes() {
-            for at in [[3.1, -0.9, 0.0], [-14.0, 14.0, -0.25], [13.3, 0.2, 0.25]] {
+            for at in [[3.1, -0.9, 0.0], [-14.0, 14.0, -0.5], [13.3, 0.2, 0.5]] {
                 let sum = |of: &dyn Fn(&[f64; 3]) -> f64| -> f64 {
                     let place = mesh.place(at);
                     place
@@ -273,9 +306,48 @@ mod tests {
                 assert!((sum(&|node| node[1]) - at[1]).abs() < 1e-10);
                 assert!((sum(&|node| node[0] * node[1]) - at[0] * at[1]).abs() < 1e-8);
                 if mesh.cut != Cut::Shells {
-                    assert!((sum(&|node| node[2]) - at[2]).abs() < 1e-12);
+                    assert!((sum(&|node| node[2]) - 0.5 * at[2]).abs() < 1e-12);
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_mounted_film_is_cut_smaller_and_as_thick_as_it_says() {
+        let design = Design {
+            stretch: [0.03, 0.0],
+            thickness_slope: [0.1, 0.0],
+            thickness_curve: [0.0, 0.05, 0.0],
+            ..Design::default()
+        };
+        let mesh = Mesh::new(&design, Cut::Bricks(1), 0.5);
+        let (x, y) = (5.0, -7.0);
+        let place = |side: f64| {
+            let place = mesh.place([x, y, side]);
+            [0, 1, 2].map(|axis| -> f64 {
+                let parts = place
+                    .iter()
+                    .map(|(node, part)| part * mesh.nodes[*node][axis]);
+                parts.sum()
+            })
+        };
+        let [across, down, up] = place(0.5);
+        assert!((across - x / 1.03).abs() < 1e-10 && (down - y).abs() < 1e-10);
+        let thick = up - place(-0.5)[2];
+        let (a, b) = (x / 14.0, y / 14.0);
+        assert!((thick - 0.5 * (1.0 + 0.1 * a + 0.05 * a * b)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn elements_on_dots_are_about_as_large_as_they() {
+        let design = Design {
+            dot_stiffening: 1.0,
+            ..Design::default()
+        };
+        let mesh = Mesh::new(&design, Cut::Bricks(1), 0.7);
+        let (on_dots, larger) = mesh.on_dots(&design);
+        let count = on_dots.iter().filter(|on_dot| **on_dot).count();
+        assert!(count >= 4 * 12, "{count}");
+        assert!((larger - 1.0).abs() < 0.2, "{larger}");
     }
 }

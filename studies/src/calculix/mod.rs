@@ -3,13 +3,14 @@
 mod compare;
 mod deck;
 mod mesh;
+mod mounted;
 mod page;
 mod presses;
 mod program;
 mod results;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -26,16 +27,25 @@ use presses::{BASE, FAINT, PRESSES, Press, RUBBER, VARIANTS, VARIED, Variant};
 use program::Program;
 use results::Pressed;
 
+pub use mounted::MountedFilms;
+
 /// What to compare, and where the page goes.
 #[derive(Args)]
 pub struct Calculix {
     /// The page to write.
     #[arg(long, default_value = "docs/results/calculix.md")]
     out: PathBuf,
+    #[command(flatten)]
+    solver: Solver,
+}
+
+/// How CalculiX is run.
+#[derive(Args)]
+struct Solver {
     /// CalculiX's program.
     #[arg(long, default_value = "ccx")]
     ccx: PathBuf,
-    /// Presses that CalculiX works on at a time.
+    /// Films that CalculiX works on at a time.
     #[arg(long, default_value_t = 2)]
     threads: usize,
     /// How fine CalculiX's mesh is; 2: elements of half the sides.
@@ -89,17 +99,13 @@ impl Calculix {
     /// When CalculiX is not installed, the project's film finds no equilibrium, or the page cannot
     /// be written.
     pub fn run(self) -> Result<()> {
-        let program = Program {
-            ccx: self.ccx.clone(),
-            keep: self.keep.clone(),
-        };
+        let program = self.solver.program();
         let version = program.version()?;
-        let camera = paper_camera()?;
         let study = Study {
             program,
-            camera,
-            fineness: self.fineness,
-            threads: self.threads,
+            camera: paper_camera()?,
+            fineness: self.solver.fineness,
+            threads: self.solver.threads,
         };
         let page = Page {
             version,
@@ -107,13 +113,25 @@ impl Calculix {
             varied: study.vary()?,
         };
         println!("{}", page.tables()?);
-        if let Some(folder) = self.out.parent() {
-            fs::create_dir_all(folder)?;
+        write_page(&self.out, &page.text()?)
+    }
+}
+
+fn write_page(out: &Path, text: &str) -> Result<()> {
+    if let Some(folder) = out.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::write(out, text).with_context(|| format!("cannot write {}", out.display()))?;
+    println!("wrote {}", out.display());
+    Ok(())
+}
+
+impl Solver {
+    fn program(&self) -> Program {
+        Program {
+            ccx: self.ccx.clone(),
+            keep: self.keep.clone(),
         }
-        fs::write(&self.out, page.text()?)
-            .with_context(|| format!("cannot write {}", self.out.display()))?;
-        println!("wrote {}", self.out.display());
-        Ok(())
     }
 }
 
@@ -192,42 +210,10 @@ impl Study {
         Ok(compare::seen(film, &state, &self.camera))
     }
 
-    /// Every job by CalculiX, in the jobs' order, several at a time.
     fn solve_all(&self, jobs: &[Job]) -> Vec<Result<Solved, String>> {
-        let next = AtomicUsize::new(0);
-        let take = || {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            jobs.get(index).map(|job| (index, job))
-        };
-        let worker = || {
-            let taken = std::iter::from_fn(take);
-            taken
-                .map(|(index, job)| (index, self.timed(job)))
-                .collect::<Vec<_>>()
-        };
-        let mut all: Vec<_> = std::thread::scope(|scope| {
-            let handles: Vec<_> = (0..self.threads.max(1))
-                .map(|_| scope.spawn(worker))
-                .collect();
-            handles
-                .into_iter()
-                .flat_map(|handle| handle.join().unwrap_or_default())
-                .collect()
-        });
-        all.sort_by_key(|(index, _)| *index);
-        all.into_iter().map(|(_, solved)| solved).collect()
-    }
-
-    /// One job, told on the terminal.
-    fn timed(&self, job: &Job) -> Result<Solved, String> {
-        let begin = Instant::now();
-        let solved = self.solve(job).map_err(|error| format!("{error:#}"));
-        let seconds = begin.elapsed().as_secs_f64();
-        match &solved {
-            Ok(_) => eprintln!("{}: {seconds:.0} s", job.name()),
-            Err(why) => eprintln!("{}: {seconds:.0} s, {why}", job.name()),
-        }
-        solved
+        in_order(self.threads, jobs, |job| {
+            timed(&job.name(), || self.solve(job))
+        })
     }
 
     fn solve(&self, job: &Job) -> Result<Solved> {
@@ -244,36 +230,88 @@ impl Study {
             mesh: &mesh,
             law,
             force_n: job.press.force_n,
+            sizes: &[1.0],
         };
         let results = self.program.run(&job.name(), &deck.text())?;
-        let pressed = Pressed::read(&mesh, &results)?;
+        let pressed = Pressed::read(&mesh, &results, 1.0)?;
         let places = [job.press.place_mm, [MARKER_REST_MM; 2]];
         Ok(Solved {
-            seen: self.seen(&design, &pressed),
+            seen: seen(&design, &pressed, &self.camera, |_| {
+                design.material.thickness_mm / 2.0
+            }),
             thickness_mm: places.map(|place| pressed.thickness_mm(place)),
             elements: mesh.counts(),
             nodes: mesh.nodes.len(),
         })
     }
+}
 
-    fn seen(&self, design: &Design, pressed: &Pressed<'_>) -> FilmObservation {
-        let mut tip_mm = [0.0; 3];
-        for ([x, y], share) in design.tip_points() {
-            for (sum, part) in tip_mm.iter_mut().zip(pressed.at([x, y, 0.0])) {
-                *sum += share * part;
-            }
+/// Every job's result, in the jobs' order, several at a time.
+fn in_order<J: Sync, T: Send>(threads: usize, jobs: &[J], work: impl Fn(&J) -> T + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let take = || {
+        let index = next.fetch_add(1, Ordering::Relaxed);
+        jobs.get(index).map(|job| (index, job))
+    };
+    let worker = || {
+        let taken = std::iter::from_fn(take);
+        taken
+            .map(|(index, job)| (index, work(job)))
+            .collect::<Vec<_>>()
+    };
+    let mut all: Vec<_> = std::thread::scope(|scope| {
+        let handles: Vec<_> = (0..threads.max(1)).map(|_| scope.spawn(worker)).collect();
+        handles
+            .into_iter()
+            .flat_map(|handle| handle.join().unwrap_or_default())
+            .collect()
+    });
+    all.sort_by_key(|(index, _)| *index);
+    all.into_iter().map(|(_, solved)| solved).collect()
+}
+
+/// What a job gives, and how long it took, told on the terminal.
+fn timed<T>(name: &str, job: impl FnOnce() -> Result<T>) -> Result<T, String> {
+    let begin = Instant::now();
+    let solved = job().map_err(|error| format!("{error:#}"));
+    let seconds = begin.elapsed().as_secs_f64();
+    match &solved {
+        Ok(_) => eprintln!("{name}: {seconds:.0} s"),
+        Err(why) => eprintln!("{name}: {seconds:.0} s, {why}"),
+    }
+    solved
+}
+
+/// What is compared of CalculiX's film, whose camera side is so far below the middle surface where
+/// the film is flat and mounted, mm.
+fn seen(
+    design: &Design,
+    pressed: &Pressed<'_>,
+    camera: &Camera,
+    half_mm: impl Fn([f64; 2]) -> f64,
+) -> FilmObservation {
+    let mut tip_mm = [0.0; 3];
+    for ([x, y], share) in design.tip_points() {
+        let [to_x, to_y, to_z] = pressed.at([x, y, 0.0]);
+        for (sum, part) in tip_mm.iter_mut().zip([to_x - x, to_y - y, to_z]) {
+            *sum += share * part;
         }
-        FilmObservation {
-            tip_mm,
-            markers: markers_on(|rest| pressed.camera_side(rest), &self.camera),
-        }
+    }
+    let camera_side = |place| pressed.camera_side(place, half_mm(place));
+    FilmObservation {
+        tip_mm,
+        markers: markers_on(camera_side, camera),
     }
 }
 
 impl Job {
     /// A name for a folder.
     fn name(&self) -> String {
-        let words = format!("{} {}", self.press.name, self.variant.name);
-        words.replace(|letter: char| !letter.is_alphanumeric(), "-")
+        folder(&format!("{} {}", self.press.name, self.variant.name))
     }
+}
+
+/// A folder's name of words.
+fn folder(words: &str) -> String {
+    words.replace(|letter: char| !letter.is_alphanumeric(), "-")
 }

@@ -254,7 +254,7 @@ fn against(own: &FilmObservation, other: &FilmObservation) -> String {
 }
 
 /// The largest of several, and the root mean square of as many root mean squares.
-fn overall(found: impl Iterator<Item = [f64; 2]> + Clone) -> [f64; 2] {
+pub fn overall(found: impl Iterator<Item = [f64; 2]> + Clone) -> [f64; 2] {
     let [largest, _] = largest_and_rms(found.clone().map(|[largest, _]| largest));
     let [_, rms] = largest_and_rms(found.map(|[_, rms]| rms));
     [largest, rms]
@@ -269,14 +269,15 @@ fn list(numbers: &[f64], digits: usize) -> String {
 }
 
 /// Why there is no result, in a cell.
-fn short(why: &str) -> &'static str {
+pub fn short(why: &str) -> &'static str {
     if why.contains("increment size smaller than minimum") {
         return "no equilibrium";
     }
     "CalculiX failed"
 }
 
-fn row(text: &mut String, cells: std::fmt::Arguments<'_>) {
+/// Writes a table's row.
+pub fn row(text: &mut String, cells: std::fmt::Arguments<'_>) {
     // Writing to a string never fails.
     let _ = writeln!(text, "| {cells} |");
 }

@@ -51,7 +51,7 @@ pub const FAINT: Press = press("faint", [0.0, 0.0, -2e-5], [0.0, 0.0]);
 /// The film that is compared at every press.
 pub const BASE: Variant = variant("as compared", Cut::Bricks(1), Law::StVenant, 1.0);
 /// Rubber as it thins, at every press, too.
-pub const RUBBER: Variant = variant("neo-Hooke", Cut::Bricks(1), Law::NeoHooke, 1.0);
+pub const RUBBER: Variant = variant("neo-Hooke", Cut::Bricks(1), Law::Rubber(0.0), 1.0);
 /// Variations at a few presses.
 pub const VARIANTS: [Variant; 7] = [
     BASE,
@@ -86,7 +86,7 @@ pub const VARIANTS: [Variant; 7] = [
 pub const VARIED: [usize; 2] = [0, 3];
 
 /// How many times stiffer a film is against what it is to do without.
-const STIFFER: f64 = 100.0;
+pub const STIFFER: f64 = 100.0;
 
 const fn press(name: &'static str, force_n: [f64; 3], place_mm: [f64; 2]) -> Press {
     Press {

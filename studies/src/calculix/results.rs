@@ -1,8 +1,11 @@
 //! What CalculiX printed: where its nodes went.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 
 use super::mesh::{Cut, Mesh};
+
+/// CalculiX writes times with seven digits.
+const SAME_TIME: f64 = 1e-6;
 
 /// A line above each table of displacements.
 const TABLE: &str = "displacements (vx,vy,vz)";
@@ -10,31 +13,46 @@ const TABLE: &str = "displacements (vx,vy,vz)";
 /// Half the distance over which a shell's slope is taken, mm.
 const SLOPE_STEP_MM: f64 = 1e-3;
 
-/// A film as CalculiX left it.
+/// A film as CalculiX left it at the end of a step.
 pub struct Pressed<'a> {
     mesh: &'a Mesh,
     moved_mm: Vec<[f64; 3]>,
 }
 
 impl<'a> Pressed<'a> {
-    /// Reads the displacements at the end of the step out of a `.dat` file's text.
+    /// The film before the first step.
+    pub fn cut(mesh: &'a Mesh) -> Pressed<'a> {
+        let moved_mm = vec![[0.0; 3]; mesh.nodes.len()];
+        Pressed { mesh, moved_mm }
+    }
+
+    /// Reads the displacements at a time, a step's end, out of a `.dat` file's text.
     ///
     /// # Errors
     /// When the step did not come to its end, or a node of the mesh is not in the table.
-    pub fn read(mesh: &'a Mesh, text: &str) -> Result<Pressed<'a>> {
-        let start = text
-            .rfind(TABLE)
-            .context("no displacements in CalculiX's results")?;
-        let mut lines = text[start..].lines();
-        let title = lines.next().unwrap_or_default();
-        let time: f64 = title.rsplit(' ').next().unwrap_or_default().parse()?;
-        ensure!(
-            time == 1.0,
-            "CalculiX stopped after {:.0} % of the step",
-            100.0 * time
-        );
+    pub fn read(mesh: &'a Mesh, text: &str, end: f64) -> Result<Pressed<'a>> {
+        let mut reached = None;
+        let mut rest = text;
+        let mut lines = loop {
+            let Some(start) = rest.find(TABLE) else {
+                let time: f64 = reached.context("no displacements in CalculiX's results")?;
+                bail!("CalculiX stopped at {time} of {end} steps");
+            };
+            let mut lines = rest[start..].lines();
+            let title = lines.next().unwrap_or_default();
+            let time: f64 = title.rsplit(' ').next().unwrap_or_default().parse()?;
+            if (time - end).abs() < SAME_TIME {
+                break lines.take_while(|line| !line.contains(TABLE));
+            }
+            reached = Some(time);
+            rest = &rest[start + TABLE.len()..];
+        };
         let mut moved_mm = vec![None; mesh.nodes.len()];
-        for line in lines.map(str::trim).filter(|line| !line.is_empty()) {
+        for line in lines
+            .by_ref()
+            .map(str::trim)
+            .filter(|line| !line.is_empty())
+        {
             let (node, moved) = row(line)?;
             match moved_mm.get_mut(node.wrapping_sub(1)) {
                 Some(place) => *place = Some(moved),
@@ -46,43 +64,45 @@ impl<'a> Pressed<'a> {
         Ok(Pressed { mesh, moved_mm })
     }
 
-    /// How the point moves that rests at (x, y) mm, z mm above the middle surface, mm.
+    /// Where a point is, mm: on the flat mounted film at (x, y) mm, and what part of the thickness
+    /// above the middle surface it is.
     pub fn at(&self, place: [f64; 3]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (node, weight) in self.mesh.place(place) {
-            for (total, part) in sum.iter_mut().zip(self.moved_mm[node]) {
-                *total += weight * part;
+            let (from, moved) = (self.mesh.nodes[node], self.moved_mm[node]);
+            for axis in 0..3 {
+                sum[axis] += weight * (from[axis] + moved[axis]);
             }
         }
         sum
     }
 
-    /// How the point of the camera's side moves that rests at (x, y) mm, mm. Shells carry it on
-    /// their normal.
-    pub fn camera_side(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        let half = self.mesh.thickness_mm / 2.0;
-        if self.mesh.cut != Cut::Shells {
-            return self.at([x, y, -half]);
-        }
-        let [a, b] = [[SLOPE_STEP_MM, 0.0], [0.0, SLOPE_STEP_MM]].map(|[dx, dy]| {
-            let (to, from) = (
-                self.at([x + dx, y + dy, 0.0]),
-                self.at([x - dx, y - dy, 0.0]),
-            );
-            [0, 1, 2].map(|axis| 2.0 * [dx, dy, 0.0][axis] + to[axis] - from[axis])
-        });
-        let n = cross(a, b);
-        let length = n[0].hypot(n[1]).hypot(n[2]);
-        let middle = self.at([x, y, 0.0]);
-        [0, 1, 2].map(|axis| middle[axis] + half * ([0.0, 0.0, 1.0][axis] - n[axis] / length))
+    /// How the point of the camera's side is displaced from the flat mounted film's, which is half
+    /// a thickness (mm) below its middle surface, mm. Shells carry it on their normal.
+    pub fn camera_side(&self, [x, y]: [f64; 2], half_mm: f64) -> [f64; 3] {
+        let [to_x, to_y, to_z] = if self.mesh.cut == Cut::Shells {
+            let [a, b] = [[SLOPE_STEP_MM, 0.0], [0.0, SLOPE_STEP_MM]].map(|[dx, dy]| {
+                let (to, from) = (
+                    self.at([x + dx, y + dy, 0.0]),
+                    self.at([x - dx, y - dy, 0.0]),
+                );
+                [0, 1, 2].map(|axis| to[axis] - from[axis])
+            });
+            let n = cross(a, b);
+            let length = n[0].hypot(n[1]).hypot(n[2]);
+            let middle = self.at([x, y, 0.0]);
+            [0, 1, 2].map(|axis| middle[axis] - half_mm * n[axis] / length)
+        } else {
+            self.at([x, y, -0.5])
+        };
+        [to_x - x, to_y - y, to_z + half_mm]
     }
 
-    /// How far apart the film's two faces are at a place, mm; shells keep their thickness.
+    /// How far apart the film's two faces are at a place, mm; nothing of shells.
     pub fn thickness_mm(&self, [x, y]: [f64; 2]) -> f64 {
-        let at_rest = self.mesh.thickness_mm;
-        let [top, bottom] = [0.5, -0.5].map(|side| self.at([x, y, side * at_rest]));
+        let [top, bottom] = [0.5, -0.5].map(|side| self.at([x, y, side]));
         let [dx, dy, dz] = [0, 1, 2].map(|axis| top[axis] - bottom[axis]);
-        dx.hypot(dy).hypot(dz + at_rest)
+        dx.hypot(dy).hypot(dz)
     }
 }
 
@@ -139,9 +159,9 @@ mod tests {
     }
 
     #[test]
-    fn the_last_table_is_read() {
+    fn the_table_of_a_time_is_read() {
         let mesh = mesh(5);
-        let pressed = Pressed::read(&mesh, PRINTED).unwrap();
+        let pressed = Pressed::read(&mesh, PRINTED, 1.0).unwrap();
         assert_eq!(
             pressed.moved_mm[0],
             [-1.234485e-4, -1.266214e-4, 1.419579e-4]
@@ -159,7 +179,7 @@ mod tests {
     #[test]
     fn what_is_not_whole_is_refused() {
         let why = |nodes, text: &str| {
-            Pressed::read(&mesh(nodes), text)
+            Pressed::read(&mesh(nodes), text, 1.0)
                 .err()
                 .map(|why| why.to_string())
                 .unwrap()
@@ -168,6 +188,7 @@ mod tests {
         assert!(why(4, PRINTED).contains("node 5"));
         assert!(why(5, "").contains("no displacements"));
         let stopped = PRINTED.replace("0.1000000E+01", "0.9000000E+00");
-        assert!(why(5, &stopped).contains("stopped after 90 %"));
+        assert!(why(5, &stopped).contains("stopped at 0.9 of 1 steps"));
+        assert!(Pressed::read(&mesh(1), PRINTED, 0.5).is_ok());
     }
 }
