@@ -202,7 +202,7 @@ mod tests {
         let (usual, known) = fitted(&loads);
         for (number, load) in loads.iter_mut().enumerate() {
             for (k, part) in load.seen_px.as_flattened_mut().iter_mut().enumerate() {
-                *part += [0.012, -0.012][(number * 8 + k) * (number + 3) % 5 / 3];
+                *part += [0.04, -0.04][(number * 8 + k) * (number + 3) % 5 / 3];
             }
         }
         let (scattered, less) = fitted(&loads);

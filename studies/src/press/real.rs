@@ -89,11 +89,6 @@ impl RealFilm {
         })
     }
 
-    /// What it was made from.
-    pub fn design(&self) -> &Design {
-        self.film.design()
-    }
-
     /// The film under a load.
     ///
     /// # Errors

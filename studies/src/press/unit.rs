@@ -95,11 +95,6 @@ impl TestedUnit {
         })
     }
 
-    /// Its film, where it is not the scene's.
-    pub fn real_film(&self) -> Option<&RealFilm> {
-        self.real.as_ref()
-    }
-
     /// A frame under a press; the number selects its noise.
     ///
     /// # Errors
