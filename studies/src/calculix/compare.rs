@@ -165,8 +165,8 @@ pub fn read(
     anyhow::bail!("no press of the film comes nearest to the markers")
 }
 
-/// The factor by which forces are to be scaled so that the film comes nearest to the markers seen in
-/// all presses together, by Gauss–Newton from 1.
+/// The factor by which forces are to be scaled so that the film comes nearest to the markers seen
+/// in all presses together, by Gauss–Newton from 1.
 ///
 /// # Errors
 /// When the film finds no equilibrium on the way, or the steps do not end.

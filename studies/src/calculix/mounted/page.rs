@@ -66,8 +66,8 @@ impl Page {
     fn presses(&self, stiff_across: bool) -> String {
         let mut text = String::from(
             "| film | tip's way under the largest force, mm: own | CalculiX | \
-             markers move, px rms | apart under each force, µm rms | px rms | one factor on \\|F\\| \
-             leaves, px: largest, rms | factor |\n\
+             markers move, px rms | apart under each force, µm rms | px rms | one factor on \
+             \\|F\\| leaves, px: largest, rms | factor |\n\
              |---|--:|--:|--:|---|---|---|--:|\n",
         );
         let films = self.films.iter();
