@@ -121,15 +121,18 @@ fn check_unit(loads: &[SeenLoad], rough: &[RoughLoad]) -> Result<()> {
     Ok(())
 }
 
-/// How far places are apart, but for their mean: a stage's zero is anywhere.
+/// How far places are apart, but for their median: a stage's zero is anywhere.
 fn apart(noted: &[[f64; 2]], found: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let off: Vec<[f64; 2]> = (noted.iter().zip(found))
         .map(|(a, b)| [a[0] - b[0], a[1] - b[1]])
         .collect();
-    let count = off.len() as f64;
-    let mean = [0, 1].map(|i| off.iter().map(|off| off[i]).sum::<f64>() / count);
+    let median = [0, 1].map(|i| {
+        let mut parts: Vec<f64> = off.iter().map(|off| off[i]).collect();
+        parts.sort_by(f64::total_cmp);
+        parts[parts.len() / 2]
+    });
     off.iter()
-        .map(|off| [off[0] - mean[0], off[1] - mean[1]])
+        .map(|off| [off[0] - median[0], off[1] - median[1]])
         .collect()
 }
 
