@@ -162,8 +162,7 @@ impl Scene {
     }
 
     /// A frame of a film that somebody else pressed, such as finite elements; the number selects
-    /// its
-    /// noise, and the load is what the frame's truth says. The film's markers are those of this
+    /// its noise, and the load is what the frame's truth says. The film's markers are those of this
     /// scene.
     pub fn render_pressed(&self, pressed: Pressed, load: &Load, number: u64) -> Frame {
         let shutter = Shutter::default();

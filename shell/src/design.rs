@@ -83,8 +83,7 @@ pub struct Design {
     /// many cells can be started from each other's states.
     pub cells: Option<usize>,
     /// Points along a side of a cell at which the film is summed: 3, or 2, which takes half the
-    /// time
-    /// and is as near to a finer mesh's solution.
+    /// time and is as near to a finer mesh's solution.
     pub gauss_points: usize,
 }
 

@@ -25,8 +25,8 @@ pub enum Contact {
     /// force.
     Travel([f64; 3]),
     /// From the film at rest it moves along a direction (of any length) with the film stuck to it,
-    /// until the force along
-    /// that direction is `force_n`, as a gauge on a stage reads it: the `stick` reading.
+    /// until the force along that direction is `force_n`, as a gauge on a stage reads it: the
+    /// `stick` reading.
     Stick {
         /// Where the tip moves; its third part < 0.
         direction: [f64; 3],
@@ -202,6 +202,28 @@ impl Film {
             radius_mm,
         };
         self.press_tip(tip, contact, start)
+    }
+
+    /// The film under a force, N, of a tip of its design's radius at a point of it, mm: found from
+    /// a state nearby, or else from rest.
+    ///
+    /// # Errors
+    /// As [`Film::press_at`].
+    pub fn press_force(
+        &self,
+        place_mm: [f64; 2],
+        force_n: [f64; 3],
+        start: &Equilibrium,
+    ) -> Result<Equilibrium, ShellError> {
+        let from = |start: &Equilibrium| {
+            self.press_at(
+                place_mm,
+                self.design.tip_radius_mm,
+                Contact::Force(force_n),
+                start,
+            )
+        };
+        from(start).or_else(|_| from(&self.rest()))
     }
 
     fn press_tip(

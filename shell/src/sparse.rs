@@ -152,8 +152,7 @@ impl Pattern {
     }
 
     /// The unknowns of the coefficients in a rectangle (from, end along each side), so that two
-    /// that
-    /// do not meet are kept apart by others that come after both.
+    /// that do not meet are kept apart by others that come after both.
     fn dissect(&self, [i, k]: [usize; 2], [j, l]: [usize; 2], order: &mut Vec<usize>) {
         let (wide, high) = (k - i, l - j);
         if wide.max(high) < 2 * REACH + LEAF {

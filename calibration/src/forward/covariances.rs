@@ -1,17 +1,15 @@
 //! What a film's tables leave of how a unit's images move: covariances at even places and sizes.
 
-use anyhow::Result;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
 use hivtac_sensing::forward::EQUATIONS;
 use hivtac_sensing::model::CovarianceSpec;
-use rayon::prelude::*;
 
 use super::matrix::cholesky;
 
 /// Places go to so many mm either way.
 const END_MM: f64 = 4.2;
-/// Knots along the size, along y and along x.
-const KNOTS: [u8; 3] = [5, 5, 5];
+/// Knots along the size, along y and along x, of a unit that was calibrated.
+pub const KNOTS: [u8; 3] = [5, 5, 5];
 /// The same where covariances do not depend on the place.
 const ANYWHERE: [u8; 3] = [5, 2, 2];
 
@@ -34,70 +32,8 @@ pub fn sum_of_squares(differences: &[Moved]) -> Covariance {
     sum
 }
 
-/// Covariances as a model file has them, each of straight loads of a size at a place.
-///
-/// # Errors
-/// When one of them cannot be had.
-pub fn covariances(at: impl Fn(&Pose) -> Result<Covariance> + Sync) -> Result<CovarianceSpec> {
-    grid(KNOTS, at)
-}
-
-/// The loads of the knots of [`covariances`], in a file's order.
-pub fn knots() -> impl Iterator<Item = Pose> {
-    poses(KNOTS)
-}
-
-/// Covariances that are known at the [`knots`], as a model file has them.
-pub fn covariances_of(knots: Vec<Covariance>) -> CovarianceSpec {
-    spec_of(KNOTS, knots)
-}
-
-/// The same of so many knots along the size, along y and along x.
-pub fn spec_of(counts: [u8; 3], knots: Vec<Covariance>) -> CovarianceSpec {
-    CovarianceSpec {
-        factors: knots.iter().map(factor).collect(),
-        counts,
-        end_mm: END_MM as f32,
-    }
-}
-
-/// The loads of so many knots, in a file's order.
-pub fn knots_of(counts: [u8; 3]) -> impl Iterator<Item = Pose> {
-    poses(counts)
-}
-
-/// Independent errors of every coordinate, everywhere the same, that grow with the size: so large,
-/// focal lengths, at the largest.
-pub fn even(largest: f64) -> CovarianceSpec {
-    let at = |pose: &Pose| {
-        let mut covariance = Covariance::default();
-        for (k, row) in covariance.iter_mut().enumerate() {
-            row[k] = (largest * pose.size / LARGEST_SIZE).powi(2);
-        }
-        covariance
-    };
-    CovarianceSpec {
-        factors: poses(ANYWHERE).map(|pose| factor(&at(&pose))).collect(),
-        counts: ANYWHERE,
-        end_mm: END_MM as f32,
-    }
-}
-
-fn grid(
-    counts: [u8; 3],
-    at: impl Fn(&Pose) -> Result<Covariance> + Sync,
-) -> Result<CovarianceSpec> {
-    let poses: Vec<Pose> = poses(counts).collect();
-    let factors = poses.par_iter().map(|pose| Ok(factor(&at(pose)?)));
-    Ok(CovarianceSpec {
-        factors: factors.collect::<Result<_>>()?,
-        counts,
-        end_mm: END_MM as f32,
-    })
-}
-
-/// The loads of the knots.
-fn poses([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
+/// The loads of so many knots along the size, along y and along x, straight, in a file's order.
+pub fn knots([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
     let along = |k: u8, count: u8| f64::from(k) / f64::from(count - 1);
     let place = move |k: u8, count: u8| END_MM * (2.0 * along(k, count) - 1.0);
     let of_size = move |i: u8| {
@@ -111,6 +47,29 @@ fn poses([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
         (0..lines).flat_map(of_line)
     };
     (0..sizes).flat_map(of_size)
+}
+
+/// Covariances that are known at so many [`knots`], as a model file has them.
+pub fn covariances(counts: [u8; 3], knots: &[Covariance]) -> CovarianceSpec {
+    CovarianceSpec {
+        factors: knots.iter().map(factor).collect(),
+        counts,
+        end_mm: END_MM as f32,
+    }
+}
+
+/// Independent errors of every coordinate, everywhere the same, that grow with the size: so large,
+/// focal lengths, at the largest.
+pub fn even(largest: f64) -> CovarianceSpec {
+    let at = |pose: &Pose| {
+        let mut covariance = Covariance::default();
+        for (k, row) in covariance.iter_mut().enumerate() {
+            row[k] = (largest * pose.size / LARGEST_SIZE).powi(2);
+        }
+        covariance
+    };
+    let all: Vec<Covariance> = knots(ANYWHERE).map(|pose| at(&pose)).collect();
+    covariances(ANYWHERE, &all)
 }
 
 fn factor(covariance: &Covariance) -> Covariance {
@@ -134,7 +93,8 @@ mod tests {
             })
         };
         let truth = |pose: &Pose| sum_of_squares(&[0, 5, 9].map(|k| wave(k, pose)));
-        let spec = covariances(|pose| Ok(truth(pose))).unwrap();
+        let all: Vec<Covariance> = knots(KNOTS).map(|pose| truth(&pose)).collect();
+        let spec = covariances(KNOTS, &all);
         let mut bytes = Vec::new();
         spec.push(&mut bytes);
         let grid = CovarianceGrid::new(spec.counts, spec.end_mm, &bytes[8..]).unwrap();

@@ -7,7 +7,7 @@ use hivtac_sensing::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
 use hivtac_sensing::model::{TableSpec, TablesSpec};
 
 use super::matrix::{Matrix, cholesky, principal};
-use super::nearest::splines;
+use super::nearest::{self, splines};
 
 /// Loads by which components are judged: so many sizes, evenly from nothing to the largest, and
 /// directions of each, so many at each part of the largest tilt, as many as cover it evenly. Weak
@@ -21,9 +21,8 @@ pub struct Sampled {
     /// The nodes along x and along y, mm of the tip's place, growing; 6 to 16 each.
     pub nodes_mm: [Vec<f64>; 2],
     /// The direction, of length one, along which the first part of the terms' tilt is; the second
-    /// is
-    /// across it, from x towards y. Markers that see the load alike, each from its own side, need
-    /// few functions.
+    /// is across it, from x towards y. Markers that see the load alike, each from its own side,
+    /// need few functions.
     pub away: [f64; 2],
     /// By node along y and node along x: coefficients of the terms, of motion along x and of motion
     /// along y, focal lengths.
@@ -128,7 +127,7 @@ fn apart(mut matrix: Matrix, odd: &[bool]) -> Matrix {
 fn table(dot: &Sampled, metric: &[Vec<f64>], kept: &[&[f64]]) -> Result<TableSpec> {
     let at = |outputs: &[Vec<f64>; OUTPUTS]| -> Vec<f64> {
         let outputs = outputs.iter().map(|row| along(metric, row));
-        let parts = outputs.flat_map(|row| kept.iter().map(move |own| dot_product(own, &row)));
+        let parts = outputs.flat_map(|row| kept.iter().map(move |own| nearest::dot(own, &row)));
         parts.collect()
     };
     let line = |line: &Vec<_>| line.iter().map(at).collect();
@@ -237,8 +236,4 @@ fn add_square(sum: &mut [Vec<f64>], row: &[f64], part: f64) {
             *sum += part * a * b;
         }
     }
-}
-
-fn dot_product(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -25,8 +25,9 @@ use serde::{Deserialize, Serialize};
 use crate::unit_fit::OwnFilm;
 use crate::weights::Weights;
 use covariances::even;
-pub use covariances::{Covariance, Moved, covariances, covariances_of, knots};
+pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 pub use functions::{Sampled, compressed};
+pub(crate) use nearest::{Nearest, cubic_law, dot};
 pub use noise::Noise;
 pub use others::OtherUnits;
 pub use tables::{Dot, UnitSetup, tables};
@@ -47,8 +48,7 @@ pub struct FilmModel {
     /// How many times that it is when the marker is four times as large.
     pub noise_at_four_areas: [f64; 2],
     /// What the chip's tables leave of each coordinate of a marker under the largest force,
-    /// standard
-    /// uncertainty, px at 320×240; less in parts of the size under smaller ones.
+    /// standard uncertainty, px at 320×240; less in parts of the size under smaller ones.
     #[serde(default)]
     pub beside_px: f64,
     /// What is known of other units' films.
@@ -90,8 +90,7 @@ impl FilmModel {
     }
 
     /// With what is known of other units: films as people mount them, solved by finite elements.
-    /// Takes
-    /// minutes.
+    /// This takes minutes.
     ///
     /// # Errors
     /// When a number is out of range, or films find no equilibrium.
@@ -146,15 +145,18 @@ impl FilmModel {
     /// When a number is out of range.
     pub fn spec(&self) -> Result<ForwardSpec> {
         self.check()?;
-        // Tables are in focal lengths: all cameras have this lens.
-        let camera = Camera::new(Preset::Ov7725, 320, 240)?;
-        let nominal = nominal(&camera)?;
         let noise = forward::Noise {
             rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
             at_rest_px: self.noise_px.map(|part| part as f32),
             at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
         };
-        let spec = ForwardSpec {
+        // Tables are in focal lengths: all cameras have this lens.
+        let camera = Camera::new(Preset::Ov7725, 320, 240)?;
+        if let Some(own) = &self.own {
+            return own.spec(self.steps, noise, &camera);
+        }
+        let nominal = nominal(&camera)?;
+        Ok(ForwardSpec {
             steps: self.steps,
             limits: limits(),
             stiffness: nominal.stiffness,
@@ -164,11 +166,7 @@ impl FilmModel {
             tables: nominal.tables,
             own: (self.beside_px > 0.0).then(|| even(self.beside_px / FOCAL_PX)),
             other: self.others.as_deref().map(OtherUnits::spec),
-        };
-        match &self.own {
-            None => Ok(spec),
-            Some(own) => own.spec(spec),
-        }
+        })
     }
 }
 
@@ -199,7 +197,7 @@ fn nominal(camera: &Camera) -> Result<Nominal> {
     Ok(nominal)
 }
 
-fn limits() -> Limits {
+pub(crate) fn limits() -> Limits {
     Limits {
         size: LARGEST_SIZE as f32,
         tilt: LARGEST_TILT as f32,
@@ -214,11 +212,16 @@ fn parsed(bytes: &[u8]) -> Result<forward::Forward<'_>> {
 
 /// Where markers at these places, mm, are seen at rest, focal lengths from the axis.
 fn at_rest(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> [[f64; 2]; DOTS] {
-    let middle = [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
     places_mm.map(|place_mm| {
         let at = Disc::marker(place_mm).centroid_px(|_| [0.0; 3], camera);
-        [0, 1].map(|i| (at[i] - middle[i]) / camera.focal_px())
+        in_focal_lengths(at, camera)
     })
+}
+
+/// A point of a camera's picture, px, in focal lengths from the axis.
+pub(crate) fn in_focal_lengths(at_px: [f64; 2], camera: &Camera) -> [f64; 2] {
+    let middle = [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
+    [0, 1].map(|i| (at_px[i] - middle[i]) / camera.focal_px())
 }
 
 /// What a rest picture says of markers at these places, mm: of the nominal camera, on a film 10 mm

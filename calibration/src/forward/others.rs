@@ -2,7 +2,7 @@
 //! nominal film's, as the chip reads them by their rest picture, and how strong the force is that
 //! moves them as far.
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use hivtac_film::MARKER_CENTRES_MM;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
 use hivtac_scene::{Camera, Disc};
@@ -11,7 +11,7 @@ use hivtac_sensing::forward::{DOTS, EQUATIONS, Forward, Markers, Mounting, Stiff
 use hivtac_sensing::forward::{Pose as ChipPose, RELATIVE};
 use hivtac_sensing::model::{CovarianceSpec, OthersSpec};
 use hivtac_sensing::rest::Rest;
-use hivtac_shell::{Contact, Design, Equilibrium, Film, Law, Material};
+use hivtac_shell::{Design, Equilibrium, Film, Law, Material};
 use hivtac_terms::units::Px;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,7 +19,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
-use super::covariances::{Moved, knots_of, spec_of, sum_of_squares};
+use super::covariances::{Covariance, Moved, covariances, knots, sum_of_squares};
+use super::in_focal_lengths;
+use super::nearest::cubic_law;
 
 /// Films that are drawn.
 const FILMS: u64 = 60;
@@ -87,7 +89,7 @@ impl OtherUnits {
             "only {} of {FILMS} films find all their equilibria",
             drawn.len()
         );
-        let poses: Vec<Pose> = knots_of(KNOTS).collect();
+        let poses: Vec<Pose> = knots(KNOTS).collect();
         let factors = (0..poses.len()).map(|knot| {
             let part = 1.0 / (drawn.len() as f64).sqrt();
             let shapes = drawn
@@ -95,7 +97,7 @@ impl OtherUnits {
                 .map(|film| film[knot].left.map(|left| part * left));
             sum_of_squares(&shapes.collect::<Vec<_>>())
         });
-        let spec = spec_of(KNOTS, factors.collect());
+        let spec = covariances(KNOTS, &factors.collect::<Vec<Covariance>>());
         let magnitudes = |size: f64| -> Vec<f64> {
             let of_film = |film: &Vec<Match>| {
                 let own = poses.iter().zip(film).filter(|(pose, _)| pose.size == size);
@@ -114,7 +116,9 @@ impl OtherUnits {
             .iter()
             .map(|of_size| mean(of_size.iter().copied()))
             .collect();
-        let stiffness_n = law(&sizes[1..], &means);
+        // Either may be near nothing, never below.
+        let stiffness_n =
+            cubic_law(sizes[1..].iter().copied().zip(means)).map(|part| part.max(1e-3));
         let [a, b] = stiffness_n;
         let relative = |k: usize| {
             let at = k.max(1);
@@ -151,22 +155,6 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// a and b of |F| = a·s + b·s³ nearest to these, in parts of each.
-fn law(sizes: &[f64], magnitudes_n: &[f64]) -> [f64; 2] {
-    let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
-    for (size, magnitude) in sizes.iter().zip(magnitudes_n) {
-        let (x, y) = (size / magnitude, size.powi(3) / magnitude);
-        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
-        (xf, yf) = (xf + x, yf + y);
-    }
-    let whole = xx * yy - xy * xy;
-    // Either may be near nothing, never below.
-    [
-        ((yy * xf - xy * yf) / whole).max(1e-3),
-        ((xx * yf - xy * xf) / whole).max(1e-3),
-    ]
-}
-
 /// A unit, and what a chip makes of its rest picture.
 struct Other<'a> {
     film: Film,
@@ -176,7 +164,6 @@ struct Other<'a> {
     camera: &'a Camera,
     to_px: [f64; 2],
     chip: &'a Forward<'a>,
-    tip_radius_mm: f64,
     /// How the forces are tilted that press it.
     tilt: [f64; 2],
 }
@@ -207,7 +194,6 @@ impl<'a> Other<'a> {
             camera,
             to_px: [cos, sin].map(|part| part * focal_px),
             chip,
-            tip_radius_mm: design.tip_radius_mm,
             tilt: [(); 2].map(|()| random.random_range(-TILT..TILT)),
         };
         other.rest_px = other
@@ -219,20 +205,18 @@ impl<'a> Other<'a> {
 
     /// Where the camera sees the dots, px from its axis.
     fn seen(&self, state: &Equilibrium) -> [[f64; 2]; DOTS] {
-        let axis =
-            [self.camera.width(), self.camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
         let [cos, sin] = self.to_px;
         std::array::from_fn(|dot| {
             let disc = Disc::marker(self.film.design().dots_mm[dot]);
             let at = disc.centroid_px(|point| self.film.displacement(state, point), self.camera);
-            let [x, y] = [0, 1].map(|i| (at[i] - axis[i]) / self.camera.focal_px());
+            let [x, y] = in_focal_lengths(at, self.camera);
             [cos * x - sin * y, sin * x + cos * y]
         })
     }
 
     /// The matches of all knots, in their order.
     fn matches(&self) -> Result<Vec<Match>> {
-        let poses: Vec<Pose> = knots_of(KNOTS).collect();
+        let poses: Vec<Pose> = knots(KNOTS).collect();
         let places = poses.len() / usize::from(KNOTS[0]);
         let mut all: Vec<Option<Match>> = poses.iter().map(|_| None).collect();
         for place in 0..places {
@@ -266,14 +250,7 @@ impl<'a> Other<'a> {
         let at_mm = self.film.material_point(&self.rest, pose.place_mm);
         for attempt in 1.. {
             let force_n = pose.direction().map(|part| magnitude_n * part);
-            let contact = Contact::Force(force_n);
-            let press = |start: &Equilibrium| {
-                self.film
-                    .press_at(at_mm, self.tip_radius_mm, contact, start)
-            };
-            *state = press(state)
-                .or_else(|_| press(&self.rest))
-                .map_err(|error| anyhow!("{error}"))?;
+            *state = self.film.press_force(at_mm, force_n, state)?;
             let (found, left) = self.nearest(pose, state);
             let times = (size / found).powf(steeper);
             let is_near = (found / size - 1.0).abs() < NEAR;

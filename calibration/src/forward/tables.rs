@@ -156,8 +156,7 @@ fn nodes_near(place_mm: f64, count: usize) -> Vec<f64> {
 }
 
 /// The tables of markers that move so under a load, by a marker's number, in focal lengths; and
-/// what
-/// they leave, root mean square over loads and places, focal lengths.
+/// what they leave, root mean square over loads and places, focal lengths.
 ///
 /// # Errors
 /// When a sample cannot be had, or the tables cannot hold what the markers do.

@@ -2,8 +2,7 @@
 //! mistyped.
 //!
 //! A sensor that knows of a unit only how it rests finds places to half a millimetre and forces to
-//! a
-//! factor of some units: enough to see such mistakes, and to name them.
+//! a factor of some units: enough to see such mistakes, and to name them.
 
 use anyhow::{Result, bail};
 

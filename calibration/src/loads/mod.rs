@@ -1,6 +1,5 @@
 //! The loads that a data set shows, for a fit of a unit: each with what was seen of it, and how
-//! well
-//! its size, direction and place are known.
+//! well its size, direction and place are known.
 //!
 //! | rows | loads |
 //! |---|---|

@@ -10,8 +10,7 @@ use super::problem::{At, Problem, Solved, Unknowns};
 /// So many loads tell a unit well enough to begin with all of them there.
 const FIRST: usize = 16;
 /// Where descents begin: how many times more than it does what is seen is taken to scatter at
-/// first,
-/// and gravity along z, g, which decides to which side a slack film sags.
+/// first, and gravity along z, g, which decides to which side a slack film sags.
 const STARTS: [(&[f64], f64); 4] = [
     (&[], 0.0),
     (&[100.0, 10.0], 0.0),

@@ -1,6 +1,5 @@
 //! How a unit's film moves its dots under any load: from finite elements at few places of the tip
-//! to
-//! every place.
+//! to every place.
 //!
 //! The dimple under a tip moves with it. So the motion of a dot with the tip at a place is that of
 //! the point as far from the tip, with the tip at solved places nearby: interpolated between these
@@ -11,9 +10,9 @@ use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use hivtac_shell::{Equilibrium, Film, Response};
 use rayon::prelude::*;
 
-use super::linear::{Matrix, dot, inverse, times};
-use super::problem::{At, Problem, press};
+use super::problem::{At, Problem};
 use super::seen::{View, mean, seen_through};
+use crate::forward::{Nearest, cubic_law};
 
 /// Places of the tip along x and along y at which the film is solved: from the first, so far apart,
 /// mm.
@@ -42,8 +41,7 @@ pub struct Field<'a> {
     poses: Vec<Pose>,
     /// By place along y, place along x and load.
     solved: Vec<Solved>,
-    /// Rows by term: what each sample counts for.
-    nearest: Matrix,
+    nearest: Nearest,
     terms: Terms,
 }
 
@@ -117,7 +115,7 @@ impl<'a> Field<'a> {
                 || self.at.rest.clone(),
                 |other| foretold(film, &solved[other], &self.poses[other], pose),
             );
-            let state = press(film, place_mm, self.force_n(pose), &start)?;
+            let state = film.press_force(place_mm, self.force_n(pose), &start)?;
             let by_load = film.responses(&state)?;
             let slopes = self
                 .per_pose(pose)
@@ -193,7 +191,7 @@ impl<'a> Field<'a> {
                 }
             }
         }
-        samples.map(|samples| times(&self.nearest, &samples))
+        samples.map(|samples| self.nearest.coefficients(&samples))
     }
 
     fn solved(&self, [i, j]: [usize; 2], load: usize) -> &Solved {
@@ -284,45 +282,29 @@ fn poses() -> Vec<Pose> {
     straight.into_iter().chain(tilted).map(pose).collect()
 }
 
-/// By term, what each sample counts for in the coefficients nearest to all of them: values and
-/// slopes of the poses.
-fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Matrix> {
-    let mut rows: Matrix = Vec::new();
-    for pose in poses {
+/// Finds the terms' coefficients nearest to values and slopes under the poses.
+fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Nearest> {
+    let of_pose = |pose: &Pose| {
         let [value, slopes @ ..] = terms.rows(pose);
-        rows.push(value);
         let weighed = |row: Vec<f64>| row.iter().map(|part| SLOPES_COUNT * part).collect();
-        rows.extend(slopes.map(weighed));
-    }
-    let count = terms.count();
-    let column = |k: usize| -> Vec<f64> { rows.iter().map(|row| row[k]).collect() };
-    let columns: Matrix = (0..count).map(column).collect();
-    let products = columns
-        .iter()
-        .map(|a| columns.iter().map(|b| dot(a, b)).collect());
-    let inverse = inverse(products.collect()).context("the tables' loads")?;
-    let row = |own: &Vec<f64>| rows.iter().map(|row| dot(own, row)).collect();
-    Ok(inverse.iter().map(row).collect())
+        [value].into_iter().chain(slopes.map(weighed))
+    };
+    let rows: Vec<Vec<f64>> = poses.iter().flat_map(of_pose).collect();
+    Nearest::new(&rows).context("the tables' loads")
 }
 
 /// How strong the force of a size is: sizes grow like the depth of a tip in the film's middle.
 fn stiffness_n(at: &At) -> Result<[f64; 2]> {
     let mut start = at.rest.clone();
-    let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
+    let mut pairs = Vec::new();
     let mut deepest = 0.0;
     for part in [0.02, 0.1, 0.4, 1.0] {
         let force = part * LARGEST_N;
-        let state = press(&at.film, [0.0; 2], [0.0, 0.0, -force], &start)?;
-        let depth = depth(at, &state);
-        deepest = depth;
-        // Each force counts alike: in parts of itself.
-        let (x, y) = (depth / force, depth * depth * depth / force);
-        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
-        (xf, yf) = (xf + x, yf + y);
-        start = state;
+        start = at.film.press_force([0.0; 2], [0.0, 0.0, -force], &start)?;
+        deepest = depth(at, &start);
+        pairs.push((deepest, force));
     }
-    let whole = xx * yy - xy * xy;
-    let (a, b) = ((yy * xf - xy * yf) / whole, (xx * yf - xy * xf) / whole);
+    let [a, b] = cubic_law(pairs);
     // Either may be near nothing, never below.
     let (a, b) = (
         a.max(1e-3 * LARGEST_N / deepest),

@@ -2,13 +2,10 @@
 
 use anyhow::{Result, ensure};
 
+pub(crate) use crate::forward::dot;
+
 /// A symmetric matrix by rows.
 pub type Matrix = Vec<Vec<f64>>;
-
-/// a · b.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
 
 /// The factor L of a symmetric matrix L·Lᵀ; 0 above its diagonal.
 ///

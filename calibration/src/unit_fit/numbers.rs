@@ -141,8 +141,7 @@ const FILM: [(Change, [f64; 4]); 17] = [
 ];
 
 /// The numbers of units with this many dots whose stage's zero is known to so many mm; the camera
-/// and
-/// the posts of a unit whose old film was fitted are known.
+/// and the posts of a unit whose old film was fitted are known.
 pub fn priors(dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
     let film = FILM.map(|(change, [mean, sigma, least, largest])| Prior {
         number: Number::Film(change),
@@ -175,12 +174,9 @@ pub fn priors(dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> 
     all
 }
 
-/// Sets a number of the film; true when the number is the film's.
-pub fn set(design: &mut Design, number: Number, value: f64) {
+/// Sets a number of the film.
+pub fn set(design: &mut Design, change: Change, value: f64) {
     let nominal = Design::default();
-    let Number::Film(change) = number else {
-        return;
-    };
     match change {
         Change::Force(_) | Change::Place(_) => {}
         Change::Youngs => {

@@ -5,8 +5,8 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_scene::{Camera, Preset};
-use hivtac_sensing::forward::{DOTS, EQUATIONS, MOST_TILTS, Stiffness};
+use hivtac_scene::Camera;
+use hivtac_sensing::forward::{DOTS, EQUATIONS, MOST_TILTS, Noise, Stiffness};
 use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use serde::{Deserialize, Serialize};
 
@@ -14,8 +14,10 @@ use super::descent::Found;
 use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::Number;
-use super::problem::{Problem, mesh_px, press};
-use crate::forward::{Covariance, Dot, covariances_of, knots, rest_image, tables};
+use super::problem::{Problem, Rates, mesh_px};
+use crate::forward::{
+    Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
+};
 
 /// Nodes along each axis of a dot's table.
 const NODES: usize = 13;
@@ -132,26 +134,26 @@ impl OwnFilm {
         self.covariance().map(|_| ())
     }
 
-    /// A model's film with this one in the nominal one's place.
+    /// What a model file holds of it, with so many Gauss–Newton steps and this noise of markers.
     ///
     /// # Errors
     /// When the covariance is of other markers.
-    pub fn spec(&self, nominal: ForwardSpec) -> Result<ForwardSpec> {
-        let camera = Camera::new(Preset::Ov7725, 320, 240)?;
+    pub fn spec(&self, steps: u8, noise: Noise, camera: &Camera) -> Result<ForwardSpec> {
         let [linear_n, cubic_n] = self.stiffness_n.map(|part| part as f32);
-        let mut noise = nominal.noise;
-        for (place, own) in noise.rest_px.iter_mut().zip(&self.rest_px) {
+        let mut rest_px = noise.rest_px;
+        for (place, own) in rest_px.iter_mut().zip(&self.rest_px) {
             *place = own.map(|part| part as f32);
         }
         Ok(ForwardSpec {
+            steps,
+            limits: limits(),
             stiffness: Stiffness { linear_n, cubic_n },
+            rest_image: rest_image(std::array::from_fn(|k| self.dots[k].place_mm), camera),
             per_px: Some(self.per_px.map(|part| part as f32)),
-            noise,
-            rest_image: rest_image(std::array::from_fn(|k| self.dots[k].place_mm), &camera),
+            noise: Noise { rest_px, ..noise },
             tables: self.tables(),
             own: Some(self.covariance()?),
             other: None,
-            ..nominal
         })
     }
 
@@ -225,17 +227,15 @@ fn left_open(
     beside: f64,
 ) -> Result<CovarianceSpec> {
     let at = &found.at;
-    let poses: Vec<Pose> = knots().collect();
+    let poses: Vec<Pose> = knots(KNOTS).collect();
     let mut states = Vec::new();
     for pose in &poses {
         let at_mm = at.film.material_point(&at.rest, pose.place_mm);
         let state = match pose.size > 0.0 {
-            true => press(
-                &at.film,
-                at_mm,
-                field.force_n(pose),
-                states.last().unwrap_or(&at.rest),
-            )?,
+            true => {
+                let start = states.last().unwrap_or(&at.rest);
+                at.film.press_force(at_mm, field.force_n(pose), start)?
+            }
             false => at.rest.clone(),
         };
         states.push(state);
@@ -257,10 +257,9 @@ fn left_open(
     let spread = cholesky(held.iter().map(row).collect())?;
     let per_px = 1.0 / at.made.focal_px;
     let (sin, cos) = libm::sincos(at.made.roll_deg.to_radians());
-    let covariances = rates.pressed.iter().zip(&poses).map(|(rates, pose)| {
-        let mut covariance = Covariance::default();
-        for column in 0..held.len() {
-            let mut moved = [0.0; EQUATIONS];
+    let of_pose = |(rates, pose): (&Rates, &Pose)| -> Covariance {
+        let along = |column: usize| -> Moved {
+            let mut moved = Moved::default();
             for (k, row) in held.iter().zip(&spread) {
                 for (sum, rate) in moved.iter_mut().zip(&rates.numbers[*k]) {
                     *sum += row[column] * rate;
@@ -272,18 +271,16 @@ fn left_open(
                     per_px * (cos * *y - sin * *x),
                 );
             }
-            for (row, a) in covariance.iter_mut().zip(&moved) {
-                for (sum, b) in row.iter_mut().zip(&moved) {
-                    *sum += a * b;
-                }
-            }
-        }
+            moved
+        };
+        let mut covariance = sum_of_squares(&(0..held.len()).map(along).collect::<Vec<_>>());
         for (k, row) in covariance.iter_mut().enumerate() {
             let size = pose.size / LARGEST_SIZE;
             let mesh = per_px * mesh_px(at.made.dots_mm[k / 2], pose.place_mm) * size.sqrt();
             row[k] += (beside * size).powi(2) + mesh * mesh;
         }
         covariance
-    });
-    Ok(covariances_of(covariances.collect()))
+    };
+    let all: Vec<Covariance> = rates.pressed.iter().zip(&poses).map(of_pose).collect();
+    Ok(covariances(KNOTS, &all))
 }

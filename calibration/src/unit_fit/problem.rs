@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use hivtac_scene::Camera;
-use hivtac_shell::{Change, Contact, Design, Equilibrium, Film, ShellError};
+use hivtac_shell::{Change, Design, Equilibrium, Film};
 use rayon::prelude::*;
 
 use super::FINENESS;
@@ -177,7 +177,7 @@ impl Problem<'_> {
         for (prior, part) in self.priors.iter().zip(parts) {
             let value = prior.value(*part);
             match prior.number {
-                Number::Film(_) => numbers::set(&mut made.design, prior.number, value),
+                Number::Film(change) => numbers::set(&mut made.design, change, value),
                 Number::Marker(k, axis) => made.dots_mm[k][axis] += value,
                 Number::Rest(k, axis) => made.rest_px[k][axis] = value,
                 Number::Roll => made.roll_deg = value,
@@ -215,7 +215,7 @@ impl Problem<'_> {
             let place_mm = [0, 1].map(|i| pressed.place_mm[i] + made.stage_mm[i]);
             let at_mm = film.material_point(&rest, place_mm);
             let start = near.and_then(|(_, states)| states.get(k)).unwrap_or(&rest);
-            Ok(press(&film, at_mm, pressed.force_n, start)?)
+            Ok(film.press_force(at_mm, pressed.force_n, start)?)
         };
         let numbers: Vec<usize> = (0..self.loads.len()).collect();
         let states = numbers.into_par_iter().map(press);
@@ -272,8 +272,7 @@ impl Problem<'_> {
     }
 
     /// Standard uncertainty of each coordinate under a load, px: of what is seen, and of what a
-    /// mesh
-    /// leaves of the film's shape beside the tip.
+    /// mesh leaves of the film's shape beside the tip.
     fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
         let of_dot = |dot: &[f64; 2]| {
             let noise_px = load.noise_px.hypot(mesh_px(*dot, load.place_mm));
@@ -480,22 +479,6 @@ pub fn mesh_px(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
     const REACH_MM: f64 = 1.3;
     let apart = libm::hypot(dot_mm[0] - place_mm[0], dot_mm[1] - place_mm[1]) / REACH_MM;
     AT_THE_TIP_PX * libm::exp(-apart * apart)
-}
-
-/// A film under a force, N, at a point of it, mm, found from a state nearby, or else from rest.
-///
-/// # Errors
-/// When it finds no equilibrium.
-pub fn press(
-    film: &Film,
-    at_mm: [f64; 2],
-    force_n: [f64; 3],
-    start: &Equilibrium,
-) -> Result<Equilibrium, ShellError> {
-    let radius_mm = film.design().tip_radius_mm;
-    let from =
-        |start: &Equilibrium| film.press_at(at_mm, radius_mm, Contact::Force(force_n), start);
-    from(start).or_else(|_| from(&film.rest()))
 }
 
 impl Unknowns {

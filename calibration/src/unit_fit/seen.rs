@@ -6,9 +6,10 @@ use std::f64::consts::PI;
 use hivtac_scene::{Camera, Disc};
 use hivtac_shell::{Equilibrium, Film, Response};
 
-/// Points on a ring within a dot over which a rate is averaged: on this ring, in parts of the
-/// radius,
-/// their mean is the disc's for polynomials to the third degree.
+use crate::forward::in_focal_lengths;
+
+/// Points on a ring within a dot over which a rate is averaged. On this ring, in parts of the
+/// radius, their mean is the disc's for polynomials to the third degree.
 const RAYS: usize = 6;
 const RING: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Points of a dot's rim at which its displacement is taken; between them it is a sum of waves.
@@ -39,13 +40,7 @@ impl View<'_> {
             let [x, y, z] = rim.at(point);
             [x, y, z + self.farther_mm]
         };
-        self.in_focal_lengths(disc.centroid_px(moved, self.camera))
-    }
-
-    fn in_focal_lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [axis_x, axis_y] =
-            [self.camera.width(), self.camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
-        [x - axis_x, y - axis_y].map(|part| part / self.camera.focal_px())
+        in_focal_lengths(disc.centroid_px(moved, self.camera), self.camera)
     }
 
     /// How the image of a dot answers to the film's responses, focal lengths per unit.
@@ -83,7 +78,7 @@ impl View<'_> {
             let [back, forth] = [-STEP_MM, STEP_MM].map(|step| {
                 let mut there = point_mm;
                 there[axis] += step;
-                self.in_focal_lengths(self.camera.project(there))
+                in_focal_lengths(self.camera.project(there), self.camera)
             });
             for (row, (a, b)) in lens.iter_mut().zip(back.into_iter().zip(forth)) {
                 row[axis] = (b - a) / (2.0 * STEP_MM);

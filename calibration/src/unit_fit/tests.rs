@@ -2,7 +2,7 @@ use hivtac_scene::{Camera, MARKERS, Preset};
 use hivtac_sensing::forward::Forward;
 use hivtac_shell::{Design, Equilibrium, Film, Law};
 
-use super::problem::{Made, press};
+use super::problem::Made;
 use super::seen::View;
 use super::*;
 use crate::forward::{FilmModel, Noise};
@@ -73,7 +73,7 @@ impl Truth {
 
     fn press(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> Equilibrium {
         let at_mm = self.film.material_point(&self.rest, place_mm);
-        press(&self.film, at_mm, force_n, &self.rest).unwrap()
+        self.film.press_force(at_mm, force_n, &self.rest).unwrap()
     }
 
     /// Where dots are seen, px, but for a few thousandths that differ from load to load.
@@ -194,7 +194,7 @@ fn a_mounted_film_is_found_from_ten_loads() {
 #[test]
 fn loads_that_contradict_each_other_are_refused() {
     let truth = Truth::new();
-    let mut loads: Vec<SeenLoad> = (0..5).map(|k| truth.load(k)).collect();
+    let mut loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
     loads[1].force_n = loads[1].force_n.map(|part| part / 3.0);
     loads[3].force_n = loads[3].force_n.map(|part| 2.0 * part);
     let error = fit(&truth.bench(), &loads, 0.1, None)

@@ -13,8 +13,7 @@ use crate::kernels::sqrt;
 /// needed: it would move no unknown by more than a fifth of its standard uncertainty.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// Where a step that would explain no more than this lowers no residual, what is left is the
-/// tables'
-/// rounding.
+/// tables' rounding.
 const ROUNDING: f32 = 0.5;
 /// The first of the unknowns that are the tilt, which the place follows.
 const TILT: usize = 1;
@@ -95,8 +94,7 @@ impl<'a> Descent<'a> {
     }
 
     /// Tries a step; one that does not lower the residual, by the covariance where it begins, is
-    /// not
-    /// taken, and the next is shorter then. False when the markers do not tell where to go.
+    /// not taken, and the next is shorter then. False when the markers do not tell where to go.
     pub fn step(&mut self) -> bool {
         let Some((white, solved)) = self.here.solved() else {
             return false;

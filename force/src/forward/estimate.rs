@@ -52,8 +52,7 @@ pub struct Estimate {
     /// The load.
     pub pose: Pose,
     /// What it does not explain: the square of that in parts of its covariance, by noise and by
-    /// what
-    /// is not known of the unit.
+    /// what is not known of the unit.
     pub unexplained: f32,
     /// What no load near it explains, in parts of noise alone: what changes of it from frame to
     /// frame is noise, whatever is not known of the unit.
@@ -67,8 +66,7 @@ pub struct Estimate {
 impl Forward<'_> {
     /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
     /// which they find no way on, from where the markers moved most, too: from there they find
-    /// theirs
-    /// where a guess was bad.
+    /// theirs where a guess was bad.
     pub fn estimate(
         &self,
         observed: &Observed,
@@ -134,8 +132,7 @@ impl Estimate {
     }
 
     /// How well the load is known; `None` where the markers do not tell its parts. The covariance
-    /// counts
-    /// as larger where more is left over than it explains as a rule.
+    /// counts as larger where more is left over than it explains as a rule.
     pub fn sigma(&self, strength: &Strength) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;
         let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);

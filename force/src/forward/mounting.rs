@@ -50,8 +50,7 @@ impl RestImage {
     }
 
     /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the
-    /// axis
-    /// and across that.
+    /// axis and across that.
     #[inline]
     pub fn noise(&self, dot: usize, [away, across]: [f32; 2]) -> [f32; 3] {
         let [x, y] = self.away(dot);

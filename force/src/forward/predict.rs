@@ -83,8 +83,7 @@ impl<'a> Tables<'a> {
     }
 
     /// Where the images of markers go that are glued `beside_mm` of the tables': a marker beside
-    /// its
-    /// place is as one in its place, with the tip as far beside the other way.
+    /// its place is as one in its place, with the tip as far beside the other way.
     pub fn predict(&self, pose: &Pose, limits: &Limits, beside_mm: &Markers) -> Prediction {
         let sizes = Sizes::at(pose.size, limits);
         let mut tilts = [Tilts::NONE; DOTS];

@@ -1,6 +1,5 @@
 //! How one marker's image moves: splines over the tip's place, whose coefficients count as
-//! functions
-//! of size and tilt say.
+//! functions of size and tilt say.
 //!
 //! Coefficients are steps of 16 bits, whose size is in the function's own. Along both axes they
 //! are summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what

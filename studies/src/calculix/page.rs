@@ -7,6 +7,7 @@ use hivtac_shell::{Design, Film};
 
 use super::compare::{Difference, FilmObservation, difference, largest_and_rms};
 use super::{Compared, Solved, Varied};
+use crate::page::filled;
 
 /// The page, with `{names}` where figures go.
 const TEMPLATE: &str = include_str!("page.md");
@@ -39,12 +40,7 @@ impl Page {
             ("variations", self.variations()),
             ("readings", self.readings()),
         ];
-        let filled = figures
-            .iter()
-            .fold(TEMPLATE.to_owned(), |text, (name, figure)| {
-                text.replace(&format!("{{{name}}}"), figure.trim_end())
-            });
-        Ok(filled)
+        Ok(filled(TEMPLATE, &figures))
     }
 
     /// The tables alone, for a terminal.

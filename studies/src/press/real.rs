@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use anyhow::Result;
 use hivtac_film::Pressed;
 use hivtac_scene::{Disc, Load, Options};
-use hivtac_shell::{Contact, Design, Equilibrium, Film, Law, Material, ShellError, pressed};
+use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed};
 use rand::Rng;
 
 use super::seeded;
@@ -129,10 +129,7 @@ impl RealFilm {
             }
         };
         let at_mm = self.film.material_point(&self.rest, load.offset_mm());
-        let contact = Contact::Force(load.vector_n());
-        let radius_mm = self.film.design().tip_radius_mm;
-        let press = |start: &Equilibrium| self.film.press_at(at_mm, radius_mm, contact, start);
-        let state = press(&start).or_else(|_| press(&self.rest))?;
+        let state = self.film.press_force(at_mm, load.vector_n(), &start)?;
         let mut kept = self
             .kept
             .lock()
@@ -146,7 +143,7 @@ impl RealFilm {
 }
 
 /// Where the dots of a scene are glued, mm.
-pub fn dots_mm(options: &Options) -> [[f64; 2]; 4] {
+fn dots_mm(options: &Options) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| {
         let at = hivtac_film::MARKER_CENTRES_MM[k];
         [0, 1].map(|i| at[i] + options.glued_mm[k][i])

@@ -8,8 +8,7 @@
 //! | `clock` | times, and a clock that starts again |
 //!
 //! What can be understood in one way only is read. Otherwise the file is refused, with the line,
-//! the
-//! cause, and what helps.
+//! the cause, and what helps.
 
 mod clock;
 mod columns;

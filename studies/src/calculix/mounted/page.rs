@@ -6,6 +6,7 @@ use super::super::compare::{FilmObservation, Reading, difference};
 use super::super::page::{overall, row, short};
 use super::films::MountedFilm;
 use super::{Compared, Course};
+use crate::page::filled;
 
 /// The page, with `{names}` where figures go.
 const TEMPLATE: &str = include_str!("page.md");
@@ -32,12 +33,7 @@ impl Page {
             ("rests", self.rests()),
             ("readings", self.readings()),
         ];
-        let filled = figures
-            .iter()
-            .fold(TEMPLATE.to_owned(), |text, (name, figure)| {
-                text.replace(&format!("{{{name}}}"), figure.trim_end())
-            });
-        Ok(filled)
+        Ok(filled(TEMPLATE, &figures))
     }
 
     /// The tables alone, for a terminal.
