@@ -147,7 +147,7 @@ fn a_unit_gets_a_model_of_its_own() {
     );
     let unit = ["unit", "--weights", weights, "--data", "loads.csv"];
     let found = calibrate(here, &[&unit[..], &["--out", "unit.weights"]].concat(), "");
-    assert!(found.contains("film's stiffness"), "{found}");
+    assert!(found.contains("film's Young's modulus"), "{found}");
     calibrate(
         here,
         &["export", "--weights", "unit.weights", "--out", "unit.hvtm"],

@@ -21,7 +21,6 @@ use serde::{Deserialize, Serialize};
 use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
 use super::covariances::{Covariance, Moved, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
-use super::nearest::cubic_law;
 
 /// Films that are drawn.
 const FILMS: u64 = 60;
@@ -58,10 +57,10 @@ const SIZE_STEPS: usize = 8;
 #[serde(deny_unknown_fields)]
 pub struct OtherUnits {
     /// |F| = a·s + b·s³ of images that move as far as the nominal film's under the size s: a and b
-    /// of the typical film, N.
+    /// of the film as the guide builds it, without stretch, N.
     pub stiffness_n: [f64; 2],
     /// Standard uncertainty of that, in parts of it, at the squares of even parts of the largest
-    /// size.
+    /// size: 95 of 100 films are within 1.96 times it.
     pub relative: [f64; RELATIVE],
     /// Knots along the size, y and x of what the motion's shape leaves beside its size.
     counts: [u8; 3],
@@ -110,24 +109,20 @@ impl OtherUnits {
         };
         let sizes: [f64; RELATIVE] =
             std::array::from_fn(|k| LARGEST_SIZE * (k as f64 / (RELATIVE - 1) as f64).powi(2));
-        // Without size there is no force.
-        let all: Vec<Vec<f64>> = sizes[1..].iter().map(|size| magnitudes(*size)).collect();
-        let means: Vec<f64> = all
-            .iter()
-            .map(|of_size| mean(of_size.iter().copied()))
-            .collect();
-        // Either may be near nothing, never below.
-        let stiffness_n =
-            cubic_law(sizes[1..].iter().copied().zip(means)).map(|part| part.max(1e-3));
-        let [a, b] = stiffness_n;
+        let law = &chip.stiffness;
         let relative = |k: usize| {
-            let at = k.max(1);
-            let typical = a * sizes[at] + b * sizes[at].powi(3);
-            let square = |own: &f64| (own / typical - 1.0).powi(2);
-            mean(all[at - 1].iter().map(square)).sqrt()
+            // Without size there is no force.
+            let size = sizes[k.max(1)];
+            let nominal_n = f64::from(law.magnitude_n(size as f32));
+            let mut off: Vec<f64> = magnitudes(size)
+                .iter()
+                .map(|own| (own / nominal_n - 1.0).abs())
+                .collect();
+            off.sort_by(f64::total_cmp);
+            off[off.len() * 95 / 100] / 1.96
         };
         Ok(Self {
-            stiffness_n,
+            stiffness_n: [law.linear_n, law.cubic_n].map(f64::from),
             relative: std::array::from_fn(relative),
             counts: spec.counts,
             end_mm: spec.end_mm,
@@ -148,11 +143,6 @@ impl OtherUnits {
             },
         }
     }
-}
-
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len() as f64;
-    values.sum::<f64>() / count
 }
 
 /// A unit, and what a chip makes of its rest picture.

@@ -243,7 +243,7 @@ fn a_model_of_no_unit_tells_rough_places() {
         let [x, y] = rough.place_mm(sample.seen);
         let [true_x, true_y] = sample.tip_mm.unwrap();
         let off_mm = (x - true_x).hypot(y - true_y);
-        assert!(off_mm < 0.3, "{off_mm} mm: {sample:?}");
+        assert!(off_mm < 0.5, "{off_mm} mm: {sample:?}");
         seen += 1;
     }
     assert!(seen > 15, "{seen}");

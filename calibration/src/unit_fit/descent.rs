@@ -22,6 +22,10 @@ const EXPLAINED: f64 = 1.4;
 /// Steps at most, and the change of χ² that ends them.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.05;
+/// χ² over the coordinates above which a fit is far from the loads, and the part of it that a step
+/// then takes away at least; with less it does not come near them.
+const FAR: f64 = 100.0;
+const FAR_SETTLED: f64 = 0.03;
 /// Parts of a step that are tried, the first at which χ² falls is taken.
 const LENGTHS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 
@@ -36,8 +40,7 @@ pub struct Found {
 impl Found {
     /// χ² over the number of coordinates that were seen.
     pub fn chi_square(&self) -> f64 {
-        let seen = self.at.residuals.iter().flatten().count() + 2 * self.at.made.dots_mm.len();
-        self.at.square() / seen as f64
+        chi_square(&self.at)
     }
 
     /// The number of the load that is explained worst.
@@ -52,6 +55,11 @@ impl Found {
     pub fn scatter(&self) -> f64 {
         self.chi_square().max(1.0)
     }
+}
+
+fn chi_square(at: &At) -> f64 {
+    let seen = at.residuals.iter().flatten().count() + 2 * at.made.dots_mm.len();
+    at.square() / seen as f64
 }
 
 impl Problem<'_> {
@@ -162,7 +170,11 @@ impl Problem<'_> {
                     }
                 }
             }
-            if fell < SETTLED {
+            let least = match chi_square(&here) > FAR {
+                true => FAR_SETTLED * here.square(),
+                false => SETTLED,
+            };
+            if fell < least {
                 return Ok(Found { at: here, solved });
             }
         }

@@ -194,7 +194,7 @@ fn a_mounted_film_is_found_from_ten_loads() {
 #[test]
 fn loads_that_contradict_each_other_are_refused() {
     let truth = Truth::new();
-    let mut loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
+    let mut loads: Vec<SeenLoad> = (0..7).map(|k| truth.load(k)).collect();
     loads[1].force_n = loads[1].force_n.map(|part| part / 3.0);
     loads[3].force_n = loads[3].force_n.map(|part| 2.0 * part);
     let error = fit(&truth.bench(), &loads, 0.1, None)

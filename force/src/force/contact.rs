@@ -1,35 +1,25 @@
 //! Whether something touches the film.
 
-use super::Force;
-use hivtac_terms::units::MicroNewtons;
+use hivtac_terms::units::{MicroNewtons, UnsignedMicroNewtons};
 
 /// The least |F| that counts as a contact, however certain it is.
 pub const LEAST_CONTACT: MicroNewtons = MicroNewtons(2_000);
 /// A contact's |F| is at least this many times its standard uncertainty.
 pub const CONTACT_SIGMAS: u32 = 3;
 
-/// Whether |F| is large and certain enough that something touches the film.
-pub fn is_contact(force: &Force) -> bool {
-    let certain = force.magnitude.0.unsigned_abs() / CONTACT_SIGMAS >= force.magnitude_sigma.0;
-    force.magnitude >= LEAST_CONTACT && certain
+/// Whether |F| is large and certain enough that something touches the film. Its uncertainty is that
+/// by noise: how strong a unit's film is, is uncertain alike in all frames.
+pub fn is_contact(magnitude: MicroNewtons, by_noise: UnsignedMicroNewtons) -> bool {
+    let certain = magnitude.0.unsigned_abs() / CONTACT_SIGMAS >= by_noise.0;
+    magnitude >= LEAST_CONTACT && certain
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_terms::units::{MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
 
     fn touches(magnitude: i32, sigma: u32) -> bool {
-        let force = Force {
-            alpha: MilliDegrees(0),
-            beta: MilliDegrees(0),
-            magnitude: MicroNewtons(magnitude),
-            cartesian: [0, 0, -magnitude].map(MicroNewtons),
-            direction_sigma: UnsignedMilliDegrees(0),
-            magnitude_sigma: UnsignedMicroNewtons(sigma),
-            place: None,
-        };
-        is_contact(&force)
+        is_contact(MicroNewtons(magnitude), UnsignedMicroNewtons(sigma))
     }
 
     #[test]

@@ -133,8 +133,8 @@ impl Resting {
         noise: FrameNoise,
         estimate: &Estimate,
     ) -> (Force, Status) {
-        let force = force(&forward.strength(self.is_own), estimate);
-        let mut status = trust(&force, range);
+        let (force, by_noise) = force(&forward.strength(self.is_own), estimate);
+        let mut status = trust(&force, by_noise, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
         if is_blurred || !estimate.is_explained() {
             status |= Status::UNEXPLAINED;
@@ -170,7 +170,8 @@ fn is_near(rest: &Rest, own: &Rest) -> bool {
         .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
 }
 
-fn force(strength: &Strength, estimate: &Estimate) -> Force {
+/// The force of a load, and how uncertain |F| is by noise.
+fn force(strength: &Strength, estimate: &Estimate) -> (Force, UnsignedMicroNewtons) {
     let pose = &estimate.pose;
     let micronewtons = 1e6 * strength.stiffness.magnitude_n(pose.size);
     let cartesian = pose
@@ -182,11 +183,11 @@ fn force(strength: &Strength, estimate: &Estimate) -> Force {
         magnitude,
     } = Polar::of_vector(cartesian);
     let sigma = estimate.sigma(strength);
-    let [direction, magnitude_sigma, place] = stated(sigma);
+    let [direction, magnitude_sigma, place, by_noise] = stated(sigma);
     let [x, y] = pose
         .place_mm
         .map(|part| SignedMicrometres(rounded(1e3 * part)));
-    Force {
+    let force = Force {
         alpha,
         beta,
         magnitude,
@@ -198,17 +199,25 @@ fn force(strength: &Strength, estimate: &Estimate) -> Force {
             y,
             sigma: Micrometres(place),
         }),
-    }
+    };
+    (force, UnsignedMicroNewtons(by_noise))
 }
 
-/// In m°, µN and µm, at least one of each.
-fn stated(sigma: Option<Sigma>) -> [u32; 3] {
+/// Of direction, |F|, place and |F| by noise: in m°, µN and µm, at least one of each.
+fn stated(sigma: Option<Sigma>) -> [u32; 4] {
     let Some(sigma) = sigma else {
-        return [NO_DIRECTION.0, i32::MAX as u32, LARGEST_PLACE_UNCERTAINTY.0];
+        let nothing = i32::MAX as u32;
+        return [
+            NO_DIRECTION.0,
+            nothing,
+            LARGEST_PLACE_UNCERTAINTY.0,
+            nothing,
+        ];
     };
     let direction = (sigma.direction.to_degrees() * 1e3).min(NO_DIRECTION.0 as f32);
     let place = (sigma.place_mm * 1e3).min(LARGEST_PLACE_UNCERTAINTY.0 as f32);
-    [direction, sigma.magnitude_n * 1e6, place].map(|part| rounded(part).max(1).unsigned_abs())
+    let [magnitude, by_noise] = [sigma.magnitude_n, sigma.by_noise_n].map(|part| 1e6 * part);
+    [direction, magnitude, place, by_noise].map(|part| rounded(part).max(1).unsigned_abs())
 }
 
 /// To nearest; at the limits of 32 bits beyond them.

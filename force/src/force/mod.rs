@@ -30,7 +30,8 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::root::rounded_root;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
+    UnsignedMilliDegrees,
 };
 
 /// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range
@@ -93,7 +94,7 @@ impl Polar {
 
 /// The force that a model's outputs mean, and its status bits:
 /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`],
-/// [`Status::DIRECTION_UNRELIABLE`] and [`Status::PLACE_OUT_OF_RANGE`]. A negative |F| from a
+/// [`Status::DIRECTION_UNRELIABLE`], [`Status::PLACE_OUT_OF_RANGE`] and [`Status::CONTACT`]. A negative |F| from a
 /// model is one of nothing: it becomes 0.
 pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
     let outputs = output.values;
@@ -117,12 +118,13 @@ pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
         magnitude_sigma,
         place: place_of(model, output.place, polar.magnitude),
     };
-    let status = trust(&force, &model.range);
+    let status = trust(&force, magnitude_sigma, &model.range);
     (force, status)
 }
 
-/// How far a force can be trusted. The angles count only where the direction does.
-fn trust(force: &Force, range: &CalibratedRange) -> Status {
+/// How far a force can be trusted, of which |F| is as uncertain by noise, and whether it is of a
+/// contact. The angles count only where the direction does.
+fn trust(force: &Force, by_noise: UnsignedMicroNewtons, range: &CalibratedRange) -> Status {
     let largest = range
         .magnitude
         .0
@@ -139,9 +141,11 @@ fn trust(force: &Force, range: &CalibratedRange) -> Status {
     if force.magnitude.0 > largest {
         status |= Status::MAGNITUDE_OUT_OF_RANGE;
     }
-    if is_contact(force) && (force.place).is_some_and(|place| place::is_beyond(&place, range.place))
-    {
-        status |= Status::PLACE_OUT_OF_RANGE;
+    if is_contact(force.magnitude, by_noise) {
+        status |= Status::CONTACT;
+        if (force.place).is_some_and(|place| place::is_beyond(&place, range.place)) {
+            status |= Status::PLACE_OUT_OF_RANGE;
+        }
     }
     status
 }

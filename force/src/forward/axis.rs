@@ -11,21 +11,14 @@ pub const ONE: f32 = 32_767.0;
 /// 3·2²²: what is added to it is rounded to whole numbers, as f32 has no smaller steps there, and
 /// those of 16 bits are then the low half of its bits.
 const WHOLE: f32 = 12_582_912.0;
-/// Most knots of an axis.
-const MOST_KNOTS: usize = *NODES.end() + SPAN;
-
 /// The nodes of cubic splines, which are sums of B-splines: one for each node, smooth over the
-/// second node and the last but one (not-a-knot).
+/// second node and the last but one (not-a-knot). Borrowed from a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Axis {
-    /// Four times the first node, the nodes but the outer two at each end, four times the last
-    /// node.
-    knots_mm: [f32; MOST_KNOTS],
-    count: usize,
+pub struct Axis<'a> {
+    /// f32 each, mm.
+    nodes: &'a [[u8; 4]],
     /// What slopes' weights are in parts of, 1/mm.
     slope_unit: f32,
-    /// Parts of one, for each 1/mm of a slope's weight.
-    per_slope: f32,
 }
 
 /// What the value and the slope at a point are made of: so much of each coefficient from the first
@@ -40,44 +33,51 @@ pub struct Weights {
     pub slopes: [Q<15, i16>; SPAN],
 }
 
-impl Axis {
-    /// Of growing nodes between ±100 mm, at least 0.01 mm apart; `None` of others, or of too few or
-    /// too many.
-    pub fn new(nodes_mm: &[f32]) -> Option<Axis> {
-        let count = nodes_mm.len();
-        let grow = nodes_mm.windows(2).all(|pair| pair[1] - pair[0] >= 0.01);
-        let near = nodes_mm.iter().all(|node| node.abs() <= 100.0);
-        if !NODES.contains(&count) || !grow || !near {
+impl<'a> Axis<'a> {
+    /// Of growing nodes, f32 each, between ±100 mm, at least 0.01 mm apart; `None` of others, or of
+    /// too few or too many.
+    pub fn new(nodes: &'a [[u8; 4]]) -> Option<Axis<'a>> {
+        let mm = |node: &[u8; 4]| f32::from_le_bytes(*node);
+        let grow = nodes
+            .windows(2)
+            .all(|pair| mm(&pair[1]) - mm(&pair[0]) >= 0.01);
+        let near = nodes.iter().all(|node| mm(node).abs() <= 100.0);
+        if !NODES.contains(&nodes.len()) || !grow || !near {
             return None;
         }
-        let node = |k: usize| nodes_mm.get(k).copied().unwrap_or_default();
-        let knot = |k: usize| {
-            node(match k {
-                0..SPAN => 0,
-                _ if k >= count => count - 1,
-                _ => k - 2,
-            })
+        let mut axis = Axis {
+            nodes,
+            slope_unit: 0.0,
         };
         // Parts of B-splines of the second degree add up to one, over at least the narrowest span:
         // the slopes' parts, differences of three times these, add up to at most six over it.
-        let spans = (SPAN - 1..count).map(|span| knot(span + 1) - knot(span));
-        let slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
-        Some(Axis {
-            knots_mm: core::array::from_fn(knot),
-            count,
-            slope_unit,
-            per_slope: ONE / slope_unit,
+        let spans = (SPAN - 1..nodes.len()).map(|span| axis.knot_mm(span + 1) - axis.knot_mm(span));
+        axis.slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
+        Some(axis)
+    }
+
+    fn node_mm(&self, nth: usize) -> f32 {
+        f32::from_le_bytes(self.nodes.get(nth).copied().unwrap_or_default())
+    }
+
+    /// Four times the first node, the nodes but the outer two at each end, four times the last
+    /// node.
+    fn knot_mm(&self, nth: usize) -> f32 {
+        self.node_mm(match nth {
+            0..SPAN => 0,
+            _ if nth >= self.count() => self.count() - 1,
+            _ => nth - 2,
         })
     }
 
     /// How many nodes it has.
     pub fn count(&self) -> usize {
-        self.count
+        self.nodes.len()
     }
 
     /// Its first and last node, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
-        [self.knots_mm[0], self.knots_mm[MOST_KNOTS - 1]]
+        [self.node_mm(0), self.node_mm(self.count() - 1)]
     }
 
     /// What slopes' weights are in parts of, 1/mm.
@@ -90,10 +90,9 @@ impl Axis {
         let [from, to] = self.ends_mm();
         // A value that is no number is at the first node.
         let x = if x_mm > from { x_mm.min(to) } else { from };
-        let inner = self.knots_mm.get(SPAN..self.count).unwrap_or_default();
-        let first = inner.iter().take_while(|knot| **knot <= x).count();
-        let around = self.knots_mm.get(first + 1..).unwrap_or_default();
-        let [a, b, c, d, e, f] = around.first_chunk().copied().unwrap_or_default();
+        let inner = SPAN..self.count();
+        let first = inner.take_while(|knot| self.knot_mm(*knot) <= x).count();
+        let [a, b, c, d, e, f] = core::array::from_fn(|k| self.knot_mm(first + 1 + k));
         // Cox and de Boor's recurrence, for the span from c to d; the slopes are made of the
         // splines of one degree less.
         let [c_x, d_x] = [x - c, d - x];
@@ -114,7 +113,7 @@ impl Axis {
             b_x * parts[1] + f_x * parts[2],
             c_x * parts[2],
         ];
-        let three = 3.0 * self.per_slope;
+        let three = 3.0 * ONE / self.slope_unit;
         let slopes = [
             -parts[0],
             parts[0] - parts[1],
@@ -142,6 +141,10 @@ mod tests {
 
     const NODES_MM: [f32; 8] = [-5.0, -2.0, 0.0, 1.0, 2.5, 3.0, 4.0, 5.0];
 
+    fn bytes(nodes_mm: &[f32]) -> Vec<[u8; 4]> {
+        nodes_mm.iter().map(|node| node.to_le_bytes()).collect()
+    }
+
     fn value(parts: &[Q<15, i16>; SPAN], coefficients: &[f64]) -> f64 {
         let pairs = parts.iter().zip(coefficients);
         pairs
@@ -153,8 +156,9 @@ mod tests {
     /// Greville's points are the coefficients of x itself: its slope is one.
     #[test]
     fn a_line_is_a_spline() {
-        let axis = Axis::new(&NODES_MM).unwrap();
-        let knot = |k: usize| f64::from(axis.knots_mm[k]);
+        let nodes = bytes(&NODES_MM);
+        let axis = Axis::new(&nodes).unwrap();
+        let knot = |k: usize| f64::from(axis.knot_mm(k));
         let greville = |j: usize| (knot(j + 1) + knot(j + 2) + knot(j + 3)) / 3.0;
         let own: Vec<f64> = (0..8).map(greville).collect();
         for step in 0..=200 {
@@ -169,7 +173,8 @@ mod tests {
 
     #[test]
     fn beyond_an_end_it_is_as_at_the_end() {
-        let axis = Axis::new(&NODES_MM).unwrap();
+        let nodes = bytes(&NODES_MM);
+        let axis = Axis::new(&nodes).unwrap();
         for far in [f32::NEG_INFINITY, -7.0, f32::NAN] {
             assert_eq!(axis.at(far), axis.at(-5.0));
         }
@@ -179,12 +184,12 @@ mod tests {
 
     #[test]
     fn nodes_that_make_no_axis_are_refused() {
-        assert!(Axis::new(&NODES_MM[..5]).is_none());
-        assert!(Axis::new(&[0.0; 17]).is_none());
+        assert!(Axis::new(&bytes(&NODES_MM[..5])).is_none());
+        assert!(Axis::new(&bytes(&[0.0; 17])).is_none());
         for wrong in [f32::NAN, 0.0, 0.005, 101.0] {
             let mut nodes = NODES_MM;
             nodes[3] = wrong;
-            assert!(Axis::new(&nodes).is_none(), "{wrong}");
+            assert!(Axis::new(&bytes(&nodes)).is_none(), "{wrong}");
         }
     }
 
@@ -196,6 +201,7 @@ mod tests {
         ) {
             let mut at = -20.0;
             let nodes: Vec<f32> = steps.iter().map(|step| { at += step; at }).collect();
+            let nodes = bytes(&nodes);
             let axis = Axis::new(&nodes).unwrap();
             let [from, to] = axis.ends_mm();
             let weights = axis.at(from + x * (to - from));

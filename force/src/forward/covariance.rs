@@ -95,7 +95,9 @@ impl<'a> CovarianceGrid<'a> {
 }
 
 impl Unknown<'_> {
-    /// Under a load that moves the images so.
+    /// Under a load that moves the images so. Not inlined: what it needs of the stack is free again
+    /// behind it.
+    #[inline(never)]
     pub fn covariance(&self, pose: &Pose, limits: &Limits, moved: &Column) -> Covariance {
         match self {
             Unknown::Nothing => Covariance::default(),

@@ -15,6 +15,9 @@ const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// Where a step that would explain no more than this lowers no residual, what is left is the
 /// tables' rounding.
 const ROUNDING: f32 = 0.5;
+/// Where no step lowers the residual and more than this is left, the steps may have stuck where the
+/// tables bend: χ² of three degrees of freedom is more in 1 of 100 honest frames.
+const STUCK: f32 = 11.3;
 /// The first of the unknowns that are the tilt, which the place follows.
 const TILT: usize = 1;
 /// What is likely before there is a frame: tilt along x and y, rad, and place along x and y, mm,
@@ -118,7 +121,8 @@ impl<'a> Descent<'a> {
             return false;
         };
         let explained = white.solved.map_or(0.0, |solved| solved.explained);
-        white.unexplained <= UNEXPLAINED && (explained <= LEFT_TO_EXPLAIN || self.has_ended)
+        let has_ended = self.has_ended && white.unexplained <= STUCK;
+        white.unexplained <= UNEXPLAINED && (explained <= LEFT_TO_EXPLAIN || has_ended)
     }
 
     /// What it has come to.
@@ -212,6 +216,8 @@ impl Linearization {
 }
 
 impl White {
+    /// Not inlined: what it needs of the stack is free again behind it.
+    #[inline(never)]
     fn new(
         covariance: &Covariance,
         slopes: &[Column; UNKNOWNS],

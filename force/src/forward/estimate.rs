@@ -116,6 +116,8 @@ pub struct Sigma {
     pub direction: f32,
     /// Of |F|, N.
     pub magnitude_n: f32,
+    /// That by what the markers leave open of the size alone, N.
+    pub by_noise_n: f32,
     /// Of each coordinate of the place, mm: the root of half their covariance's trace.
     pub place_mm: f32,
 }
@@ -144,6 +146,7 @@ impl Estimate {
         Some(Sigma {
             direction: noisier * stated(across(&self.pose, tilt)),
             magnitude_n: strength.sigma_n(self.pose.size, size),
+            by_noise_n: strength.stiffness.per_size_n(self.pose.size) * size,
             place_mm,
         })
     }

@@ -84,7 +84,7 @@ pub struct Forward<'a> {
 /// What is known of units beside the one that a model was made on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Others<'a> {
-    /// How strong the force of a size is on the typical one.
+    /// How strong the force of a size is on one without stretch.
     pub stiffness: Stiffness,
     /// Standard uncertainty of that, in parts of it, at the squares of even parts of the largest
     /// size.

@@ -15,7 +15,7 @@ use crate::kernels::Factors;
 /// Markers.
 pub const DOTS: usize = EQUATIONS / 2;
 /// Functions of size and tilt at most.
-pub const MOST_FUNCTIONS: usize = 24;
+pub const MOST_FUNCTIONS: usize = 16;
 
 /// Positions along x and y for each marker.
 pub type Markers = [[f32; 2]; DOTS];

@@ -18,7 +18,7 @@ pub const OUTPUTS: usize = 2;
 /// coefficients are splines over the place. Borrowed from a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<'a> {
-    axes: [Axis; 2],
+    axes: [Axis<'a>; 2],
     /// The direction along which the first part of its functions' tilt is.
     away: [f32; 2],
     functions: usize,
@@ -48,7 +48,7 @@ impl<'a> Table<'a> {
     /// Of axes along x and y, a direction of the tilt's first part and these bytes, as many as
     /// [`Table::length`] says; `None` of others.
     pub fn new(
-        axes: [Axis; 2],
+        axes: [Axis<'a>; 2],
         away: [f32; 2],
         functions: usize,
         steps: &'a [u8],
@@ -64,12 +64,12 @@ impl<'a> Table<'a> {
     }
 
     /// Bytes of a table's steps.
-    pub fn length([x, y]: &[Axis; 2], functions: usize) -> usize {
+    pub fn length([x, y]: &[Axis<'_>; 2], functions: usize) -> usize {
         2 * OUTPUTS * functions * x.count() * y.count()
     }
 
     /// Its axes, along x and y.
-    pub fn axes(&self) -> &[Axis; 2] {
+    pub fn axes(&self) -> &[Axis<'a>; 2] {
         &self.axes
     }
 
@@ -138,10 +138,19 @@ mod tests {
     /// Of 30°.
     const AWAY: [f32; 2] = [0.866_025_4, 0.5];
 
-    fn axes() -> [Axis; 2] {
-        let x = Axis::new(&[-2.0, -1.0, 0.0, 1.0, 2.0, 3.0]);
-        let y = Axis::new(&[-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0]);
-        [x.unwrap(), y.unwrap()]
+    /// Nodes every mm from -3 to 3.
+    const NODES: [[u8; 4]; 7] = {
+        let mut nodes = [[0; 4]; 7];
+        let mut k = 0;
+        while k < 7 {
+            nodes[k] = (k as f32 - 3.0).to_le_bytes();
+            k += 1;
+        }
+        nodes
+    };
+
+    fn axes() -> [Axis<'static>; 2] {
+        [&NODES[1..], &NODES].map(|nodes| Axis::new(nodes).unwrap())
     }
 
     /// s, s·a² and s²·b in steps, of the tilt as the table sees it.

@@ -201,13 +201,17 @@ impl Tilts {
     pub fn set(&mut self, a: &Powers, b: &Powers) {
         let even = EVEN.iter().zip(&mut self.even);
         for ([j, k], group) in even.chain(ODD.iter().zip(&mut self.odd)) {
-            *group = [
-                a.values[*j] * b.values[*k],
-                a.slopes[*j] * b.values[*k],
-                a.values[*j] * b.slopes[*k],
-            ];
+            let (value, slope) = (power(&a.values, *j), power(&a.slopes, *j));
+            let (other, other_slope) = (power(&b.values, *k), power(&b.slopes, *k));
+            *group = [value * other, slope * other, value * other_slope];
         }
     }
+}
+
+/// One of the powers; indices of groups are below their number, so that nothing else is read.
+#[inline]
+fn power(of: &[f32; MOST_TILTS], degree: usize) -> f32 {
+    of.get(degree).copied().unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -82,7 +82,7 @@ fn tables<'a>(reader: &mut Reader<'a>) -> Result<Tables<'a>, ModelError> {
     let functions = [even, odd].map(usize::from);
     let count = functions.iter().sum();
     let terms = Terms::new(sizes).filter(|_| (1..=MOST_FUNCTIONS).contains(&count));
-    let terms = terms.ok_or(wrong("tables", "1 to 88 terms and 1 to 24 functions"))?;
+    let terms = terms.ok_or(wrong("tables", "1 to 88 terms and 1 to 16 functions"))?;
     reader.offset -= 1;
     reader.zero("reserved byte")?;
     let [terms_even, terms_odd] = terms.counts();
@@ -107,14 +107,11 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
     reader.zero("reserved byte")?;
     reader.zero("reserved byte")?;
     let mut axis = |count: u8| {
-        let mut nodes_mm = [0.0; *NODES.end()];
-        let nodes = nodes_mm.get_mut(..usize::from(count));
-        let nodes = nodes.ok_or(wrong("table", "6 to 16 nodes"))?;
-        for node in nodes.iter_mut() {
-            *node = f32::from_le_bytes(reader.array()?);
+        if !NODES.contains(&usize::from(count)) {
+            return Err(wrong("table", "6 to 16 nodes"));
         }
-        let axis = Axis::new(nodes);
-        axis.ok_or(wrong(
+        let (nodes, _) = reader.take(4 * usize::from(count))?.as_chunks();
+        Axis::new(nodes).ok_or(wrong(
             "table's nodes",
             "6 to 16, growing from -100 to 100 mm",
         ))
@@ -123,14 +120,14 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
     let away = pair(reader, "direction", [-1.0, 1.0], "-1 to 1")?;
     let steps = reader.take(Table::length(&axes, functions))?;
     reader.pad()?;
-    Table::new(axes, away, functions, steps).ok_or(wrong("table", "1 to 24 functions"))
+    Table::new(axes, away, functions, steps).ok_or(wrong("table", "1 to 16 functions"))
 }
 
 fn others<'a>(reader: &mut Reader<'a>) -> Result<Others<'a>, ModelError> {
     let stiffness = stiffness(reader)?;
     let mut relative = [0.0; RELATIVE];
     for part in &mut relative {
-        *part = float(reader, "other units' strength", [0.0, 10.0], "0 to 10")?;
+        *part = float(reader, "other units' strength", [0.0, 100.0], "0 to 100")?;
     }
     Ok(Others {
         stiffness,
@@ -230,7 +227,7 @@ pub struct ForwardSpec {
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct OthersSpec {
-    /// How strong the force of a size is on the typical one.
+    /// How strong the force of a size is on one without stretch.
     pub stiffness: Stiffness,
     /// Standard uncertainty of that, in parts of it.
     pub relative: [f32; RELATIVE],

@@ -416,13 +416,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         };
         *status |= trust;
         if status.contains(Status::UNEXPLAINED) {
+            status.0 &= !Status::CONTACT.0;
             return None;
         }
         if output.input_saturated {
             *status |= Status::MAGNITUDE_OUT_OF_RANGE;
-        }
-        if force::is_contact(&force) {
-            *status |= Status::CONTACT;
         }
         Some(force)
     }

@@ -4,7 +4,9 @@
 //! uncertainty; it ends below the lower limit, or below half of that certainty.
 
 use super::ContactLimits;
-use hivtac_force::force::{CONTACT_SIGMAS, Force};
+use crate::pipeline::Measurement;
+use hivtac_force::force::CONTACT_SIGMAS;
+use hivtac_terms::status::Status;
 
 /// What was known is forgotten when no frame had a force for so long, µs.
 const FORGOTTEN_US: u64 = 100_000;
@@ -28,15 +30,17 @@ impl Contact {
         &mut self,
         limits: &ContactLimits,
         time_us: u64,
-        force: Option<&Force>,
+        measurement: &Measurement,
     ) -> Option<bool> {
-        let force = force?;
+        let force = measurement.force.as_ref()?;
+        // Where a unit's strength is uncertain, the frame's own status tells what is by noise.
+        let is_certain = measurement.status.contains(Status::CONTACT);
         let was_touched = self.is_touched && time_us.saturating_sub(self.newest_us) <= FORGOTTEN_US;
         let magnitude = force.magnitude.0.unsigned_abs();
         let sigma = u64::from(force.magnitude_sigma.0) * u64::from(CONTACT_SIGMAS);
         self.is_touched = match was_touched {
-            true => magnitude >= limits.ends.0 && 2 * u64::from(magnitude) >= sigma,
-            false => magnitude >= limits.begins.0 && u64::from(magnitude) >= sigma,
+            true => magnitude >= limits.ends.0 && (is_certain || 2 * u64::from(magnitude) >= sigma),
+            false => magnitude >= limits.begins.0 && (is_certain || u64::from(magnitude) >= sigma),
         };
         self.newest_us = time_us;
         Some(self.is_touched)
@@ -46,7 +50,8 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::temporal::tests::pressed;
+    use crate::temporal::tests::{frame, pressed};
+    use hivtac_terms::units::Px;
 
     /// Whether each of forces, µN with standard uncertainty, a frame apart, is a contact.
     fn told(forces: &[(i32, u32)]) -> std::vec::Vec<bool> {
@@ -55,7 +60,8 @@ mod tests {
         let frames = forces.iter().map(|&(magnitude, sigma)| {
             time_us += 6_405;
             let force = pressed(magnitude, sigma);
-            contact.follow(&ContactLimits::default(), time_us, Some(&force))
+            let seen = frame(Some(force), Px(0));
+            contact.follow(&ContactLimits::default(), time_us, &seen)
         });
         frames.map(|told| told.unwrap()).collect()
     }
@@ -80,15 +86,29 @@ mod tests {
         assert_eq!(told(&extremes), [false, true, false]);
     }
 
+    /// How strong a unit's film is, may be as uncertain as its force is large: the frame's status
+    /// knows what is by noise.
+    #[test]
+    fn a_film_of_unknown_strength_is_touched() {
+        let mut seen = frame(Some(pressed(20_000, 20_000)), Px(0));
+        for (bit, expected) in [(Status::OK, false), (Status::CONTACT, true)] {
+            seen.status |= bit;
+            let mut contact = Contact::NONE;
+            let told = contact.follow(&ContactLimits::default(), 0, &seen);
+            assert_eq!(told, Some(expected));
+        }
+    }
+
     #[test]
     fn without_a_force_nobody_knows_and_after_a_while_nothing_is_remembered() {
         let limits = ContactLimits::default();
-        let (first, between) = (pressed(5_000, 1), pressed(1_500, 1));
+        let [first, none, between] = [Some(pressed(5_000, 1)), None, Some(pressed(1_500, 1))]
+            .map(|force| frame(force, Px(0)));
         for (later_us, expected) in [(100_000, true), (100_001, false)] {
             let mut contact = Contact::NONE;
-            assert_eq!(contact.follow(&limits, 0, Some(&first)), Some(true));
-            assert_eq!(contact.follow(&limits, 50_000, None), None);
-            let told = contact.follow(&limits, later_us, Some(&between));
+            assert_eq!(contact.follow(&limits, 0, &first), Some(true));
+            assert_eq!(contact.follow(&limits, 50_000, &none), None);
+            let told = contact.follow(&limits, later_us, &between);
             assert_eq!(told, Some(expected), "{later_us}");
         }
     }

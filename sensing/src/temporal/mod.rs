@@ -115,7 +115,7 @@ impl Temporal {
             rezero,
         } = self.settings;
         let own = measurement.force.as_ref();
-        let touched = self.contact.follow(&contact, at.time_us, own);
+        let touched = self.contact.follow(&contact, at.time_us, measurement);
         let slipping = self.slip.follow(&slip, at.time_us, own, touched);
         let mut status = Status(measurement.status.0 & !(Status::CONTACT.0 | Status::SLIP.0));
         for (set, bit) in [

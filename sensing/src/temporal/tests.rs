@@ -46,10 +46,10 @@ use hivtac_terms::temporal::{Filter, Rezero, TemporalError, TemporalSettings};
 use hivtac_terms::units::{Milliseconds, Px};
 
 /// A frame with a force, of markers that stand so far to the right.
-fn frame(force: Option<Force>, right: Px) -> Measurement {
+pub(super) fn frame(force: Option<Force>, right: Px) -> Measurement {
     let markers = rest(right).markers();
     Measurement {
-        status: Status::NOT_CALIBRATED | Status::CONTACT,
+        status: Status::NOT_CALIBRATED | Status::SLIP,
         markers: Some(markers),
         features: Some(Features::of_markers(&markers)),
         force,
