@@ -67,9 +67,13 @@ fn frames_back_to_back_are_all_measured() {
     // All words of every frame that has ended, and some of the one under way, or all.
     let under_way = dcmi.words - dcmi.frames * 38_400;
     assert!((0..=38_400).contains(&under_way), "{dcmi:?}");
-    // Each band reached the core once; on a busy bus the last ones are under way.
+    // Each band reached the core once, but for those of the first frame: no motion is known of it
+    // yet, so that it may be looked at again. On a busy bus the last ones are under way.
     let words = run.report.mdma_bytes / 4;
-    assert!(dcmi.words.abs_diff(words) <= 4 * 640, "{words} of {dcmi:?}");
+    let once = [0, 38_400]
+        .iter()
+        .any(|more| (dcmi.words + more).abs_diff(words) <= 4 * 640);
+    assert!(once, "{words} of {dcmi:?}");
 }
 
 /// Whether regions of memory are enforced, and whether an earlier run translated the program.

@@ -92,10 +92,12 @@ impl Resting {
                 at_four_areas,
                 ..
             } = &forward.noise;
-            let variances = [0, 1].map(|i| {
-                let growth = 1.0 + (at_four_areas[i] - 1.0) * (larger - 1.0) / 3.0;
+            let [away, across] = *at_rest_px;
+            let [more_away, more_across] = *at_four_areas;
+            let variances = [(away, more_away), (across, more_across)].map(|(at_rest, more)| {
+                let growth = 1.0 + (more - 1.0) * (larger - 1.0) / 3.0;
                 // A law that falls to nothing within the areas would weigh a marker as certain.
-                let seen = frame.times * scale * at_rest_px[i] * growth.max(0.1);
+                let seen = frame.times * scale * at_rest * growth.max(0.1);
                 seen * seen + blur * blur
             });
             noise[k] = forward.rest_image.noise(k, variances);

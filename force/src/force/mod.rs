@@ -94,8 +94,8 @@ impl Polar {
 
 /// The force that a model's outputs mean, and its status bits:
 /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`],
-/// [`Status::DIRECTION_UNRELIABLE`], [`Status::PLACE_OUT_OF_RANGE`] and [`Status::CONTACT`]. A negative |F| from a
-/// model is one of nothing: it becomes 0.
+/// [`Status::DIRECTION_UNRELIABLE`], [`Status::PLACE_OUT_OF_RANGE`] and [`Status::CONTACT`]. A
+/// negative |F| from a model is one of nothing: it becomes 0.
 pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
     let outputs = output.values;
     let (polar, vector) = match model.output {

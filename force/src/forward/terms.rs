@@ -77,8 +77,14 @@ impl Terms {
 
     /// How many there are of even k, and of odd k.
     pub fn counts(&self) -> [usize; 2] {
-        let of = |[j, k]: &[usize; 2]| usize::from(self.sizes[j + k]);
+        let of = |[j, k]: &[usize; 2]| self.sizes_of(j + k);
         [EVEN.iter().map(of).sum(), ODD.iter().map(of).sum()]
+    }
+
+    /// How many sizes there are of a degree of tilt.
+    #[inline]
+    fn sizes_of(&self, degree: usize) -> usize {
+        self.sizes.get(degree).copied().map_or(0, usize::from)
     }
 
     /// What a sum of the terms of even k, of these parts, is under a load of a size and of each of
@@ -124,7 +130,7 @@ impl Terms {
         sums: &mut [[f32; 2]],
     ) {
         for ([j, k], group) in groups.iter().zip(sums) {
-            let count = usize::from(self.sizes[j + k]);
+            let count = self.sizes_of(j + k);
             let (own, rest) = parts.split_at(count.min(parts.len()));
             parts = rest;
             *group = sum(own, sizes);
