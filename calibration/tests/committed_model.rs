@@ -133,7 +133,7 @@ fn steps_that_find_no_way_on_begin_anew_from_the_middle() {
     let [found_n, sigma_n] = [force.magnitude.0, force.magnitude_sigma.0 as i32].map(newtons);
     let off_n = found_n - load.magnitude_n();
     assert!(
-        off_n.abs() < 3.0 * sigma_n && sigma_n < 0.5e-3,
+        off_n.abs() < 3.0 * sigma_n && sigma_n < 1e-3,
         "{off_n} ± {sigma_n}"
     );
     let place = force.place.unwrap();
