@@ -191,14 +191,19 @@ fn a_mounted_film_is_found_from_ten_loads() {
     }
 }
 
+/// No film moves two markers apart by 40 px and leaves the others.
 #[test]
-fn loads_that_contradict_each_other_are_refused() {
+fn what_no_film_does_is_refused() {
     let truth = Truth::new();
-    let mut loads: Vec<SeenLoad> = (0..7).map(|k| truth.load(k)).collect();
-    loads[1].force_n = loads[1].force_n.map(|part| part / 3.0);
-    loads[3].force_n = loads[3].force_n.map(|part| 2.0 * part);
+    let mut loads: Vec<SeenLoad> = (0..2).map(|k| truth.load(k)).collect();
+    loads[1].seen_px[0][0] += 20.0;
+    loads[1].seen_px[1][0] -= 20.0;
     let error = fit(&truth.bench(), &loads, 0.1, None)
         .unwrap_err()
         .to_string();
-    assert!(error.contains("no unit explains"), "{error}");
+    let expected = "no unit explains these loads";
+    assert!(
+        error.contains(expected) && error.contains("load 2"),
+        "{error}"
+    );
 }
