@@ -27,7 +27,7 @@ use crate::weights::Weights;
 use covariances::even;
 pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 pub use functions::{Sampled, compressed};
-pub(crate) use nearest::{Nearest, cubic_law, dot};
+pub(crate) use nearest::{Nearest, dot};
 pub use noise::Noise;
 pub use others::OtherUnits;
 pub use tables::{Dot, UnitSetup, tables};

@@ -7,18 +7,6 @@ use hivtac_film::reduced::Axis;
 /// What is told least of the terms is at least this part of what is told most.
 const LEAST_TOLD: f64 = 1e-9;
 
-/// a and b of f = a·x + b·x³ nearest to these, each f > 0 in parts of itself.
-pub fn cubic_law(pairs: impl IntoIterator<Item = (f64, f64)>) -> [f64; 2] {
-    let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
-    for (x, f) in pairs {
-        let (x, y) = (x / f, x * x * x / f);
-        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
-        (xf, yf) = (xf + x, yf + y);
-    }
-    let whole = xx * yy - xy * xy;
-    [(yy * xf - xy * yf) / whole, (xx * yf - xy * xf) / whole]
-}
-
 /// Finds terms' coefficients from samples at always the same loads.
 pub struct Nearest {
     /// Columns at right angles, by term.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::problem::{At, Problem};
 use super::seen::{View, mean, seen_through};
-use crate::forward::{Nearest, cubic_law};
+use crate::forward::Nearest;
 
 /// Places of the tip along x and along y at which the film is solved: from the first, so far apart,
 /// mm.
@@ -319,4 +319,16 @@ fn stiffness_n(at: &At) -> Result<[f64; 2]> {
 fn depth(at: &At, state: &Equilibrium) -> f64 {
     let [here, rest] = [state, &at.rest].map(|state| at.film.displacement(state, [0.0; 2])[2]);
     rest - here
+}
+
+/// a and b of f = a·x + b·x³ nearest to these, each f > 0 in parts of itself.
+fn cubic_law(pairs: impl IntoIterator<Item = (f64, f64)>) -> [f64; 2] {
+    let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
+    for (x, f) in pairs {
+        let (x, y) = (x / f, x * x * x / f);
+        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+        (xf, yf) = (xf + x, yf + y);
+    }
+    let whole = xx * yy - xy * xy;
+    [(yy * xf - xy * yf) / whole, (xx * yf - xy * xf) / whole]
 }

@@ -11,6 +11,7 @@ pub const ONE: f32 = 32_767.0;
 /// 3·2²²: what is added to it is rounded to whole numbers, as f32 has no smaller steps there, and
 /// those of 16 bits are then the low half of its bits.
 const WHOLE: f32 = 12_582_912.0;
+
 /// The nodes of cubic splines, which are sums of B-splines: one for each node, smooth over the
 /// second node and the last but one (not-a-knot). Borrowed from a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
