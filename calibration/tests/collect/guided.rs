@@ -189,9 +189,13 @@ fn a_person_is_led_to_a_units_own_model() {
 fn assert_good(here: &Path, stdout: &str) {
     let verdict = stdout
         .lines()
-        .find(|line| line.contains("left out of the fit"));
+        .find(|line| line.starts_with("on each of the 6 loads, left out of the fit"));
     let verdict = verdict.unwrap_or_else(|| panic!("no verdict: {stdout}"));
-    assert!(verdict.starts_with("on each of the 6 loads"), "{verdict}");
+    let used = stdout
+        .lines()
+        .filter(|line| line.contains(" under a force"));
+    let frames: f64 = used.map(|line| number(line, "at rest, ")).sum();
+    assert!(frames > 100.0, "frames: {stdout}");
     let direction_deg = number(verdict, "direction ");
     let force_mn = number(verdict, "|F| ");
     let place_um = number(verdict, "the place ");
