@@ -145,6 +145,10 @@ impl Resting {
         if estimate.pose.size >= forward.limits.size {
             status |= Status::MAGNITUDE_OUT_OF_RANGE | Status::UNEXPLAINED;
         }
+        // A load that explains nothing tells of no contact.
+        if status.contains(Status::UNEXPLAINED) {
+            status.0 &= !Status::CONTACT.0;
+        }
         (force, status)
     }
 

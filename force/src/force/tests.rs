@@ -271,7 +271,10 @@ fn trust_in_a_place() {
     }
     let (weak, status) = told(2_048, [9_000, 0]);
     assert_eq!(weak.place.unwrap().sigma.0, 758);
-    assert!(status.contains(Status::PLACE_OUT_OF_RANGE) == status.contains(Status::CONTACT));
+    assert!(
+        status.contains(Status::PLACE_OUT_OF_RANGE)
+            == is_contact(weak.magnitude, weak.magnitude_sigma)
+    );
     assert!(
         !told(1_000, [9_000, 0])
             .1

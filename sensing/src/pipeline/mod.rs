@@ -416,7 +416,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         };
         *status |= trust;
         if status.contains(Status::UNEXPLAINED) {
-            status.0 &= !Status::CONTACT.0;
             return None;
         }
         if output.input_saturated {

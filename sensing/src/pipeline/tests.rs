@@ -447,8 +447,9 @@ proptest! {
         if let Some(force) = seen.force {
             prop_assert!(force.magnitude.0 >= 0);
         }
-        let large = seen.force.is_some_and(|force| force.magnitude >= force::LEAST_CONTACT);
-        prop_assert!(large || !seen.status.contains(Status::CONTACT));
+        let touches = |force: Force| force::is_contact(force.magnitude, force.magnitude_sigma);
+        let touched = seen.force.is_some_and(touches);
+        prop_assert_eq!(seen.status.contains(Status::CONTACT), touched);
     }
 
     /// Whatever lens, rest position and picture: an answer, and no overflow on the way.

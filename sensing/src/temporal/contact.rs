@@ -1,7 +1,8 @@
 //! Whether something touches the film, with hysteresis.
 //!
 //! A contact begins with the limit's |F| when that is at least three times its standard
-//! uncertainty; it ends below the lower limit, or below half of that certainty.
+//! uncertainty, or the frame's own status says that something touches the film: it leaves out how
+//! uncertain a film's strength is. It ends below the lower limit, or below half of that certainty.
 
 use super::ContactLimits;
 use crate::pipeline::Measurement;
