@@ -1,8 +1,10 @@
 //! Gauss–Newton steps to the unit that explains the loads best.
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_shell::{Change, Film};
+use hivtac_shell::Change;
+use rayon::prelude::*;
 
+use super::load::UNKNOWNS;
 use super::numbers::Number;
 use super::own::FoundNumber;
 use super::problem::{At, Problem, Solved, Unknowns};
@@ -21,7 +23,7 @@ const STARTS: [(&[f64], f64); 4] = [
 const EXPLAINED: f64 = 1.4;
 /// Steps at most, and the change of χ² that ends them.
 const ROUNDS: usize = 20;
-const SETTLED: f64 = 0.05;
+const SETTLED: f64 = 0.3;
 /// χ² over the coordinates above which a fit is far from the loads, and the part of it that a step
 /// then takes away at least; with less it does not come near them.
 const FAR: f64 = 100.0;
@@ -62,6 +64,11 @@ fn chi_square(at: &At) -> f64 {
     at.square() / seen as f64
 }
 
+/// What a load adds to χ².
+fn own_square(parts: &[f64; UNKNOWNS], residual: &[f64]) -> f64 {
+    parts.iter().chain(residual).map(|part| part * part).sum()
+}
+
 impl Problem<'_> {
     /// What was found of each number.
     pub fn found_numbers(&self, found: &Found) -> Vec<FoundNumber> {
@@ -82,7 +89,7 @@ impl Problem<'_> {
     fn likeliest(&self) -> Unknowns {
         Unknowns {
             numbers: vec![0.0; self.priors.len()],
-            loads: vec![[0.0; super::load::UNKNOWNS]; self.loads.len()],
+            loads: vec![[0.0; UNKNOWNS]; self.loads.len()],
         }
     }
 
@@ -124,7 +131,8 @@ impl Problem<'_> {
             numbers: best.at.unknowns.numbers,
             ..self.likeliest()
         };
-        self.descend(unknowns, Some(&best.at.film))
+        let here = self.at(unknowns, Some((&best.at.film, &[])))?;
+        self.descend(self.located(here)?)
     }
 
     /// Descends as if what is seen scattered so many times more than it does, one after the other,
@@ -140,20 +148,57 @@ impl Problem<'_> {
         let mut found: Option<Found> = None;
         for blur in blurs.iter().copied().chain([1.0]) {
             self.blur = blur;
-            let film = found.as_ref().map(|found| &found.at.film);
-            let next = self.descend(unknowns.clone(), film)?;
+            let near = found
+                .as_ref()
+                .map(|found| (&found.at.film, &found.at.states[..]));
+            let next = self.descend(self.at(unknowns, near)?)?;
             unknowns = next.at.unknowns.clone();
             found = Some(next);
         }
         found.context("no descent")
     }
 
-    /// Descends from some values, those of a film nearby.
+    /// Each load where it explains most with the unit as it is, whatever the others do: a place
+    /// that is known roughly would spoil steps of all unknowns.
     ///
     /// # Errors
-    /// When the film finds no equilibrium under a load.
-    fn descend(&self, from: Unknowns, film: Option<&Film>) -> Result<Found> {
-        let mut here = self.at(from, film.map(|film| (film, &[][..])))?;
+    /// When a state is not stable.
+    fn located(&self, mut at: At) -> Result<At> {
+        let of_load = |number: usize| {
+            let mut parts = at.unknowns.loads[number];
+            let mut here = (at.states[number].clone(), at.residuals[number].clone());
+            for _ in 0..ROUNDS {
+                let step = self.own_step(&at, number, &parts, &here)?;
+                let square = own_square(&parts, &here.1);
+                let found = LENGTHS.iter().find_map(|length| {
+                    let there = std::array::from_fn(|i| parts[i] + length * step[i]);
+                    let pressed = self.press(&at, number, &there, &here.0).ok()?;
+                    let fell = square - own_square(&there, &pressed.1);
+                    (fell > 0.0).then_some((there, pressed, fell))
+                });
+                let Some((there, pressed, fell)) = found else {
+                    break;
+                };
+                (parts, here) = (there, pressed);
+                if fell < SETTLED {
+                    break;
+                }
+            }
+            Ok((parts, here))
+        };
+        let loads = (0..self.loads.len()).into_par_iter().map(of_load);
+        let loads: Vec<_> = loads.collect::<Result<_>>()?;
+        let (own, pressed): (Vec<_>, Vec<_>) = loads.into_iter().unzip();
+        at.unknowns.loads = own;
+        (at.states, at.residuals) = pressed.into_iter().unzip();
+        Ok(at)
+    }
+
+    /// Descends from some values.
+    ///
+    /// # Errors
+    /// When a state is not stable.
+    fn descend(&self, mut here: At) -> Result<Found> {
         for round in 1.. {
             let solved = self.solve(&here)?;
             let mut fell = 0.0;

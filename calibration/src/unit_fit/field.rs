@@ -1,17 +1,19 @@
 //! How a unit's film moves its dots under any load: from finite elements at few places of the tip
 //! to every place.
 //!
-//! The dimple under a tip moves with it. So the motion of a dot with the tip at a place is that of
-//! the point as far from the tip, with the tip at solved places nearby: interpolated between these
-//! it changes slowly, although the film moves quite otherwise a little beside a tip.
+//! The dimple under a tip moves with it. So the motion of a dot near the tip is that of the point as
+//! far from the tip, with the tip at solved places nearby: interpolated between these it changes
+//! slowly, although the film moves quite otherwise a little beside a tip. Far from the tip the film
+//! moves alike with the tip at places nearby, and dots, which are stiffer, stay where they are:
+//! there the motion of the dot itself is interpolated, with its slopes by the place.
 
 use anyhow::{Context, Result};
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use hivtac_shell::{Equilibrium, Film, Response};
 use rayon::prelude::*;
 
-use super::problem::{At, Problem};
-use super::seen::{View, mean, seen_through};
+use super::problem::{At, Problem, apart_mm};
+use super::seen::View;
 use crate::forward::Nearest;
 
 /// Places of the tip along x and along y at which the film is solved: from the first, so far apart,
@@ -19,18 +21,22 @@ use crate::forward::Nearest;
 const FIRST_MM: f64 = -5.0;
 const APART_MM: f64 = 2.0;
 const TIPS: usize = 6;
-/// Places that a value is interpolated from, along each axis.
+/// How far from the tip a dot is in its dimple, and outside it, mm.
+const FAR_MM: [f64; 2] = [1.5, 3.0];
+/// Places that a value in the dimple is interpolated from, along each axis.
 const SPAN: usize = 4;
 /// The force of the largest size, N.
 const LARGEST_N: f64 = 0.256;
 /// Loads at each place: sizes in parts of the largest without tilt, and with tilts: radius in parts
 /// of the largest, the turn of the first of four, °, and the size.
-const STRAIGHT: [f64; 4] = [0.1, 0.35, 0.7, 1.0];
+const STRAIGHT: [f64; 6] = [0.03, 0.12, 0.3, 0.52, 0.77, 1.0];
 const TILTED: [(f64, f64, f64); 2] = [(0.6, 20.0, 0.4), (0.8, 65.0, 0.9)];
 /// What slopes count for beside values.
 const SLOPES_COUNT: f64 = 0.05;
+/// Step by which images are differentiated along a slope, in its unit.
+const SLOPE_STEP: f64 = 3e-3;
 /// How many sizes the terms have without tilt, with its first degree, and so on.
-const TERMS: [u8; 5] = [6, 4, 3, 1, 0];
+const TERMS: [u8; 5] = [8, 5, 3, 1, 0];
 
 /// A unit's film, solved under some loads at some places of the tip.
 pub struct Field<'a> {
@@ -49,6 +55,8 @@ struct Solved {
     state: Equilibrium,
     /// By size, and by tilt along x and y, 1/rad.
     slopes: Vec<Response>,
+    /// By the place along x and y, per mm.
+    by_place: Vec<Response>,
 }
 
 /// The terms' coefficients of a dot's motion along x and y, focal lengths.
@@ -120,9 +128,11 @@ impl<'a> Field<'a> {
             let slopes = self
                 .per_pose(pose)
                 .map(|[x, y, z]| Response::to_all(&by_load, [x, y, z, 0.0, 0.0]));
+            let [.., by_x, by_y] = by_load;
             solved.push(Solved {
                 state,
                 slopes: slopes.into(),
+                by_place: vec![by_x, by_y],
             });
         }
         Ok(solved)
@@ -155,39 +165,64 @@ impl<'a> Field<'a> {
             farther_mm: made.farther_mm,
         };
         let place_mm = film.material_point(rest, place_mm);
-        let around = Around::new(place_mm);
+        let (around, between) = (Around::new(place_mm), Between::new(place_mm));
+        let far = far_part(apart_mm(dot_mm, place_mm));
         let still = |point: [f64; 2]| film.displacement(rest, point);
         let at_rest = view.image_of(still, dot_mm);
         let mut samples = [Vec::new(), Vec::new()];
         for load in 0..self.poses.len() {
             let displaced = |point: [f64; 2]| {
                 let mut sum = still(point);
-                around.add(&mut sum, |tip, shift| {
-                    let there = self.on_film([0, 1].map(|i| point[i] + shift[i]));
-                    let moved = film.displacement(&self.solved(tip, load).state, there);
-                    let rested = film.displacement(rest, there);
-                    [0, 1, 2].map(|i| moved[i] - rested[i])
-                });
+                if far < 1.0 {
+                    around.add(&mut sum, |tip, shift, part| {
+                        let there = self.on_film([0, 1].map(|i| point[i] + shift[i]));
+                        let moved = film.displacement(&self.solved(tip, load).state, there);
+                        let rested = film.displacement(rest, there);
+                        [0, 1, 2].map(|i| (1.0 - far) * part * (moved[i] - rested[i]))
+                    });
+                }
+                if far > 0.0 {
+                    between.add(&mut sum, |tip, parts| {
+                        let Solved {
+                            state, by_place, ..
+                        } = self.solved(tip, load);
+                        let moved = film.displacement(state, point);
+                        let rested = film.displacement(rest, point);
+                        let rates =
+                            [0, 1].map(|way| film.surface_rate(state, &by_place[way], point));
+                        [0, 1, 2].map(|i| {
+                            let value = parts[0] * (moved[i] - rested[i]);
+                            far * (value + parts[1] * rates[0][i] + parts[2] * rates[1][i])
+                        })
+                    });
+                }
                 sum
             };
             let image = view.image_of(displaced, dot_mm);
-            let lens = view.lens_at(displaced, dot_mm);
             for i in [0, 1] {
                 samples[i].push(image[i] - at_rest[i]);
             }
             for slope in 0..3 {
-                let rate = mean(dot_mm, |point| {
+                let rate = |point: [f64; 2]| {
                     let mut sum = [0.0; 3];
-                    around.add(&mut sum, |tip, shift| {
-                        let there = self.on_film([0, 1].map(|i| point[i] + shift[i]));
-                        let Solved { state, slopes } = self.solved(tip, load);
-                        film.surface_rate(state, &slopes[slope], there)
+                    around.add(&mut sum, |tip, shift, part| {
+                        let there = [0, 1].map(|i| point[i] + (1.0 - far) * shift[i]);
+                        let Solved { state, slopes, .. } = self.solved(tip, load);
+                        let rate = film.surface_rate(state, &slopes[slope], self.on_film(there));
+                        rate.map(|component| part * component)
                     });
                     sum
+                };
+                let [back, forth] = [-SLOPE_STEP, SLOPE_STEP].map(|step| {
+                    let there = |point: [f64; 2]| {
+                        let (at, rate) = (displaced(point), rate(point));
+                        [0, 1, 2].map(|i| at[i] + step * rate[i])
+                    };
+                    view.image_of(there, dot_mm)
                 });
-                let rate = seen_through(&lens, rate);
                 for i in [0, 1] {
-                    samples[i].push(SLOPES_COUNT * rate[i]);
+                    let rate = (forth[i] - back[i]) / (2.0 * SLOPE_STEP);
+                    samples[i].push(SLOPES_COUNT * rate);
                 }
             }
         }
@@ -246,20 +281,68 @@ impl Around {
         }
     }
 
-    /// Adds a vector of each solved place: by its number along x and y, and how far it is from the
-    /// place, mm.
-    fn add(&self, sum: &mut [f64; 3], of: impl Fn([usize; 2], [f64; 2]) -> [f64; 3]) {
+    /// Adds a vector of each solved place: by its number along x and y, how far it is from the
+    /// place, mm, and what it counts for.
+    fn add(&self, sum: &mut [f64; 3], of: impl Fn([usize; 2], [f64; 2], f64) -> [f64; 3]) {
         for (j, down) in self.parts[1].iter().enumerate() {
             for (i, right) in self.parts[0].iter().enumerate() {
                 let tip = [self.first[0] + i, self.first[1] + j];
                 let shift = [0, 1].map(|axis| tip_mm(tip[axis]) - self.place_mm[axis]);
-                let part = right * down;
-                for (sum, value) in sum.iter_mut().zip(of(tip, shift)) {
-                    *sum += part * value;
+                for (sum, value) in sum.iter_mut().zip(of(tip, shift, right * down)) {
+                    *sum += value;
                 }
             }
         }
     }
+}
+
+/// The four solved places that a place is between, and what values there and slopes along x and y
+/// count for: Adini's polynomials, of the third degree.
+struct Between {
+    corners: [([usize; 2], [f64; 3]); 4],
+}
+
+impl Between {
+    fn new(place_mm: [f64; 2]) -> Between {
+        let at = place_mm.map(|part| (part - FIRST_MM) / APART_MM);
+        let first = at.map(|at| at.floor().clamp(0.0, (TIPS - 2) as f64));
+        // From −1 to 1 across the four.
+        let [x, y] = [0, 1].map(|axis| 2.0 * (at[axis] - first[axis]) - 1.0);
+        let half_mm = APART_MM / 2.0;
+        let corner = |k: usize| {
+            let [i, j] = [k % 2, k / 2];
+            let [sx, sy] = [i, j].map(|side| 2.0 * side as f64 - 1.0);
+            let (u, v) = (x * sx, y * sy);
+            let parts = [
+                (1.0 + u) * (1.0 + v) * (2.0 + u + v - x * x - y * y),
+                half_mm * sx * (1.0 + u) * (1.0 + u) * (u - 1.0) * (1.0 + v),
+                half_mm * sy * (1.0 + v) * (1.0 + v) * (v - 1.0) * (1.0 + u),
+            ];
+            let tip = [first[0] as usize + i, first[1] as usize + j];
+            (tip, parts.map(|part| part / 8.0))
+        };
+        Between {
+            corners: [0, 1, 2, 3].map(corner),
+        }
+    }
+
+    /// Adds a vector of each corner: by its number along x and y, and what value and slopes count
+    /// for.
+    fn add(&self, sum: &mut [f64; 3], of: impl Fn([usize; 2], &[f64; 3]) -> [f64; 3]) {
+        for (tip, parts) in &self.corners {
+            for (sum, value) in sum.iter_mut().zip(of(*tip, parts)) {
+                *sum += value;
+            }
+        }
+    }
+}
+
+/// The part of a dot's motion that is interpolated where the dot is; the rest is interpolated as
+/// far from the tip as the dot is: 0 for dots in the dimple, 1 for far ones.
+fn far_part(apart_mm: f64) -> f64 {
+    let [from_mm, to_mm] = FAR_MM;
+    let along = ((apart_mm - from_mm) / (to_mm - from_mm)).clamp(0.0, 1.0);
+    along * along * (3.0 - 2.0 * along)
 }
 
 fn tip_mm(number: usize) -> f64 {

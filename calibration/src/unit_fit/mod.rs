@@ -38,6 +38,9 @@ use problem::Problem;
 /// beside it.
 const FINENESS: f64 = 0.5;
 
+/// How fine a mesh is that tells how a film answers to its numbers.
+const COARSE: f64 = 0.3;
+
 /// χ² over the coordinates that are seen beyond which loads contradict each other: they are off by
 /// some tenths of a pixel then, which no film in tolerance is.
 const CONTRADICTED: f64 = 2_500.0;

@@ -4,17 +4,20 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
+use hivtac_data::loads::norm;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
 use hivtac_scene::Camera;
 use hivtac_sensing::forward::{DOTS, EQUATIONS, MOST_TILTS, Noise, Stiffness};
 use hivtac_sensing::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
+use hivtac_shell::Equilibrium;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::descent::Found;
 use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::Number;
-use super::problem::{Problem, Rates, mesh_px};
+use super::problem::{At, Problem, Rates, apart_mm, mesh_px};
 use crate::forward::{
     Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
@@ -226,21 +229,10 @@ fn left_open(
     field: &Field<'_>,
     beside: f64,
 ) -> Result<CovarianceSpec> {
-    let at = &found.at;
+    let at = problem.coarse(&found.at)?;
     let poses: Vec<Pose> = knots(KNOTS).collect();
-    let mut states = Vec::new();
-    for pose in &poses {
-        let at_mm = at.film.material_point(&at.rest, pose.place_mm);
-        let state = match pose.size > 0.0 {
-            true => {
-                let start = states.last().unwrap_or(&at.rest);
-                at.film.press_force(at_mm, field.force_n(pose), start)?
-            }
-            false => at.rest.clone(),
-        };
-        states.push(state);
-    }
-    let rates = problem.rates(at, &states)?;
+    let states = knot_states(&at, field, &poses)?;
+    let rates = problem.rates(&at, &states)?;
     let is_held = |k: &usize| {
         !matches!(
             problem.priors[*k].number,
@@ -274,13 +266,49 @@ fn left_open(
             moved
         };
         let mut covariance = sum_of_squares(&(0..held.len()).map(along).collect::<Vec<_>>());
+        let force_n = norm(field.force_n(pose));
         for (k, row) in covariance.iter_mut().enumerate() {
+            let dot_mm = at.made.dots_mm[k / 2];
             let size = pose.size / LARGEST_SIZE;
-            let mesh = per_px * mesh_px(at.made.dots_mm[k / 2], pose.place_mm) * size.sqrt();
-            row[k] += (beside * size).powi(2) + mesh * mesh;
+            let mesh = per_px * mesh_px(dot_mm, pose.place_mm, force_n);
+            let table = per_px * size * table_px(dot_mm, pose.place_mm);
+            row[k] += (beside * size).powi(2) + mesh * mesh + table * table;
         }
         covariance
     };
     let all: Vec<Covariance> = rates.pressed.iter().zip(&poses).map(of_pose).collect();
     Ok(covariances(KNOTS, &all))
+}
+
+/// What a table leaves of each coordinate of a dot at the largest size with the tip at a place,
+/// standard uncertainty, px at 320×240: most where the dimple is.
+fn table_px(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
+    const ANYWHERE_PX: f64 = 0.015;
+    const AT_THE_TIP_PX: f64 = 0.12;
+    const REACH_MM: f64 = 2.4;
+    let apart = apart_mm(dot_mm, place_mm) / REACH_MM;
+    ANYWHERE_PX.hypot(AT_THE_TIP_PX * libm::exp(-apart * apart))
+}
+
+/// The film at the knots of its covariance: sizes, the smallest first, lines and places.
+fn knot_states(at: &At, field: &Field<'_>, poses: &[Pose]) -> Result<Vec<Equilibrium>> {
+    let places = poses.len() / usize::from(KNOTS[0]);
+    let of_place = |place: usize| -> Result<Vec<Equilibrium>> {
+        let mut states: Vec<Equilibrium> = Vec::new();
+        for pose in poses.iter().skip(place).step_by(places) {
+            let start = states.last().unwrap_or(&at.rest);
+            let at_mm = at.film.material_point(&at.rest, pose.place_mm);
+            states.push(match pose.size > 0.0 {
+                true => at.film.press_force(at_mm, field.force_n(pose), start)?,
+                false => at.rest.clone(),
+            });
+        }
+        Ok(states)
+    };
+    let by_place: Vec<Vec<Equilibrium>> = (0..places)
+        .into_par_iter()
+        .map(of_place)
+        .collect::<Result<_>>()?;
+    let of_size = |size: usize| by_place.iter().map(move |states| states[size].clone());
+    Ok((0..usize::from(KNOTS[0])).flat_map(of_size).collect())
 }

@@ -5,13 +5,18 @@ use hivtac_scene::Camera;
 use hivtac_shell::{Change, Design, Equilibrium, Film};
 use rayon::prelude::*;
 
-use super::FINENESS;
 use super::equations::{LoadEquations, LoadSlopes, Normal};
-use super::linear::{Matrix, inverse};
+use super::linear::{Matrix, inverse, times};
 use super::load::UNKNOWNS;
 use super::numbers::{self, Number, Prior};
 use super::seen::View;
+use super::{COARSE, FINENESS};
 use crate::loads::SeenLoad;
+
+/// So many loads are not alike: places and directions all over the film.
+const APART: usize = 10;
+/// What the family of films leaves of a real one's motion, standard uncertainty, px at 320×240.
+const FAMILY_PX: f64 = 0.006;
 
 /// What is known of the camera and the rest position before there is a load.
 #[derive(Clone, Debug)]
@@ -71,6 +76,8 @@ pub struct At {
     pub made: Made,
     pub film: Film,
     pub rest: Equilibrium,
+    /// The dots' images at rest, focal lengths.
+    images: Vec<[f64; 2]>,
     /// Under each load.
     pub states: Vec<Equilibrium>,
     /// What is seen less what should be, in parts of its uncertainty: at rest, and under each load.
@@ -190,6 +197,27 @@ impl Problem<'_> {
         made
     }
 
+    /// A unit on a mesh good enough to tell how it answers to its numbers, with no loads.
+    ///
+    /// # Errors
+    /// When the film finds no rest.
+    pub fn coarse(&self, at: &At) -> Result<At> {
+        let mut made = at.made.clone();
+        made.design.fineness = COARSE;
+        let film = Film::new(&made.design)?;
+        let rest = film.rest();
+        Ok(At {
+            unknowns: at.unknowns.clone(),
+            images: self.view(&made, &film).images(&rest, &made.dots_mm),
+            made,
+            film,
+            rest,
+            states: Vec::new(),
+            rest_residual: Vec::new(),
+            residuals: Vec::new(),
+        })
+    }
+
     fn view<'a>(&'a self, made: &Made, film: &'a Film) -> View<'a> {
         View {
             film,
@@ -210,36 +238,61 @@ impl Problem<'_> {
             None => Film::new(&made.design)?,
         };
         let rest = film.rest();
-        let press = |k: usize| -> Result<Equilibrium> {
-            let pressed = self.loads[k].at(&unknowns.loads[k]);
-            let place_mm = [0, 1].map(|i| pressed.place_mm[i] + made.stage_mm[i]);
-            let at_mm = film.material_point(&rest, place_mm);
-            let start = near.and_then(|(_, states)| states.get(k)).unwrap_or(&rest);
-            Ok(film.press_force(at_mm, pressed.force_n, start)?)
-        };
-        let numbers: Vec<usize> = (0..self.loads.len()).collect();
-        let states = numbers.into_par_iter().map(press);
-        let states = states.collect::<Result<Vec<_>>>()?;
         let mut at = At {
+            images: self.view(&made, &film).images(&rest, &made.dots_mm),
             unknowns,
             made,
             film,
             rest,
-            states,
+            states: Vec::new(),
             rest_residual: Vec::new(),
             residuals: Vec::new(),
         };
-        (at.rest_residual, at.residuals) = self.residuals(&at);
+        at.rest_residual = self.rest_residual(&at);
+        let press = |k: usize| -> Result<(Equilibrium, Vec<f64>)> {
+            let start = near.and_then(|(_, states)| states.get(k));
+            self.press(&at, k, &at.unknowns.loads[k], start.unwrap_or(&at.rest))
+        };
+        let pressed = (0..self.loads.len()).into_par_iter().map(press);
+        let pressed: Vec<_> = pressed.collect::<Result<_>>()?;
+        (at.states, at.residuals) = pressed.into_iter().unzip();
         Ok(at)
+    }
+
+    /// The unit's film under a load that is so many standard uncertainties beside what is told, and
+    /// what is seen of it less what should be, in parts of its uncertainty.
+    ///
+    /// # Errors
+    /// When the film finds no equilibrium.
+    pub fn press(
+        &self,
+        at: &At,
+        number: usize,
+        parts: &[f64; UNKNOWNS],
+        start: &Equilibrium,
+    ) -> Result<(Equilibrium, Vec<f64>)> {
+        let load = &self.loads[number];
+        let pressed = load.at(parts);
+        let place_mm = [0, 1].map(|i| pressed.place_mm[i] + at.made.stage_mm[i]);
+        let at_mm = at.film.material_point(&at.rest, place_mm);
+        let state = at.film.press_force(at_mm, pressed.force_n, start)?;
+        let images = self
+            .view(&at.made, &at.film)
+            .images(&state, &at.made.dots_mm);
+        let should = moved_px(&at.made, &images, &at.images);
+        let (seen, rest) = (
+            load.seen_px.as_flattened(),
+            self.bench.rest_px.as_flattened(),
+        );
+        let noise_px = self.noise_px(load, &at.made);
+        let residual = (0..should.len()).map(|i| (seen[i] - rest[i] - should[i]) / noise_px[i]);
+        Ok((state, residual.collect()))
     }
 
     /// Where the dots' images are at rest and in some states, focal lengths.
     fn images(&self, at: &At, made: &Made, states: &[Equilibrium]) -> Images {
         let view = self.view(made, &at.film);
-        let of = |state: &Equilibrium| -> Vec<[f64; 2]> {
-            let dots = made.dots_mm.iter();
-            dots.map(|dot| view.image(state, *dot)).collect()
-        };
+        let of = |state: &Equilibrium| view.images(state, &made.dots_mm);
         Images {
             rest: of(&at.rest),
             pressed: states.par_iter().map(of).collect(),
@@ -249,94 +302,47 @@ impl Problem<'_> {
     /// What a unit with these images is seen to do, px: where its dots rest, and how far beside the
     /// rest position that a tare takes they are in each state.
     fn seen(&self, made: &Made, images: &Images) -> Seen {
-        let rest = images
-            .rest
-            .iter()
-            .zip(&made.rest_px)
-            .flat_map(|(image, off)| {
-                let at = made.to_px(*image);
-                [0, 1].map(|i| made.middle_px[i] + at[i] + off[i])
-            });
-        let of_state = |pressed: &Vec<[f64; 2]>| -> Vec<f64> {
-            let dots = pressed.iter().zip(&images.rest).zip(&made.rest_px);
-            let moved = dots.flat_map(|((there, here), off)| {
-                let moved = made.to_px([0, 1].map(|i| there[i] - here[i]));
-                [0, 1].map(|i| moved[i] - off[i])
-            });
-            moved.collect()
-        };
+        let pressed = images.pressed.iter();
         Seen {
-            rest: rest.collect(),
-            pressed: images.pressed.iter().map(of_state).collect(),
+            rest: rest_px(made, &images.rest),
+            pressed: pressed
+                .map(|there| moved_px(made, there, &images.rest))
+                .collect(),
         }
     }
 
     /// Standard uncertainty of each coordinate under a load, px: of what is seen, and of what a
-    /// mesh leaves of the film's shape beside the tip.
+    /// mesh leaves of the film's shape beside the tip. What no film of the family does is alike in
+    /// loads that are alike: more loads than [`APART`] do not tell it better.
     fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
+        let more = self.loads.len().saturating_sub(APART) as f64 / APART as f64;
+        let shared_px = load.noise_px.hypot(FAMILY_PX * more.sqrt());
         let of_dot = |dot: &[f64; 2]| {
-            let noise_px = load.noise_px.hypot(mesh_px(*dot, load.place_mm));
+            let noise_px = shared_px.hypot(mesh_px(*dot, load.place_mm, load.magnitude_n()));
             [self.blur * noise_px; 2]
         };
         made.dots_mm.iter().flat_map(of_dot).collect()
     }
 
-    /// What is seen less what should be, in parts of its uncertainty.
-    fn residuals(&self, at: &At) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let bench = self.bench;
-        let should = self.seen(&at.made, &self.images(at, &at.made, &at.states));
-        let rest = bench.rest_px.as_flattened().iter().zip(&should.rest);
-        let of_load = |(load, should): (&SeenLoad, &Vec<f64>)| -> Vec<f64> {
-            let seen = load.seen_px.as_flattened().iter();
-            let moved = seen
-                .zip(bench.rest_px.as_flattened())
-                .map(|(seen, rest)| seen - rest);
-            let noise_px = self.noise_px(load, &at.made).into_iter();
-            let off = moved.zip(should).map(|(moved, should)| moved - should);
-            off.zip(noise_px)
-                .map(|(off, noise_px)| off / noise_px)
-                .collect()
-        };
-        (
-            rest.map(|(seen, should)| (seen - should) / (self.blur * bench.noise_px))
-                .collect(),
-            self.loads
-                .iter()
-                .zip(&should.pressed)
-                .map(of_load)
-                .collect(),
-        )
+    /// Where the dots are seen to rest less where they should, in parts of its uncertainty.
+    fn rest_residual(&self, at: &At) -> Vec<f64> {
+        let sigma_px = self.blur * self.bench.noise_px;
+        let seen = self.bench.rest_px.as_flattened().iter();
+        let pairs = seen.zip(rest_px(&at.made, &at.images));
+        pairs
+            .map(|(seen, should)| (seen - should) / sigma_px)
+            .collect()
     }
 
     /// How residuals answer to the unknowns there.
     fn slopes(&self, at: &At) -> Result<Slopes> {
         let rates = self.rates(at, &at.states)?;
-        let scaled = |column: &[f64], by: &[f64]| -> Vec<f64> {
-            column.iter().zip(by).map(|(rate, by)| -rate / by).collect()
-        };
         let of_load = |(load, rates): (&SeenLoad, &Rates)| {
             let noise_px = self.noise_px(load, &at.made);
-            let of_force = |parts: &[f64; 3]| {
-                let sums = (0..noise_px.len()).map(|i| {
-                    (0..3)
-                        .map(|axis| parts[axis] * rates.force[axis][i])
-                        .sum::<f64>()
-                });
-                scaled(&sums.collect::<Vec<_>>(), &noise_px)
-            };
-            let of_place = |column: &Vec<f64>| {
-                let parts = scaled(column, &noise_px);
-                parts
-                    .iter()
-                    .map(|part| load.place_sigma_mm() * part)
-                    .collect()
-            };
             let numbers = rates.numbers.iter();
             LoadSlopes {
                 numbers: numbers.map(|column| scaled(column, &noise_px)).collect(),
-                own: (load.directions().iter().map(of_force))
-                    .chain(rates.place.iter().map(of_place))
-                    .collect(),
+                own: own_slopes(load, &noise_px, &rates.force, &rates.place),
             }
         };
         let of_rest = vec![self.blur * self.bench.noise_px; 2 * at.made.dots_mm.len()];
@@ -361,9 +367,7 @@ impl Problem<'_> {
             })
             .collect();
         let at_rest = self.image_rates(at, &at.rest, &changes)?;
-        let mut all = changes.clone();
-        all.extend((0..3).map(Change::Force));
-        all.extend((0..2).map(Change::Place));
+        let all: Vec<Change> = changes.iter().copied().chain(load_changes()).collect();
         let of_state = |state: &Equilibrium| -> Result<Rates> {
             let moved = self.image_rates(at, state, &all)?;
             let (of_film, of_load) = moved.split_at(changes.len());
@@ -443,6 +447,30 @@ impl Problem<'_> {
         Ok(rates)
     }
 
+    /// The step of a load's own unknowns to where they explain most with the unit as it is.
+    ///
+    /// # Errors
+    /// When the state is not stable.
+    pub fn own_step(
+        &self,
+        at: &At,
+        number: usize,
+        parts: &[f64; UNKNOWNS],
+        (state, residual): &(Equilibrium, Vec<f64>),
+    ) -> Result<[f64; UNKNOWNS]> {
+        let load = &self.loads[number];
+        let changes: Vec<Change> = load_changes().collect();
+        let rates = self.image_rates(at, state, &changes)?;
+        let (force, place) = rates.split_at(3);
+        let mut own = Normal::before(parts);
+        own.add(
+            &own_slopes(load, &self.noise_px(load, &at.made), force, place),
+            residual,
+        );
+        let step = times(&inverse(own.matrix)?, &own.side);
+        Ok(std::array::from_fn(|i| step[i]))
+    }
+
     /// The step to where the unknowns explain most, and what is known of the numbers then.
     ///
     /// # Errors
@@ -472,13 +500,69 @@ impl Problem<'_> {
     }
 }
 
-/// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty,
-/// px at 320×240: a finer mesh moves dots beside the tip by so much more than others.
-pub fn mesh_px(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
-    const AT_THE_TIP_PX: f64 = 0.06;
+/// The changes of a load: of its force, and of its place.
+fn load_changes() -> impl Iterator<Item = Change> {
+    (0..3).map(Change::Force).chain((0..2).map(Change::Place))
+}
+
+/// Where a unit's dots rest, x and y of each, px.
+fn rest_px(made: &Made, images: &[[f64; 2]]) -> Vec<f64> {
+    let of_dot = |(image, off): (&[f64; 2], &[f64; 2])| {
+        let at = made.to_px(*image);
+        [0, 1].map(|i| made.middle_px[i] + at[i] + off[i])
+    };
+    images.iter().zip(&made.rest_px).flat_map(of_dot).collect()
+}
+
+/// How far a unit's dots are beside the rest position that a tare takes, x and y of each, px.
+fn moved_px(made: &Made, there: &[[f64; 2]], rest: &[[f64; 2]]) -> Vec<f64> {
+    let dots = there.iter().zip(rest).zip(&made.rest_px);
+    let moved = dots.flat_map(|((there, here), off)| {
+        let moved = made.to_px([0, 1].map(|i| there[i] - here[i]));
+        [0, 1].map(|i| moved[i] - off[i])
+    });
+    moved.collect()
+}
+
+/// How the residual of a load answers to its own unknowns, from what is seen of a force along x, y
+/// and z, px/N, and of a place along x and y, px/mm.
+fn own_slopes(
+    load: &SeenLoad,
+    noise_px: &[f64],
+    force: &[Vec<f64>],
+    place: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    let of_force = |parts: &[f64; 3]| {
+        let sum = |i: usize| (0..3).map(|axis| parts[axis] * force[axis][i]).sum::<f64>();
+        scaled(&(0..noise_px.len()).map(sum).collect::<Vec<_>>(), noise_px)
+    };
+    let of_place = |column: &Vec<f64>| {
+        let parts = scaled(column, noise_px).into_iter();
+        parts.map(|part| load.place_sigma_mm() * part).collect()
+    };
+    let forces = load.directions();
+    let forces = forces.iter().map(of_force);
+    forces.chain(place.iter().map(of_place)).collect()
+}
+
+/// The slope of residuals of these uncertainties where what should be seen has this one.
+fn scaled(column: &[f64], sigmas: &[f64]) -> Vec<f64> {
+    let pairs = column.iter().zip(sigmas);
+    pairs.map(|(rate, sigma)| -rate / sigma).collect()
+}
+
+/// What the mesh leaves of each coordinate of a dot with the tip at a place under a force, standard
+/// uncertainty, px at 320×240: a finer mesh moves dots beside the tip by so much more than others.
+pub fn mesh_px(dot_mm: [f64; 2], place_mm: [f64; 2], force_n: f64) -> f64 {
+    const AT_THE_TIP_PX_PER_N: f64 = 1.8;
     const REACH_MM: f64 = 1.3;
-    let apart = libm::hypot(dot_mm[0] - place_mm[0], dot_mm[1] - place_mm[1]) / REACH_MM;
-    AT_THE_TIP_PX * libm::exp(-apart * apart)
+    let apart = apart_mm(dot_mm, place_mm) / REACH_MM;
+    AT_THE_TIP_PX_PER_N * force_n * libm::exp(-apart * apart)
+}
+
+/// How far a dot is from the tip, mm.
+pub fn apart_mm(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
+    libm::hypot(dot_mm[0] - place_mm[0], dot_mm[1] - place_mm[1])
 }
 
 impl Unknowns {

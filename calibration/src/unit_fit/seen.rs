@@ -32,6 +32,11 @@ impl View<'_> {
         self.image_of(|point| self.film.displacement(state, point), dot_mm)
     }
 
+    /// The same of all dots.
+    pub fn images(&self, state: &Equilibrium, dots_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        dots_mm.iter().map(|dot| self.image(state, *dot)).collect()
+    }
+
     /// The same on a film whose points, mm, are displaced so.
     pub fn image_of(&self, displaced: impl Fn([f64; 2]) -> [f64; 3], dot_mm: [f64; 2]) -> [f64; 2] {
         let disc = Disc::marker(dot_mm);
@@ -50,25 +55,15 @@ impl View<'_> {
         responses: &[Response],
         dot_mm: [f64; 2],
     ) -> Vec<[f64; 2]> {
-        let lens = self.lens_at(|point| self.film.displacement(state, point), dot_mm);
+        let [x, y, z] = mean(dot_mm, |point| self.film.displacement(state, point));
+        let lens = self.lens([dot_mm[0] + x, dot_mm[1] + y, z + self.farther_mm]);
         let rate = |response: &Response| {
-            let moved = mean(dot_mm, |point| {
+            let [x, y, z] = mean(dot_mm, |point| {
                 self.film.surface_rate(state, response, point)
             });
-            seen_through(&lens, moved)
+            lens.map(|row| row[0] * x + row[1] * y + row[2] * z)
         };
         responses.iter().map(rate).collect()
-    }
-
-    /// How the image of a dot answers to its motion on a film whose points are displaced so, focal
-    /// lengths per mm.
-    pub fn lens_at(
-        &self,
-        displaced: impl Fn([f64; 2]) -> [f64; 3],
-        dot_mm: [f64; 2],
-    ) -> [[f64; 3]; 2] {
-        let [x, y, z] = mean(dot_mm, displaced);
-        self.lens([dot_mm[0] + x, dot_mm[1] + y, z + self.farther_mm])
     }
 
     /// The derivative of a point's image by the point, focal lengths per mm.
@@ -88,13 +83,8 @@ impl View<'_> {
     }
 }
 
-/// A motion, mm, through a lens's derivatives.
-pub fn seen_through(lens: &[[f64; 3]; 2], [x, y, z]: [f64; 3]) -> [f64; 2] {
-    lens.map(|row| row[0] * x + row[1] * y + row[2] * z)
-}
-
 /// The mean of vectors over a dot.
-pub fn mean(dot_mm: [f64; 2], of: impl Fn([f64; 2]) -> [f64; 3]) -> [f64; 3] {
+fn mean(dot_mm: [f64; 2], of: impl Fn([f64; 2]) -> [f64; 3]) -> [f64; 3] {
     let points = points(dot_mm);
     let mut sum = [0.0; 3];
     for point in &points {

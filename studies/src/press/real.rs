@@ -1,7 +1,7 @@
 //! Films as people mount them, solved by finite elements: stretched, cut otherwise, of other
 //! rubber.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard};
 
 use anyhow::Result;
 use hivtac_film::Pressed;
@@ -12,7 +12,7 @@ use rand::Rng;
 use super::seeded;
 
 /// States that are kept to start others from.
-const MOST_KEPT: usize = 40;
+const MOST_STATES: usize = 40;
 /// How fine the films' meshes are: another one than that of fits.
 const FINENESS: f64 = 0.7;
 
@@ -20,8 +20,16 @@ const FINENESS: f64 = 0.7;
 pub struct RealFilm {
     film: Film,
     rest: Equilibrium,
-    /// States that were found, by their loads.
-    kept: Mutex<Vec<(Load, Equilibrium)>>,
+    known: Mutex<Known>,
+}
+
+/// What is known of a film, by its loads.
+#[derive(Default)]
+struct Known {
+    /// The states that were found last.
+    states: Vec<(Load, Equilibrium)>,
+    /// What a scene shows.
+    pressed: Vec<(Load, Pressed)>,
 }
 
 impl RealFilm {
@@ -85,7 +93,7 @@ impl RealFilm {
         Ok(Self {
             rest: film.rest(),
             film,
-            kept: Mutex::default(),
+            known: Mutex::default(),
         })
     }
 
@@ -94,20 +102,39 @@ impl RealFilm {
     /// # Errors
     /// When it finds no equilibrium.
     pub fn press(&self, load: &Load) -> Result<Pressed, ShellError> {
-        let discs = self.film.design().dots_mm.iter().copied().map(Disc::marker);
+        let mut known = self.known();
+        if let Some((_, pressed)) = known.pressed.iter().find(|(other, _)| other == load) {
+            return Ok(*pressed);
+        }
         let state = match load.magnitude_n() {
             0.0 => self.rest.clone(),
-            _ => self.state(load)?,
+            _ => {
+                let at_mm = self.film.material_point(&self.rest, load.offset_mm());
+                let start = known.nearest(load).unwrap_or(&self.rest);
+                self.film.press_force(at_mm, load.vector_n(), start)?
+            }
         };
-        Ok(Pressed {
+        let discs = self.film.design().dots_mm.iter().copied().map(Disc::marker);
+        let pressed = Pressed {
             tip_mm: state.tip_mm,
             force_n: load.vector_n(),
             touches_mm: load.offset_mm(),
             ..pressed(&self.film, &state, discs)?
-        })
+        };
+        known.take(load, state);
+        known.pressed.push((*load, pressed));
+        Ok(pressed)
     }
 
-    fn state(&self, load: &Load) -> Result<Equilibrium, ShellError> {
+    fn known(&self) -> MutexGuard<'_, Known> {
+        let known = self.known.lock();
+        known.unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+impl Known {
+    /// The state under the load that is nearest to this one.
+    fn nearest(&self, load: &Load) -> Option<&Equilibrium> {
         let far = |other: &Load| {
             let apart = |a: &[f64], b: &[f64]| -> f64 {
                 a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
@@ -116,29 +143,16 @@ impl RealFilm {
             apart(&load.vector_n(), &other.vector_n())
                 + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
         };
-        let start = {
-            let kept = self
-                .kept
-                .lock()
-                .unwrap_or_else(|poisoned| poisoned.into_inner());
-            let near = kept.iter().min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
-            match near {
-                Some((known, state)) if known == load => return Ok(state.clone()),
-                Some((_, state)) => state.clone(),
-                None => self.rest.clone(),
-            }
-        };
-        let at_mm = self.film.material_point(&self.rest, load.offset_mm());
-        let state = self.film.press_force(at_mm, load.vector_n(), &start)?;
-        let mut kept = self
-            .kept
-            .lock()
-            .unwrap_or_else(|poisoned| poisoned.into_inner());
-        if kept.len() >= MOST_KEPT {
-            kept.remove(0);
+        let all = self.states.iter();
+        let nearest = all.min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
+        nearest.map(|(_, state)| state)
+    }
+
+    fn take(&mut self, load: &Load, state: Equilibrium) {
+        if self.states.len() >= MOST_STATES {
+            self.states.remove(0);
         }
-        kept.push((*load, state.clone()));
-        Ok(state)
+        self.states.push((*load, state));
     }
 }
 
