@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_data::loads::norm;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
 use hivtac_scene::Camera;
 use hivtac_sensing::forward::{DOTS, EQUATIONS, MOST_TILTS, Noise, Stiffness};
@@ -17,7 +16,7 @@ use super::descent::Found;
 use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::Number;
-use super::problem::{At, Problem, Rates, apart_mm, mesh_px};
+use super::problem::{At, Problem, Rates, apart_mm, mesh_part};
 use crate::forward::{
     Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
@@ -249,7 +248,7 @@ fn left_open(
     let spread = cholesky(held.iter().map(row).collect())?;
     let per_px = 1.0 / at.made.focal_px;
     let (sin, cos) = libm::sincos(at.made.roll_deg.to_radians());
-    let of_pose = |(rates, pose): (&Rates, &Pose)| -> Covariance {
+    let of_pose = |((rates, moved_px), pose): ((&Rates, &Vec<f64>), &Pose)| -> Covariance {
         let along = |column: usize| -> Moved {
             let mut moved = Moved::default();
             for (k, row) in held.iter().zip(&spread) {
@@ -266,28 +265,29 @@ fn left_open(
             moved
         };
         let mut covariance = sum_of_squares(&(0..held.len()).map(along).collect::<Vec<_>>());
-        let force_n = norm(field.force_n(pose));
         for (k, row) in covariance.iter_mut().enumerate() {
             let dot_mm = at.made.dots_mm[k / 2];
+            let moved = per_px * libm::hypot(moved_px[k & !1], moved_px[k | 1]);
+            let part = mesh_part(dot_mm, pose.place_mm).hypot(table_part(dot_mm, pose.place_mm));
             let size = pose.size / LARGEST_SIZE;
-            let mesh = per_px * mesh_px(dot_mm, pose.place_mm, force_n);
-            let table = per_px * size * table_px(dot_mm, pose.place_mm);
-            row[k] += (beside * size).powi(2) + mesh * mesh + table * table;
+            row[k] += (beside * size).powi(2) + (part * moved).powi(2);
         }
         covariance
     };
-    let all: Vec<Covariance> = rates.pressed.iter().zip(&poses).map(of_pose).collect();
+    let moved_px = problem.moved_px(&at, &states);
+    let knots = rates.pressed.iter().zip(&moved_px).zip(&poses);
+    let all: Vec<Covariance> = knots.map(of_pose).collect();
     Ok(covariances(KNOTS, &all))
 }
 
-/// What a table leaves of each coordinate of a dot at the largest size with the tip at a place,
-/// standard uncertainty, px at 320×240: most where the dimple is.
-fn table_px(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
-    const ANYWHERE_PX: f64 = 0.015;
-    const AT_THE_TIP_PX: f64 = 0.12;
+/// What a table leaves of each coordinate of a dot with the tip at a place, standard uncertainty in
+/// parts of how far the dot is moved: most where the dimple is.
+fn table_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
+    const ANYWHERE: f64 = 2.5e-4;
+    const AT_THE_TIP: f64 = 1.5e-3;
     const REACH_MM: f64 = 2.4;
     let apart = apart_mm(dot_mm, place_mm) / REACH_MM;
-    ANYWHERE_PX.hypot(AT_THE_TIP_PX * libm::exp(-apart * apart))
+    ANYWHERE.hypot(AT_THE_TIP * libm::exp(-apart * apart))
 }
 
 /// The film at the knots of its covariance: sizes, the smallest first, lines and places.

@@ -317,11 +317,19 @@ impl Problem<'_> {
     fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
         let more = self.loads.len().saturating_sub(APART) as f64 / APART as f64;
         let shared_px = load.noise_px.hypot(FAMILY_PX * more.sqrt());
-        let of_dot = |dot: &[f64; 2]| {
-            let noise_px = shared_px.hypot(mesh_px(*dot, load.place_mm, load.magnitude_n()));
-            [self.blur * noise_px; 2]
+        let seen = load.seen_px.iter().zip(&self.bench.rest_px);
+        let of_dot = |(dot, (seen, rest)): (&[f64; 2], (&[f64; 2], &[f64; 2]))| {
+            let moved_px = libm::hypot(seen[0] - rest[0], seen[1] - rest[1]);
+            let mesh_px = moved_px * mesh_part(*dot, load.place_mm);
+            [self.blur * shared_px.hypot(mesh_px); 2]
         };
-        made.dots_mm.iter().flat_map(of_dot).collect()
+        made.dots_mm.iter().zip(seen).flat_map(of_dot).collect()
+    }
+
+    /// How far a unit's dots are beside their rest position in some states, x and y of each, px.
+    pub fn moved_px(&self, at: &At, states: &[Equilibrium]) -> Vec<Vec<f64>> {
+        self.seen(&at.made, &self.images(at, &at.made, states))
+            .pressed
     }
 
     /// Where the dots are seen to rest less where they should, in parts of its uncertainty.
@@ -551,13 +559,13 @@ fn scaled(column: &[f64], sigmas: &[f64]) -> Vec<f64> {
     pairs.map(|(rate, sigma)| -rate / sigma).collect()
 }
 
-/// What the mesh leaves of each coordinate of a dot with the tip at a place under a force, standard
-/// uncertainty, px at 320×240: a finer mesh moves dots beside the tip by so much more than others.
-pub fn mesh_px(dot_mm: [f64; 2], place_mm: [f64; 2], force_n: f64) -> f64 {
-    const AT_THE_TIP_PX_PER_N: f64 = 1.8;
+/// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty in
+/// parts of how far the dot is moved: a finer mesh moves dots beside the tip otherwise.
+pub fn mesh_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
+    const AT_THE_TIP: f64 = 0.004;
     const REACH_MM: f64 = 1.3;
     let apart = apart_mm(dot_mm, place_mm) / REACH_MM;
-    AT_THE_TIP_PX_PER_N * force_n * libm::exp(-apart * apart)
+    AT_THE_TIP * libm::exp(-apart * apart)
 }
 
 /// How far a dot is from the tip, mm.
