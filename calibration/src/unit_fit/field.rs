@@ -1,8 +1,8 @@
 //! How a unit's film moves its dots under any load: from finite elements at few places of the tip
 //! to every place.
 //!
-//! The dimple under a tip moves with it. So the motion of a dot near the tip is that of the point as
-//! far from the tip, with the tip at solved places nearby: interpolated between these it changes
+//! The dimple under a tip moves with it. So the motion of a dot near the tip is that of the point
+//! as far from the tip, with the tip at solved places nearby: interpolated between these it changes
 //! slowly, although the film moves quite otherwise a little beside a tip. Far from the tip the film
 //! moves alike with the tip at places nearby, and dots, which are stiffer, stay where they are:
 //! there the motion of the dot itself is interpolated, with its slopes by the place.

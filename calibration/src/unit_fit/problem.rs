@@ -559,8 +559,8 @@ fn scaled(column: &[f64], sigmas: &[f64]) -> Vec<f64> {
     pairs.map(|(rate, sigma)| -rate / sigma).collect()
 }
 
-/// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty in
-/// parts of how far the dot is moved: a finer mesh moves dots beside the tip otherwise.
+/// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty
+/// in parts of how far the dot is moved: a finer mesh moves dots beside the tip otherwise.
 pub fn mesh_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
     const AT_THE_TIP: f64 = 0.004;
     const REACH_MM: f64 = 1.3;
