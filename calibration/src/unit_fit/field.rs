@@ -13,7 +13,7 @@ use hivtac_shell::{Equilibrium, Film, Response};
 use rayon::prelude::*;
 
 use super::problem::{At, Problem, apart_mm};
-use super::seen::View;
+use super::seen::{Rim, View};
 use crate::forward::Nearest;
 
 /// Places of the tip along x and along y at which the film is solved: from the first, so far apart,
@@ -54,9 +54,9 @@ pub struct Field<'a> {
 struct Solved {
     state: Equilibrium,
     /// By size, and by tilt along x and y, 1/rad.
-    slopes: Vec<Response>,
+    slopes: [Response; 3],
     /// By the place along x and y, per mm.
-    by_place: Vec<Response>,
+    by_place: [Response; 2],
 }
 
 /// The terms' coefficients of a dot's motion along x and y, focal lengths.
@@ -131,8 +131,8 @@ impl<'a> Field<'a> {
             let [.., by_x, by_y] = by_load;
             solved.push(Solved {
                 state,
-                slopes: slopes.into(),
-                by_place: vec![by_x, by_y],
+                slopes,
+                by_place: [by_x, by_y],
             });
         }
         Ok(solved)
@@ -168,11 +168,12 @@ impl<'a> Field<'a> {
         let (around, between) = (Around::new(place_mm), Between::new(place_mm));
         let far = far_part(apart_mm(dot_mm, place_mm));
         let still = |point: [f64; 2]| film.displacement(rest, point);
-        let at_rest = view.image_of(still, dot_mm);
+        let at_rest = view.image_of(&Rim::of(dot_mm, still));
         let mut samples = [Vec::new(), Vec::new()];
         for load in 0..self.poses.len() {
             let displaced = |point: [f64; 2]| {
-                let mut sum = still(point);
+                let rested = still(point);
+                let mut sum = rested;
                 if far < 1.0 {
                     around.add(&mut sum, |tip, shift, part| {
                         let there = self.on_film([0, 1].map(|i| point[i] + shift[i]));
@@ -187,7 +188,6 @@ impl<'a> Field<'a> {
                             state, by_place, ..
                         } = self.solved(tip, load);
                         let moved = film.displacement(state, point);
-                        let rested = film.displacement(rest, point);
                         let rates =
                             [0, 1].map(|way| film.surface_rate(state, &by_place[way], point));
                         [0, 1, 2].map(|i| {
@@ -198,7 +198,8 @@ impl<'a> Field<'a> {
                 }
                 sum
             };
-            let image = view.image_of(displaced, dot_mm);
+            let rim = Rim::of(dot_mm, displaced);
+            let image = view.image_of(&rim);
             for i in [0, 1] {
                 samples[i].push(image[i] - at_rest[i]);
             }
@@ -213,13 +214,9 @@ impl<'a> Field<'a> {
                     });
                     sum
                 };
-                let [back, forth] = [-SLOPE_STEP, SLOPE_STEP].map(|step| {
-                    let there = |point: [f64; 2]| {
-                        let (at, rate) = (displaced(point), rate(point));
-                        [0, 1, 2].map(|i| at[i] + step * rate[i])
-                    };
-                    view.image_of(there, dot_mm)
-                });
+                let rate = Rim::of(dot_mm, rate);
+                let [back, forth] =
+                    [-SLOPE_STEP, SLOPE_STEP].map(|step| view.image_of(&rim.beside(&rate, step)));
                 for i in [0, 1] {
                     let rate = (forth[i] - back[i]) / (2.0 * SLOPE_STEP);
                     samples[i].push(SLOPES_COUNT * rate);

@@ -16,7 +16,7 @@ use super::descent::Found;
 use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::Number;
-use super::problem::{At, Problem, Rates, apart_mm, mesh_part};
+use super::problem::{At, Problem, Rates, mesh_part, near_tip};
 use crate::forward::{
     Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
@@ -267,14 +267,17 @@ fn left_open(
         let mut covariance = sum_of_squares(&(0..held.len()).map(along).collect::<Vec<_>>());
         for (k, row) in covariance.iter_mut().enumerate() {
             let dot_mm = at.made.dots_mm[k / 2];
-            let moved = per_px * libm::hypot(moved_px[k & !1], moved_px[k | 1]);
+            let moved = per_px * libm::hypot(moved_px[k - k % 2], moved_px[k - k % 2 + 1]);
             let part = mesh_part(dot_mm, pose.place_mm).hypot(table_part(dot_mm, pose.place_mm));
             let size = pose.size / LARGEST_SIZE;
             row[k] += (beside * size).powi(2) + (part * moved).powi(2);
         }
         covariance
     };
-    let moved_px = problem.moved_px(&at, &states);
+    let moved_px: Vec<Vec<f64>> = states
+        .par_iter()
+        .map(|state| problem.moved_px(&at, state))
+        .collect();
     let knots = rates.pressed.iter().zip(&moved_px).zip(&poses);
     let all: Vec<Covariance> = knots.map(of_pose).collect();
     Ok(covariances(KNOTS, &all))
@@ -283,11 +286,7 @@ fn left_open(
 /// What a table leaves of each coordinate of a dot with the tip at a place, standard uncertainty in
 /// parts of how far the dot is moved: most where the dimple is.
 fn table_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
-    const ANYWHERE: f64 = 2.5e-4;
-    const AT_THE_TIP: f64 = 1.5e-3;
-    const REACH_MM: f64 = 2.4;
-    let apart = apart_mm(dot_mm, place_mm) / REACH_MM;
-    ANYWHERE.hypot(AT_THE_TIP * libm::exp(-apart * apart))
+    2.5e-4_f64.hypot(1.5e-3 * near_tip(dot_mm, place_mm, 2.4))
 }
 
 /// The film at the knots of its covariance: sizes, the smallest first, lines and places.

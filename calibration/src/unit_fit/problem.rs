@@ -6,7 +6,7 @@ use hivtac_shell::{Change, Design, Equilibrium, Film};
 use rayon::prelude::*;
 
 use super::equations::{LoadEquations, LoadSlopes, Normal};
-use super::linear::{Matrix, inverse, times};
+use super::linear::{Matrix, inverse};
 use super::load::UNKNOWNS;
 use super::numbers::{self, Number, Prior};
 use super::seen::View;
@@ -205,17 +205,23 @@ impl Problem<'_> {
         let mut made = at.made.clone();
         made.design.fineness = COARSE;
         let film = Film::new(&made.design)?;
+        Ok(self.unloaded(at.unknowns.clone(), made, film))
+    }
+
+    /// A unit and its film, with no loads.
+    fn unloaded(&self, unknowns: Unknowns, made: Made, film: Film) -> At {
         let rest = film.rest();
-        Ok(At {
-            unknowns: at.unknowns.clone(),
-            images: self.view(&made, &film).images(&rest, &made.dots_mm),
+        let images = self.view(&made, &film).images(&rest, &made.dots_mm);
+        At {
+            rest_residual: self.rest_residual(&made, &images),
+            images,
+            unknowns,
             made,
             film,
             rest,
             states: Vec::new(),
-            rest_residual: Vec::new(),
             residuals: Vec::new(),
-        })
+        }
     }
 
     fn view<'a>(&'a self, made: &Made, film: &'a Film) -> View<'a> {
@@ -237,18 +243,7 @@ impl Problem<'_> {
             Some((near, _)) => near.changed(&made.design)?,
             None => Film::new(&made.design)?,
         };
-        let rest = film.rest();
-        let mut at = At {
-            images: self.view(&made, &film).images(&rest, &made.dots_mm),
-            unknowns,
-            made,
-            film,
-            rest,
-            states: Vec::new(),
-            rest_residual: Vec::new(),
-            residuals: Vec::new(),
-        };
-        at.rest_residual = self.rest_residual(&at);
+        let mut at = self.unloaded(unknowns, made, film);
         let press = |k: usize| -> Result<(Equilibrium, Vec<f64>)> {
             let start = near.and_then(|(_, states)| states.get(k));
             self.press(&at, k, &at.unknowns.loads[k], start.unwrap_or(&at.rest))
@@ -276,10 +271,7 @@ impl Problem<'_> {
         let place_mm = [0, 1].map(|i| pressed.place_mm[i] + at.made.stage_mm[i]);
         let at_mm = at.film.material_point(&at.rest, place_mm);
         let state = at.film.press_force(at_mm, pressed.force_n, start)?;
-        let images = self
-            .view(&at.made, &at.film)
-            .images(&state, &at.made.dots_mm);
-        let should = moved_px(&at.made, &images, &at.images);
+        let should = self.moved_px(at, &state);
         let (seen, rest) = (
             load.seen_px.as_flattened(),
             self.bench.rest_px.as_flattened(),
@@ -326,17 +318,18 @@ impl Problem<'_> {
         made.dots_mm.iter().zip(seen).flat_map(of_dot).collect()
     }
 
-    /// How far a unit's dots are beside their rest position in some states, x and y of each, px.
-    pub fn moved_px(&self, at: &At, states: &[Equilibrium]) -> Vec<Vec<f64>> {
-        self.seen(&at.made, &self.images(at, &at.made, states))
-            .pressed
+    /// How far a unit's dots are beside their rest position in a state, x and y of each, px.
+    pub fn moved_px(&self, at: &At, state: &Equilibrium) -> Vec<f64> {
+        let view = self.view(&at.made, &at.film);
+        let images = view.images(state, &at.made.dots_mm);
+        moved_px(&at.made, &images, &at.images)
     }
 
     /// Where the dots are seen to rest less where they should, in parts of its uncertainty.
-    fn rest_residual(&self, at: &At) -> Vec<f64> {
+    fn rest_residual(&self, made: &Made, images: &[[f64; 2]]) -> Vec<f64> {
         let sigma_px = self.blur * self.bench.noise_px;
         let seen = self.bench.rest_px.as_flattened().iter();
-        let pairs = seen.zip(rest_px(&at.made, &at.images));
+        let pairs = seen.zip(rest_px(made, images));
         pairs
             .map(|(seen, should)| (seen - should) / sigma_px)
             .collect()
@@ -470,13 +463,11 @@ impl Problem<'_> {
         let changes: Vec<Change> = load_changes().collect();
         let rates = self.image_rates(at, state, &changes)?;
         let (force, place) = rates.split_at(3);
-        let mut own = Normal::before(parts);
-        own.add(
-            &own_slopes(load, &self.noise_px(load, &at.made), force, place),
-            residual,
-        );
-        let step = times(&inverse(own.matrix)?, &own.side);
-        Ok(std::array::from_fn(|i| step[i]))
+        let slopes = LoadSlopes {
+            numbers: Vec::new(),
+            own: own_slopes(load, &self.noise_px(load, &at.made), force, place),
+        };
+        Ok(LoadEquations::new(slopes, residual, parts)?.step(&[]))
     }
 
     /// The step to where the unknowns explain most, and what is known of the numbers then.
@@ -562,10 +553,13 @@ fn scaled(column: &[f64], sigmas: &[f64]) -> Vec<f64> {
 /// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty
 /// in parts of how far the dot is moved: a finer mesh moves dots beside the tip otherwise.
 pub fn mesh_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
-    const AT_THE_TIP: f64 = 0.004;
-    const REACH_MM: f64 = 1.3;
-    let apart = apart_mm(dot_mm, place_mm) / REACH_MM;
-    AT_THE_TIP * libm::exp(-apart * apart)
+    0.004 * near_tip(dot_mm, place_mm, 1.3)
+}
+
+/// 1 for a dot at the tip, nothing for one that is much farther from it than a reach, mm.
+pub fn near_tip(dot_mm: [f64; 2], place_mm: [f64; 2], reach_mm: f64) -> f64 {
+    let apart = apart_mm(dot_mm, place_mm) / reach_mm;
+    libm::exp(-apart * apart)
 }
 
 /// How far a dot is from the tip, mm.

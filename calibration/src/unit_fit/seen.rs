@@ -29,7 +29,9 @@ pub struct View<'a> {
 impl View<'_> {
     /// Where a dot with its centre at a point of the film is seen, focal lengths from the axis.
     pub fn image(&self, state: &Equilibrium, dot_mm: [f64; 2]) -> [f64; 2] {
-        self.image_of(|point| self.film.displacement(state, point), dot_mm)
+        self.image_of(&Rim::of(dot_mm, |point| {
+            self.film.displacement(state, point)
+        }))
     }
 
     /// The same of all dots.
@@ -37,15 +39,13 @@ impl View<'_> {
         dots_mm.iter().map(|dot| self.image(state, *dot)).collect()
     }
 
-    /// The same on a film whose points, mm, are displaced so.
-    pub fn image_of(&self, displaced: impl Fn([f64; 2]) -> [f64; 3], dot_mm: [f64; 2]) -> [f64; 2] {
-        let disc = Disc::marker(dot_mm);
-        let rim = Rim::of(&disc, displaced);
+    /// The same of a dot whose rim is displaced so.
+    pub fn image_of(&self, rim: &Rim) -> [f64; 2] {
         let moved = |point: [f64; 2]| {
             let [x, y, z] = rim.at(point);
             [x, y, z + self.farther_mm]
         };
-        in_focal_lengths(disc.centroid_px(moved, self.camera), self.camera)
+        in_focal_lengths(rim.disc.centroid_px(moved, self.camera), self.camera)
     }
 
     /// How the image of a dot answers to the film's responses, focal lengths per unit.
@@ -112,17 +112,19 @@ fn on_circle(disc: &Disc, part: f64, turn: f64) -> [f64; 2] {
 }
 
 /// How a dot's rim is displaced.
-struct Rim {
-    centre_mm: [f64; 2],
+pub struct Rim {
+    disc: Disc,
     /// By wave along the rim: its cosine's and its sine's part.
     waves: [[[f64; 3]; 2]; RIM / 2],
 }
 
 impl Rim {
-    fn of(disc: &Disc, displaced: impl Fn([f64; 2]) -> [f64; 3]) -> Rim {
+    /// Of a dot with its centre at a point of a film whose points, mm, are displaced so.
+    pub fn of(dot_mm: [f64; 2], displaced: impl Fn([f64; 2]) -> [f64; 3]) -> Rim {
+        let disc = Disc::marker(dot_mm);
         let mut waves = [[[0.0; 3]; 2]; RIM / 2];
         for k in 0..RIM {
-            let moved = displaced(on_circle(disc, 1.0, k as f64 / RIM as f64));
+            let moved = displaced(on_circle(&disc, 1.0, k as f64 / RIM as f64));
             for (wave, parts) in waves.iter_mut().enumerate() {
                 let angle = 2.0 * PI * (wave * k) as f64 / RIM as f64;
                 let (sin, cos) = libm::sincos(angle);
@@ -133,15 +135,26 @@ impl Rim {
                 }
             }
         }
+        Rim { disc, waves }
+    }
+
+    /// So many units of a rate away.
+    pub fn beside(&self, rate: &Rim, units: f64) -> Rim {
+        let mut waves = self.waves;
+        let sums = waves.as_flattened_mut().as_flattened_mut().iter_mut();
+        for (sum, part) in sums.zip(rate.waves.as_flattened().as_flattened()) {
+            *sum += units * part;
+        }
         Rim {
-            centre_mm: disc.centre_mm,
+            disc: self.disc,
             waves,
         }
     }
 
     /// At a point of the rim, or just beside it.
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        let (x, y) = (x - self.centre_mm[0], y - self.centre_mm[1]);
+        let [cx, cy] = self.disc.centre_mm;
+        let (x, y) = (x - cx, y - cy);
         let radius = libm::hypot(x, y);
         let (cos, sin) = (x / radius, y / radius);
         // (cos wφ, sin wφ), one wave after the other.
