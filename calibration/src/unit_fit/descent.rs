@@ -1,24 +1,24 @@
 //! Gauss–Newton steps to the unit that explains the loads best.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use hivtac_shell::Change;
 use rayon::prelude::*;
 
 use super::load::UNKNOWNS;
 use super::numbers::Number;
 use super::own::FoundNumber;
-use super::problem::{At, Problem, Solved, Unknowns};
+use super::problem::{At, Problem, Solved, Trust, Unknowns};
 
 /// So many loads tell a unit well enough to begin with all of them there.
 const FIRST: usize = 16;
-/// Where descents begin: how many times more than it does what is seen is taken to scatter at
-/// first, and gravity along z, g, which decides to which side a slack film sags.
-const STARTS: [(&[f64], f64); 4] = [
-    (&[], 0.0),
-    (&[100.0, 10.0], 0.0),
-    (&[10.0], 0.7),
-    (&[10.0], -0.7),
-];
+/// Where descents begin: whether the film is taut and weighs nothing at first, and gravity along z,
+/// g, which decides to which side a slack film sags. How far a film sags that is hardly taut is no
+/// linear matter: steps do not lead to it from afar.
+const STARTS: [(bool, f64); 4] = [(true, 0.0), (false, 0.0), (false, 0.7), (false, -0.7)];
+/// The least stretch of a taut film.
+const TAUT: f64 = 1e-3;
+/// How far a descent trusts what is seen, one after the other.
+const TRUSTS: [Trust; 3] = [apart(100.0), apart(10.0), Trust::WHOLE];
 /// χ² over the coordinates that are seen of a fit that explains them.
 const EXPLAINED: f64 = 1.4;
 /// Steps at most, and the change of χ² that ends them.
@@ -28,8 +28,18 @@ const SETTLED: f64 = 0.3;
 /// then takes away at least; with less it does not come near them.
 const FAR: f64 = 100.0;
 const FAR_SETTLED: f64 = 0.03;
-/// Parts of a step that are tried, the first at which χ² falls is taken.
+/// How much is added to what is known of each number, in parts of what was known before, until χ²
+/// falls (Levenberg–Marquardt).
+const DAMPINGS: [f64; 6] = [0.0, 3.0, 30.0, 300.0, 3e3, 3e4];
+/// Parts of a load's own step that are tried, the first at which χ² falls is taken.
 const LENGTHS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
+
+const fn apart(blur: f64) -> Trust {
+    Trust {
+        blur,
+        from_rest: false,
+    }
+}
 
 /// Where a descent ended.
 pub struct Found {
@@ -100,15 +110,15 @@ impl Problem<'_> {
     pub fn found(&self) -> Result<Found> {
         let every = self.loads.len().div_ceil(FIRST);
         let some: Vec<_> = self.loads.iter().step_by(every).cloned().collect();
-        let mut first = Problem {
+        let first = Problem {
             bench: self.bench,
             loads: &some,
             priors: self.priors.clone(),
-            blur: 1.0,
+            trust: Trust::WHOLE,
         };
         let mut best: Result<Found> = Err(anyhow!("no start"));
-        for (blurs, down) in STARTS {
-            let found = first.start(blurs, down);
+        for (taut, down) in STARTS {
+            let found = first.start(taut, down);
             let is_better = match (&best, &found) {
                 (Ok(best), Ok(found)) => found.chi_square() < best.chi_square(),
                 _ => best.is_err(),
@@ -135,27 +145,42 @@ impl Problem<'_> {
         self.descend(self.located(here)?)
     }
 
-    /// Descends as if what is seen scattered so many times more than it does, one after the other,
-    /// from what is most likely of a film on which gravity pulls so, g.
-    fn start(&mut self, blurs: &[f64], down: f64) -> Result<Found> {
+    /// Descends with more and more trust in what is seen, from what is most likely of a film on
+    /// which gravity pulls so, g; of one that is taut and weighs nothing at first, if it is asked
+    /// for.
+    fn start(&self, taut: bool, down: f64) -> Result<Found> {
         let mut unknowns = self.likeliest();
-        let gravity = Number::Film(Change::Down(2));
-        for (prior, part) in self.priors.iter().zip(&mut unknowns.numbers) {
-            if prior.number == gravity {
-                *part = prior.within((down - prior.mean) / prior.sigma);
+        let mut way = Problem {
+            priors: self.priors.clone(),
+            ..*self
+        };
+        for (prior, part) in way.priors.iter_mut().zip(&mut unknowns.numbers) {
+            match prior.number {
+                Number::Film(Change::Down(2)) if taut => prior.range = [0.0; 2],
+                Number::Film(Change::Down(2)) => {
+                    *part = prior.within((down - prior.mean) / prior.sigma);
+                }
+                Number::Film(Change::Stretch(_)) if taut => prior.range[0] = TAUT,
+                _ => {}
             }
         }
-        let mut found: Option<Found> = None;
-        for blur in blurs.iter().copied().chain([1.0]) {
-            self.blur = blur;
-            let near = found
-                .as_ref()
-                .map(|found| (&found.at.film, &found.at.states[..]));
-            let next = self.descend(self.at(unknowns, near)?)?;
-            unknowns = next.at.unknowns.clone();
-            found = Some(next);
+        let [first, rest @ ..] = TRUSTS;
+        way.trust = first;
+        let mut found = way.descend(way.at(unknowns, None)?)?;
+        for trust in rest {
+            way.trust = trust;
+            found = way.go_on(found)?;
         }
-        found.context("no descent")
+        if taut {
+            found = self.go_on(found)?;
+        }
+        Ok(found)
+    }
+
+    /// Descends from where another descent ended.
+    fn go_on(&self, from: Found) -> Result<Found> {
+        let near = Some((&from.at.film, &from.at.states[..]));
+        self.descend(self.at(from.at.unknowns.clone(), near)?)
     }
 
     /// Each load where it explains most with the unit as it is, whatever the others do: a place
@@ -199,27 +224,29 @@ impl Problem<'_> {
     /// # Errors
     /// When a state is not stable.
     fn descend(&self, mut here: At) -> Result<Found> {
+        let mut solved = self.solve(&here)?;
+        let mut least_damped = 0;
         for round in 1.. {
-            let solved = self.solve(&here)?;
-            let mut fell = 0.0;
-            if round <= ROUNDS {
-                for length in LENGTHS {
-                    let there = here.unknowns.after(&solved.step, length, &self.priors);
-                    let Ok(there) = self.at(there, Some((&here.film, &here.states))) else {
-                        continue;
-                    };
-                    fell = here.square() - there.square();
-                    if fell > 0.0 {
-                        here = there;
-                        break;
-                    }
-                }
-            }
+            let dampings = DAMPINGS.iter().enumerate().skip(least_damped);
+            let shorter = dampings.into_iter().find_map(|(k, damping)| {
+                let step = solved.step(&self.priors, &here.unknowns, *damping).ok()?;
+                let there = here.unknowns.after(&step, &self.priors);
+                let there = self.at(there, Some((&here.film, &here.states))).ok()?;
+                let fell = here.square() - there.square();
+                // A film that is about to snap has no slopes.
+                let next = (fell > 0.0).then(|| self.solve(&there))?.ok()?;
+                Some((there, next, fell, k))
+            });
+            let Some((there, next, fell, damped)) = shorter else {
+                return Ok(Found { at: here, solved });
+            };
+            (here, solved) = (there, next);
+            least_damped = damped.saturating_sub(1);
             let least = match chi_square(&here) > FAR {
                 true => FAR_SETTLED * here.square(),
                 false => SETTLED,
             };
-            if fell < least {
+            if round >= ROUNDS || fell < least {
                 return Ok(Found { at: here, solved });
             }
         }

@@ -46,14 +46,19 @@ impl Normal {
     }
 
     /// Their solution in which no number, so many standard deviations beside its mean, leaves its
-    /// range: one that would is held at its end, and the others are solved for anew.
+    /// range: one that would is held at its end, and the others are solved for anew. Damping is
+    /// added to what is known of each number.
     ///
     /// # Errors
     /// When they do not tell the numbers.
-    pub fn step_within(&self, priors: &[Prior], at: &[f64]) -> Result<Vec<f64>> {
+    pub fn step_within(&self, priors: &[Prior], at: &[f64], damping: f64) -> Result<Vec<f64>> {
+        let mut damped = self.clone();
+        for k in 0..at.len() {
+            damped.matrix[k][k] += damping;
+        }
         let mut held: Vec<Option<f64>> = vec![None; at.len()];
         loop {
-            let step = self.step_with(&held)?;
+            let step = damped.step_with(&held)?;
             let mut is_within = true;
             for (k, prior) in priors.iter().enumerate() {
                 let there = at[k] + step[k];

@@ -32,7 +32,7 @@ use crate::loads::SeenLoad;
 pub use left_out::LeftOut;
 pub use own::{FoundNumber, OwnFilm};
 pub use problem::Bench;
-use problem::Problem;
+use problem::{Problem, Trust};
 
 /// How fine the film's mesh is: coarser ones do not show how the film bends between a tip and a dot
 /// beside it.
@@ -70,7 +70,7 @@ pub fn fit(
         bench,
         loads,
         priors: numbers::priors(bench.dots_mm.len(), stage_mm, from),
-        blur: 1.0,
+        trust: Trust::WHOLE,
     };
     let found = problem.found()?;
     ensure!(

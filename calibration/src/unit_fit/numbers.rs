@@ -10,11 +10,14 @@ use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 const REST_PX: f64 = 0.006;
 const DISTANCE_MM: f64 = 0.1;
 
+/// The overhang by which what it does to the film falls to a part of e, mm.
+const OVERHANG_MM: f64 = 2.0;
+
 /// A number of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Number {
-    /// Of the film: ln of Young's modulus, thickness and grip in parts of the nominal ones, all
-    /// others in the unit of the change.
+    /// Of the film: ln of Young's modulus, thickness and grip in parts of the nominal ones, of an
+    /// overhang exp(−mm/[`OVERHANG_MM`]), all others in the unit of the change.
     Film(Change),
     /// How far a marker is glued beside its place along x or y, mm.
     Marker(usize, usize),
@@ -71,7 +74,7 @@ impl Number {
                 Change::DotStiffening => "dots' stiffness in parts of the film's".into(),
                 Change::Down(axis) => format!("gravity along {}, g", along(axis)),
                 Change::PostRadius => "posts' radius, mm".into(),
-                Change::Overhang => "overhang, mm".into(),
+                Change::Overhang => "overhang, exp(-mm/2)".into(),
             },
             Number::Marker(k, axis) => format!("marker {k}, {}, mm", along(axis)),
             Number::Rest(k, axis) => format!("pixel grid at rest, marker {k}, {}, px", along(axis)),
@@ -125,7 +128,7 @@ const FILM: [(Change, [f64; 4]); 17] = [
     (Change::Thickness, [0.0, 0.1, -0.35, 0.35]),
     (Change::Stretch(0), [0.01, 0.01, -0.006, 0.045]),
     (Change::Stretch(1), [0.01, 0.01, -0.006, 0.045]),
-    (Change::Overhang, [3.0, 3.0, 0.0, 8.5]),
+    (Change::Overhang, [0.45, 0.4, 0.014, 1.0]),
     (Change::PostRadius, [1.8, 0.5, 0.9, 3.2]),
     (Change::Grip, [0.0, 0.7, -2.0, 2.0]),
     (Change::NeoHooke, [0.5, 0.4, 0.0, 1.0]),
@@ -196,7 +199,7 @@ pub fn set(design: &mut Design, change: Change, value: f64) {
         Change::DotStiffening => design.dot_stiffening = value,
         Change::Down(axis) => design.down[axis] = value,
         Change::PostRadius => design.post_radius_mm = value,
-        Change::Overhang => design.overhang_mm = value,
+        Change::Overhang => design.overhang_mm = -OVERHANG_MM * libm::log(value),
     }
 }
 
@@ -204,6 +207,7 @@ pub fn set(design: &mut Design, change: Change, value: f64) {
 pub fn per_number(design: &Design, change: Change) -> f64 {
     match change {
         Change::Thickness => design.material.thickness_mm,
+        Change::Overhang => -OVERHANG_MM * libm::exp(design.overhang_mm / OVERHANG_MM),
         _ => 1.0,
     }
 }

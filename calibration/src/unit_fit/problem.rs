@@ -15,6 +15,8 @@ use crate::loads::SeenLoad;
 
 /// So many loads are not alike: places and directions all over the film.
 const APART: usize = 10;
+/// Standard uncertainty of the rest position while it counts little, px, times the blur.
+const LITTLE_REST_PX: f64 = 0.05;
 /// What the family of films leaves of a real one's motion, standard uncertainty, px at 320×240.
 const FAMILY_PX: f64 = 0.006;
 
@@ -40,9 +42,26 @@ pub struct Problem<'a> {
     pub bench: &'a Bench,
     pub loads: &'a [SeenLoad],
     pub priors: Vec<Prior>,
-    /// How many times larger than it is what is seen is taken to scatter, ≥ 1: from far away a fit
-    /// that trusts it less finds its way.
+    pub trust: Trust,
+}
+
+/// How far a fit trusts what is seen: from far away one that trusts it less finds its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trust {
+    /// How many times larger than it is what is seen is taken to scatter, ≥ 1.
     pub blur: f64,
+    /// Whether dots under loads are held against how far they are seen beside their rest position,
+    /// or against where in the picture they are, with a rest position that counts little: that of a
+    /// slack film jumps, and would take all loads with it.
+    pub from_rest: bool,
+}
+
+impl Trust {
+    /// What is seen is what is known.
+    pub const WHOLE: Trust = Trust {
+        blur: 1.0,
+        from_rest: true,
+    };
 }
 
 /// A unit as some values of its numbers make it.
@@ -122,9 +141,8 @@ pub struct Rates {
     pub place: Vec<Vec<f64>>,
 }
 
-/// A step of the unknowns, and what is known after it.
+/// The equations of the unknowns, and what they tell of them.
 pub struct Solved {
-    pub step: Unknowns,
     /// Of the numbers, in parts of their standard deviations before.
     pub covariance: Matrix,
     /// All equations of the numbers, and each load's.
@@ -298,7 +316,7 @@ impl Problem<'_> {
         Seen {
             rest: rest_px(made, &images.rest),
             pressed: pressed
-                .map(|there| moved_px(made, there, &images.rest))
+                .map(|there| self.pressed_px(made, there, &images.rest))
                 .collect(),
         }
     }
@@ -313,7 +331,7 @@ impl Problem<'_> {
         let of_dot = |(dot, (seen, rest)): (&[f64; 2], (&[f64; 2], &[f64; 2]))| {
             let moved_px = libm::hypot(seen[0] - rest[0], seen[1] - rest[1]);
             let mesh_px = moved_px * mesh_part(*dot, load.place_mm);
-            [self.blur * shared_px.hypot(mesh_px); 2]
+            [self.trust.blur * shared_px.hypot(mesh_px); 2]
         };
         made.dots_mm.iter().zip(seen).flat_map(of_dot).collect()
     }
@@ -322,12 +340,37 @@ impl Problem<'_> {
     pub fn moved_px(&self, at: &At, state: &Equilibrium) -> Vec<f64> {
         let view = self.view(&at.made, &at.film);
         let images = view.images(state, &at.made.dots_mm);
-        moved_px(&at.made, &images, &at.images)
+        self.pressed_px(&at.made, &images, &at.images)
+    }
+
+    /// How far dots with these images should be seen beside the rest position of a tare, x and y of
+    /// each, px.
+    fn pressed_px(&self, made: &Made, there: &[[f64; 2]], rest: &[[f64; 2]]) -> Vec<f64> {
+        if self.trust.from_rest {
+            return moved_px(made, there, rest);
+        }
+        let of_dot = |(image, seen_rest): (&[f64; 2], &[f64; 2])| {
+            let at = made.to_px(*image);
+            [0, 1].map(|i| made.middle_px[i] + at[i] - seen_rest[i])
+        };
+        there
+            .iter()
+            .zip(&self.bench.rest_px)
+            .flat_map(of_dot)
+            .collect()
+    }
+
+    /// Standard uncertainty of each coordinate at rest, px.
+    fn rest_sigma_px(&self) -> f64 {
+        match self.trust.from_rest {
+            true => self.trust.blur * self.bench.noise_px,
+            false => self.trust.blur * LITTLE_REST_PX,
+        }
     }
 
     /// Where the dots are seen to rest less where they should, in parts of its uncertainty.
     fn rest_residual(&self, made: &Made, images: &[[f64; 2]]) -> Vec<f64> {
-        let sigma_px = self.blur * self.bench.noise_px;
+        let sigma_px = self.rest_sigma_px();
         let seen = self.bench.rest_px.as_flattened().iter();
         let pairs = seen.zip(rest_px(made, images));
         pairs
@@ -346,7 +389,7 @@ impl Problem<'_> {
                 own: own_slopes(load, &noise_px, &rates.force, &rates.place),
             }
         };
-        let of_rest = vec![self.blur * self.bench.noise_px; 2 * at.made.dots_mm.len()];
+        let of_rest = vec![self.rest_sigma_px(); 2 * at.made.dots_mm.len()];
         let at_rest = rates.rest.iter();
         Ok(Slopes {
             rest: at_rest.map(|column| scaled(column, &of_rest)).collect(),
@@ -380,7 +423,8 @@ impl Problem<'_> {
             };
             for (j, k) in numbers.iter().enumerate() {
                 let pairs = of_film[j].iter().zip(&at_rest[j]);
-                rates.numbers[*k] = pairs.map(|(a, b)| units[j] * (a - b)).collect();
+                let with_rest = if self.trust.from_rest { 1.0 } else { 0.0 };
+                rates.numbers[*k] = pairs.map(|(a, b)| units[j] * (a - with_rest * b)).collect();
             }
             for (k, prior) in self.priors.iter().enumerate() {
                 if let Number::Stage(axis) = prior.number {
@@ -470,7 +514,7 @@ impl Problem<'_> {
         Ok(LoadEquations::new(slopes, residual, parts)?.step(&[]))
     }
 
-    /// The step to where the unknowns explain most, and what is known of the numbers then.
+    /// The equations of where the unknowns explain most, and what is known of the numbers there.
     ///
     /// # Errors
     /// When a state is not stable.
@@ -486,15 +530,25 @@ impl Problem<'_> {
         for load in &loads {
             whole.take(load, 1.0);
         }
-        let numbers = whole.step_within(&self.priors, &at.unknowns.numbers)?;
         Ok(Solved {
-            step: Unknowns {
-                loads: loads.iter().map(|load| load.step(&numbers)).collect(),
-                numbers,
-            },
             covariance: inverse(whole.matrix.clone())?,
             whole,
             loads,
+        })
+    }
+}
+
+impl Solved {
+    /// The step of the unknowns from some values to where they explain most; a damped one goes less
+    /// far where little is known.
+    ///
+    /// # Errors
+    /// When the equations have no solution.
+    pub fn step(&self, priors: &[Prior], at: &Unknowns, damping: f64) -> Result<Unknowns> {
+        let numbers = self.whole.step_within(priors, &at.numbers, damping)?;
+        Ok(Unknowns {
+            loads: self.loads.iter().map(|load| load.step(&numbers)).collect(),
+            numbers,
         })
     }
 }
@@ -568,15 +622,15 @@ pub fn apart_mm(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
 }
 
 impl Unknowns {
-    /// So much of a step away.
-    pub fn after(&self, step: &Unknowns, length: f64, priors: &[Prior]) -> Unknowns {
+    /// A step away.
+    pub fn after(&self, step: &Unknowns, priors: &[Prior]) -> Unknowns {
         let numbers = self.numbers.iter().zip(&step.numbers).zip(priors);
-        let within = |((at, step), prior): ((&f64, &f64), &Prior)| prior.within(at + length * step);
+        let within = |((at, step), prior): ((&f64, &f64), &Prior)| prior.within(at + step);
         let loads = self.loads.iter().zip(&step.loads);
         Unknowns {
             numbers: numbers.map(within).collect(),
             loads: loads
-                .map(|(at, step)| std::array::from_fn(|i| at[i] + length * step[i]))
+                .map(|(at, step)| std::array::from_fn(|i| at[i] + step[i]))
                 .collect(),
         }
     }
