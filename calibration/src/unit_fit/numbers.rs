@@ -211,3 +211,22 @@ pub fn per_number(design: &Design, change: Change) -> f64 {
         _ => 1.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_overhang_is_what_its_number_says() {
+        const STEP: f64 = 1e-6;
+        let mut design = Design::default();
+        let mut overhang_mm = |value: f64| {
+            set(&mut design, Change::Overhang, value);
+            (design.overhang_mm, per_number(&design, Change::Overhang))
+        };
+        assert_eq!(overhang_mm(1.0).0, 0.0);
+        let ((here, rate), (there, _)) = (overhang_mm(0.3), overhang_mm(0.3 + STEP));
+        assert!((here - 2.408).abs() < 1e-3, "{here}");
+        assert!(((there - here) / STEP - rate).abs() < 1e-4, "{rate}");
+    }
+}

@@ -19,6 +19,8 @@ const APART: usize = 10;
 const LITTLE_REST_PX: f64 = 0.05;
 /// What the family of films leaves of a real one's motion, standard uncertainty, px at 320×240.
 const FAMILY_PX: f64 = 0.006;
+/// The same of loads whose places nobody noted: the family alone tells how far apart they are.
+const FAMILY_PX_NOWHERE: f64 = 0.02;
 
 /// What is known of the camera and the rest position before there is a load.
 #[derive(Clone, Debug)]
@@ -326,7 +328,11 @@ impl Problem<'_> {
     /// loads that are alike: more loads than [`APART`] do not tell it better.
     fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
         let more = self.loads.len().saturating_sub(APART) as f64 / APART as f64;
-        let shared_px = load.noise_px.hypot(FAMILY_PX * more.sqrt());
+        let family_px = match load.each_place_mm.is_finite() {
+            true => FAMILY_PX,
+            false => FAMILY_PX_NOWHERE,
+        };
+        let shared_px = load.noise_px.hypot(family_px * more.sqrt());
         let seen = load.seen_px.iter().zip(&self.bench.rest_px);
         let of_dot = |(dot, (seen, rest)): (&[f64; 2], (&[f64; 2], &[f64; 2]))| {
             let moved_px = libm::hypot(seen[0] - rest[0], seen[1] - rest[1]);
