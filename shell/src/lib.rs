@@ -40,4 +40,4 @@ pub use load::{Loaded, press_load};
 pub use path::halton;
 pub use point::{DENSITY_KG_PER_M3, Law, Material};
 pub use tables::tables;
-pub use view::{Marker, markers, markers_on, paper_camera, pressed};
+pub use view::{Marker, markers, markers_on, paper_camera, pressed, pressed_on};

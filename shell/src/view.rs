@@ -57,12 +57,23 @@ pub fn pressed(
     state: &Equilibrium,
     discs: impl Iterator<Item = Disc>,
 ) -> Result<Pressed, ShellError> {
+    pressed_on(|point| film.displacement(state, point), discs)
+}
+
+/// The same of a film whose camera side moves so: from a place to its displacement, mm.
+///
+/// # Errors
+/// As [`pressed`].
+pub fn pressed_on(
+    moved: impl Fn([f64; 2]) -> [f64; 3],
+    discs: impl Iterator<Item = Disc>,
+) -> Result<Pressed, ShellError> {
     let camera = paper_camera()?;
     let mut pressed = Pressed::default();
     let places = pressed.centres_mm.iter_mut().zip(&mut pressed.discs);
     for ((centre_mm, motion), disc) in places.zip(discs) {
         *centre_mm = disc.centre_mm;
-        *motion = seen_motion(|point| film.displacement(state, point), &disc, &camera);
+        *motion = seen_motion(&moved, &disc, &camera);
     }
     Ok(pressed)
 }

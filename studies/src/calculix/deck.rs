@@ -258,7 +258,7 @@ impl Deck<'_> {
                 let axis = axis + 1;
                 line(
                     &mut text,
-                    format_args!("*BOUNDARY\n{},{axis},{axis},{part:e}", self.mount()),
+                    format_args!("*BOUNDARY\n{},{axis},{axis},{part:.9e}", self.mount()),
                 );
             }
         }

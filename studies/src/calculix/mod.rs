@@ -2,6 +2,7 @@
 
 mod compare;
 mod deck;
+mod film;
 mod mesh;
 mod mounted;
 mod page;
@@ -27,6 +28,7 @@ use presses::{BASE, FAINT, PRESSES, Press, RUBBER, VARIANTS, VARIED, Variant};
 use program::Program;
 use results::Pressed;
 
+pub use film::CalculixFilm;
 pub use mounted::MountedFilms;
 
 /// What to compare, and where the page goes.
@@ -37,17 +39,17 @@ pub struct Calculix {
     out: PathBuf,
     #[command(flatten)]
     solver: Solver,
-}
-
-/// How CalculiX is run.
-#[derive(Args)]
-struct Solver {
-    /// CalculiX's program.
-    #[arg(long, default_value = "ccx")]
-    ccx: PathBuf,
     /// Films that CalculiX works on at a time.
     #[arg(long, default_value_t = 2)]
     threads: usize,
+}
+
+/// How CalculiX is run.
+#[derive(Args, Clone)]
+pub struct Solver {
+    /// CalculiX's program.
+    #[arg(long, default_value = "ccx")]
+    ccx: PathBuf,
     /// How fine CalculiX's mesh is; 2: elements of half the sides.
     #[arg(long, default_value_t = 0.7)]
     fineness: f64,
@@ -105,7 +107,7 @@ impl Calculix {
             program,
             camera: paper_camera()?,
             fineness: self.solver.fineness,
-            threads: self.solver.threads,
+            threads: self.threads,
         };
         let page = Page {
             version,
@@ -127,6 +129,14 @@ fn write_page(out: &Path, text: &str) -> Result<()> {
 }
 
 impl Solver {
+    /// The same; what is kept goes into a folder of this name.
+    pub fn within(&self, folder: &str) -> Solver {
+        Solver {
+            keep: self.keep.as_ref().map(|keep| keep.join(folder)),
+            ..self.clone()
+        }
+    }
+
     fn program(&self) -> Program {
         Program {
             ccx: self.ccx.clone(),

@@ -10,90 +10,62 @@ use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed
 use rand::Rng;
 
 use super::seeded;
+use crate::calculix::{CalculixFilm, Solver};
 
 /// States that are kept to start others from.
 const MOST_STATES: usize = 40;
 /// How fine the films' meshes are: another one than that of fits.
 const FINENESS: f64 = 0.7;
+/// Poisson's ratio of rubber in CalculiX; `shell/` takes it for incompressible.
+const RUBBERS_POISSON: f64 = 0.499;
 
 /// A film on its posts.
 pub struct RealFilm {
-    film: Film,
-    rest: Equilibrium,
-    known: Mutex<Known>,
+    solved: Solved,
+    /// What a scene shows under loads that were asked for before.
+    pressed: Mutex<Vec<(Load, Pressed)>>,
 }
 
-/// What is known of a film, by its loads.
-#[derive(Default)]
-struct Known {
+/// Who solves it.
+enum Solved {
+    Here(Box<ShellFilm>),
+    ByCalculix(Box<CalculixFilm>),
+}
+
+/// A film of the project's own solver.
+struct ShellFilm {
+    film: Film,
+    rest: Equilibrium,
     /// The states that were found last.
-    states: Vec<(Load, Equilibrium)>,
-    /// What a scene shows.
-    pressed: Vec<(Load, Pressed)>,
+    states: Mutex<Vec<(Load, Equilibrium)>>,
 }
 
 impl RealFilm {
     /// The film with this number, on the posts and with the dots of these options, under a tip of a
-    /// radius, mm.
+    /// radius, mm; by CalculiX where its solver is given.
     ///
     /// # Errors
     /// When it finds no rest position.
-    pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
-        let mut random = seeded(77_000 + number);
-        let mut between = |from: f64, to: f64| random.random_range(from..to);
-        let unit = &options.film.unit;
-        let nominal = Design::default();
-        let across = [between(-0.05, 0.05), between(-0.05, 0.05)];
-        let curve = [(); 3].map(|()| between(-0.03, 0.03));
-        let law = match number % 3 {
-            0 => Law::default(),
-            1 => Law {
-                neo_hooke: 1.0,
-                stiffening: 0.0,
-            },
-            _ => Law {
-                neo_hooke: 1.0,
-                stiffening: between(0.02, 0.2),
-            },
-        };
-        // Every third is cut at its holes.
-        let overhang_mm = match number / 3 % 3 {
-            0 => 0.0,
-            _ => between(0.0, 8.0),
-        };
-        let down = loop {
-            let vector = [(); 3].map(|()| between(-1.0, 1.0));
-            let length = vector.iter().map(|part| part * part).sum::<f64>().sqrt();
-            if (0.1..1.0).contains(&length) {
-                break vector.map(|part| part / length);
+    pub fn drawn(
+        number: u64,
+        options: &Options,
+        tip_radius_mm: f64,
+        calculix: Option<&Solver>,
+    ) -> Result<Self> {
+        let mut design = drawn(number, options, tip_radius_mm);
+        let solved = match calculix {
+            None => Solved::Here(Box::new(ShellFilm::new(&design)?)),
+            Some(solver) => {
+                // Solids of St Venant's law give way under a tip.
+                design.law.neo_hooke = 1.0;
+                design.material.poisson = RUBBERS_POISSON;
+                let solver = solver.within(&format!("film-{number}"));
+                Solved::ByCalculix(Box::new(CalculixFilm::new(&solver, design)?))
             }
         };
-        let dots_mm = dots_mm(options).to_vec();
-        let design = Design {
-            material: Material {
-                youngs_mpa: unit.stiffness * nominal.material.youngs_mpa,
-                thickness_mm: unit.thickness * nominal.material.thickness_mm,
-                ..nominal.material
-            },
-            law,
-            stretch: [between(-0.003, 0.03), between(-0.003, 0.03)],
-            overhang_mm,
-            post_radius_mm: between(1.0, 3.0),
-            post_shift_mm: unit.posts_mm,
-            thickness_slope: across,
-            thickness_curve: curve,
-            dot_stiffening: between(0.0, 1.0),
-            dots_mm,
-            down,
-            tip_radius_mm,
-            fineness: FINENESS,
-            ..nominal
-        };
-        let film = Film::new(&design)?;
         Ok(Self {
-            rest: film.rest(),
-            film,
-            known: Mutex::default(),
+            solved,
+            pressed: Mutex::default(),
         })
     }
 
@@ -101,16 +73,37 @@ impl RealFilm {
     ///
     /// # Errors
     /// When it finds no equilibrium.
-    pub fn press(&self, load: &Load) -> Result<Pressed, ShellError> {
-        let mut known = self.known();
-        if let Some((_, pressed)) = known.pressed.iter().find(|(other, _)| other == load) {
+    pub fn press(&self, load: &Load) -> Result<Pressed> {
+        let mut known = locked(&self.pressed);
+        if let Some((_, pressed)) = known.iter().find(|(other, _)| other == load) {
             return Ok(*pressed);
         }
+        let pressed = match &self.solved {
+            Solved::Here(film) => film.press(load)?,
+            Solved::ByCalculix(film) => film.press(load)?,
+        };
+        known.push((*load, pressed));
+        Ok(pressed)
+    }
+}
+
+impl ShellFilm {
+    fn new(design: &Design) -> Result<Self, ShellError> {
+        let film = Film::new(design)?;
+        Ok(Self {
+            rest: film.rest(),
+            film,
+            states: Mutex::default(),
+        })
+    }
+
+    fn press(&self, load: &Load) -> Result<Pressed, ShellError> {
+        let mut states = locked(&self.states);
         let state = match load.magnitude_n() {
             0.0 => self.rest.clone(),
             _ => {
                 let at_mm = self.film.material_point(&self.rest, load.offset_mm());
-                let start = known.nearest(load).unwrap_or(&self.rest);
+                let start = nearest(&states, load).unwrap_or(&self.rest);
                 self.film.press_force(at_mm, load.vector_n(), start)?
             }
         };
@@ -121,38 +114,84 @@ impl RealFilm {
             touches_mm: load.offset_mm(),
             ..pressed(&self.film, &state, discs)?
         };
-        known.take(load, state);
-        known.pressed.push((*load, pressed));
+        if states.len() >= MOST_STATES {
+            states.remove(0);
+        }
+        states.push((*load, state));
         Ok(pressed)
-    }
-
-    fn known(&self) -> MutexGuard<'_, Known> {
-        let known = self.known.lock();
-        known.unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
 
-impl Known {
-    /// The state under the load that is nearest to this one.
-    fn nearest(&self, load: &Load) -> Option<&Equilibrium> {
-        let far = |other: &Load| {
-            let apart = |a: &[f64], b: &[f64]| -> f64 {
-                a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
-            };
-            // A millimetre of place is as far as 20 mN.
-            apart(&load.vector_n(), &other.vector_n())
-                + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
-        };
-        let all = self.states.iter();
-        let nearest = all.min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
-        nearest.map(|(_, state)| state)
-    }
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner())
+}
 
-    fn take(&mut self, load: &Load, state: Equilibrium) {
-        if self.states.len() >= MOST_STATES {
-            self.states.remove(0);
+/// The state under the load that is nearest to this one.
+fn nearest<'a>(states: &'a [(Load, Equilibrium)], load: &Load) -> Option<&'a Equilibrium> {
+    let far = |other: &Load| {
+        let apart =
+            |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum() };
+        // A millimetre of place is as far as 20 mN.
+        apart(&load.vector_n(), &other.vector_n())
+            + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
+    };
+    let nearest = states.iter().min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
+    nearest.map(|(_, state)| state)
+}
+
+/// The film with this number.
+fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
+    let mut random = seeded(77_000 + number);
+    let mut between = |from: f64, to: f64| random.random_range(from..to);
+    let unit = &options.film.unit;
+    let nominal = Design::default();
+    let across = [between(-0.05, 0.05), between(-0.05, 0.05)];
+    let curve = [(); 3].map(|()| between(-0.03, 0.03));
+    let law = match number % 3 {
+        0 => Law::default(),
+        1 => Law {
+            neo_hooke: 1.0,
+            stiffening: 0.0,
+        },
+        _ => Law {
+            neo_hooke: 1.0,
+            stiffening: between(0.02, 0.2),
+        },
+    };
+    // Every third is cut at its holes.
+    let overhang_mm = match number / 3 % 3 {
+        0 => 0.0,
+        _ => between(0.0, 8.0),
+    };
+    let down = loop {
+        let vector = [(); 3].map(|()| between(-1.0, 1.0));
+        let length = vector.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if (0.1..1.0).contains(&length) {
+            break vector.map(|part| part / length);
         }
-        self.states.push((*load, state));
+    };
+    let dots_mm = dots_mm(options).to_vec();
+    Design {
+        material: Material {
+            youngs_mpa: unit.stiffness * nominal.material.youngs_mpa,
+            thickness_mm: unit.thickness * nominal.material.thickness_mm,
+            ..nominal.material
+        },
+        law,
+        stretch: [between(-0.003, 0.03), between(-0.003, 0.03)],
+        overhang_mm,
+        post_radius_mm: between(1.0, 3.0),
+        post_shift_mm: unit.posts_mm,
+        thickness_slope: across,
+        thickness_curve: curve,
+        dot_stiffening: between(0.0, 1.0),
+        dots_mm,
+        down,
+        tip_radius_mm,
+        fineness: FINENESS,
+        ..nominal
     }
 }
 

@@ -14,6 +14,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 
 use super::{Drawn, RealFilm};
+use crate::calculix::Solver;
 
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
@@ -81,14 +82,19 @@ impl TestedUnit {
         Self::new(conditions, options, tip_radius_mm, number)
     }
 
-    /// The same with the film of this number of those that people mount.
+    /// The same with the film of this number of those that people mount; by CalculiX where its
+    /// solver is given.
     ///
     /// # Errors
     /// When there is no such camera, or the film finds no rest position.
-    pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
+    pub fn with_real_film(
+        conditions: &Conditions,
+        number: u64,
+        calculix: Option<&Solver>,
+    ) -> Result<Self> {
         let unit = Self::drawn(conditions, number)?;
         let options = unit.scene.options();
-        let film = RealFilm::drawn(number, options, unit.tip_radius_mm)?;
+        let film = RealFilm::drawn(number, options, unit.tip_radius_mm, calculix)?;
         Ok(Self {
             real: Some(film),
             ..unit

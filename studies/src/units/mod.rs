@@ -15,9 +15,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
+use crate::calculix::Solver;
 use crate::page;
 use crate::press::{Errors, FORCES_MN, REACH_MM, Row, Tared, TestedUnit, press};
 use bench::Bench;
+use real::RealFilms;
 
 /// What a calibrated unit shall be within: direction, degrees, |F|, mN, place, µm, root mean
 /// squares.
@@ -30,7 +32,7 @@ pub struct Units {
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Units drawn.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 24)]
     units: u64,
     /// Presses of each force on each of them.
     #[arg(long, default_value_t = 100)]
@@ -38,6 +40,8 @@ pub struct Units {
     /// Whose films: of today's tables, or as people mount them.
     #[arg(long, value_enum, default_value_t = Films::Nominal)]
     films: Films,
+    #[command(flatten)]
+    calculix: Solver,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
@@ -50,6 +54,8 @@ pub enum Films {
     Nominal,
     /// Solved by finite elements: stretched, cut otherwise, of other rubber.
     Real,
+    /// The same, solved by CalculiX as solids; an hour for two.
+    Calculix,
 }
 
 /// One unit's errors at each force.
@@ -79,11 +85,23 @@ impl Units {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        if self.films == Films::Real {
-            return real::run(&weights, &model, self.units, self.presses, self.json);
-        }
+        let calculix = match self.films {
+            Films::Nominal => return self.of_todays_tables(&weights, &model),
+            Films::Real => None,
+            Films::Calculix => Some(&self.calculix),
+        };
+        let study = RealFilms {
+            weights: &weights,
+            model: &model,
+            calculix,
+            presses: self.presses,
+        };
+        study.run(self.units, self.json)
+    }
+
+    fn of_todays_tables(&self, weights: &Weights, model: &Model<'_>) -> Result<()> {
         let units = (0..self.units).into_par_iter();
-        let tested = units.map(|number| self.test(&weights, &model, number));
+        let tested = units.map(|number| self.test(weights, model, number));
         let tested: Vec<Tested> = tested.collect::<Result<_>>()?;
         let calibrated: Vec<ByForce> = tested
             .iter()

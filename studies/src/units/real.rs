@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result, anyhow};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensing::model::Model;
@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::bench::Bench;
+use crate::calculix::Solver;
 use crate::page;
 use crate::press::{REACH_MM, Tally, Tared, TestedUnit, press_of_any};
 
@@ -41,33 +42,85 @@ struct Row {
     within: [f64; 3],
 }
 
-/// Draws films, calibrates them, and prints one JSON object or writes the page.
-///
-/// # Errors
-/// When a file cannot be written, or a film finds no equilibrium.
-pub fn run(
-    weights: &Weights,
-    model: &Model<'_>,
-    units: u64,
-    presses: u32,
-    json: bool,
-) -> Result<()> {
-    let numbers = (0..units).into_par_iter();
-    let tested = numbers.map(|number| test(weights, model, number, presses));
-    let tested: Vec<Tested> = tested.collect::<Result<_>>()?;
-    let mut rows = vec![row("tare alone", &tested, |film| Some(&film.tared))];
-    for (k, (_, name)) in Bench::ALL.into_iter().enumerate() {
-        rows.push(row(name, &tested, |film| film.calibrated[k].as_ref().ok()));
+/// Units with films as people mount them.
+pub struct RealFilms<'a> {
+    /// A network that tells places, with its film.
+    pub weights: &'a Weights,
+    /// The same as a model.
+    pub model: &'a Model<'a>,
+    /// Who solves the films, if it is CalculiX.
+    pub calculix: Option<&'a Solver>,
+    /// Presses of each film.
+    pub presses: u32,
+}
+
+impl RealFilms<'_> {
+    /// Draws so many, calibrates them, and prints one JSON object or writes the page.
+    ///
+    /// # Errors
+    /// When a file cannot be written, or a film finds no equilibrium.
+    pub fn run(&self, units: u64, json: bool) -> Result<()> {
+        let numbers = (0..units).into_par_iter();
+        let tested = numbers.map(|number| {
+            let tested = self.test(number);
+            tested.with_context(|| format!("film {number}"))
+        });
+        let tested: Vec<Tested> = tested.collect::<Result<_>>()?;
+        let mut rows = vec![row("tare alone", &tested, |film| Some(&film.tared))];
+        for (k, (_, name)) in self.benches().iter().enumerate() {
+            rows.push(row(name, &tested, |film| film.calibrated[k].as_ref().ok()));
+        }
+        if json {
+            return page::print_rows(&rows);
+        }
+        let mut text = table(&rows)?;
+        for (number, film) in tested.iter().enumerate() {
+            for (error, (_, name)) in film.calibrated.iter().zip(self.benches()) {
+                if let Err(error) = error {
+                    writeln!(text, "\nFilm {number} after {name}: {error:#}.")?;
+                }
+            }
+        }
+        print!("{text}");
+        match self.calculix {
+            None => page::write("real-films.md", include_str!("real.md"), &text),
+            Some(_) => page::write("calculix-films.md", include_str!("calculix.md"), &text),
+        }
     }
-    if json {
-        return page::print_rows(&rows);
+
+    /// Films of CalculiX are pressed ten times: each press takes it half a minute.
+    fn benches(&self) -> &'static [(Bench, &'static str)] {
+        match self.calculix {
+            None => &Bench::ALL,
+            Some(_) => &Bench::ALL[..1],
+        }
     }
+
+    fn test(&self, number: u64) -> Result<Tested> {
+        let conditions = &self.model.conditions;
+        let unit = TestedUnit::with_real_film(conditions, number, self.calculix)?;
+        let mut tared = unit.tare(self.model)?;
+        let of_tare = answers(&unit, &mut tared, number, self.presses)?;
+        let benches = self.benches().iter();
+        let calibrated = benches.map(|(bench, _)| {
+            let own = export(&bench.calibrate(self.weights, &unit, &mut tared, number)?)?;
+            let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
+            answers(&unit, &mut unit.tare(&own)?, number, self.presses)
+        });
+        Ok(Tested {
+            tared: of_tare,
+            calibrated: calibrated.collect(),
+        })
+    }
+}
+
+fn table(rows: &[Row]) -> Result<String> {
     let mut text = String::from(
         "| calibration | direction, rms, median of films | \\|F\\| | place | frames with a force | \
          beyond 3 stated σ | within the stated 95 %: direction, \\|F\\|, place | films without a \
          model |\n|---|--:|--:|--:|--:|--:|---|--:|\n",
     );
-    for row in &rows {
+    for row in rows {
         let [direction, force, place] = row.within;
         writeln!(
             text,
@@ -83,30 +136,7 @@ pub fn run(
             row.films,
         )?;
     }
-    for (number, film) in tested.iter().enumerate() {
-        for (error, (_, name)) in film.calibrated.iter().zip(Bench::ALL) {
-            if let Err(error) = error {
-                writeln!(text, "\nFilm {number} after {name}: {error:#}.")?;
-            }
-        }
-    }
-    print!("{text}");
-    page::write("real-films.md", include_str!("real.md"), &text)
-}
-
-fn test(weights: &Weights, model: &Model<'_>, number: u64, presses: u32) -> Result<Tested> {
-    let unit = TestedUnit::with_real_film(&model.conditions, number)?;
-    let mut tared = unit.tare(model)?;
-    let of_tare = answers(&unit, &mut tared, number, presses)?;
-    let calibrated = Bench::ALL.map(|(bench, _)| {
-        let own = export(&bench.calibrate(weights, &unit, &mut tared, number)?)?;
-        let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
-        answers(&unit, &mut unit.tare(&own)?, number, presses)
-    });
-    Ok(Tested {
-        tared: of_tare,
-        calibrated: calibrated.into(),
-    })
+    Ok(text)
 }
 
 fn answers(unit: &TestedUnit, tared: &mut Tared<'_>, number: u64, presses: u32) -> Result<Tally> {

@@ -30,6 +30,9 @@ pub struct MountedFilms {
     out: PathBuf,
     #[command(flatten)]
     solver: Solver,
+    /// Films that CalculiX works on at a time.
+    #[arg(long, default_value_t = 2)]
+    threads: usize,
 }
 
 /// A film at rest and pressed.
@@ -68,7 +71,7 @@ impl MountedFilms {
             fineness: self.solver.fineness,
         };
         let films = films();
-        let compared = in_order(self.solver.threads, &films, |film| {
+        let compared = in_order(self.threads, &films, |film| {
             timed(&film.job(), || study.compare(film))
         });
         let page = Page {
