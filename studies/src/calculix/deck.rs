@@ -458,7 +458,7 @@ mod tests {
             equations += 1;
         }
         assert_eq!(equations, 3 * design.post_points().len());
-        assert!(text.contains(&format!("*BOUNDARY\n{mount},1,1,3e-2\n")));
+        assert!(text.contains(&format!("*BOUNDARY\n{mount},1,1,3.000000000e-2\n")));
     }
 
     #[test]
