@@ -227,8 +227,8 @@ impl Problem<'_> {
         let mut solved = self.solve(&here)?;
         let mut least_damped = 0;
         for round in 1.. {
-            let dampings = DAMPINGS.iter().enumerate().skip(least_damped);
-            let shorter = dampings.into_iter().find_map(|(k, damping)| {
+            let mut dampings = DAMPINGS.iter().enumerate().skip(least_damped);
+            let shorter = dampings.find_map(|(k, damping)| {
                 let step = solved.step(&self.priors, &here.unknowns, *damping).ok()?;
                 let there = here.unknowns.after(&step, &self.priors);
                 let there = self.at(there, Some((&here.film, &here.states))).ok()?;

@@ -22,6 +22,9 @@ const LARGEST_STEP: f64 = 0.25;
 const RESIDUAL: f64 = 1e-5;
 const CORRECTION: f64 = 1e-3;
 
+/// Poisson's ratio of rubber here: `shell/` takes it for incompressible, CalculiX cannot.
+pub const RUBBERS_POISSON: f64 = 0.499;
+
 /// How the film answers to strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Law {
@@ -35,6 +38,17 @@ pub enum Law {
     /// Rubber with the same moduli at rest: C₁ (I₁−3) + C₂ (I₁−3)² of the isochoric part, and this
     /// C₂/C₁; 0 is compressible neo-Hooke.
     Rubber(f64),
+}
+
+impl Law {
+    /// CalculiX's law of a film of this one.
+    pub fn of(law: &hivtac_shell::Law) -> Law {
+        if law.neo_hooke == 0.0 {
+            Law::StVenant
+        } else {
+            Law::Rubber(law.stiffening)
+        }
+    }
 }
 
 /// A film that is mounted, and then pressed harder and harder.

@@ -39,10 +39,7 @@ impl CalculixFilm {
     /// # Errors
     /// When CalculiX is not installed or finds no rest position.
     pub fn new(solver: &Solver, design: Design) -> Result<Self> {
-        let law = match design.law {
-            hivtac_shell::Law { neo_hooke: 0.0, .. } => Law::StVenant,
-            law => Law::Rubber(law.stiffening),
-        };
+        let law = Law::of(&design.law);
         let flat = Film::new(&Design {
             fineness: 0.25,
             ..design.clone()

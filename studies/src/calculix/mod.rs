@@ -28,6 +28,7 @@ use presses::{BASE, FAINT, PRESSES, Press, RUBBER, VARIANTS, VARIED, Variant};
 use program::Program;
 use results::Pressed;
 
+pub use deck::RUBBERS_POISSON;
 pub use film::CalculixFilm;
 pub use mounted::MountedFilms;
 

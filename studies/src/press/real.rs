@@ -10,14 +10,12 @@ use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed
 use rand::Rng;
 
 use super::seeded;
-use crate::calculix::{CalculixFilm, Solver};
+use crate::calculix::{CalculixFilm, RUBBERS_POISSON, Solver};
 
 /// States that are kept to start others from.
 const MOST_STATES: usize = 40;
 /// How fine the films' meshes are: another one than that of fits.
 const FINENESS: f64 = 0.7;
-/// Poisson's ratio of rubber in CalculiX; `shell/` takes it for incompressible.
-const RUBBERS_POISSON: f64 = 0.499;
 
 /// A film on its posts.
 pub struct RealFilm {

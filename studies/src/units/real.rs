@@ -88,7 +88,7 @@ impl RealFilms<'_> {
         }
     }
 
-    /// Films of CalculiX are pressed ten times: each press takes it half a minute.
+    /// Films of CalculiX are pressed ten times: each press takes it a minute.
     fn benches(&self) -> &'static [(Bench, &'static str)] {
         match self.calculix {
             None => &Bench::ALL,

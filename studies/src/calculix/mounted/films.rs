@@ -2,7 +2,7 @@
 
 use hivtac_shell::Design;
 
-use super::super::deck::Law;
+use super::super::deck::{Law, RUBBERS_POISSON};
 use super::super::presses::STIFFER;
 
 /// Where the tip meets every film, mm from the middle.
@@ -12,8 +12,6 @@ pub const FORCE_N: [f64; 3] = [0.024, 0.012, -0.12];
 /// See there.
 pub const SIZES: [f64; 3] = [1.0 / 12.0, 1.0 / 3.0, 1.0];
 
-/// Poisson's ratio of rubber here: `shell/` takes it for incompressible, CalculiX cannot.
-const RUBBERS_POISSON: f64 = 0.499;
 /// C₂/C₁ of rubber that stiffens as Yeoh's.
 const YEOH: f64 = 0.3;
 
@@ -143,12 +141,11 @@ fn film(name: &'static str, design: Design) -> MountedFilm {
         tip_offset_mm: PLACE_MM,
         ..design
     };
-    let law = if design.law.neo_hooke == 0.0 {
-        Law::StVenant
-    } else {
-        Law::Rubber(design.law.stiffening)
-    };
-    MountedFilm { name, design, law }
+    MountedFilm {
+        name,
+        law: Law::of(&design.law),
+        design,
+    }
 }
 
 fn stretched(stretch: [f64; 2]) -> Design {
