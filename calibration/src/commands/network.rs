@@ -93,9 +93,10 @@ pub struct FilmArgs {
     /// The weights file.
     #[arg(long)]
     weights: PathBuf,
-    /// Presses anywhere (`dataset --samples 6000 --seed 5`), 200 and more.
-    #[arg(long)]
-    data: PathBuf,
+    /// Presses anywhere (`dataset --samples 6000 --seed 5`), 200 and more; without them the film's
+    /// tables stay.
+    #[arg(long, required_unless_present = "others")]
+    data: Option<PathBuf>,
     /// Gauss–Newton steps from the network's answer, 0 to 3.
     #[arg(long, default_value_t = 1)]
     steps: u8,
@@ -110,9 +111,10 @@ pub struct FilmArgs {
 
 impl FilmArgs {
     pub fn run(&self) -> Result<()> {
-        let weights = Weights::load(&self.weights)?;
-        let dataset = Dataset::load(&self.data)?;
-        let mut weights = weights.with_film(self.steps, &dataset)?;
+        let mut weights = Weights::load(&self.weights)?;
+        if let Some(data) = &self.data {
+            weights = weights.with_film(self.steps, &Dataset::load(data)?)?;
+        }
         if self.others {
             weights = weights.with_others()?;
         }

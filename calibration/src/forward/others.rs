@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
-use super::covariances::{Covariance, Moved, covariances, knots, sum_of_squares};
+use super::covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
 
 /// Films that are drawn.
@@ -43,8 +43,7 @@ const TILT: f64 = 0.2;
 const FOCAL_PX: f64 = 175.0;
 /// How fine the meshes are.
 const FINENESS: f64 = 0.3;
-/// Knots along the size, along y and along x. A grip on places is in the middle and at both ends.
-const KNOTS: [u8; 3] = [RELATIVE as u8, 3, 3];
+const _: () = assert!(KNOTS[0] as usize == RELATIVE, "their sizes are the same");
 /// A force is found when its images' size is as near to the one asked for, in parts of it.
 const NEAR: f64 = 0.06;
 /// Forces that are tried for each size.

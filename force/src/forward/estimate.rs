@@ -16,7 +16,7 @@ pub const UNEXPLAINED: f32 = 17.7;
 const USUAL: f32 = 5.0;
 /// Steps that a frame takes at most: more than the model asks for while what they led to does not
 /// explain the markers. Units of which little is known begin far from where they end.
-pub const STEPS_AT_MOST: u8 = 6;
+pub const STEPS_AT_MOST: u8 = 8;
 
 /// How the markers' images moved since the rest position, and how well that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,6 +15,8 @@ const LEAST_OWN: f32 = 1e-3;
 
 /// A column of the markers' equations.
 pub type Column = [f32; EQUATIONS];
+/// Size, tilt along x and y, place along x and y, or what they change.
+pub type Unknowns = [f32; UNKNOWNS];
 
 /// The square of what has these parts.
 pub(crate) fn square(parts: &[f32]) -> f32 {
@@ -25,7 +27,7 @@ pub(crate) fn square(parts: &[f32]) -> f32 {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solved {
     /// The unknowns.
-    pub unknowns: [f32; UNKNOWNS],
+    pub unknowns: Unknowns,
     /// The square of what no unknowns explain, of the right side.
     pub left_over: f32,
     /// The square of what they explain.
@@ -50,11 +52,11 @@ impl Solved {
     /// after it are less by `less` along a direction of length one.
     pub fn held_back(
         &self,
-        unknowns: [f32; UNKNOWNS],
+        unknowns: Unknowns,
         first: usize,
         along: [f32; 2],
         less: f32,
-    ) -> [f32; UNKNOWNS] {
+    ) -> Unknowns {
         let with = |unknown: usize| {
             let [a, b] = [first, first + 1].map(|k| self.covariance(unknown, k));
             a * along[0] + b * along[1]
