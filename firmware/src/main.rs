@@ -61,6 +61,7 @@ use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::temporal::Temporal;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::threshold::Threshold;
@@ -173,6 +174,7 @@ fn configure(
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
         Some(Ok(rest)) => {
             sensor.set_tare(Some(rest));
+            sensor.set_drift(Drift::UNSEEN);
             temporal.set_tare(Some(rest));
         }
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),

@@ -16,6 +16,7 @@ use crate::{outbox, session, settings, stats, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::pipeline::{self, Measurement};
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::temporal::{Followed, Moment, Temporal};
@@ -266,11 +267,13 @@ impl PipelineTask {
             return;
         };
         self.give_up_tare();
+        let drift = self.sensor.drift();
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
         if afresh {
             *self.temporal = Temporal::new();
         }
+        self.sensor.set_drift(drift);
         self.temporal.set_tare(self.sensor.tare().copied());
         if self.sensor.threshold() == before {
             self.follow();
@@ -289,6 +292,8 @@ impl PipelineTask {
             Ok(rest) => {
                 self.give_up_tare();
                 self.use_tare(rest);
+                // It was taken at another time.
+                self.sensor.set_drift(Drift::UNSEEN);
                 Outcome::Done
             }
             Err(outcome) => outcome,
@@ -354,8 +359,8 @@ impl PipelineTask {
         stats::PROCESSING_US.set(self.busy_us);
         let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
         stats::LATENCY_US.set(latency_us as u32);
-        if let Some(rest) = followed.rest {
-            self.sensor.set_tare(Some(rest));
+        if let Some(at_rest) = &followed.at_rest {
+            self.sensor.follow(at_rest);
             self.follow();
         }
         self.tare_with(&measurement);

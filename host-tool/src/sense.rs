@@ -6,6 +6,7 @@ use hivtac_host::failure::Failure;
 use hivtac_host::files::read_at_most;
 use hivtac_host::picture::Picture;
 use hivtac_host::stop;
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline;
 use hivtac_sensing::rest::Rest;
@@ -122,6 +123,7 @@ impl<'a> Bench<'a> {
                 )));
             }
             sensor.set_tare(Some(tare.rest));
+            sensor.set_drift(Drift::UNSEEN);
         }
         let mut measurement = sensor.measure_frame(&picture.pixels);
         // What the threshold makes of the picture, whatever another look does.
@@ -215,8 +217,11 @@ impl<'a> Bench<'a> {
 /// What is wrong with a tare's picture, and what to do.
 fn complaint(refusal: Refusal) -> &'static str {
     match refusal {
-        // One picture has no rest position before it, so that nothing is known to touch it.
-        Refusal::MarkersImplausible | Refusal::Unsteady | Refusal::Touched => {
+        Refusal::Touched => {
+            "shows a film that something touches, by where the unit's markers rested when it was \
+             calibrated: use a picture without a press, or calibrate anew"
+        }
+        Refusal::MarkersImplausible | Refusal::Unsteady => {
             "does not show four whole, equal markers: one may be covered, cut, stained or glare; \
              use a picture of a clean film in even light"
         }

@@ -39,10 +39,10 @@ pub struct Coverage {
     #[arg(long, default_value_t = 10_000)]
     presses: u32,
     /// Units drawn, each after ten loads.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 24)]
     units: u64,
     /// Presses of each of them.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 400)]
     unit_presses: u32,
     /// Print one JSON object and write no page.
     #[arg(long)]

@@ -70,6 +70,9 @@ bits! {
     /// The frame has specks or little light: its markers were found by a second look, and the
     /// standard uncertainties are larger.
     FRAME_DISTURBED = 22, "frame_disturbed";
+    /// The untouched film was seen last beside its rest position; standard uncertainties include
+    /// that.
+    REST_MOVED = 23, "rest_moved";
 }
 
 impl Status {

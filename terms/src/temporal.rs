@@ -86,7 +86,7 @@ pub struct Rezero {
 
 impl TemporalSettings {
     /// A contact from 2 mN on until 1 mN; a slip of 60 µm within 50 ms, from a tenth of the normal
-    /// force on; no filter, no re-zeroing.
+    /// force on; no filter; re-zeroing as [`Rezero::USUAL`].
     pub const USUAL: TemporalSettings = TemporalSettings {
         contact: ContactLimits {
             begins: UnsignedMicroNewtons(2_000),
@@ -98,7 +98,7 @@ impl TemporalSettings {
             ratio: Permille(100),
         },
         filter: Filter::None,
-        rezero: None,
+        rezero: Some(Rezero::USUAL),
     };
 }
 
@@ -123,14 +123,19 @@ impl Default for SlipLimits {
     }
 }
 
+impl Rezero {
+    /// After 10 s, by 5 thousandths of a pixel a second, 200 in all.
+    pub const USUAL: Rezero = Rezero {
+        after: Milliseconds(10_000),
+        rate: MilliPx(5),
+        total: MilliPx(200),
+    };
+}
+
 impl Default for Rezero {
-    /// After 10 s, by 5 thousandths of a pixel a second, 100 in all.
+    /// [`Rezero::USUAL`].
     fn default() -> Self {
-        Rezero {
-            after: Milliseconds(10_000),
-            rate: MilliPx(5),
-            total: MilliPx(100),
-        }
+        Rezero::USUAL
     }
 }
 

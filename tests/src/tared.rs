@@ -7,6 +7,7 @@ use std::vec::Vec;
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensing::model::{Model, OutputKind};
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
@@ -241,6 +242,16 @@ impl TaredSensor {
             }
         }
         Err(anyhow!("too few frames that show markers"))
+    }
+
+    /// Another unit: there is no rest position of it.
+    pub fn forget_tare(&mut self) {
+        self.sensor.set_tare(None);
+    }
+
+    /// The rest position stays, but no frame has confirmed it.
+    pub fn tared_at_another_time(&mut self) {
+        self.sensor.set_drift(Drift::UNSEEN);
     }
 
     /// The whole pipeline on a frame that follows none, which it looks at again when it refuses it.

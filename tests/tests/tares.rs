@@ -70,9 +70,14 @@ fn honest_units_are_tared(units: u64) {
     let mut sensor = sensor();
     let mut random = Random::new(3);
     for number in 0..units {
-        let options = built(&mut random);
-        let outcome = sensor.tare(FRAMES, at_rest(&scene(&options, number)));
-        assert!(outcome.unwrap().is_ok(), "{number}: {options:?}");
+        let mut options = built(&mut random);
+        sensor.forget_tare();
+        // The second time in other light.
+        for times in [1.0, between(&mut random, 0.8, 1.2)] {
+            options.gain *= times;
+            let outcome = sensor.tare(FRAMES, at_rest(&scene(&options, number)));
+            assert!(outcome.unwrap().is_ok(), "{number}: {options:?}");
+        }
     }
 }
 
@@ -226,4 +231,77 @@ fn a_film_that_moves_or_is_pressed_is_refused() {
     assert_eq!(tare(|n| 0.002 * (n % 4) as f64), Err(Refusal::Touched));
     assert_eq!(tare(|_| 0.2), Err(Refusal::NotAtRest));
     assert!(tare(|_| 0.0).is_ok());
+}
+
+/// Silicone that has not recovered still presses: from 0.5 mN on, wherever, that is no rest. A
+/// camera that moved is.
+#[test]
+fn what_still_presses_is_refused_and_a_camera_that_moved_is_tared() {
+    let nominal = scene(&Options::default(), 1);
+    let pressed = |force_n: f64, place_mm: [f64; 2]| {
+        let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
+        let load = load.with_offset_mm(place_mm).unwrap();
+        let frames = 0..4 * u64::from(FRAMES);
+        let nominal = &nominal;
+        frames.map(move |number| nominal.render_load(&load, number).unwrap())
+    };
+    for force_n in [5e-4, 1e-3, 1.5e-3] {
+        for place_mm in [[0.0, 0.0], [2.0, -1.0], [-3.5, 3.5]] {
+            let outcome = sensor().tare(FRAMES, pressed(force_n, place_mm)).unwrap();
+            assert_eq!(outcome, Err(Refusal::Touched), "{force_n} {place_mm:?}");
+        }
+    }
+    for (shift_px, roll_deg, longer) in [
+        ([0.0, 0.0], 0.0, 0.0),
+        ([0.3, -0.2], 0.0, 0.0),
+        ([0.0, 4.0], 0.5, 0.0),
+        ([0.1, 0.0], 0.0, 3e-3),
+        ([0.0, 0.0], -1.0, -3e-3),
+    ] {
+        let moved = Options {
+            mounting: Mounting { shift_px, roll_deg },
+            lens: Lens {
+                pitch_um: Some(12.0 / (1.0 + longer)),
+                ..Lens::default()
+            },
+            ..Options::default()
+        };
+        let outcome = sensor().tare(FRAMES, at_rest(&scene(&moved, 2))).unwrap();
+        assert!(
+            outcome.is_ok(),
+            "{shift_px:?} {roll_deg} {longer}: {outcome:?}"
+        );
+    }
+}
+
+/// A rest position that no frame has confirmed, of a camera that shifted since: what is stated
+/// covers that.
+#[test]
+fn a_shift_since_the_tare_is_within_what_is_stated() {
+    let mut sensor = sensor();
+    sensor.tared_at_another_time();
+    for shift_px in [[0.1, 0.0], [0.2, 0.0], [0.0, -0.2], [0.3, 0.0]] {
+        let mounting = Mounting {
+            shift_px,
+            roll_deg: 0.0,
+        };
+        let shifted = scene(
+            &Options {
+                mounting,
+                ..Options::default()
+            },
+            1,
+        );
+        for force_n in [0.05, 0.1, 0.2] {
+            let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
+            let sensed = sensor.sense(&shifted.render_load(&load, 3).unwrap());
+            let force = sensed.force.unwrap();
+            let [alpha, beta] = [force.alpha, force.beta].map(|angle| f64::from(angle.0));
+            let off = alpha.hypot(beta) / f64::from(force.direction_sigma.0);
+            assert!(
+                off < 3.0,
+                "{shift_px:?} {force_n}: {off} times what is stated"
+            );
+        }
+    }
 }

@@ -2,7 +2,8 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::forward::{
-    Column, DOTS, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose, Sigma, Strength,
+    Column, Covariance, DOTS, Drift, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose,
+    Sigma, Strength,
 };
 use crate::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::network::Output;
@@ -21,6 +22,8 @@ pub struct Resting {
     is_own: bool,
     px: Markers,
     areas: [f32; DOTS],
+    /// How far that may be from where the film rests; `None` where it is known.
+    drift: Option<Covariance>,
 }
 
 /// A marker that rests this far from where it rested when the model was made is another unit's:
@@ -30,6 +33,8 @@ const LARGEST_DRIFT: Px = Px(Px::ONE.0 / 2);
 /// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
 /// the light: in 1 of 1,000 frames).
 const UNEXPLAINED_BLURRED: f32 = 5.0;
+/// Where the search for a light touch begins, in parts of the largest size.
+const FIRST_SIZE: f32 = 0.1;
 /// Areas at which a marker's noise is known, in parts of the one at rest.
 const AREAS: [f32; 2] = [0.5, 6.0];
 
@@ -37,24 +42,35 @@ impl Resting {
     /// For a model that takes steps, and markers that rest there.
     pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
         let forward = model.forward.as_ref()?;
-        (forward.steps > 0).then(|| Resting::new(forward, rest, &model.rest))
+        let is_calibrated = !model.is_simulated();
+        (forward.steps > 0).then(|| Resting::new(forward, rest, &model.rest, is_calibrated))
+    }
+
+    /// Says how far the film may rest from there.
+    pub fn set_drift(&mut self, drift: &Drift) {
+        let is_known = *drift == Drift::NONE;
+        self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
     }
 
     /// For markers that rest there, by what the model knows of the unit that it was made on; of
-    /// another one by what its rest picture tells.
-    fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest) -> Resting {
-        let is_own = is_near(rest, own);
+    /// another one by what its rest picture tells. The camera of a unit that was calibrated may have
+    /// been mounted anew.
+    fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest, is_calibrated: bool) -> Resting {
         let told = forward.rest_image.mounting(rest);
-        let mounting = match is_own {
-            // The tables are of this unit's own markers.
-            true => Mounting {
-                per_px: forward.per_px.unwrap_or(told.per_px),
-                beside_mm: Markers::default(),
-            },
-            false => told,
+        let near = is_near(rest, own);
+        // The tables are of this unit's own markers.
+        let known = Mounting {
+            per_px: forward.per_px.unwrap_or(told.per_px),
+            beside_mm: Markers::default(),
         };
+        let own = match near {
+            true => Some(known),
+            false => known.remounted(rest, own).filter(|_| is_calibrated),
+        };
+        let is_own = own.is_some();
+        let mounting = own.unwrap_or(told);
         let centroids = rest.features.centroids;
-        let off = match is_own {
+        let off = match near {
             true => forward.noise.rest_px,
             false => Markers::default(),
         };
@@ -69,16 +85,40 @@ impl Resting {
             is_own,
             px: core::array::from_fn(at),
             areas: rest.areas.map(|area| area as f32),
+            drift: None,
         }
     }
 
-    /// How markers moved from there.
+    /// The force that another rest position looks like, µN, and its standard uncertainty by noise,
+    /// whatever the camera did.
+    pub fn touch(
+        model: &Model<'_>,
+        rest: &Rest,
+        other: &Rest,
+    ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
+        let forward = model.forward.as_ref()?;
+        let mut resting = Resting::of_model(model, rest)?;
+        resting.set_drift(&Drift::MOUNTED_ANEW);
+        let observed = resting.observed(forward, &other.markers(), FrameNoise::AS_MODELLED);
+        let guess = Pose {
+            size: FIRST_SIZE * forward.limits.size,
+            place_mm: forward.rest_image.where_most(&observed.moved),
+            ..Pose::default()
+        };
+        let unknown = forward.unknown(resting.is_own);
+        let estimate = forward.estimate(&observed, &resting.mounting, unknown, guess);
+        let (force, by_noise) = force(&forward.strength(resting.is_own), &estimate);
+        Some((force.magnitude, by_noise))
+    }
+
+    /// How markers moved from there. Once in the near memory, which is scarce.
+    #[inline(never)]
     fn observed(
         &self,
         forward: &Forward<'_>,
         markers: &[Marker; 4],
         frame: FrameNoise,
-    ) -> Observed {
+    ) -> Observed<'_> {
         let (mut moved, mut noise) = (Column::default(), [[0.0; 3]; DOTS]);
         let scale = self.mounting.scale();
         let blur = scale * frame.blur.to_f32();
@@ -102,7 +142,12 @@ impl Resting {
             });
             noise[k] = forward.rest_image.noise(k, variances);
         }
-        Observed { moved, noise }
+        let drift = self.drift.as_ref();
+        Observed {
+            moved,
+            noise,
+            drift,
+        }
     }
 
     /// The load that explains the markers best, from the network's answer on.

@@ -46,7 +46,7 @@ pub struct Descent<'a> {
 
 /// What the markers of a frame show, and of which unit.
 struct Markers<'a> {
-    observed: &'a Observed,
+    observed: &'a Observed<'a>,
     mounting: &'a Mounting,
     unknown: Unknown<'a>,
 }
@@ -77,7 +77,7 @@ impl<'a> Descent<'a> {
     /// At a guess; at the nearest load that the tables hold where it is beyond.
     pub fn new(
         forward: &'a Forward<'a>,
-        observed: &'a Observed,
+        observed: &'a Observed<'a>,
         mounting: &'a Mounting,
         unknown: Unknown<'a>,
         guess: Pose,
@@ -135,7 +135,7 @@ impl<'a> Descent<'a> {
 
     /// What it has come to.
     pub fn estimate(self) -> Estimate {
-        let left = self.here.by_noise(&self.markers.observed.covariance());
+        let left = self.here.by_noise(&self.markers.observed.by_noise());
         let white = self.here.white;
         Estimate {
             pose: self.here.pose,
@@ -192,7 +192,7 @@ impl Linearization {
         let Prediction { moved, slopes } = tables.predict(&pose, limits, &mounting.beside_mm);
         let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
         let mut covariance = unknown.covariance(&pose, limits, &moved);
-        observed.add_noise(&mut covariance);
+        observed.add_to(&mut covariance);
         let white = White::new(&covariance, &slopes, &left, &pose);
         Linearization {
             pose,
@@ -254,13 +254,7 @@ impl White {
 
 /// The load after a part of a step, and the square of that of a bend. Where that is too steep for the tables, the other unknowns
 /// follow the tilt back: without that, steps along the tables' border would not lower the residual.
-fn after(
-    forward: &Forward<'_>,
-    pose: &Pose,
-    solved: &Solved,
-    part: f32,
-    bend: &Unknowns,
-) -> Pose {
+fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &Unknowns) -> Pose {
     let most = forward.limits.tilt;
     let mut step = solved.unknowns;
     for (step, bend) in step.iter_mut().zip(bend) {

@@ -20,23 +20,37 @@ pub const STEPS_AT_MOST: u8 = 8;
 
 /// How the markers' images moved since the rest position, and how well that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observed {
+pub struct Observed<'a> {
     /// x and y of markers 0–3, focal lengths along the film's axes.
     pub moved: Column,
     /// The noise of each marker: covariances of x and x, x and y, y and y, focal lengths squared;
     /// the first and the last > 0.
     pub noise: [[f32; 3]; DOTS],
+    /// How far the rest position may be from where the film rests ([`Drift`](super::Drift)); `None`
+    /// where it is known.
+    pub drift: Option<&'a Covariance>,
 }
 
-impl Observed {
+impl Observed<'_> {
     /// The noise of all markers: no two share any.
-    pub(super) fn covariance(&self) -> Covariance {
+    pub(super) fn by_noise(&self) -> Covariance {
         let mut covariance = Covariance::default();
         self.add_noise(&mut covariance);
         covariance
     }
 
-    pub(super) fn add_noise(&self, covariance: &mut Covariance) {
+    /// Noise, and what the rest position may be off.
+    pub(super) fn add_to(&self, covariance: &mut Covariance) {
+        self.add_noise(covariance);
+        let drift = self.drift.into_iter().flatten();
+        for (i, (row, of_drift)) in covariance.iter_mut().zip(drift).enumerate() {
+            for (sum, part) in row[..=i].iter_mut().zip(of_drift) {
+                *sum += part;
+            }
+        }
+    }
+
+    fn add_noise(&self, covariance: &mut Covariance) {
         for (dot, [xx, xy, yy]) in self.noise.into_iter().enumerate() {
             let (x, y) = (2 * dot, 2 * dot + 1);
             covariance[x][x] += xx;
@@ -66,10 +80,11 @@ pub struct Estimate {
 impl Forward<'_> {
     /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
     /// which they find no way on, from where the markers moved most, too: from there they find
-    /// theirs where a guess was bad.
+    /// theirs where a guess was bad. Once in the near memory, which is scarce.
+    #[inline(never)]
     pub fn estimate(
         &self,
-        observed: &Observed,
+        observed: &Observed<'_>,
         mounting: &Mounting,
         unknown: Unknown<'_>,
         guess: Pose,

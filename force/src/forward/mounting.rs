@@ -1,7 +1,7 @@
 //! Where this unit's markers are on its film, and how its camera sees them.
 
 use super::predict::{DOTS, Markers};
-use super::solve::Column;
+use super::solve::{Column, square};
 use crate::kernels::sqrt;
 use crate::rest::Rest;
 
@@ -23,6 +23,13 @@ pub struct RestImage {
     /// What a focal length is on the film at each of them: away from the axis, and across that, mm.
     pub film_mm: Markers,
 }
+
+/// How far a unit's camera may be from where it was, in parts of the pattern's radius, as the sine
+/// of its turn and in parts of its scale; and a marker beside that, px.
+const LARGEST_SHIFT: f32 = 0.125;
+const LARGEST_TURN: f32 = 0.052;
+const LARGEST_SCALE: f32 = 0.01;
+const LARGEST_BESIDE_PX: f32 = 0.5;
 
 impl RestImage {
     /// The direction in which a marker's image lies from the axis, of length one; along x where it
@@ -89,7 +96,7 @@ impl RestImage {
 }
 
 /// Places as seen from their mean.
-fn about_middle(places: &Markers) -> Markers {
+pub(super) fn about_middle(places: &Markers) -> Markers {
     let mut middle = [0.0; 2];
     for place in places {
         middle = [0, 1].map(|i| middle[i] + place[i] / DOTS as f32);
@@ -98,7 +105,7 @@ fn about_middle(places: &Markers) -> Markers {
 }
 
 /// The complex number that brings what is seen nearest to where it would be seen.
-fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
+pub(super) fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
     let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
     for ([x, y], [cx, cy]) in seen.iter().zip(own) {
         along += x * cx + y * cy;
@@ -112,6 +119,36 @@ fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
 }
 
 impl Mounting {
+    /// The same film and camera, seen as at rest: `own_px` are where the markers rested when this
+    /// was known. `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of
+    /// scale of 1 % bring all of them within half a pixel of that: another unit's film.
+    pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
+        let [(seen, at), (own, own_at)] = [rest, own].map(|rest| {
+            let px = rest
+                .features
+                .centroids
+                .map(|(x, y)| [x.to_f32(), y.to_f32()]);
+            let about = about_middle(&px);
+            (about, [px[0][0] - about[0][0], px[0][1] - about[0][1]])
+        });
+        let radius = sqrt(square(own.as_flattened()) / DOTS as f32);
+        let [along, across] = similarity(&seen, &own);
+        let beside = |k: usize| {
+            let [x, y] = turned([along, across], seen[k]);
+            (x - own[k][0]).abs().max((y - own[k][1]).abs())
+        };
+        let shift = (at[0] - own_at[0]).abs().max((at[1] - own_at[1]).abs());
+        let scale = sqrt(along * along + across * across);
+        let is_own = shift <= LARGEST_SHIFT * radius
+            && across.abs() <= LARGEST_TURN
+            && (scale - 1.0).abs() <= LARGEST_SCALE
+            && (0..DOTS).all(|k| beside(k) <= LARGEST_BESIDE_PX);
+        is_own.then(|| Mounting {
+            per_px: turned(self.per_px, [along, across]),
+            ..*self
+        })
+    }
+
     /// How a marker's image moved, px, in focal lengths along the film's axes.
     pub fn moved(&self, px: [f32; 2]) -> [f32; 2] {
         turned(self.per_px, px)

@@ -10,10 +10,12 @@ mod tests;
 
 use crate::known_answer::{self, Answer};
 use crate::motion::Motion;
+use crate::temporal::AtRest;
 use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_force::features::Features;
 use hivtac_force::force::{self, Force, NoiseLevel, Resting};
+use hivtac_force::forward::Drift;
 use hivtac_force::model::Model;
 use hivtac_force::network::Network;
 use hivtac_force::rest::Rest;
@@ -59,6 +61,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
     model: Option<Model<'m>>,
     tare: Option<Rest>,
+    drift: Drift,
     pixels: Formats<T>,
     scanner: Scanner<BLOBS>,
     network: Network,
@@ -96,6 +99,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             },
             model: None,
             tare: None,
+            drift: Drift::NONE,
             pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
@@ -127,8 +131,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
         self.settings = settings;
         self.model = model;
-        self.tare = None;
-        self.prepare();
+        self.set_tare(None);
         Ok(())
     }
 
@@ -163,7 +166,34 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// [sound](Rest::is_sound) is as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {
         self.tare = tare.filter(Rest::is_sound);
+        self.drift = Drift::NONE;
         self.prepare();
+    }
+
+    /// Says how far the film may rest from its rest position, from the next frame on; just after it
+    /// was [set](Self::set_tare), nowhere else.
+    pub fn set_drift(&mut self, drift: Drift) {
+        self.drift = drift;
+        if let Some(resting) = self.resting_mut() {
+            resting.set_drift(&drift);
+        }
+    }
+
+    /// Measures from the next frame on against where the untouched film was seen.
+    pub fn follow(&mut self, at_rest: &AtRest) {
+        if let Some(rest) = at_rest.rest {
+            self.set_tare(Some(rest));
+        }
+        self.set_drift(at_rest.drift);
+    }
+
+    /// How far the film may rest from its rest position.
+    pub fn drift(&self) -> Drift {
+        self.drift
+    }
+
+    fn resting_mut(&mut self) -> Option<&mut Resting> {
+        self.prepared.as_mut()?.resting.as_mut()
     }
 
     /// The rest position of this unit, when one was taken.
@@ -326,11 +356,17 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 Reading::of(model.conditions.contact, model.output.tells_place())
             });
         let own_rest = self.tare.is_some();
+        let drift = self.drift;
+        let drifted = |mut resting: Resting| {
+            resting.set_drift(&drift);
+            resting
+        };
         self.prepared = Some(Prepared {
             finder: Finder::new(settings),
             resting: fitting
                 .zip(rest)
-                .and_then(|(model, rest)| Resting::of_model(model, &rest)),
+                .and_then(|(model, rest)| Resting::of_model(model, &rest))
+                .map(drifted),
             trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
             standing: self.standing_status(),
         });

@@ -2,9 +2,15 @@
 
 use super::{Look, Measurement, Sensor};
 use crate::tare::{Refusal, TareBuilder};
+use hivtac_force::force::{CONTACT_SIGMAS, Resting};
+use hivtac_force::model::Model;
 use hivtac_force::rest::Rest;
 use hivtac_markers::tables::Table;
 use hivtac_terms::status::Status;
+use hivtac_terms::units::UnsignedMicroNewtons;
+
+/// A change of the rest position that a press of this much explains is a touch: 0.3 mN.
+const TOUCHED: UnsignedMicroNewtons = UnsignedMicroNewtons(300);
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Gives a tare the frame that was finished last, of which `measurement` is. A frame without
@@ -30,10 +36,33 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
         // The images of a pressed film are not those of a flat one; that it is pressed matters.
         let is_pressed = !Rest::of_markers(&found.markers).fits(geometry);
-        if is_pressed || found.may_rest(&self.settings) {
-            tare.add(markers, features, geometry)
-        } else {
-            tare.add_implausible().map(Err)
+        if !is_pressed && !found.may_rest(&self.settings) {
+            return tare.add_implausible().map(Err);
         }
+        let outcome = tare.add(markers, features, geometry)?;
+        Some(
+            outcome.and_then(|rest| match tare.insists() || !self.looks_touched(&rest) {
+                true => Ok(rest),
+                false => Err(Refusal::Touched),
+            }),
+        )
+    }
+
+    /// Whether a press explains how the markers moved since the rest position from before, or since
+    /// the calibration of this unit.
+    fn looks_touched(&self, rest: &Rest) -> bool {
+        let fitting = |model: &&Model<'_>| model.conditions.are_of(&self.settings);
+        let Some(model) = self.model.as_ref().filter(fitting) else {
+            return false;
+        };
+        let own = (!model.is_simulated()).then_some(&model.rest);
+        let touch = self
+            .tare
+            .as_ref()
+            .or(own)
+            .and_then(|before| Resting::touch(model, before, rest));
+        touch.is_some_and(|(magnitude, by_noise)| {
+            magnitude.0.unsigned_abs() >= TOUCHED.0.max(CONTACT_SIGMAS.saturating_mul(by_noise.0))
+        })
     }
 }

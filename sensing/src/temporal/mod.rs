@@ -19,8 +19,17 @@ use hivtac_force::rest::Rest;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, SlipLimits, TemporalError, TemporalSettings};
 use hivtac_terms::units::Px;
+pub use rezero::AtRest;
 use rezero::Rezeroing;
 use slip::Slip;
+
+/// A rest position is said to have moved when a coordinate was seen farther from it than this, px:
+/// 3 µm of film.
+const MOVED_PX: f32 = 0.05;
+/// Frames that do not show where the film rests. Nothing needs to explain them; but the markers of
+/// another mask are no rest position's.
+const NOT_AT_REST: Status =
+    Status(Status::NO_FORCE.0 & !Status::UNEXPLAINED.0 | Status::FRAME_DISTURBED.0);
 
 /// Which frame, and when it was exposed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,15 +41,16 @@ pub struct Moment {
 }
 
 /// What follows from a frame and those before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Followed {
-    /// The frame's status, with [`Status::CONTACT`], [`Status::SLIP`] and [`Status::REZEROED`] as
-    /// they follow from all frames.
+    /// The frame's status, with [`Status::CONTACT`], [`Status::SLIP`], [`Status::REZEROED`] and
+    /// [`Status::REST_MOVED`] as they follow from all frames.
     pub status: Status,
     /// The filtered force, exactly when the frame has one.
     pub force: Option<Force>,
-    /// Where the film rests from the next frame on, when re-zeroing moves that.
-    pub rest: Option<Rest>,
+    /// What a second of the untouched film tells of where it rests
+    /// ([`Sensor::follow`](crate::pipeline::Sensor::follow)).
+    pub at_rest: Option<AtRest>,
 }
 
 /// What is known of the frames before.
@@ -122,24 +132,22 @@ impl Temporal {
             (touched == Some(true), Status::CONTACT),
             (slipping, Status::SLIP),
             (self.rezeroed() != Px(0), Status::REZEROED),
+            (
+                self.rezeroing.drift().farthest_px() > MOVED_PX,
+                Status::REST_MOVED,
+            ),
         ] {
             if set {
                 status |= bit;
             }
         }
-        // The markers of another mask are no rest position's.
-        let is_disturbed = measurement.status.contains(Status::FRAME_DISTURBED);
-        let rest = rezero.and_then(|rezero| {
-            let untouched = measurement
-                .features
-                .as_ref()
-                .filter(|_| touched == Some(false) && !is_disturbed);
-            self.rezeroing.follow(&rezero, at.time_us, untouched)
-        });
+        let may_rest = touched != Some(true) && !measurement.status.intersects(NOT_AT_REST);
+        let features = measurement.features.as_ref().filter(|_| may_rest);
+        let at_rest = self.rezeroing.follow(rezero.as_ref(), at.time_us, features);
         Followed {
             status,
             force: self.filter.follow(filter, at, own, touched == Some(true)),
-            rest,
+            at_rest,
         }
     }
 }

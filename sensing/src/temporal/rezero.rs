@@ -1,20 +1,24 @@
-//! Re-zeroing: the rest position follows what drifts while nothing touches the film.
+//! Where the untouched film rests: how far from its rest position, and re-zeroing, by which that
+//! follows.
 //!
 //! Where the markers rest wanders with temperature and with what the film remembers of its loads.
-//! While nothing has touched the film for long enough, each coordinate of the rest position goes
-//! towards where the markers are, the mean of a second, by no more than a rate; never farther from
-//! where it was taken than a total. It goes nowhere during a contact, nor in frames without a
-//! force or with [`frame_disturbed`](hivtac_terms::status::Status::FRAME_DISTURBED).
+//! Frames in which all of them are within half a pixel of the rest position are of the untouched
+//! film, whether or not a force explains them: what touches it moves them farther. The mean of a
+//! second of such frames tells how far the rest is off.
+//!
+//! While that has lasted for long enough, each coordinate of the rest position goes towards that
+//! mean by no more than a rate; never farther from where it was taken than a total.
 //!
 //! A force that is too small to be a contact looks like drift. What grows no faster than the rate
 //! is followed, and so missing in every force from then on: up to the total, and no more. What
 //! grows faster becomes a contact and stays whole, but for what was followed until then. In the
 //! simulated sensor at 320×240 a straight press moves each coordinate by 2.6 px for its first mN,
 //! and by 0.1 px for each mN more at 0.1 N (`hivtac-studies scene film`). So the usual rate of
-//! 0.005 px a second is 2 µN a second at rest, and the usual total of 0.1 px takes 0.04 mN of a
-//! force of some mN, and at most 1 mN of one of 0.1 N.
+//! 0.005 px a second is 2 µN a second at rest, and the usual total of 0.2 px takes 0.08 mN of a
+//! force of some mN, and at most 2 mN of one of 0.1 N.
 
 use hivtac_force::features::Features;
+use hivtac_force::forward::Drift;
 use hivtac_force::rest::Rest;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::temporal::Rezero;
@@ -22,10 +26,21 @@ use hivtac_terms::units::{MilliPx, Px};
 
 /// Frames are averaged for so long, µs.
 const MEAN_US: u64 = 1_000_000;
+/// The untouched film's markers are all within this of the rest position: half a pixel.
+const NEAR: Px = Px(Px::ONE.0 / 2);
 /// Frames farther apart than this do not follow each other: nobody knows what touched meanwhile.
 const LONGEST_GAP_US: u64 = 100_000;
 /// Most frames of a mean: 65 s of frames of a millisecond. Sums are below 2⁴⁸.
 const MOST_FRAMES: u32 = 1 << 16;
+
+/// What a second of the untouched film tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtRest {
+    /// The rest position from the next frame on, when re-zeroing moves it.
+    pub rest: Option<Rest>,
+    /// How far the film rests from it.
+    pub drift: Drift,
+}
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rezeroing {
@@ -33,6 +48,8 @@ pub(super) struct Rezeroing {
     taken: Option<Rest>,
     /// How far it is from there: x and y of markers 0–3.
     moved: [Px; 8],
+    /// How far the film was seen from that last.
+    drift: Drift,
     quiet: Option<Quiet>,
 }
 
@@ -63,11 +80,24 @@ impl Mean {
     }
 }
 
+impl Mean {
+    /// How far it is from a rest position, px.
+    fn beside(&self, rest: &Rest) -> [Q<16, i64>; 8] {
+        let frames = i64::from(self.frames);
+        let mut beside = self.sums;
+        for (part, rest) in beside.iter_mut().zip(coordinates(rest)) {
+            *part = Q::from_bits(part.bits().checked_div(frames).unwrap_or(0)) - Q::from(rest);
+        }
+        beside
+    }
+}
+
 impl Rezeroing {
     /// No rest position was taken.
     pub const NONE: Rezeroing = Rezeroing {
         taken: None,
         moved: [Px(0); 8],
+        drift: Drift::NONE,
         quiet: None,
     };
 
@@ -95,16 +125,21 @@ impl Rezeroing {
         far.max().unwrap_or_default()
     }
 
-    /// Takes the features of a frame that nothing touched, or none of any other frame. Gives the
-    /// rest position when it moves.
+    /// How far the untouched film was seen from the rest position last.
+    pub fn drift(&self) -> &Drift {
+        &self.drift
+    }
+
+    /// Takes the features of a frame in which no contact is known, or none of any other frame.
+    /// Gives what a second's mean tells.
     pub fn follow(
         &mut self,
-        limits: &Rezero,
+        limits: Option<&Rezero>,
         time_us: u64,
-        untouched: Option<&Features>,
-    ) -> Option<Rest> {
+        features: Option<&Features>,
+    ) -> Option<AtRest> {
         let taken = self.taken?;
-        let Some(features) = untouched else {
+        let Some(features) = features.filter(|features| self.is_near(&taken, features)) else {
             self.quiet = None;
             return None;
         };
@@ -116,12 +151,6 @@ impl Rezeroing {
             mean: Mean::new(time_us),
         });
         quiet.newest_us = time_us;
-        let quiet_us = time_us.saturating_sub(quiet.since_us);
-        if quiet_us < u64::from(limits.after.0) * 1_000 {
-            quiet.mean = Mean::new(time_us);
-            self.quiet = Some(quiet);
-            return None;
-        }
         take(&mut quiet.mean, features);
         let mean = quiet.mean;
         let averaged_us = time_us.saturating_sub(mean.begun_us);
@@ -130,24 +159,42 @@ impl Rezeroing {
             quiet.mean = Mean::new(time_us);
         }
         self.quiet = Some(quiet);
-        is_due
-            .then(|| self.moved_towards(limits, &taken, &mean))
-            .flatten()
+        if !is_due {
+            return None;
+        }
+        let there = mean.beside(&taken);
+        let quiet_us = mean.begun_us.saturating_sub(quiet.since_us);
+        let is_long = |limits: &&Rezero| quiet_us >= u64::from(limits.after.0) * 1_000;
+        let before = self.moved;
+        if let Some(limits) = limits.filter(is_long) {
+            self.move_towards(limits, &there);
+        }
+        let seen_px = self.drift.seen_px.as_flattened_mut().iter_mut();
+        for (seen, (there, moved)) in seen_px.zip(there.iter().zip(self.moved)) {
+            *seen = Px::saturated(*there - Q::from(moved)).to_f32();
+        }
+        Some(AtRest {
+            rest: (self.moved != before).then(|| displaced(&taken, &self.moved)),
+            drift: self.drift,
+        })
     }
 
-    /// Of a second's mean; `None` when it stays.
-    fn moved_towards(&mut self, limits: &Rezero, taken: &Rest, mean: &Mean) -> Option<Rest> {
+    fn is_near(&self, taken: &Rest, features: &Features) -> bool {
+        let all = features.centroids.iter().flat_map(|(x, y)| [*x, *y]);
+        let rests = coordinates(taken).zip(self.moved);
+        all.zip(rests).all(|(seen, (rest, moved))| {
+            let beside = seen.0.saturating_sub(rest.0).saturating_sub(moved.0);
+            beside.unsigned_abs() <= NEAR.0.unsigned_abs()
+        })
+    }
+
+    fn move_towards(&mut self, limits: &Rezero, there: &[Q<16, i64>; 8]) {
         let (rate, total) = (steps(limits.rate), steps(limits.total));
-        let frames = i64::from(mean.frames);
-        let before = self.moved;
-        for ((moved, sum), rest) in self.moved.iter_mut().zip(mean.sums).zip(coordinates(taken)) {
-            let mean = Q::from_bits(sum.bits().checked_div(frames).unwrap_or(0));
-            let there = mean - Q::from(rest);
-            let farther = (there - Q::from(*moved)).clamp(-rate, rate);
+        for (moved, there) in self.moved.iter_mut().zip(there) {
+            let farther = (*there - Q::from(*moved)).clamp(-rate, rate);
             // A total that was lowered is kept, too.
             *moved = Px::saturated((Q::from(*moved) + farther).clamp(-total, total));
         }
-        (self.moved != before).then(|| displaced(taken, &self.moved))
     }
 }
 
@@ -247,7 +294,8 @@ mod tests {
         fn with(&mut self, limits: &Rezero, ms: u64, features: Option<&Features>) {
             for _ in 0..ms * 1_000 / FRAME_US {
                 self.time_us += FRAME_US;
-                if let Some(rest) = self.state.follow(limits, self.time_us, features) {
+                let told = self.state.follow(Some(limits), self.time_us, features);
+                if let Some(rest) = told.and_then(|told| told.rest) {
                     self.rest = rest;
                 }
             }
@@ -261,7 +309,7 @@ mod tests {
 
     #[test]
     fn it_waits_goes_by_its_rate_and_stops_at_its_total() {
-        let drifted = features(Px::ONE);
+        let drifted = features(NEAR);
         let mut film = Followed::new();
         film.for_ms(2_900, Some(&drifted));
         assert!(
@@ -291,7 +339,7 @@ mod tests {
 
     #[test]
     fn nothing_is_followed_while_something_touches_nor_soon_after() {
-        let drifted = features(Px::ONE);
+        let drifted = features(NEAR);
         let mut film = Followed::new();
         film.for_ms(10_000, None);
         film.for_ms(1_900, Some(&drifted));
@@ -304,11 +352,33 @@ mod tests {
         assert_eq!(film.right(), 0.0);
     }
 
+    /// A second tells how far the film rests from there, whether or not that moves; the rest that
+    /// is followed is no drift any more.
+    #[test]
+    fn how_far_the_film_was_seen_from_there_stays_until_it_is_seen_again() {
+        let mut film = Followed::new();
+        film.for_ms(1_100, Some(&features(Px(6_554))));
+        let far = |film: &Followed| f64::from(film.state.drift().farthest_px());
+        assert!((far(&film) - 0.1).abs() < 1e-4, "{}", far(&film));
+        film.for_ms(60_000, None);
+        assert!((far(&film) - 0.1).abs() < 1e-4, "through a press");
+        film.for_ms(20_000, Some(&features(Px(6_554))));
+        assert!((film.right() - 0.1).abs() < 1e-4 && far(&film) < 1e-4);
+    }
+
+    /// Five millinewtons for ten minutes, of which the chip makes no force: beyond half a pixel.
+    #[test]
+    fn what_is_held_is_no_rest() {
+        let mut film = Followed::new();
+        film.for_ms(600_000, Some(&features(Px(NEAR.0 + 1))));
+        assert!(film.right() == 0.0 && film.state.drift() == &Drift::NONE);
+    }
+
     #[test]
     fn without_a_rest_position_that_was_taken_nothing_moves() {
         let mut film = Followed::new();
         film.state.set(None);
-        film.for_ms(20_000, Some(&features(Px::ONE)));
+        film.for_ms(20_000, Some(&features(NEAR)));
         assert_eq!(film.right(), 0.0);
     }
 

@@ -66,7 +66,7 @@ pub struct Film<'m> {
 pub struct Contact<'f> {
     film: &'f Film<'f>,
     pose: Pose,
-    observed: Observed,
+    observed: Observed<'static>,
     best: Estimate,
 }
 
@@ -115,6 +115,7 @@ impl<'m> Film<'m> {
         let mut random = noise.map(seeded);
         let variances = [away * away, across * across];
         let observed = Observed {
+            drift: None,
             moved: shown.moved.map(|part| {
                 // As large both ways as the mean of away and across is.
                 let noise = random.as_mut().map_or(0.0, normal);
@@ -245,7 +246,7 @@ impl Contact<'_> {
 /// many as the sensor takes.
 fn descend(
     forward: &Forward<'_>,
-    observed: &Observed,
+    observed: &Observed<'_>,
     mounting: &Mounting,
     guess: Pose,
 ) -> (Estimate, u32) {
