@@ -313,8 +313,8 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
              cut, stained or glare; look at the film and its light, and clean it"
         }
         Outcome::Touched => {
-            "something touches the film, as the rest position from before tells; take it away, or \
-             say --force when nothing does"
+            "something touches the film, as the rest position from before tells, or that of the \
+             unit's calibration: 0.3 mN and more; take it away, or say --force when nothing does"
         }
         Outcome::Unsteady => {
             "the markers moved meanwhile; take away what touches or shakes the film"

@@ -6,8 +6,8 @@ use std::vec::Vec;
 
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
-use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::forward::Drift;
+use hivtac_sensing::model::{Model, OutputKind};
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;

@@ -114,7 +114,10 @@ mod tests {
                 bytes: 9_216,
                 crc: 0xcafe_f00d,
             }),
-            temporal: TemporalSettings::default(),
+            temporal: TemporalSettings {
+                rezero: None,
+                ..TemporalSettings::default()
+            },
             camera: CameraSettings {
                 exposure: Some(Microseconds(2_500)),
                 gain: None,

@@ -2,7 +2,7 @@
 
 use super::Forward;
 use super::covariance::{Covariance, Unknown, Whitening};
-use super::estimate::{Estimate, Observed, UNEXPLAINED};
+use super::estimate::{Estimate, Observed};
 use super::mounting::Mounting;
 use super::pose::{Pose, limited};
 use super::predict::Prediction;
@@ -15,8 +15,8 @@ const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// Where a step that would explain no more than this lowers no residual, what is left is the
 /// tables' rounding.
 const ROUNDING: f32 = 0.5;
-/// Where no step lowers the residual and more than this is left, the steps may have stuck where the
-/// tables bend: χ² of three degrees of freedom is more in 1 of 100 honest frames.
+/// Where steps end and more than this is left, they may have stuck where the tables bend: χ² of
+/// three degrees of freedom is more in 1 of 100 honest frames.
 const STUCK: f32 = 11.3;
 /// The first of the unknowns that are the tilt, which the place follows.
 const TILT: usize = 1;
@@ -123,14 +123,17 @@ impl<'a> Descent<'a> {
         true
     }
 
-    /// Whether the load explains the markers, and another step would hardly explain more.
+    /// Whether another step would hardly explain more.
+    pub fn has_converged(&self) -> bool {
+        let solved = self.here.solved();
+        solved.is_some_and(|(_, solved)| solved.explained <= LEFT_TO_EXPLAIN)
+    }
+
+    /// Whether the load explains the markers, and the steps came to an end.
     pub fn is_done(&self) -> bool {
-        let Some(white) = &self.here.white else {
-            return false;
-        };
-        let explained = white.solved.map_or(0.0, |solved| solved.explained);
-        let has_ended = self.has_ended && white.unexplained <= STUCK;
-        white.unexplained <= UNEXPLAINED && (explained <= LEFT_TO_EXPLAIN || has_ended)
+        let white = self.here.white.as_ref();
+        let is_explained = white.is_some_and(|white| white.unexplained <= STUCK);
+        is_explained && (self.has_ended || self.has_converged())
     }
 
     /// What it has come to.

@@ -350,7 +350,7 @@ mod tests {
             filter,
             "low-pass of 20 ms: a steady change comes 20 ms later"
         );
-        let expected = "after 10.000 s without a contact, by 0.007 px a second, 0.100 px in all";
+        let expected = "after 10.000 s without a contact, by 0.007 px a second, 0.200 px in all";
         assert_eq!(rezero, expected);
     }
 

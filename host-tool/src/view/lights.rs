@@ -132,6 +132,10 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "the rest position followed what drifted since the tare",
             "take a new tare when forces matter",
         ),
+        Status::REST_MOVED => (
+            "the untouched film was seen beside its rest position",
+            "leave the film alone for a minute, or take a new tare",
+        ),
         Status::UNEXPLAINED => (
             "no single contact explains where the markers are",
             "press with one tip; at rest, take a new tare",
