@@ -314,8 +314,11 @@ fn the_global_shutter_camera_takes_exposure_gain_and_rate() {
     let after = frame_times_ms(&run, gap + 1..u32::MAX);
     assert!(after.len() >= 8, "{after:?}");
     assert!(after.iter().all(|ms| (8.1..8.3).contains(ms)), "{after:?}");
-    let last = run.samples().last().unwrap().force;
-    assert!(last.is_some(), "{}", run.log());
+    // At the end of the run the scene's press comes near the largest force.
+    let samples = run.samples();
+    let last = samples.iter().rev().take(8);
+    let forces = last.filter(|sample| sample.force.is_some()).count();
+    assert!(forces >= 6, "{forces}: {}", run.log());
     let too_long = CameraSettings {
         exposure: Some(Microseconds(6_000)),
         ..settings

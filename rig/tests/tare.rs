@@ -3,7 +3,7 @@
 use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
-use hivtac_wire::message::{DeviceMessage, Outcome, Request};
+use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample};
 use hivtac_wire::settings::TareReport;
 
 const ASKED: u16 = 40;
@@ -95,4 +95,37 @@ fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_befor
     let moved = report(&run).moved.expect("there was one before");
     let one = 1 << 16;
     assert!((one / 2..2 * one).contains(&moved.0), "{moved:?}");
+}
+
+/// A millinewton is less than a contact, and more than a rest position bears: 0.1 N would read
+/// 67 mN.
+#[test]
+fn what_still_presses_is_no_rest() {
+    let rest = report(&tared("rest", 200)).rest;
+    answered(
+        "tests/residual.toml",
+        &[
+            (190, Request::SetTare(Some(rest)), Outcome::Done),
+            (200, Request::Tare { frames: 4 }, Outcome::Touched),
+        ],
+    );
+}
+
+/// A rest position that no frame has confirmed: what the camera may have shifted since is stated.
+#[test]
+fn a_shift_since_the_tare_is_within_what_is_stated() {
+    let rest = report(&tared("rest", 200)).rest;
+    let set = [(190, Request::SetTare(Some(rest)), Outcome::Done)];
+    let run = answered("tests/shifted.toml", &set);
+    let is_tared = |sample: &Sample| !sample.status.contains(Status::TARE_MISSING);
+    let samples = run.samples();
+    let tared = samples.iter().filter(|sample| is_tared(sample));
+    let forces: Vec<_> = tared.filter_map(|sample| sample.force).collect();
+    assert!(forces.len() > 3, "{}", forces.len());
+    for force in forces {
+        let [alpha, beta] = [force.alpha, force.beta].map(|angle| f64::from(angle.0));
+        let off = alpha.hypot(beta);
+        assert!(off > 1_000.0, "2.8°: {force:?}");
+        assert!(off < 3.0 * f64::from(force.direction_sigma.0), "{force:?}");
+    }
 }

@@ -71,7 +71,8 @@ fn the_sensing_runs_from_itcm() {
             || symbol.name.starts_with("hivtac_")
     };
     // What runs for a model, a setting, a tare or a message, and what follows a force once it is
-    // there: no loop over pixels or weights. And what only another look at a refused frame needs.
+    // there, or stands for one without a film: no loop over pixels or weights. And what only
+    // another look at a refused frame needs.
     let seldom = [
         "hivtac_force5model",
         "hivtac_force..model",
@@ -85,6 +86,10 @@ fn the_sensing_runs_from_itcm() {
         "6Tables3new",
         "14CovarianceGrid3new",
         "7Resting8of_model",
+        "7Resting5touch",
+        "7Resting9set_drift",
+        "7forward5drift",
+        "5force10of_outputs",
         "8Geometry9rest_area",
         "$GT$9configure17h",
         "8pipeline6taring",

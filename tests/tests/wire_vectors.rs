@@ -394,6 +394,7 @@ fn model_part() -> ModelPart {
 fn host_messages() -> BTreeMap<String, HostMessage> {
     let median = TemporalSettings {
         filter: Filter::MedianOfThree,
+        rezero: None,
         ..TemporalSettings::USUAL
     };
     let command = |id, request| HostMessage::Command(Command { id, request });

@@ -140,15 +140,18 @@ LIMITS = [
     unsigned("within_ms", 50),
     unsigned("ratio_permille", 100),
 ]
-REZERO = [
-    raw("rezero: Some", [1]),
-    unsigned("after_ms", 10_000),
-    unsigned("rate_mpx_per_s", 5),
-    unsigned("total_mpx", 100),
-]
+def rezero(total_mpx):
+    return [
+        raw("rezero: Some", [1]),
+        unsigned("after_ms", 10_000),
+        unsigned("rate_mpx_per_s", 5),
+        unsigned("total_mpx", total_mpx),
+    ]
+
+
 NO_REZERO = [raw("rezero: None", [0])]
-USUAL = LIMITS + NO_FILTER + NO_REZERO
-OWN = LIMITS + LOW_PASS + REZERO
+USUAL = LIMITS + NO_FILTER + rezero(200)
+OWN = LIMITS + LOW_PASS + rezero(100)
 
 
 MODEL = [

@@ -53,8 +53,8 @@ impl Resting {
     }
 
     /// For markers that rest there, by what the model knows of the unit that it was made on; of
-    /// another one by what its rest picture tells. The camera of a unit that was calibrated may have
-    /// been mounted anew.
+    /// another one by what its rest picture tells. The camera of a unit that was calibrated may
+    /// have been mounted anew.
     fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest, is_calibrated: bool) -> Resting {
         let told = forward.rest_image.mounting(rest);
         let near = is_near(rest, own);

@@ -255,8 +255,9 @@ impl White {
     }
 }
 
-/// The load after a part of a step, and the square of that of a bend. Where that is too steep for the tables, the other unknowns
-/// follow the tilt back: without that, steps along the tables' border would not lower the residual.
+/// The load after a part of a step, and the square of that of a bend. Where that is too steep for
+/// the tables, the other unknowns follow the tilt back: without that, steps along the tables'
+/// border would not lower the residual.
 fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &Unknowns) -> Pose {
     let most = forward.limits.tilt;
     let mut step = solved.unknowns;

@@ -10,8 +10,8 @@ use crate::kernels::sqrt;
 /// What may have happened to a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Standard uncertainties of what nobody saw, in parts of the pattern's radius: of a shift along
-    /// x and along y each, of a turn, and of a change of scale.
+    /// Standard uncertainties of what nobody saw, in parts of the pattern's radius: of a shift
+    /// along x and along y each, of a turn, and of a change of scale.
     pub unseen: [f32; 3],
     /// How far from it the untouched film's markers were when they were seen last, px.
     pub seen_px: Markers,

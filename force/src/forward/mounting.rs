@@ -119,9 +119,9 @@ pub(super) fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
 }
 
 impl Mounting {
-    /// The same film and camera, seen as at rest: `own_px` are where the markers rested when this
-    /// was known. `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of
-    /// scale of 1 % bring all of them within half a pixel of that: another unit's film.
+    /// The same film, seen as at `rest` by a camera that moved since it was seen as at `own`.
+    /// `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of scale of
+    /// 1 % bring all markers within half a pixel of that: another unit's film.
     pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
         let [(seen, at), (own, own_at)] = [rest, own].map(|rest| {
             let px = rest

@@ -41,7 +41,8 @@ fn settings_for_a_person() {
          contact    from 2.000 mN on, until below 1.000 mN (kept)\n\
          slip       60 µm within 50 ms, from 0.100 of the normal force on (kept)\n\
          filter     none: each frame's own force (kept)\n\
-         rezero     after 10.000 s without a contact, by 0.005 px a second, 0.200 px in all (kept)\n\
+         rezero     after 10.000 s without a contact, by 0.005 px a second, 0.200 px in all \
+         (kept)\n\
          exposure   5.922 ms, as the light needs (kept)\n\
          gain       1.5, as the light needs (kept)\n\
          rate       156 frames a second (kept)\n\
