@@ -173,8 +173,7 @@ fn configure(
     let tare = kept.tare.as_ref();
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
         Some(Ok(rest)) => {
-            sensor.set_tare(Some(rest));
-            sensor.set_drift(Drift::UNSEEN);
+            sensor.set_drifted_tare(Some(rest), Drift::UNSEEN);
             temporal.set_tare(Some(rest));
         }
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),

@@ -41,6 +41,7 @@ pub fn bring_into_use(
     let made_for = sensor.model().map(|model| model.conditions.threshold);
     let is_own = made_for.is_some_and(|threshold| threshold != used.threshold);
     let tare = sensor.tare().map(|rest| settings::position(rest, &used));
+    let drift = sensor.drift();
     let mut settings = model::settings(next.model.as_ref());
     let wanted = match is_own && !afresh {
         true => used.threshold,
@@ -58,6 +59,6 @@ pub fn bring_into_use(
     before.slot.into_iter().for_each(model_slots::give_back);
     let tare = tare.filter(|_| !afresh);
     let rest = tare.and_then(|tare| settings::rest(&tare, &settings).ok());
-    sensor.set_tare(rest);
+    sensor.set_drifted_tare(rest, drift);
     (!sends_it).then_some(wanted)
 }

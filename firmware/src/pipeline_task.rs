@@ -267,13 +267,11 @@ impl PipelineTask {
             return;
         };
         self.give_up_tare();
-        let drift = self.sensor.drift();
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
         if afresh {
             *self.temporal = Temporal::new();
         }
-        self.sensor.set_drift(drift);
         self.temporal.set_tare(self.sensor.tare().copied());
         if self.sensor.threshold() == before {
             self.follow();
@@ -291,9 +289,8 @@ impl PipelineTask {
         match rest.transpose() {
             Ok(rest) => {
                 self.give_up_tare();
-                self.use_tare(rest);
                 // It was taken at another time.
-                self.sensor.set_drift(Drift::UNSEEN);
+                self.use_tare(rest, Drift::UNSEEN);
                 Outcome::Done
             }
             Err(outcome) => outcome,
@@ -306,8 +303,8 @@ impl PipelineTask {
     }
 
     /// Measures against this rest position from the next frame on, or against the model's own.
-    fn use_tare(&mut self, rest: Option<Rest>) {
-        self.sensor.set_tare(rest);
+    fn use_tare(&mut self, rest: Option<Rest>, drift: Drift) {
+        self.sensor.set_drifted_tare(rest, drift);
         self.temporal.set_tare(self.sensor.tare().copied());
         self.follow();
     }
@@ -316,7 +313,7 @@ impl PipelineTask {
     /// other areas in them, so that no rest position holds.
     fn change_format(&mut self) {
         let asked = self.next_threshold.come_into_use(self.sensor);
-        self.use_tare(None);
+        self.use_tare(None, Drift::NONE);
         self.give_up_tare();
         self.threshold_changed();
         if let Some(id) = asked.and_then(Asked::id) {
@@ -361,7 +358,9 @@ impl PipelineTask {
         stats::LATENCY_US.set(latency_us as u32);
         if let Some(at_rest) = &followed.at_rest {
             self.sensor.follow(at_rest);
-            self.follow();
+            if at_rest.rest.is_some() {
+                self.follow();
+            }
         }
         self.tare_with(&measurement);
         health::set(match measurement.force {
@@ -439,7 +438,7 @@ impl PipelineTask {
             }
             self.taring = None;
             if let Ok(rest) = outcome {
-                self.use_tare(Some(rest));
+                self.use_tare(Some(rest), Drift::NONE);
             }
             outbox::reply(id, outcome.err().unwrap_or(Outcome::Done));
         }

@@ -251,7 +251,8 @@ impl TaredSensor {
 
     /// The rest position stays, but no frame has confirmed it.
     pub fn tared_at_another_time(&mut self) {
-        self.sensor.set_drift(Drift::UNSEEN);
+        let rest = self.sensor.tare().copied();
+        self.sensor.set_drifted_tare(rest, Drift::UNSEEN);
     }
 
     /// The whole pipeline on a frame that follows none, which it looks at again when it refuses it.

@@ -10,8 +10,18 @@ pub const CONTACT_SIGMAS: u32 = 3;
 /// Whether |F| is large and certain enough that something touches the film. Its uncertainty is that
 /// by noise: how strong a unit's film is, is uncertain alike in all frames.
 pub fn is_contact(magnitude: MicroNewtons, by_noise: UnsignedMicroNewtons) -> bool {
+    is_force(magnitude, by_noise, LEAST_CONTACT)
+}
+
+/// Whether |F| is at least as large as that, and as certain as a contact's.
+#[inline]
+pub fn is_force(
+    magnitude: MicroNewtons,
+    by_noise: UnsignedMicroNewtons,
+    least: MicroNewtons,
+) -> bool {
     let certain = magnitude.0.unsigned_abs() / CONTACT_SIGMAS >= by_noise.0;
-    magnitude >= LEAST_CONTACT && certain
+    magnitude >= least && certain
 }
 
 #[cfg(test)]

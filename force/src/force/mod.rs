@@ -17,7 +17,7 @@ mod place;
 #[cfg(test)]
 mod tests;
 
-pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT, is_contact};
+pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT, is_contact, is_force};
 pub use explained::Resting;
 pub use hivtac_terms::force::{Force, Place};
 pub use noise::{FrameNoise, NoiseLevel};

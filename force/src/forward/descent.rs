@@ -123,8 +123,13 @@ impl<'a> Descent<'a> {
         true
     }
 
+    /// Whether more steps would not help, whether or not the load explains the markers.
+    pub fn is_over(&self) -> bool {
+        self.has_converged() || self.is_done()
+    }
+
     /// Whether another step would hardly explain more.
-    pub fn has_converged(&self) -> bool {
+    fn has_converged(&self) -> bool {
         let solved = self.here.solved();
         solved.is_some_and(|(_, solved)| solved.explained <= LEFT_TO_EXPLAIN)
     }

@@ -2,10 +2,9 @@
 //! temperature, and whoever touches the sensor moves them.
 
 use super::covariance::Covariance;
-use super::mounting::{Mounting, about_middle};
+use super::mounting::{Mounting, about_middle, radius};
 use super::predict::{DOTS, Markers};
-use super::solve::{Column, square};
-use crate::kernels::sqrt;
+use super::solve::Column;
 
 /// What may have happened to a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +46,8 @@ impl Drift {
     /// nothing.
     pub fn covariance(&self, mounting: &Mounting, rest_px: &Markers) -> Covariance {
         let about = about_middle(rest_px);
-        let radius = sqrt(square(about.as_flattened()) / DOTS as f32);
         let [shift, turn, scale] = self.unseen;
+        let shift_px = shift * radius(&about);
         let mut covariance = Covariance::default();
         let mut add = |px: Markers| {
             let moved = px.map(|px| mounting.moved(px));
@@ -60,8 +59,8 @@ impl Drift {
                 }
             }
         };
-        add([[shift * radius, 0.0]; DOTS]);
-        add([[0.0, shift * radius]; DOTS]);
+        add([[shift_px, 0.0]; DOTS]);
+        add([[0.0, shift_px]; DOTS]);
         add(about.map(|[x, y]| [-turn * y, turn * x]));
         add(about.map(|place| place.map(|part| scale * part)));
         add(self.seen_px);

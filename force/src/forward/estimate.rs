@@ -112,7 +112,7 @@ impl Forward<'_> {
     /// Also whether that came to an end.
     fn descend(&self, mut descent: Descent<'_>) -> (Estimate, bool) {
         for step in 0..STEPS_AT_MOST {
-            if step >= self.steps && (descent.is_done() || descent.has_converged()) {
+            if step >= self.steps && descent.is_over() {
                 break;
             }
             if !descent.step() {

@@ -72,8 +72,7 @@ impl RestImage {
     /// whole pattern count as the camera's, which a rest picture cannot tell from gluing; what is
     /// left is gluing.
     pub fn mounting(&self, rest: &Rest) -> Mounting {
-        let centroids = rest.features.centroids;
-        let seen = about_middle(&centroids.map(|(x, y)| [x.to_f32(), y.to_f32()]));
+        let seen = about_middle(&places_px(rest));
         let own = about_middle(&self.at);
         let per_px = similarity(&seen, &own);
         let beside = |dot: usize| {
@@ -95,17 +94,32 @@ impl RestImage {
     }
 }
 
-/// Places as seen from their mean.
-pub(super) fn about_middle(places: &Markers) -> Markers {
+fn places_px(rest: &Rest) -> Markers {
+    let centroids = rest.features.centroids;
+    centroids.map(|(x, y)| [x.to_f32(), y.to_f32()])
+}
+
+fn middle(places: &Markers) -> [f32; 2] {
     let mut middle = [0.0; 2];
     for place in places {
         middle = [0, 1].map(|i| middle[i] + place[i] / DOTS as f32);
     }
+    middle
+}
+
+/// Places as seen from their mean.
+pub(super) fn about_middle(places: &Markers) -> Markers {
+    let middle = middle(places);
     places.map(|[x, y]| [x - middle[0], y - middle[1]])
 }
 
+/// How far places are from their mean, which they are seen from: root mean square.
+pub(super) fn radius(about: &Markers) -> f32 {
+    sqrt(square(about.as_flattened()) / DOTS as f32)
+}
+
 /// The complex number that brings what is seen nearest to where it would be seen.
-pub(super) fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
+fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
     let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
     for ([x, y], [cx, cy]) in seen.iter().zip(own) {
         along += x * cx + y * cy;
@@ -123,15 +137,9 @@ impl Mounting {
     /// `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of scale of
     /// 1 % bring all markers within half a pixel of that: another unit's film.
     pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
-        let [(seen, at), (own, own_at)] = [rest, own].map(|rest| {
-            let px = rest
-                .features
-                .centroids
-                .map(|(x, y)| [x.to_f32(), y.to_f32()]);
-            let about = about_middle(&px);
-            (about, [px[0][0] - about[0][0], px[0][1] - about[0][1]])
-        });
-        let radius = sqrt(square(own.as_flattened()) / DOTS as f32);
+        let places = [rest, own].map(places_px);
+        let [at, own_at] = places.each_ref().map(middle);
+        let [seen, own] = places.each_ref().map(about_middle);
         let [along, across] = similarity(&seen, &own);
         let beside = |k: usize| {
             let [x, y] = turned([along, across], seen[k]);
@@ -139,7 +147,7 @@ impl Mounting {
         };
         let shift = (at[0] - own_at[0]).abs().max((at[1] - own_at[1]).abs());
         let scale = sqrt(along * along + across * across);
-        let is_own = shift <= LARGEST_SHIFT * radius
+        let is_own = shift <= LARGEST_SHIFT * radius(&own)
             && across.abs() <= LARGEST_TURN
             && (scale - 1.0).abs() <= LARGEST_SCALE
             && (0..DOTS).all(|k| beside(k) <= LARGEST_BESIDE_PX);

@@ -165,26 +165,26 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Sets the rest position of this unit, or goes back to the model's. One that is not
     /// [sound](Rest::is_sound) is as none.
     pub fn set_tare(&mut self, tare: Option<Rest>) {
-        self.tare = tare.filter(Rest::is_sound);
-        self.drift = Drift::NONE;
-        self.prepare();
+        self.set_drifted_tare(tare, Drift::NONE);
     }
 
-    /// Says how far the film may rest from its rest position, from the next frame on; just after it
-    /// was [set](Self::set_tare), nowhere else.
-    pub fn set_drift(&mut self, drift: Drift) {
-        self.drift = drift;
-        if let Some(resting) = self.resting_mut() {
-            resting.set_drift(&drift);
-        }
+    /// The same of a rest position that the film may have drifted from since it was taken.
+    pub fn set_drifted_tare(&mut self, tare: Option<Rest>, drift: Drift) {
+        self.tare = tare.filter(Rest::is_sound);
+        // What is not known of no rest position is nothing.
+        self.drift = self.tare.map_or(Drift::NONE, |_| drift);
+        self.prepare();
     }
 
     /// Measures from the next frame on against where the untouched film was seen.
     pub fn follow(&mut self, at_rest: &AtRest) {
-        if let Some(rest) = at_rest.rest {
-            self.set_tare(Some(rest));
+        match at_rest.rest {
+            Some(rest) => self.set_drifted_tare(Some(rest), at_rest.drift),
+            None => {
+                self.drift = at_rest.drift;
+                self.apply_drift();
+            }
         }
-        self.set_drift(at_rest.drift);
     }
 
     /// How far the film may rest from its rest position.
@@ -192,8 +192,17 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.drift
     }
 
-    fn resting_mut(&mut self) -> Option<&mut Resting> {
-        self.prepared.as_mut()?.resting.as_mut()
+    fn apply_drift(&mut self) {
+        let prepared = self.prepared.as_mut();
+        if let Some(resting) = prepared.and_then(|prepared| prepared.resting.as_mut()) {
+            resting.set_drift(&self.drift);
+        }
+    }
+
+    /// The model in use, when it is for these frames.
+    fn fitting_model(&self) -> Option<&Model<'m>> {
+        let model = self.model.as_ref();
+        model.filter(|model| model.conditions.are_of(&self.settings))
     }
 
     /// The rest position of this unit, when one was taken.
@@ -343,10 +352,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.noise = NoiseLevel::AS_MODELLED;
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
-        let fitting = self
-            .model
-            .as_ref()
-            .filter(|model| model.conditions.are_of(settings));
+        let fitting = self.fitting_model();
         let rest = self.tare.or(fitting.map(|model| model.rest));
         // The same tip presses, whether or not the model is for these frames.
         let reading = self
@@ -356,20 +362,15 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 Reading::of(model.conditions.contact, model.output.tells_place())
             });
         let own_rest = self.tare.is_some();
-        let drift = self.drift;
-        let drifted = |mut resting: Resting| {
-            resting.set_drift(&drift);
-            resting
-        };
         self.prepared = Some(Prepared {
             finder: Finder::new(settings),
             resting: fitting
                 .zip(rest)
-                .and_then(|(model, rest)| Resting::of_model(model, &rest))
-                .map(drifted),
+                .and_then(|(model, rest)| Resting::of_model(model, &rest)),
             trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
             standing: self.standing_status(),
         });
+        self.apply_drift();
     }
 
     fn standing_status(&self) -> Status {

@@ -2,15 +2,14 @@
 
 use super::{Look, Measurement, Sensor};
 use crate::tare::{Refusal, TareBuilder};
-use hivtac_force::force::{CONTACT_SIGMAS, Resting};
-use hivtac_force::model::Model;
+use hivtac_force::force::{Resting, is_force};
 use hivtac_force::rest::Rest;
 use hivtac_markers::tables::Table;
 use hivtac_terms::status::Status;
-use hivtac_terms::units::UnsignedMicroNewtons;
+use hivtac_terms::units::MicroNewtons;
 
 /// A change of the rest position that a press of this much explains is a touch: 0.3 mN.
-const TOUCHED: UnsignedMicroNewtons = UnsignedMicroNewtons(300);
+const TOUCHED: MicroNewtons = MicroNewtons(300);
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Gives a tare the frame that was finished last, of which `measurement` is. A frame without
@@ -51,18 +50,12 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Whether a press explains how the markers moved since the rest position from before, or since
     /// the calibration of this unit.
     fn looks_touched(&self, rest: &Rest) -> bool {
-        let fitting = |model: &&Model<'_>| model.conditions.are_of(&self.settings);
-        let Some(model) = self.model.as_ref().filter(fitting) else {
+        let Some(model) = self.fitting_model() else {
             return false;
         };
         let own = (!model.is_simulated()).then_some(&model.rest);
-        let touch = self
-            .tare
-            .as_ref()
-            .or(own)
-            .and_then(|before| Resting::touch(model, before, rest));
-        touch.is_some_and(|(magnitude, by_noise)| {
-            magnitude.0.unsigned_abs() >= TOUCHED.0.max(CONTACT_SIGMAS.saturating_mul(by_noise.0))
-        })
+        let before = self.tare.as_ref().or(own);
+        let touch = before.and_then(|before| Resting::touch(model, before, rest));
+        touch.is_some_and(|(magnitude, by_noise)| is_force(magnitude, by_noise, TOUCHED))
     }
 }

@@ -116,6 +116,17 @@ fn a_tare_that_cannot_be_is_none() {
     assert_eq!(sensor.tare(), None);
 }
 
+/// Without a rest position that was taken there is none that may have drifted.
+#[test]
+fn a_rest_position_that_is_forgotten_takes_its_drift_with_it() {
+    let mut sensor = tared(GEOMETRY);
+    let rest = sensor.tare().copied();
+    for (tare, expected) in [(rest, Drift::UNSEEN), (None, Drift::NONE)] {
+        sensor.set_drifted_tare(tare, Drift::UNSEEN);
+        assert_eq!(sensor.drift(), expected);
+    }
+}
+
 /// The pattern tapered along x and sheared, px at each marker: what a tip does that the film sticks
 /// to.
 fn pulled(taper: f64, shear: f64) -> Pattern {

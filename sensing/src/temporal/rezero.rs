@@ -78,9 +78,7 @@ impl Mean {
             sums: [Q::default(); 8],
         }
     }
-}
 
-impl Mean {
     /// How far it is from a rest position, px.
     fn beside(&self, rest: &Rest) -> [Q<16, i64>; 8] {
         let frames = i64::from(self.frames);

@@ -242,8 +242,7 @@ impl Contact<'_> {
     }
 }
 
-/// Steps until the load explains the markers and another step would not explain more: at most as
-/// many as the sensor takes.
+/// Steps until more would not help: at most as many as the sensor takes.
 fn descend(
     forward: &Forward<'_>,
     observed: &Observed<'_>,
@@ -253,7 +252,7 @@ fn descend(
     let unknown = forward.unknown(true);
     let mut descent = Descent::new(forward, observed, mounting, unknown, guess);
     let mut steps = 0;
-    while steps < u32::from(STEPS_AT_MOST) && !descent.is_done() && descent.step() {
+    while steps < u32::from(STEPS_AT_MOST) && !descent.is_over() && descent.step() {
         steps += 1;
     }
     (descent.estimate(), steps)
