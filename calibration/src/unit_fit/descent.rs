@@ -8,6 +8,7 @@ use super::load::UNKNOWNS;
 use super::numbers::Number;
 use super::own::FoundNumber;
 use super::problem::{At, Problem, Solved, Trust, Unknowns};
+use crate::loads::SeenLoad;
 
 /// So many loads tell a unit well enough to begin with all of them there.
 const FIRST: usize = 16;
@@ -21,6 +22,8 @@ const TAUT: f64 = 1e-3;
 const TRUSTS: [Trust; 3] = [apart(100.0), apart(10.0), Trust::WHOLE];
 /// χ² over the coordinates that are seen of a fit that explains them.
 const EXPLAINED: f64 = 1.4;
+/// χ² of the nominal family is at most so many standard deviations above what chance makes.
+const BY_CHANCE: f64 = 3.0;
 /// Steps at most, and the change of χ² that ends them.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.3;
@@ -70,8 +73,12 @@ impl Found {
 }
 
 fn chi_square(at: &At) -> f64 {
-    let seen = at.residuals.iter().flatten().count() + 2 * at.made.dots_mm.len();
-    at.square() / seen as f64
+    at.square() / coordinates(at) as f64
+}
+
+/// How many coordinates were seen.
+fn coordinates(at: &At) -> usize {
+    at.residuals.iter().flatten().count() + 2 * at.made.dots_mm.len()
 }
 
 /// What a load adds to χ².
@@ -103,19 +110,31 @@ impl Problem<'_> {
         }
     }
 
+    /// Descends from where it is likeliest before; `None` where that does not explain all that is
+    /// seen, or the film finds no equilibrium.
+    ///
+    /// # Errors
+    /// When a state is not stable.
+    pub fn explained(&self) -> Result<Option<Found>> {
+        let some = self.some();
+        let first = self.with(&some);
+        let is_explained = |found: &Found| {
+            let seen = coordinates(&found.at) as f64;
+            found.at.square() < seen + BY_CHANCE * (2.0 * seen).sqrt()
+        };
+        let Some(best) = first.start(false, 0.0).ok().filter(is_explained) else {
+            return Ok(None);
+        };
+        Ok(Some(self.with_all(&some, best)?).filter(is_explained))
+    }
+
     /// Descends by some of the loads, from several starts until one explains them, then by all.
     ///
     /// # Errors
     /// When the film finds no equilibrium from any start.
     pub fn found(&self) -> Result<Found> {
-        let every = self.loads.len().div_ceil(FIRST);
-        let some: Vec<_> = self.loads.iter().step_by(every).cloned().collect();
-        let first = Problem {
-            bench: self.bench,
-            loads: &some,
-            priors: self.priors.clone(),
-            trust: Trust::WHOLE,
-        };
+        let some = self.some();
+        let first = self.with(&some);
         let mut best: Result<Found> = Err(anyhow!("no start"));
         for (taut, down) in STARTS {
             let found = first.start(taut, down);
@@ -133,8 +152,28 @@ impl Problem<'_> {
                 break;
             }
         }
-        let best = best?;
-        if every == 1 {
+        self.with_all(&some, best?)
+    }
+
+    /// The loads to begin with.
+    fn some(&self) -> Vec<SeenLoad> {
+        let every = self.loads.len().div_ceil(FIRST);
+        self.loads.iter().step_by(every).cloned().collect()
+    }
+
+    /// With other loads.
+    fn with<'b>(&'b self, loads: &'b [SeenLoad]) -> Problem<'b> {
+        Problem {
+            bench: self.bench,
+            loads,
+            priors: self.priors.clone(),
+            trust: self.trust,
+        }
+    }
+
+    /// Descends by all loads from what some of them told.
+    fn with_all(&self, some: &[SeenLoad], best: Found) -> Result<Found> {
+        if some.len() == self.loads.len() {
             return Ok(best);
         }
         let unknowns = Unknowns {

@@ -30,6 +30,7 @@ use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
 pub use left_out::LeftOut;
+use numbers::Family;
 pub use own::{FoundNumber, OwnFilm};
 pub use problem::Bench;
 use problem::{Problem, Trust};
@@ -66,13 +67,16 @@ pub fn fit(
     stage_mm: f64,
     from: Option<&OwnFilm>,
 ) -> Result<Fit> {
-    let problem = Problem {
+    let problem = |family| Problem {
         bench,
         loads,
-        priors: numbers::priors(bench.dots_mm.len(), stage_mm, from),
+        priors: numbers::priors(family, bench.dots_mm.len(), stage_mm, from),
         trust: Trust::WHOLE,
     };
-    let found = problem.found()?;
+    let (problem, found) = match problem(Family::Nominal).explained()? {
+        Some(found) => (problem(Family::Nominal), found),
+        None => (problem(Family::Real), problem(Family::Real).found()?),
+    };
     ensure!(
         found.chi_square() <= CONTRADICTED,
         "no unit explains these loads: what is seen of them is off by {:.1} px, root mean square, \

@@ -143,19 +143,43 @@ const FILM: [(Change, [f64; 4]); 17] = [
     (Change::Down(2), [0.0, 0.6, -1.2, 1.2]),
 ];
 
+/// What is known of how a film is made and mounted, before anything is seen of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// As the simulated sensor's: even, weightless, without stretch, cut at its holes.
+    Nominal,
+    /// As people make and mount them.
+    Real,
+}
+
+impl Family {
+    /// Whether its films differ in this.
+    fn differs_in(self, change: Change) -> bool {
+        use Change::{Grip, Thickness, TipRadius, Youngs};
+        match self {
+            Family::Nominal => matches!(change, Youngs | Thickness | Grip | TipRadius),
+            Family::Real => true,
+        }
+    }
+}
+
 /// The numbers of units with this many dots whose stage's zero is known to so many mm; the camera
 /// and the posts of a unit whose old film was fitted are known.
-pub fn priors(dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
-    let film = FILM.map(|(change, [mean, sigma, least, largest])| Prior {
-        number: Number::Film(change),
-        mean,
-        sigma,
-        range: [least, largest],
+pub fn priors(family: Family, dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
+    let film = FILM.iter();
+    let film = film.filter(|(change, _)| family.differs_in(*change));
+    let film = film.map(|(change, [mean, sigma, least, largest])| Prior {
+        number: Number::Film(*change),
+        mean: *mean,
+        sigma: *sigma,
+        range: [*least, *largest],
     });
-    let mut all = film.to_vec();
+    let mut all: Vec<Prior> = film.collect();
     let mut add = |number, sigma| all.push(Prior::about_zero(number, sigma));
     for axis in [0, 1] {
-        add(Number::Film(Change::Down(axis)), 0.6);
+        if family == Family::Real {
+            add(Number::Film(Change::Down(axis)), 0.6);
+        }
         add(Number::Middle(axis), MIDDLE_PX);
         add(Number::Stage(axis), stage_mm);
         for post in 0..4 {
