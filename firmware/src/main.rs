@@ -62,7 +62,6 @@ use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
 use hivtac_sensing::forward::Drift;
-use hivtac_sensing::temporal::Temporal;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
@@ -82,9 +81,6 @@ static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
 /// cache holds.
 #[unsafe(link_section = ".sram.sensor")]
 static SENSOR: ConstStaticCell<Sensor> = ConstStaticCell::new(Sensor::new());
-/// Likewise.
-#[unsafe(link_section = ".sram.temporal")]
-static TEMPORAL: ConstStaticCell<Temporal> = ConstStaticCell::new(Temporal::new());
 
 #[entry]
 fn main() -> ! {
@@ -94,7 +90,6 @@ fn main() -> ! {
         .run(|spawner: Spawner| {
             spawner.spawn(token(pipeline_task::run(
                 foreground.sensor,
-                foreground.temporal,
                 foreground.model,
                 foreground.bands,
                 foreground.snapshots,
@@ -106,7 +101,6 @@ fn main() -> ! {
 /// What runs in thread mode.
 struct Foreground {
     sensor: &'static mut Sensor,
-    temporal: &'static mut Temporal,
     model: InUse,
     bands: BandCopy,
     snapshots: SnapshotCopy,
@@ -128,8 +122,7 @@ fn start() -> Foreground {
     settings::set_name(memory.record().name.clone());
     let chosen = memory.model();
     let model = InUse::of(&chosen);
-    let temporal = TEMPORAL.take();
-    let format = configure(sensor, temporal, chosen, memory.record());
+    let format = configure(sensor, chosen, memory.record());
     set_camera(memory.record().camera);
     self_test::at_start(&memory.of_flash(), sensor);
 
@@ -145,7 +138,6 @@ fn start() -> Foreground {
     )));
     Foreground {
         sensor,
-        temporal,
         model,
         bands: board.bands,
         snapshots: board.snapshots,
@@ -154,12 +146,7 @@ fn start() -> Foreground {
 }
 
 /// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
-fn configure(
-    sensor: &mut Sensor,
-    temporal: &mut Temporal,
-    chosen: Chosen,
-    kept: &Record,
-) -> Format {
+fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
     let Chosen { model, source, .. } = chosen;
     let mut settings = model::settings(model.as_ref());
     let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
@@ -173,16 +160,15 @@ fn configure(
     let tare = kept.tare.as_ref();
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
         Some(Ok(rest)) => {
-            sensor.set_drifted_tare(Some(rest), Drift::UNSEEN);
-            temporal.set_tare(Some(rest));
+            sensor.set_tare(Some(rest), Drift::UNSEEN);
         }
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
         None => {}
     }
-    if temporal.set(kept.temporal).is_err() {
+    if sensor.set_temporal(kept.temporal).is_err() {
         defmt::warn!("the kept limits of contact, slip or filter are out of range");
     }
-    settings::follow(sensor, temporal, source);
+    settings::follow(sensor, source);
     // Always one that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }

@@ -3,7 +3,6 @@
 use crate::model::{self, Chosen};
 use crate::model_slots;
 use crate::pipeline_task::Sensor;
-use crate::settings;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::ModelSource;
 
@@ -40,8 +39,6 @@ pub fn bring_into_use(
     let used = *sensor.settings();
     let made_for = sensor.model().map(|model| model.conditions.threshold);
     let is_own = made_for.is_some_and(|threshold| threshold != used.threshold);
-    let tare = sensor.tare().map(|rest| settings::position(rest, &used));
-    let drift = sensor.drift();
     let mut settings = model::settings(next.model.as_ref());
     let wanted = match is_own && !afresh {
         true => used.threshold,
@@ -50,15 +47,16 @@ pub fn bring_into_use(
     let sends_it = wanted.format() == used.threshold.format();
     settings.threshold = if sends_it { wanted } else { used.threshold };
     let now = InUse::of(&next);
-    if sensor.configure(settings, next.model).is_err() {
+    let configured = match afresh {
+        true => sensor.configure(settings, next.model),
+        false => sensor.reconfigure(settings, next.model),
+    };
+    if configured.is_err() {
         // Never: they were checked when the model was.
         now.slot.into_iter().for_each(model_slots::give_back);
         return None;
     }
     let before = core::mem::replace(in_use, now);
     before.slot.into_iter().for_each(model_slots::give_back);
-    let tare = tare.filter(|_| !afresh);
-    let rest = tare.and_then(|tare| settings::rest(&tare, &settings).ok());
-    sensor.set_drifted_tare(rest, drift);
     (!sends_it).then_some(wanted)
 }

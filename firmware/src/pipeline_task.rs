@@ -19,7 +19,7 @@ use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensing::forward::Drift;
 use hivtac_sensing::pipeline::{self, Measurement};
 use hivtac_sensing::rest::Rest;
-use hivtac_sensing::temporal::{Followed, Moment, Temporal};
+use hivtac_sensing::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
@@ -72,18 +72,16 @@ pub enum Order {
 /// The pipeline, its table in DTCM.
 pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
-/// Runs for ever in thread mode. `sensor`, with `model`, and `temporal` are configured.
+/// Runs for ever in thread mode. `sensor` is configured with `model`.
 #[embassy_executor::task]
 pub async fn run(
     sensor: &'static mut Sensor,
-    temporal: &'static mut Temporal,
     model: InUse,
     bands: BandCopy,
     snapshots: SnapshotCopy,
 ) {
     let mut task = PipelineTask {
         sensor,
-        temporal,
         model,
         next_threshold: NextThreshold::NONE,
         bands,
@@ -117,7 +115,6 @@ pub async fn run(
 
 struct PipelineTask {
     sensor: &'static mut Sensor,
-    temporal: &'static mut Temporal,
     model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
@@ -249,7 +246,7 @@ impl PipelineTask {
                 outbox::reply(id, self.set_tare(position));
             }
             Order::SetTemporal { id, settings } => {
-                let outcome = match self.temporal.set(settings) {
+                let outcome = match self.sensor.set_temporal(settings) {
                     Ok(()) => Outcome::Done,
                     Err(_) => Outcome::InvalidArgument,
                 };
@@ -270,9 +267,9 @@ impl PipelineTask {
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
         if afresh {
-            *self.temporal = Temporal::new();
+            // The usual settings are in their ranges.
+            let _ = self.sensor.set_temporal(TemporalSettings::USUAL);
         }
-        self.temporal.set_tare(self.sensor.tare().copied());
         if self.sensor.threshold() == before {
             self.follow();
         } else {
@@ -299,13 +296,12 @@ impl PipelineTask {
 
     /// Tells what it measures with from now on.
     fn follow(&self) {
-        settings::follow(self.sensor, self.temporal, self.model.source);
+        settings::follow(self.sensor, self.model.source);
     }
 
     /// Measures against this rest position from the next frame on, or against the model's own.
     fn use_tare(&mut self, rest: Option<Rest>, drift: Drift) {
-        self.sensor.set_drifted_tare(rest, drift);
-        self.temporal.set_tare(self.sensor.tare().copied());
+        self.sensor.set_tare(rest, drift);
         self.follow();
     }
 
@@ -326,7 +322,6 @@ impl PipelineTask {
     fn threshold_changed(&mut self) {
         self.follow();
         self.sensor.forget_frame();
-        self.temporal.begin_anew();
         let mut missed = false;
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
             missed = true;
@@ -349,18 +344,15 @@ impl PipelineTask {
             self.look_again(&mut measurement, delivery);
         }
         self.newest = delivery.edge.number;
-        let followed = self.temporal.follow(moment(delivery), &measurement);
+        let followed = self.sensor.follow(moment(delivery), &measurement);
         let sample = self.sample(delivery, &measurement, &followed);
         let (frame, time_us) = (sample.frame, sample.time_us);
         self.busy_us += stats::since(begun).as_micros() as u32;
         stats::PROCESSING_US.set(self.busy_us);
         let latency_us = Instant::now().as_micros().saturating_sub(sample.time_us);
         stats::LATENCY_US.set(latency_us as u32);
-        if let Some(at_rest) = &followed.at_rest {
-            self.sensor.follow(at_rest);
-            if at_rest.rest.is_some() {
-                self.follow();
-            }
+        if followed.tells_rest {
+            self.follow();
         }
         self.tare_with(&measurement);
         health::set(match measurement.force {

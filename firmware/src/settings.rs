@@ -7,7 +7,6 @@ use core::cell::Cell;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
-use hivtac_sensing::temporal::Temporal;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::root::root;
 use hivtac_terms::temporal::TemporalSettings;
@@ -32,7 +31,7 @@ pub struct OfPipeline {
 }
 
 /// Tells what the pipeline measures with from now on, its model from this source.
-pub fn follow(sensor: &Sensor, temporal: &Temporal, source: ModelSource) {
+pub fn follow(sensor: &Sensor, source: ModelSource) {
     let model = sensor.model().map(|model| ModelIdentity {
         crc: model.crc(),
         name: model.name(),
@@ -42,9 +41,9 @@ pub fn follow(sensor: &Sensor, temporal: &Temporal, source: ModelSource) {
     });
     let told = OfPipeline {
         settings: *sensor.settings(),
-        tare: temporal.tare().copied(),
-        rezeroed: temporal.rezeroed(),
-        temporal: *temporal.settings(),
+        tare: sensor.taken().copied(),
+        rezeroed: sensor.rezeroed(),
+        temporal: *sensor.temporal(),
         model,
     };
     PIPELINE.lock(|cell| cell.set(Some(told)));

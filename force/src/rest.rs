@@ -9,6 +9,10 @@ use hivtac_terms::units::Px;
 /// The longest side of a picture, px.
 const LARGEST_SIDE: i32 = 800;
 
+/// The untouched film of the same unit has its markers no farther from its rest position than this,
+/// beside what its camera did: half a pixel. What touches it, and another unit, moves one farther.
+pub const NEAR: Px = Px(Px::ONE.0 / 2);
+
 /// A rest position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rest {
@@ -25,6 +29,15 @@ impl Rest {
             features: Features::of_markers(markers),
             areas: markers.map(|marker| marker.area),
         }
+    }
+
+    /// Whether all coordinates of these markers are within [`NEAR`] of it.
+    pub fn is_near(&self, features: &Features) -> bool {
+        let near = |a: Px, b: Px| a.0.abs_diff(b.0) <= NEAR.0.unsigned_abs();
+        let pairs = self.features.centroids.iter().zip(&features.centroids);
+        pairs
+            .into_iter()
+            .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
     }
 
     /// Its markers 0–3.

@@ -2,6 +2,7 @@
 //! no force says why.
 
 use arbitrary::{Result, Unstructured};
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::{AlignedFile, Model};
 use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
@@ -136,7 +137,7 @@ fn measure(sensor: &mut Sensor<'_>, frame: &[u16], input: &mut Unstructured<'_>)
     if let Some(mut tare) = TareBuilder::new(1)
         && let Some(Ok(rest)) = sensor.tare_with(&mut tare, &whole)
     {
-        sensor.set_tare(Some(rest));
+        sensor.set_tare(Some(rest), Drift::NONE);
         let measurement = sensor.measure_frame(frame);
         is_sound(sensor, &measurement);
     }

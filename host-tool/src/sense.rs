@@ -122,7 +122,7 @@ impl<'a> Bench<'a> {
                     picture.width, picture.height
                 )));
             }
-            sensor.set_drifted_tare(Some(tare.rest), Drift::UNSEEN);
+            sensor.set_tare(Some(tare.rest), Drift::UNSEEN);
         }
         let mut measurement = sensor.measure_frame(&picture.pixels);
         // What the threshold makes of the picture, whatever another look does.

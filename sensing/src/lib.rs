@@ -19,6 +19,7 @@ pub use hivtac_markers::{blob, formats, rules, scanner, screen, settings, tables
 pub mod known_answer;
 pub mod motion;
 pub mod pipeline;
+mod rezero;
 pub mod tare;
 pub mod temporal;
 

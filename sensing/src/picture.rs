@@ -3,6 +3,7 @@
 
 use crate::pipeline::{Measurement, Sensor};
 use crate::tare::TareBuilder;
+use hivtac_force::forward::Drift;
 use hivtac_force::model::Model;
 use hivtac_force::rest::Rest;
 use hivtac_markers::settings::Settings;
@@ -195,6 +196,6 @@ pub fn rest_of(picture: &Picture, sensor: &mut Sensor<'_>) -> Rest {
 pub fn tared(geometry: Geometry) -> Box<Sensor<'static>> {
     let mut sensor = sensor(geometry, None);
     let rest = rest_of(&Pattern::at_rest(geometry).draw(), &mut sensor);
-    sensor.set_tare(Some(rest));
+    sensor.set_tare(Some(rest), Drift::NONE);
     sensor
 }

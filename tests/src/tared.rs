@@ -191,7 +191,7 @@ impl View {
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let configured = tared.sensor.configure(settings, Some(model));
         configured.map_err(|error| anyhow!("{error}"))?;
-        tared.sensor.set_tare(Some(rest));
+        tared.sensor.set_tare(Some(rest), Drift::NONE);
         Ok(tared)
     }
 }
@@ -213,7 +213,7 @@ impl TaredSensor {
         configured.map_err(|error| anyhow!("{error}"))?;
         let mut tared = TaredSensor { sensor };
         let rest = tared.rest(&Scene::preset("rest", preset, width, height, 7)?)?;
-        tared.sensor.set_tare(Some(rest));
+        tared.sensor.set_tare(Some(rest), Drift::NONE);
         Ok(tared)
     }
 
@@ -237,7 +237,7 @@ impl TaredSensor {
         for frame in frames {
             let measurement = self.sensor.measure_frame(&frame.words());
             if let Some(outcome) = self.sensor.tare_with(&mut tare, &measurement) {
-                self.sensor.set_tare(outcome.ok());
+                self.sensor.set_tare(outcome.ok(), Drift::NONE);
                 return Ok(outcome);
             }
         }
@@ -246,13 +246,13 @@ impl TaredSensor {
 
     /// Another unit: there is no rest position of it.
     pub fn forget_tare(&mut self) {
-        self.sensor.set_tare(None);
+        self.sensor.set_tare(None, Drift::NONE);
     }
 
     /// The rest position stays, but no frame has confirmed it.
     pub fn tared_at_another_time(&mut self) {
         let rest = self.sensor.tare().copied();
-        self.sensor.set_drifted_tare(rest, Drift::UNSEEN);
+        self.sensor.set_tare(rest, Drift::UNSEEN);
     }
 
     /// The whole pipeline on a frame that follows none, which it looks at again when it refuses it.

@@ -78,6 +78,8 @@ fn the_sensing_runs_from_itcm() {
         "hivtac_force..model",
         "hivtac_sensing4tare",
         "hivtac_sensing8temporal",
+        "hivtac_sensing6rezero",
+        "8pipeline9following",
         "serde_core",
         "$GT$7prepare17h",
         "7forward8mounting",
@@ -92,11 +94,14 @@ fn the_sensing_runs_from_itcm() {
         "5force10of_outputs",
         "8Geometry9rest_area",
         "$GT$9configure17h",
+        "$GT$13set_threshold17h",
         "8pipeline6taring",
         "hivtac_force4rest",
         "5trust5Trust3new",
         "8pipeline5again",
         "8majority8Majority",
+        "8portable8multiply",
+        "8portable6spline",
         "17mask_covered_rows",
     ];
     let runs_for_frames = |symbol: &&Symbol| !seldom.iter().any(|part| symbol.name.contains(part));

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use anyhow::{Result, anyhow};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
@@ -61,7 +62,7 @@ impl<'m> Sensing<'m> {
         let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
-        sensor.set_tare(Some(model.rest));
+        sensor.set_tare(Some(model.rest), Drift::NONE);
         Ok(Self(sensor))
     }
 }

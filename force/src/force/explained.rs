@@ -11,7 +11,7 @@ use crate::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before there is a frame.
@@ -26,9 +26,6 @@ pub struct Resting {
     drift: Option<Covariance>,
 }
 
-/// A marker that rests this far from where it rested when the model was made is another unit's:
-/// half a pixel.
-const LARGEST_DRIFT: Px = Px(Px::ONE.0 / 2);
 /// What is left over of markers that are known less well, in parts of its variance, is seldom more
 /// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
 /// the light: in 1 of 1,000 frames).
@@ -57,7 +54,7 @@ impl Resting {
     /// have been mounted anew.
     fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest, is_calibrated: bool) -> Resting {
         let told = forward.rest_image.mounting(rest);
-        let near = is_near(rest, own);
+        let near = own.is_near(&rest.features);
         // The tables are of this unit's own markers.
         let known = Mounting {
             per_px: forward.per_px.unwrap_or(told.per_px),
@@ -209,16 +206,6 @@ impl Resting {
         let estimate = self.estimate(forward, markers, noise, output);
         self.told(forward, range, noise, &estimate)
     }
-}
-
-/// Whether a rest position is that of the unit that a model was made on, as it may have drifted
-/// since.
-fn is_near(rest: &Rest, own: &Rest) -> bool {
-    let pairs = rest.features.centroids.iter().zip(&own.features.centroids);
-    let near = |a: Px, b: Px| a.0.abs_diff(b.0) <= LARGEST_DRIFT.0.unsigned_abs();
-    pairs
-        .into_iter()
-        .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
 }
 
 /// The force of a load, and how uncertain |F| is by noise.

@@ -3,7 +3,7 @@
 use super::predict::{DOTS, Markers};
 use super::solve::{Column, square};
 use crate::kernels::sqrt;
-use crate::rest::Rest;
+use crate::rest::{NEAR, Rest};
 
 /// How a unit's camera sees its film, and where its markers are glued.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,11 +25,10 @@ pub struct RestImage {
 }
 
 /// How far a unit's camera may be from where it was, in parts of the pattern's radius, as the sine
-/// of its turn and in parts of its scale; and a marker beside that, px.
+/// of its turn and in parts of its scale.
 const LARGEST_SHIFT: f32 = 0.125;
 const LARGEST_TURN: f32 = 0.052;
 const LARGEST_SCALE: f32 = 0.01;
-const LARGEST_BESIDE_PX: f32 = 0.5;
 
 impl RestImage {
     /// The direction in which a marker's image lies from the axis, of length one; along x where it
@@ -135,7 +134,7 @@ fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
 impl Mounting {
     /// The same film, seen as at `rest` by a camera that moved since it was seen as at `own`.
     /// `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of scale of
-    /// 1 % bring all markers within half a pixel of that: another unit's film.
+    /// 1 % bring all markers within [`NEAR`] of that: another unit's film.
     pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
         let places = [rest, own].map(places_px);
         let [at, own_at] = places.each_ref().map(middle);
@@ -150,7 +149,7 @@ impl Mounting {
         let is_own = shift <= LARGEST_SHIFT * radius(&own)
             && across.abs() <= LARGEST_TURN
             && (scale - 1.0).abs() <= LARGEST_SCALE
-            && (0..DOTS).all(|k| beside(k) <= LARGEST_BESIDE_PX);
+            && (0..DOTS).all(|k| beside(k) <= NEAR.to_f32());
         is_own.then(|| Mounting {
             per_px: turned(self.per_px, [along, across]),
             ..*self

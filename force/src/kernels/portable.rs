@@ -7,7 +7,8 @@ use crate::rescale::rescale_sum;
 use hivtac_terms::fixed::Q;
 
 /// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::model::Model::parse) has proven
-/// that it fits, in any order of summation.
+/// that it fits, in any order of summation. Apart from the kernel, which has the near memory.
+#[cfg_attr(armv7em, inline(never))]
 pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
     match layer.weight_width() {
         WeightWidth::Int8 => sum_groups(layer, inputs, sums, unpack8),
@@ -25,6 +26,8 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
 ///
 /// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
 /// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
+/// Apart from the kernel, as [`multiply`].
+#[cfg_attr(armv7em, inline(never))]
 pub fn spline(
     steps: &[u8],
     line: usize,

@@ -70,6 +70,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 mod tests {
     use super::*;
     use crate::picture::{Pattern, Picture, RED, tared};
+    use hivtac_force::forward::Drift;
     use hivtac_terms::geometry::{Geometry, Preset};
     use proptest::prelude::*;
 
@@ -110,7 +111,7 @@ mod tests {
         assert_eq!(cut.markers, None, "{:?}", cut.status);
         sensor.begin_frame();
         sensor.push_rows(&picture.pixels);
-        sensor.set_tare(None);
+        sensor.set_tare(None, Drift::NONE);
         let untared = sensor.finish_frame();
         assert_ne!(untared.status, expected.status);
         assert_eq!(untared.markers, expected.markers);

@@ -2,6 +2,7 @@
 
 mod again;
 mod ahead;
+mod following;
 #[cfg(test)]
 mod marker_tests;
 mod taring;
@@ -10,7 +11,8 @@ mod tests;
 
 use crate::known_answer::{self, Answer};
 use crate::motion::Motion;
-use crate::temporal::AtRest;
+use crate::rezero::Tare;
+use crate::temporal::Temporal;
 use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_force::features::Features;
@@ -60,8 +62,7 @@ const SATURATED_PART: u32 = 2;
 pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
     model: Option<Model<'m>>,
-    tare: Option<Rest>,
-    drift: Drift,
+    tare: Option<Tare>,
     pixels: Formats<T>,
     scanner: Scanner<BLOBS>,
     network: Network,
@@ -71,6 +72,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     motion: Motion,
     noise: NoiseLevel,
     look: Look,
+    temporal: Temporal,
 }
 
 /// What follows from settings, model and tare before there is a frame.
@@ -99,7 +101,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             },
             model: None,
             tare: None,
-            drift: Drift::NONE,
             pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
@@ -108,6 +109,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             motion: Motion::GLOBAL,
             noise: NoiseLevel::AS_MODELLED,
             look: Look::First,
+            temporal: Temporal::new(),
         }
     }
 
@@ -131,7 +133,27 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
         self.settings = settings;
         self.model = model;
-        self.set_tare(None);
+        self.set_tare(None, Drift::NONE);
+        Ok(())
+    }
+
+    /// The same, and keeps the rest position with all that became of it, when markers are seen as
+    /// before.
+    ///
+    /// # Errors
+    /// A setting out of its range; nothing is then changed.
+    pub fn reconfigure(
+        &mut self,
+        settings: Settings,
+        model: Option<Model<'m>>,
+    ) -> Result<(), SettingsError> {
+        let seen = |by: &Settings| (by.threshold.format(), by.dilations, by.centroid);
+        let is_alike = seen(&settings) == seen(&self.settings);
+        let holds = |tare: &Tare| is_alike && tare.rest().fits(&settings.geometry);
+        let tare = self.tare.filter(holds);
+        self.configure(settings, model)?;
+        self.tare = tare;
+        self.begin_anew();
         Ok(())
     }
 
@@ -158,44 +180,32 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     pub fn set_threshold(&mut self, threshold: Threshold) -> Result<(), ThresholdError> {
         self.pixels.set(&threshold, self.settings.byte_order)?;
         self.settings.threshold = threshold;
-        self.prepare();
+        self.begin_anew();
         Ok(())
     }
 
-    /// Sets the rest position of this unit, or goes back to the model's. One that is not
-    /// [sound](Rest::is_sound) is as none.
-    pub fn set_tare(&mut self, tare: Option<Rest>) {
-        self.set_drifted_tare(tare, Drift::NONE);
+    /// Sets the rest position of this unit, from which the film may have drifted since it was taken,
+    /// or goes back to the model's. One that is not [sound](Rest::is_sound) is as none.
+    pub fn set_tare(&mut self, rest: Option<Rest>, drift: Drift) {
+        let rest = rest.filter(Rest::is_sound);
+        self.tare = rest.map(|rest| Tare::new(rest, drift));
+        self.begin_anew();
     }
 
-    /// The same of a rest position that the film may have drifted from since it was taken.
-    pub fn set_drifted_tare(&mut self, tare: Option<Rest>, drift: Drift) {
-        self.tare = tare.filter(Rest::is_sound);
-        // What is not known of no rest position is nothing.
-        self.drift = self.tare.map_or(Drift::NONE, |_| drift);
+    /// The next frames are seen in another way: what was before says nothing of them.
+    fn begin_anew(&mut self) {
+        self.temporal.begin_anew();
+        if let Some(tare) = &mut self.tare {
+            tare.begin_anew();
+        }
         self.prepare();
     }
 
-    /// Measures from the next frame on against where the untouched film was seen.
-    pub fn follow(&mut self, at_rest: &AtRest) {
-        match at_rest.rest {
-            Some(rest) => self.set_drifted_tare(Some(rest), at_rest.drift),
-            None => {
-                self.drift = at_rest.drift;
-                self.apply_drift();
-            }
-        }
-    }
-
-    /// How far the film may rest from its rest position.
-    pub fn drift(&self) -> Drift {
-        self.drift
-    }
-
     fn apply_drift(&mut self) {
+        let drift = self.tare.as_ref().map_or(&Drift::NONE, Tare::drift);
         let prepared = self.prepared.as_mut();
         if let Some(resting) = prepared.and_then(|prepared| prepared.resting.as_mut()) {
-            resting.set_drift(&self.drift);
+            resting.set_drift(drift);
         }
     }
 
@@ -205,9 +215,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         model.filter(|model| model.conditions.are_of(&self.settings))
     }
 
-    /// The rest position of this unit, when one was taken.
+    /// The rest position of this unit that is measured against, when one was taken.
     pub fn tare(&self) -> Option<&Rest> {
-        self.tare.as_ref()
+        self.tare.as_ref().map(Tare::rest)
     }
 
     /// Says when which row of a frame is exposed, and forgets the frame before. At first all are at
@@ -353,7 +363,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self.fitting_model();
-        let rest = self.tare.or(fitting.map(|model| model.rest));
+        let rest = self.tare().or(fitting.map(|model| &model.rest));
         // The same tip presses, whether or not the model is for these frames.
         let reading = self
             .model
@@ -366,7 +376,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             finder: Finder::new(settings),
             resting: fitting
                 .zip(rest)
-                .and_then(|(model, rest)| Resting::of_model(model, &rest)),
+                .and_then(|(model, rest)| Resting::of_model(model, rest)),
             trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
             standing: self.standing_status(),
         });
@@ -432,7 +442,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             return None;
         }
         let model = self.model.as_ref()?;
-        let tare = self.tare.as_ref().unwrap_or(&model.rest);
+        let tare = self.tare.as_ref().map_or(&model.rest, Tare::rest);
         let output = self.network.run(model, features, &tare.features);
         let resting = self
             .prepared

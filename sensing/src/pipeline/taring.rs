@@ -54,7 +54,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             return false;
         };
         let own = (!model.is_simulated()).then_some(&model.rest);
-        let before = self.tare.as_ref().or(own);
+        let before = self.tare().or(own);
         let touch = before.and_then(|before| Resting::touch(model, before, rest));
         touch.is_some_and(|(magnitude, by_noise)| is_force(magnitude, by_noise, TOUCHED))
     }

@@ -72,12 +72,12 @@ fn a_tare_takes_the_place_of_the_models_rest() {
         |_| {},
         |sensor| {
             let rest = rest_of(&shifted(3.0, -4.0), sensor);
-            sensor.set_tare(Some(rest));
+            sensor.set_tare(Some(rest), Drift::NONE);
             let seen = shifted(4.0, -4.0).feed(sensor);
             assert_eq!(seen.status, Status::NOT_CALIBRATED | Status::CONTACT);
             let expected = [PER_PIXEL, 0, -100_000].map(MicroNewtons);
             assert_eq!(seen.force.unwrap().cartesian, expected);
-            sensor.set_tare(None);
+            sensor.set_tare(None, Drift::NONE);
             assert!(
                 shifted(0.0, 0.0)
                     .feed(sensor)
@@ -112,19 +112,8 @@ fn a_tare_that_cannot_be_is_none() {
     let mut sensor = tared(GEOMETRY);
     let mut rest = *sensor.tare().unwrap();
     rest.features.centroids[2].0 = Px(-1);
-    sensor.set_tare(Some(rest));
+    sensor.set_tare(Some(rest), Drift::NONE);
     assert_eq!(sensor.tare(), None);
-}
-
-/// Without a rest position that was taken there is none that may have drifted.
-#[test]
-fn a_rest_position_that_is_forgotten_takes_its_drift_with_it() {
-    let mut sensor = tared(GEOMETRY);
-    let rest = sensor.tare().copied();
-    for (tare, expected) in [(rest, Drift::UNSEEN), (None, Drift::NONE)] {
-        sensor.set_drifted_tare(tare, Drift::UNSEEN);
-        assert_eq!(sensor.drift(), expected);
-    }
 }
 
 /// The pattern tapered along x and sheared, px at each marker: what a tip does that the film sticks
@@ -150,7 +139,7 @@ fn the_models_contact_reading_says_what_the_markers_may_do() {
             |spec| spec.conditions.contact = contact,
             |sensor| {
                 let rest = rest_of(&pulled(0.0, 0.0).draw(), sensor);
-                sensor.set_tare(Some(rest));
+                sensor.set_tare(Some(rest), Drift::NONE);
                 let mut is_refused = |pattern: &Pattern| {
                     let status = pattern.draw().feed(sensor).status;
                     status.contains(Status::MARKERS_IMPLAUSIBLE)
@@ -446,7 +435,7 @@ proptest! {
         let bytes = SPEC.with(|spec| spec.encode().unwrap());
         let mut sensor = sensor(GEOMETRY, Some(Model::parse(&bytes).unwrap()));
         if tare {
-            sensor.set_tare(Some(SPEC.with(|spec| spec.rest)));
+            sensor.set_tare(Some(SPEC.with(|spec| spec.rest)), Drift::NONE);
         }
         // Mostly whole frames.
         let rows = if rows == 239 { 239 } else { 240 };
@@ -488,7 +477,7 @@ proptest! {
         let mut sensor = sensor(geometry, None);
         let mut rest = Rest { areas, ..spec(&[11, 3]).rest };
         rest.features.centroids = corners.map(|(x, y)| (Px(x), Px(y)));
-        sensor.set_tare(Some(rest));
+        sensor.set_tare(Some(rest), Drift::NONE);
         let seen = picture.feed(&mut sensor);
         prop_assert!(seen.status.contains(Status::MODEL_MISSING));
     }

@@ -42,11 +42,11 @@ use hivtac_force::features::Features;
 use hivtac_force::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::{Filter, Rezero, TemporalError, TemporalSettings};
+use hivtac_terms::temporal::{Filter, TemporalError, TemporalSettings};
 use hivtac_terms::units::{Milliseconds, Px};
 
 /// A frame with a force, of markers that stand so far to the right.
-pub(super) fn frame(force: Option<Force>, right: Px) -> Measurement {
+pub fn frame(force: Option<Force>, right: Px) -> Measurement {
     let markers = rest(right).markers();
     Measurement {
         status: Status::NOT_CALIBRATED | Status::SLIP,
@@ -56,7 +56,8 @@ pub(super) fn frame(force: Option<Force>, right: Px) -> Measurement {
     }
 }
 
-fn rest(right: Px) -> Rest {
+/// A rest position so far to the right.
+pub fn rest(right: Px) -> Rest {
     let markers = [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
         x: Px::from_int(x) + right,
         y: Px::from_int(y),
@@ -125,67 +126,4 @@ fn settings_that_are_none_change_nothing_and_others_begin_anew() {
     temporal.set(TemporalSettings::default()).unwrap();
     let followed = temporal.follow(moment(3), &between);
     assert!(!followed.status.contains(Status::CONTACT), "by its own |F|");
-}
-
-#[test]
-fn re_zeroing_can_be_off_and_is_told_when_it_moved() {
-    let at_rest = frame(Some(pressed(500, 100)), Px(3_000));
-    let rezeroing = TemporalSettings {
-        rezero: Some(Rezero {
-            after: Milliseconds(1_000),
-            ..Rezero::default()
-        }),
-        ..TemporalSettings::default()
-    };
-    let off = TemporalSettings {
-        rezero: None,
-        ..TemporalSettings::default()
-    };
-    for (settings, moves) in [(off, false), (rezeroing, true)] {
-        let mut temporal = Temporal::new();
-        temporal.set(settings).unwrap();
-        temporal.set_tare(Some(rest(Px(0))));
-        let followed: std::vec::Vec<_> = (0..700)
-            .map(|number| temporal.follow(moment(number), &at_rest))
-            .collect();
-        assert_eq!(
-            followed
-                .iter()
-                .any(|f| f.at_rest.is_some_and(|it| it.rest.is_some())),
-            moves
-        );
-        let last = followed.last().unwrap();
-        assert_eq!(last.status.contains(Status::REZEROED), moves);
-        assert_eq!(temporal.tare(), Some(&rest(Px(0))), "as it was taken");
-        temporal.set_tare(Some(rest(Px(0))));
-        let followed = temporal.follow(moment(700), &at_rest);
-        assert!(!followed.status.contains(Status::REZEROED));
-    }
-}
-
-/// A rest position that is off by 0.1 px: nothing explains the untouched frames, but they tell it,
-/// and a press does not make that forgotten.
-#[test]
-fn a_rest_that_moved_is_told_through_the_next_press() {
-    let mut temporal = Temporal::new();
-    temporal.set_tare(Some(rest(Px(0))));
-    let mut unexplained = frame(None, Px(6_554));
-    unexplained.status |= Status::UNEXPLAINED;
-    let mut at_rest = None;
-    for number in 0..200 {
-        let followed = temporal.follow(moment(number), &unexplained);
-        at_rest = at_rest.or(followed.at_rest);
-    }
-    let drift = at_rest.unwrap().drift;
-    assert!((drift.farthest_px() - 0.1).abs() < 1e-3, "{drift:?}");
-    let pressed = frame(Some(pressed(100_000, 1_000)), Px::from_int(20));
-    let followed = temporal.follow(moment(200), &pressed);
-    assert!(
-        followed
-            .status
-            .contains(Status::REST_MOVED | Status::CONTACT)
-    );
-    temporal.set_tare(Some(rest(Px(6_554))));
-    let followed = temporal.follow(moment(201), &pressed);
-    assert!(!followed.status.contains(Status::REST_MOVED));
 }

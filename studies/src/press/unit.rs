@@ -5,6 +5,7 @@ use hivtac_data::dataset::measure;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_scene::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensing::force::Force;
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::{Conditions, Model};
 use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
@@ -185,7 +186,7 @@ impl TestedUnit {
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
         let rest = self.rest(&mut sensor)?;
-        sensor.set_tare(Some(rest));
+        sensor.set_tare(Some(rest), Drift::NONE);
         Ok(Tared { sensor })
     }
 

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_data::dataset::reasons;
 use hivtac_scene::{Camera, Frame, Load, Scene, Truth};
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
@@ -69,7 +70,7 @@ impl Pipeline {
             }
             if let Some(outcome) = pipeline.sensor.tare_with(&mut builder, &measured) {
                 let rest = outcome.map_err(|refusal| anyhow!("no tare: {refusal:?}"))?;
-                pipeline.sensor.set_tare(Some(rest));
+                pipeline.sensor.set_tare(Some(rest), Drift::NONE);
                 break;
             }
         }

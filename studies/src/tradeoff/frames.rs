@@ -11,6 +11,7 @@ use hivtac_calibration::weights::{Training, Uncertainty, Weights};
 use hivtac_data::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
 use hivtac_scene::Frame;
 use hivtac_sensing::features::Features;
+use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::settings::Settings;
@@ -198,7 +199,7 @@ fn eye<'m>(recipe: &Recipe, model: Option<Model<'m>>) -> Result<Box<Sensor<'m>>>
     sensor
         .configure(settings, model)
         .map_err(|error| anyhow!("{error}"))?;
-    sensor.set_tare(model.map(|model| model.rest));
+    sensor.set_tare(model.map(|model| model.rest), Drift::NONE);
     Ok(sensor)
 }
 

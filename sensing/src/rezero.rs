@@ -21,34 +21,41 @@ use hivtac_force::features::Features;
 use hivtac_force::forward::Drift;
 use hivtac_force::rest::Rest;
 use hivtac_terms::fixed::Q;
+use hivtac_terms::status::Status;
 use hivtac_terms::temporal::Rezero;
 use hivtac_terms::units::{MilliPx, Px};
 
 /// Frames are averaged for so long, µs.
 const MEAN_US: u64 = 1_000_000;
-/// The untouched film's markers are all within this of the rest position: half a pixel.
-const NEAR: Px = Px(Px::ONE.0 / 2);
+/// A rest position is said to have moved when a coordinate was seen farther from it than this, px:
+/// 3 µm of film.
+const MOVED_PX: f32 = 0.05;
 /// Frames farther apart than this do not follow each other: nobody knows what touched meanwhile.
 const LONGEST_GAP_US: u64 = 100_000;
 /// Most frames of a mean: 65 s of frames of a millisecond. Sums are below 2⁴⁸.
 const MOST_FRAMES: u32 = 1 << 16;
 
-/// What a second of the untouched film tells.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AtRest {
-    /// The rest position from the next frame on, when re-zeroing moves it.
-    pub rest: Option<Rest>,
-    /// How far the film rests from it.
-    pub drift: Drift,
+/// What a frame tells of the rest position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Told {
+    /// Nothing: no second of the untouched film ends with it.
+    Nothing,
+    /// How far the film rests from there.
+    Drift,
+    /// The same, and re-zeroing moved it.
+    Moved,
 }
 
+/// A rest position that forces are measured against, and what became of it since it was taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rezeroing {
+pub(crate) struct Tare {
     /// As it was taken.
-    taken: Option<Rest>,
-    /// How far it is from there: x and y of markers 0–3.
+    taken: Rest,
+    /// How far re-zeroing moved it from there: x and y of markers 0–3.
     moved: [Px; 8],
-    /// How far the film was seen from that last.
+    /// Where that is.
+    rest: Rest,
+    /// How far the film may rest from that.
     drift: Drift,
     quiet: Option<Quiet>,
 }
@@ -90,21 +97,16 @@ impl Mean {
     }
 }
 
-impl Rezeroing {
-    /// No rest position was taken.
-    pub const NONE: Rezeroing = Rezeroing {
-        taken: None,
-        moved: [Px(0); 8],
-        drift: Drift::NONE,
-        quiet: None,
-    };
-
-    /// A rest position was taken, or none holds.
-    pub fn set(&mut self, taken: Option<Rest>) {
-        *self = Rezeroing {
+impl Tare {
+    /// A rest position that was taken, and from which the film may have drifted since.
+    pub fn new(taken: Rest, drift: Drift) -> Tare {
+        Tare {
             taken,
-            ..Rezeroing::NONE
-        };
+            moved: [Px(0); 8],
+            rest: taken,
+            drift,
+            quiet: None,
+        }
     }
 
     /// Waits anew; what was followed stays.
@@ -113,33 +115,48 @@ impl Rezeroing {
     }
 
     /// The rest position as it was taken.
-    pub fn taken(&self) -> Option<&Rest> {
-        self.taken.as_ref()
+    pub fn taken(&self) -> &Rest {
+        &self.taken
     }
 
-    /// How far the coordinate moved that moved farthest.
+    /// The one that is measured against.
+    pub fn rest(&self) -> &Rest {
+        &self.rest
+    }
+
+    /// How far re-zeroing moved the coordinate that it moved farthest.
     pub fn farthest(&self) -> Px {
         let far = self.moved.iter().map(|moved| Px(moved.0.abs()));
         far.max().unwrap_or_default()
     }
 
-    /// How far the untouched film was seen from the rest position last.
+    /// How far the film may rest from the one that is measured against.
     pub fn drift(&self) -> &Drift {
         &self.drift
     }
 
+    /// [`Status::REZEROED`] and [`Status::REST_MOVED`].
+    pub fn status(&self) -> Status {
+        let mut status = Status::OK;
+        if self.farthest() != Px(0) {
+            status |= Status::REZEROED;
+        }
+        if self.drift.farthest_px() > MOVED_PX {
+            status |= Status::REST_MOVED;
+        }
+        status
+    }
+
     /// Takes the features of a frame in which no contact is known, or none of any other frame.
-    /// Gives what a second's mean tells.
     pub fn follow(
         &mut self,
         limits: Option<&Rezero>,
         time_us: u64,
         features: Option<&Features>,
-    ) -> Option<AtRest> {
-        let taken = self.taken?;
-        let Some(features) = features.filter(|features| self.is_near(&taken, features)) else {
+    ) -> Told {
+        let Some(features) = features.filter(|features| self.rest.is_near(features)) else {
             self.quiet = None;
-            return None;
+            return Told::Nothing;
         };
         let since = |quiet: &Quiet| time_us.saturating_sub(quiet.newest_us);
         let follows = |quiet: &Quiet| since(quiet) <= LONGEST_GAP_US;
@@ -158,9 +175,9 @@ impl Rezeroing {
         }
         self.quiet = Some(quiet);
         if !is_due {
-            return None;
+            return Told::Nothing;
         }
-        let there = mean.beside(&taken);
+        let there = mean.beside(&self.taken);
         let quiet_us = mean.begun_us.saturating_sub(quiet.since_us);
         let is_long = |limits: &&Rezero| quiet_us >= u64::from(limits.after.0) * 1_000;
         let before = self.moved;
@@ -171,19 +188,11 @@ impl Rezeroing {
         for (seen, (there, moved)) in seen_px.zip(there.iter().zip(self.moved)) {
             *seen = Px::saturated(*there - Q::from(moved)).to_f32();
         }
-        Some(AtRest {
-            rest: (self.moved != before).then(|| displaced(&taken, &self.moved)),
-            drift: self.drift,
-        })
-    }
-
-    fn is_near(&self, taken: &Rest, features: &Features) -> bool {
-        let all = features.centroids.iter().flat_map(|(x, y)| [*x, *y]);
-        let rests = coordinates(taken).zip(self.moved);
-        all.zip(rests).all(|(seen, (rest, moved))| {
-            let beside = seen.0.saturating_sub(rest.0).saturating_sub(moved.0);
-            beside.unsigned_abs() <= NEAR.0.unsigned_abs()
-        })
+        if self.moved == before {
+            return Told::Drift;
+        }
+        self.rest = displaced(&self.taken, &self.moved);
+        Told::Moved
     }
 
     fn move_towards(&mut self, limits: &Rezero, there: &[Q<16, i64>; 8]) {
@@ -242,6 +251,7 @@ fn displaced(rest: &Rest, moved: &[Px; 8]) -> Rest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_force::rest::NEAR;
     use hivtac_terms::marker::Marker;
     use proptest::prelude::*;
 
@@ -267,20 +277,16 @@ mod tests {
 
     /// A rest position that was taken, frame by frame.
     struct Followed {
-        state: Rezeroing,
+        tare: Tare,
         time_us: u64,
-        rest: Rest,
     }
 
     impl Followed {
         fn new() -> Self {
             let rest = Rest::of_markers(&shifted(Px(0)));
-            let mut state = Rezeroing::NONE;
-            state.set(Some(rest));
             Self {
-                state,
+                tare: Tare::new(rest, Drift::NONE),
                 time_us: 5_000_000,
-                rest,
             }
         }
 
@@ -292,16 +298,17 @@ mod tests {
         fn with(&mut self, limits: &Rezero, ms: u64, features: Option<&Features>) {
             for _ in 0..ms * 1_000 / FRAME_US {
                 self.time_us += FRAME_US;
-                let told = self.state.follow(Some(limits), self.time_us, features);
-                if let Some(rest) = told.and_then(|told| told.rest) {
-                    self.rest = rest;
-                }
+                let before = self.tare;
+                let told = self.tare.follow(Some(limits), self.time_us, features);
+                let has_moved = before.rest != self.tare.rest;
+                assert_eq!(has_moved, told == Told::Moved);
+                assert!(told != Told::Nothing || before.drift == self.tare.drift);
             }
         }
 
         /// How far to the right it is, px.
         fn right(&self) -> f64 {
-            (self.rest.features.centroids[0].0 - Px::from_int(100)).to_f64()
+            (self.tare.rest.features.centroids[0].0 - Px::from_int(100)).to_f64()
         }
     }
 
@@ -311,19 +318,20 @@ mod tests {
         let mut film = Followed::new();
         film.for_ms(2_900, Some(&drifted));
         assert!(
-            film.right() == 0.0 && film.state.farthest() == Px(0),
+            film.right() == 0.0 && film.tare.farthest() == Px(0),
             "it waits"
         );
         film.for_ms(5_000, Some(&drifted));
         assert!((0.039..0.061).contains(&film.right()), "{}", film.right());
-        assert!((film.state.farthest().to_f64() - film.right()).abs() < 1e-9);
+        assert!((film.tare.farthest().to_f64() - film.right()).abs() < 1e-9);
         film.for_ms(20_000, Some(&drifted));
         assert!((film.right() - 0.1).abs() < 1e-4, "{}", film.right());
-        assert_eq!(film.rest.areas, [130; 4]);
-        let moved = film.rest.features;
-        assert_eq!(moved, Features::of_markers(&film.rest.markers()));
-        film.state.set(Some(film.rest));
-        assert_eq!(film.state.farthest(), Px(0), "taken anew");
+        assert_eq!(film.tare.rest.areas, [130; 4]);
+        let moved = film.tare.rest.features;
+        assert_eq!(moved, Features::of_markers(&film.tare.rest.markers()));
+        let taken = Rest::of_markers(&shifted(Px(0)));
+        assert_eq!(film.tare.taken(), &taken, "as it was taken");
+        assert_eq!(film.tare.status(), Status::REZEROED | Status::REST_MOVED);
     }
 
     #[test]
@@ -356,7 +364,7 @@ mod tests {
     fn how_far_the_film_was_seen_from_there_stays_until_it_is_seen_again() {
         let mut film = Followed::new();
         film.for_ms(1_100, Some(&features(Px(6_554))));
-        let far = |film: &Followed| f64::from(film.state.drift().farthest_px());
+        let far = |film: &Followed| f64::from(film.tare.drift().farthest_px());
         assert!((far(&film) - 0.1).abs() < 1e-4, "{}", far(&film));
         film.for_ms(60_000, None);
         assert!((far(&film) - 0.1).abs() < 1e-4, "through a press");
@@ -369,15 +377,7 @@ mod tests {
     fn what_is_held_is_no_rest() {
         let mut film = Followed::new();
         film.for_ms(600_000, Some(&features(Px(NEAR.0 + 1))));
-        assert!(film.right() == 0.0 && film.state.drift() == &Drift::NONE);
-    }
-
-    #[test]
-    fn without_a_rest_position_that_was_taken_nothing_moves() {
-        let mut film = Followed::new();
-        film.state.set(None);
-        film.for_ms(20_000, Some(&features(NEAR)));
-        assert_eq!(film.right(), 0.0);
+        assert!(film.right() == 0.0 && film.tare.drift() == &Drift::NONE);
     }
 
     proptest! {
