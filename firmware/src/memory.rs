@@ -167,6 +167,7 @@ impl Memory {
             tare,
             temporal,
             rezeroed,
+            seen,
             ..
         } = used;
         let drift = tare.zip(self.record.tare);
@@ -182,6 +183,7 @@ impl Memory {
                 failures: self.log.failures(),
                 temporal,
                 rezeroed,
+                seen,
                 drift,
                 camera: camera::report(),
             }));

@@ -5,15 +5,18 @@ use crate::pipeline_task::Sensor;
 use crate::shared::{NAME, PIPELINE};
 use core::cell::Cell;
 use hivtac_sensing::features::Features;
+use hivtac_sensing::forward::CameraMotion;
 use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
+use hivtac_terms::angle::atan2;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::root::root;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{ModelIdentity, ModelSource, Outcome};
-use hivtac_wire::settings::{Name, RestPosition, TareReport};
+use hivtac_wire::settings::{Moved, Name, RestPosition, TareReport};
 
 /// What the pipeline measures with.
 #[derive(Clone)]
@@ -24,6 +27,8 @@ pub struct OfPipeline {
     pub tare: Option<Rest>,
     /// How far re-zeroing moved it.
     pub rezeroed: Px,
+    /// How far from there the untouched film was seen last.
+    pub seen: Option<MilliPx>,
     /// How it follows forces from frame to frame.
     pub temporal: TemporalSettings,
     /// Its model, when it has one.
@@ -43,6 +48,7 @@ pub fn follow(sensor: &Sensor, source: ModelSource) {
         settings: *sensor.settings(),
         tare: sensor.taken().copied(),
         rezeroed: sensor.rezeroed(),
+        seen: sensor.rest_seen(),
         temporal: *sensor.temporal(),
         model,
     };
@@ -80,6 +86,8 @@ pub struct InUse {
     pub tare: Option<RestPosition>,
     /// How far re-zeroing moved it.
     pub rezeroed: Px,
+    /// How far from there the untouched film was seen last.
+    pub seen: Option<MilliPx>,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
     /// The threshold of the model.
@@ -99,6 +107,7 @@ pub fn in_use() -> Option<InUse> {
         settings,
         tare,
         rezeroed,
+        seen,
         temporal,
         model,
     } = of_pipeline()?;
@@ -107,6 +116,7 @@ pub fn in_use() -> Option<InUse> {
         threshold: settings.threshold,
         tare: tare.map(|rest| position(&rest, &settings)),
         rezeroed,
+        seen,
         temporal,
         of_model: model.map(|model| model.threshold),
     })
@@ -126,11 +136,27 @@ pub fn position(rest: &Rest, settings: &Settings) -> RestPosition {
 
 /// What a tare gave that is to be `rest`; the sensor still has the rest position before.
 pub fn tared(rest: &Rest, sensor: &Sensor, spread: Px) -> TareReport {
-    let before = sensor.tare().map(Rest::markers);
+    let before = sensor.tare();
     TareReport {
         rest: position(rest, sensor.settings()),
         spread,
-        moved: before.map(|before| farthest(&before, &rest.markers())),
+        moved: before.map(|before| moved(before, rest)),
+    }
+}
+
+/// From one rest position to another.
+fn moved(before: &Rest, now: &Rest) -> Moved {
+    let px = |px: f32| Px((65_536.0 * px) as i32);
+    let motion = CameraMotion::between(before, now);
+    let [x, y] = motion.shift_px;
+    // Of markers that are not all in one place the parts are of the order of one.
+    let [along, across] = motion.back.map(|part| (part * (1 << 24) as f32) as i64);
+    Moved {
+        farthest: farthest(&before.markers(), &now.markers()),
+        shift: (px(x), px(y)),
+        turn: atan2(-across, along),
+        larger: Q::from_bits((65_536.0 * (motion.times() - 1.0)) as i32),
+        beside: px(motion.beside_px),
     }
 }
 

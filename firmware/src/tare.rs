@@ -68,7 +68,7 @@ impl Taring {
             Refusal::MarkersImplausible => Outcome::MarkersImplausible,
             Refusal::Unsteady => Outcome::Unsteady,
             Refusal::NotAtRest => Outcome::NotAtRest,
-            Refusal::Touched => Outcome::Touched,
+            Refusal::Touched(looks_like) => Outcome::Touched { looks_like },
         }))
     }
 
@@ -81,8 +81,8 @@ impl Taring {
     pub fn given_up(&self) -> Outcome {
         if self.builder.saw_implausible() {
             Outcome::MarkersImplausible
-        } else if self.builder.saw_touch() {
-            Outcome::Touched
+        } else if let Some(looks_like) = self.builder.saw_touch() {
+            Outcome::Touched { looks_like }
         } else {
             Outcome::NoGoodFrames
         }

@@ -9,7 +9,7 @@ use hivtac_host::threshold::{text, to_json};
 use hivtac_terms::threshold::Threshold;
 use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
-use hivtac_wire::settings::{Selection, TareReport};
+use hivtac_wire::settings::{Moved, Selection, TareReport};
 use serde::Serialize;
 use serde_json::json;
 use std::time::Duration;
@@ -40,7 +40,17 @@ struct Tared {
     kept: bool,
     markers: [[f64; 2]; 4],
     spread_px: f64,
-    moved_px: Option<f64>,
+    moved: Option<MovedPx>,
+}
+
+/// How far the rest position is from the one before, and what a camera's motion explains of it.
+#[derive(Serialize)]
+struct MovedPx {
+    farthest_px: f64,
+    shift_px: [f64; 2],
+    turn_deg: f64,
+    larger: f64,
+    beside_px: f64,
 }
 
 /// A tare when nothing else is said: the request, how long it may take, and what is said once it is
@@ -91,15 +101,15 @@ impl Tared {
             kept: tare.keep,
             markers: (report.rest.markers).map(|marker| [px(marker.x), px(marker.y)]),
             spread_px: px(report.spread),
-            moved_px: report.moved.map(px),
+            moved: report.moved.as_ref().map(MovedPx::of),
         }
     }
 
     fn line(&self) -> String {
         let kept = if self.kept { " and kept" } else { "" };
         let markers = self.markers.map(|[x, y]| format!("({x:.2}, {y:.2})"));
-        let moved = match self.moved_px {
-            Some(moved) => format!("{moved:.3} px from the rest before"),
+        let moved = match &self.moved {
+            Some(moved) => moved.text(),
             None => "the first one".to_owned(),
         };
         format!(
@@ -107,6 +117,30 @@ impl Tared {
             self.frames,
             markers.join(", "),
             self.spread_px
+        )
+    }
+}
+
+impl MovedPx {
+    fn of(moved: &Moved) -> MovedPx {
+        MovedPx {
+            farthest_px: px(moved.farthest),
+            shift_px: [px(moved.shift.0), px(moved.shift.1)],
+            turn_deg: f64::from(moved.turn.0) * 1e-3,
+            larger: moved.larger.to_f64(),
+            beside_px: px(moved.beside),
+        }
+    }
+
+    fn text(&self) -> String {
+        let [x, y] = self.shift_px;
+        format!(
+            "{:.3} px from the rest before: as if the camera had shifted the picture by ({x:.2}, \
+             {y:.2}) px, turned it by {:.2}° and enlarged it by {:.2} %, but for {:.3} px",
+            self.farthest_px,
+            self.turn_deg,
+            1e2 * self.larger,
+            self.beside_px
         )
     }
 }

@@ -90,6 +90,10 @@ struct Tare {
     kept: bool,
     /// How far it is from the kept one, px.
     drift_px: Option<f64>,
+    /// How far re-zeroing moved it since it was taken, px.
+    rezeroed_px: f64,
+    /// How far from it the untouched film was seen last, px.
+    seen_px: Option<f64>,
 }
 
 impl Tare {
@@ -99,6 +103,8 @@ impl Tare {
             taken,
             kept: taken && settings.kept.tare,
             drift_px: settings.drift.map(px),
+            rezeroed_px: px(settings.rezeroed),
+            seen_px: settings.seen.map(|seen| f64::from(seen.0) * 1e-3),
         }
     }
 
@@ -108,10 +114,11 @@ impl Tare {
             Tare { kept: true, .. } => "kept",
             _ => "taken, until restart",
         };
-        match self.drift_px.filter(|_| !self.kept) {
-            Some(drift) => format!("{state}; {drift:.3} px from the kept one"),
-            None => state.to_owned(),
+        let mut text = state.to_owned();
+        if let Some(drift) = self.drift_px.filter(|_| !self.kept) {
+            text += &format!("; {drift:.3} px from the kept one");
         }
+        text + &settings::rest_text(self.rezeroed_px, self.seen_px)
     }
 }
 

@@ -312,9 +312,13 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
             "the images at rest are not those of four whole, equal markers: one may be covered, \
              cut, stained or glare; look at the film and its light, and clean it"
         }
-        Outcome::Touched => {
-            "something touches the film, as the rest position from before tells, or that of the \
-             unit's calibration: 0.3 mN and more; take it away, or say --force when nothing does"
+        Outcome::Touched { looks_like } => {
+            let millinewtons = f64::from(looks_like.0) * 1e-3;
+            &format!(
+                "the film looks touched, by {millinewtons:.1} mN, beside where it rested before, \
+                 when it was calibrated, or as sensors are built; take away what touches it, or \
+                 say --force when nothing does"
+            )
         }
         Outcome::Unsteady => {
             "the markers moved meanwhile; take away what touches or shakes the film"

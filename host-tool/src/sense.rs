@@ -214,11 +214,15 @@ impl<'a> Bench<'a> {
 }
 
 /// What is wrong with a tare's picture, and what to do.
-fn complaint(refusal: Refusal) -> &'static str {
+fn complaint(refusal: Refusal) -> String {
     match refusal {
-        Refusal::Touched => {
-            "shows a film that something touches, by where the unit's markers rested when it was \
-             calibrated: use a picture without a press, or calibrate anew"
+        Refusal::Touched(force) => {
+            let millinewtons = f64::from(force.0) * 1e-3;
+            return format!(
+                "shows a film that looks touched, by {millinewtons:.1} mN, beside where the unit \
+                 rested when it was calibrated, or as sensors are built: use a picture without a \
+                 press, or calibrate anew"
+            );
         }
         Refusal::MarkersImplausible | Refusal::Unsteady => {
             "does not show four whole, equal markers: one may be covered, cut, stained or glare; \
@@ -230,4 +234,5 @@ fn complaint(refusal: Refusal) -> &'static str {
              --preset"
         }
     }
+    .to_owned()
 }

@@ -41,9 +41,11 @@ __all__ = [
     "Device",
     "Error",
     "LostError",
+    "Moved",
     "NoDeviceError",
     "Recording",
     "RefusedError",
+    "Rest",
     "Sample",
     "Sensor",
     "Tare",
@@ -126,6 +128,38 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
+class Moved:
+    """How far a rest position is from the one before, and what a camera's motion explains of it."""
+
+    farthest: float
+    """How far the marker moved that moved most, px."""
+    shift: Floats
+    """(2,): how far the markers' middle moved, px."""
+    turn: float
+    """How far they turned about it, x towards y, rad."""
+    larger: float
+    """How much larger their pattern is, in parts of it."""
+    beside: float
+    """How far beside that they are: the coordinate that is farthest, px."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The rest position in use, and what became of it since it was taken."""
+
+    taken: bool
+    """Whether one was taken; the model's own is in use otherwise."""
+    kept: bool
+    """Whether it is the same after a restart."""
+    rezeroed: float
+    """How far re-zeroing moved it, px."""
+    seen: float | None
+    """How far from it the untouched film was seen last, px; `None` until it was seen."""
+    from_kept: float | None
+    """How far it is from the kept one, px; `None` unless there are both."""
+
+
+@dataclass(frozen=True, eq=False)
 class Tare:
     """What a tare gave."""
 
@@ -133,8 +167,8 @@ class Tare:
     """(4, 2): column and row of the markers at rest, px."""
     spread: float
     """How far the markers moved meanwhile, px."""
-    moved: float | None
-    """How far the rest position moved from the one before, px; `None` of the first one."""
+    moved: Moved | None
+    """How far the rest position moved from the one before; `None` of the first one."""
 
 
 def open(
@@ -199,13 +233,21 @@ class Sensor:
         """Takes the mean of the next good `frames` (1–256) as the rest position: nothing may touch
         the film. `force`: though something seems to. `keep`: through restarts.
 
-        Raises `RefusedError` when the sensor finds that it is not at rest, or sees no markers.
+        Raises `RefusedError` when the sensor finds that it is not at rest, with the force that the
+        markers look like, or sees no markers.
         """
         try:
             markers, spread, moved = self._connection.tare(frames, force, keep)
         finally:
             self._tell_log()
-        return Tare(np.array(markers), spread, moved)
+        return Tare(np.array(markers), spread, _moved(*moved) if moved else None)
+
+    def rest(self) -> Rest:
+        """The rest position in use, and how far from it the untouched film was seen last."""
+        try:
+            return Rest(*self._connection.rest())
+        finally:
+            self._tell_log()
 
     def snapshot(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3): the next whole frame as the sensing reads it, levels of red, green
@@ -248,6 +290,12 @@ class Recording:
         if numbers is None:
             raise StopIteration
         return _sample(*numbers)
+
+
+def _moved(
+    farthest: float, shift: tuple[float, float], turn: float, larger: float, beside: float
+) -> Moved:
+    return Moved(farthest, np.array(shift), turn, larger, beside)
 
 
 def _sample(

@@ -2,7 +2,7 @@
 //! taken only after the connection's own, so that two threads may use one connection.
 
 use crate::error::{Error, raised};
-use crate::told::{self, SampleNumbers, TareNumbers};
+use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame;
 use hivtac_host::link::{Link, log_text};
@@ -121,6 +121,16 @@ impl Talk {
         }
         tared.ok_or_else(|| self.link.lost("what the tare gave did not come"))
     }
+
+    fn rest(&mut self, patience: Duration) -> Result<RestNumbers, Failure> {
+        let mut rest = None;
+        let Talk { link, heard, .. } = self;
+        link.request(Request::GetSettings, patience, |message| match message {
+            DeviceMessage::Settings(report) => rest = Some(told::rest(&report)),
+            message => heard.take(message),
+        })?;
+        rest.ok_or_else(|| self.link.lost("the settings did not come"))
+    }
 }
 
 #[pymethods]
@@ -179,6 +189,11 @@ impl Connection {
     /// Takes a rest position.
     fn tare(&self, py: Python<'_>, frames: u16, force: bool, keep: bool) -> PyResult<TareNumbers> {
         self.with(py, |talk| talk.tare(frames, force, keep))
+    }
+
+    /// What became of the rest position.
+    fn rest(&self, py: Python<'_>) -> PyResult<RestNumbers> {
+        self.with(py, |talk| talk.rest(self.patience))
     }
 
     /// Number, device time, s, columns and rows of a frame, and its levels of red, green and blue.

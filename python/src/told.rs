@@ -4,7 +4,7 @@ use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::force::Force;
 use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, Sample};
-use hivtac_wire::settings::TareReport;
+use hivtac_wire::settings::{Moved, SettingsReport, TareReport};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -73,8 +73,16 @@ pub fn hello<'py>(py: Python<'py>, hello: &DeviceHello) -> PyResult<Bound<'py, P
     Ok(told)
 }
 
-/// Markers at rest, px; how far they spread, px; how far they moved from the rest before, px.
-pub type TareNumbers = ([(f64, f64); 4], f64, Option<f64>);
+/// Of the marker that moved most, px; of the markers' middle, px; turn, rad; how much larger their
+/// pattern is, in parts of it; what is left beside that, px.
+type MovedNumbers = (f64, (f64, f64), f64, f64, f64);
+
+/// Markers at rest, px; how far they spread, px; how far they moved from the rest before.
+pub type TareNumbers = ([(f64, f64); 4], f64, Option<MovedNumbers>);
+
+/// Whether a rest position was taken, and is kept; how far re-zeroing moved it, how far from there
+/// the untouched film was seen last, and how far it is from the kept one, px.
+pub type RestNumbers = (bool, bool, f64, Option<f64>, Option<f64>);
 
 /// What a tare gave.
 pub fn tare(report: &TareReport) -> TareNumbers {
@@ -84,7 +92,29 @@ pub fn tare(report: &TareReport) -> TareNumbers {
             .markers
             .map(|marker| (px(marker.x), px(marker.y))),
         px(report.spread),
-        report.moved.map(px),
+        report.moved.as_ref().map(moved),
+    )
+}
+
+fn moved(moved: &Moved) -> MovedNumbers {
+    (
+        px(moved.farthest),
+        (px(moved.shift.0), px(moved.shift.1)),
+        f64::from(moved.turn.0).to_radians() / 1e3,
+        moved.larger.to_f64(),
+        px(moved.beside),
+    )
+}
+
+/// What became of a rest position.
+pub fn rest(report: &SettingsReport) -> RestNumbers {
+    let is_taken = report.tare.is_some();
+    (
+        is_taken,
+        is_taken && report.kept.tare,
+        px(report.rezeroed),
+        report.seen.map(|seen| f64::from(seen.0) * 1e-3),
+        report.drift.map(px),
     )
 }
 

@@ -67,6 +67,8 @@ class OnTheRig(unittest.TestCase):
         with Rig("rest") as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:
             before = next(sensor)
             tare = sensor.tare(frames=4)
+            again = sensor.tare(frames=4)
+            rest = sensor.rest()
             picture = sensor.snapshot()
             after = next(sensor)
             with self.assertRaisesRegex(hivtac.RefusedError, "outside its range"):
@@ -74,6 +76,12 @@ class OnTheRig(unittest.TestCase):
         self.assertEqual(after.sequence, before.sequence + 1)
         self.assertEqual(tare.markers.shape, (4, 2))
         self.assertLess(tare.spread, 0.5)
+        self.assertIsNone(tare.moved)
+        moved = again.moved
+        self.assertEqual(moved.shift.shape, (2,))
+        self.assertLess(max(moved.farthest, moved.beside, *np.abs(moved.shift)), 0.1)
+        self.assertLess(max(abs(moved.turn), abs(moved.larger)), 1e-3)
+        self.assertEqual(rest, hivtac.Rest(True, False, 0.0, None, None))
         self.assertEqual((picture.shape, picture.dtype), ((240, 320, 3), np.uint8))
         red, green = picture[..., 0].astype(int), picture[..., 1].astype(int)
         for column, row in tare.markers.round().astype(int):

@@ -51,8 +51,12 @@ fn markers_that_are_covered_from_one_side_are_refused_and_nothing_changes() {
     }
 }
 
-/// The answers to these commands, each sent at its time.
-fn answered(scene: &'static str, asked: &[(u64, Request, Outcome)]) -> Run {
+/// A touch of this range, mN.
+type Touch = std::ops::Range<f64>;
+
+/// The answers to these commands, each sent at its time; where a touch is expected, one in that
+/// range, mN.
+fn answered(scene: &'static str, asked: &[(u64, Request, Result<Outcome, Touch>)]) -> Run {
     let mut setup = Setup {
         scene,
         ..Setup::new(firmware(), 300)
@@ -63,7 +67,13 @@ fn answered(scene: &'static str, asked: &[(u64, Request, Outcome)]) -> Run {
     }
     let run = setup.run();
     for (nth, (_, request, expected)) in (0..).zip(asked) {
-        assert_eq!(run.outcome(ASKED + nth), *expected, "{request:?}");
+        match (run.outcome(ASKED + nth), expected) {
+            (Outcome::Touched { looks_like }, Err(touch)) => {
+                let millinewtons = f64::from(looks_like.0) * 1e-3;
+                assert!(touch.contains(&millinewtons), "{millinewtons}");
+            }
+            (outcome, expected) => assert_eq!(Ok(outcome), *expected, "{request:?}"),
+        }
     }
     run
 }
@@ -78,9 +88,9 @@ fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_befor
     answered(
         "demo",
         &[
-            (190, Request::SetTare(Some(rest)), Outcome::Done),
-            (200, Request::Tare { frames }, Outcome::Touched),
-            (250, anyway.clone(), Outcome::NotAtRest),
+            (190, Request::SetTare(Some(rest)), Ok(Outcome::Done)),
+            (200, Request::Tare { frames }, Err(50.0..400.0)),
+            (250, anyway.clone(), Ok(Outcome::NotAtRest)),
         ],
     );
     let mut before = rest;
@@ -90,11 +100,19 @@ fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_befor
         marker.y.0 -= (marker.y.0 - y.0) / 64;
     }
     let set = Request::SetTare(Some(before));
-    let asked = [(190, set, Outcome::Done), (200, anyway, Outcome::Done)];
+    let asked = [
+        (190, set, Ok(Outcome::Done)),
+        (200, anyway, Ok(Outcome::Done)),
+    ];
     let run = answered("rest", &asked);
     let moved = report(&run).moved.expect("there was one before");
     let one = 1 << 16;
-    assert!((one / 2..2 * one).contains(&moved.0), "{moved:?}");
+    assert!((one / 2..2 * one).contains(&moved.farthest.0), "{moved:?}");
+    // A 64th, about the middle.
+    let larger = moved.larger.to_f64();
+    assert!((larger - 1.0 / 63.0).abs() < 1e-3, "{moved:?}");
+    let small = [moved.shift.0, moved.shift.1, moved.beside];
+    assert!(small.iter().all(|px| px.0.abs() < one / 16), "{moved:?}");
 }
 
 /// A millinewton is less than a contact, and more than a rest position bears: 0.1 N would read
@@ -105,8 +123,8 @@ fn what_still_presses_is_no_rest() {
     answered(
         "tests/residual.toml",
         &[
-            (190, Request::SetTare(Some(rest)), Outcome::Done),
-            (200, Request::Tare { frames: 4 }, Outcome::Touched),
+            (190, Request::SetTare(Some(rest)), Ok(Outcome::Done)),
+            (200, Request::Tare { frames: 4 }, Err(0.9..1.1)),
         ],
     );
 }
@@ -115,7 +133,7 @@ fn what_still_presses_is_no_rest() {
 #[test]
 fn a_shift_since_the_tare_is_within_what_is_stated() {
     let rest = report(&tared("rest", 200)).rest;
-    let set = [(190, Request::SetTare(Some(rest)), Outcome::Done)];
+    let set = [(190, Request::SetTare(Some(rest)), Ok(Outcome::Done))];
     let run = answered("tests/shifted.toml", &set);
     let is_tared = |sample: &Sample| !sample.status.contains(Status::TARE_MISSING);
     let samples = run.samples();

@@ -57,6 +57,8 @@ pub(crate) struct Tare {
     rest: Rest,
     /// How far the film may rest from that.
     drift: Drift,
+    /// Whether it was seen there.
+    is_seen: bool,
     quiet: Option<Quiet>,
 }
 
@@ -105,6 +107,7 @@ impl Tare {
             moved: [Px(0); 8],
             rest: taken,
             drift,
+            is_seen: false,
             quiet: None,
         }
     }
@@ -133,6 +136,13 @@ impl Tare {
     /// How far the film may rest from the one that is measured against.
     pub fn drift(&self) -> &Drift {
         &self.drift
+    }
+
+    /// How far from there the untouched film was seen last: the coordinate that was farthest.
+    /// `None` until it was seen.
+    pub fn seen(&self) -> Option<MilliPx> {
+        let far = 1e3 * self.drift.farthest_px() + 0.5;
+        self.is_seen.then_some(MilliPx(far as u16))
     }
 
     /// [`Status::REZEROED`] and [`Status::REST_MOVED`].
@@ -184,6 +194,8 @@ impl Tare {
         if let Some(limits) = limits.filter(is_long) {
             self.move_towards(limits, &there);
         }
+        // What was seen is no more what nobody saw.
+        (self.drift, self.is_seen) = (Drift::NONE, true);
         let seen_px = self.drift.seen_px.as_flattened_mut().iter_mut();
         for (seen, (there, moved)) in seen_px.zip(there.iter().zip(self.moved)) {
             *seen = Px::saturated(*there - Q::from(moved)).to_f32();

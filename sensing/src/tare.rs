@@ -6,7 +6,8 @@
 //! 1. the images are those of whole markers ([`Sensor::tare_with`](crate::pipeline::Sensor)): a
 //!    film at rest is flat, so that optics says what four equal discs look like;
 //! 2. nothing moves: the frames scatter no more than noise does;
-//! 3. nothing touches the film, as the rest position from before tells, where there is one;
+//! 3. nothing touches the film, as the rest position from before tells, or that of the unit's
+//!    calibration; without either, as far as how exactly units are built lets it be seen;
 //! 4. the markers are as far from their centre as a film at rest shows them ([`Rest::fits`]).
 //!
 //! Who [insists](TareBuilder::insisting) does without 2 and 3.
@@ -17,7 +18,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::root::rounded_root;
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MicroNewtons, Px};
 
 /// Most frames in a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
@@ -40,8 +41,8 @@ pub enum Refusal {
     Unsteady,
     /// The markers are nearer to or farther from their centre than a film at rest shows them.
     NotAtRest,
-    /// Something touches the film.
-    Touched,
+    /// Something touches the film: the force that it looks like.
+    Touched(MicroNewtons),
 }
 
 /// Sums up good frames until there are enough. All sums are exact; each mean is rounded once, half
@@ -53,6 +54,8 @@ pub struct TareBuilder {
     taken: u16,
     implausible: u16,
     touched: u16,
+    /// The force of the touched frame that came last.
+    touch: MicroNewtons,
     features: [Q<16, i64>; FEATURES],
     areas: [u64; 4],
     /// Coordinates of the first frame; sums of what the others differ by, and of its squares, px².
@@ -71,6 +74,7 @@ impl TareBuilder {
             taken: 0,
             implausible: 0,
             touched: 0,
+            touch: MicroNewtons(0),
             features: [Q::default(); FEATURES],
             areas: [0; 4],
             first: [Q::default(); 8],
@@ -110,11 +114,12 @@ impl TareBuilder {
         (self.implausible >= self.wanted).then_some(Refusal::MarkersImplausible)
     }
 
-    /// Takes notice of a frame in which something touches the film. Says so once there were as many
-    /// as good ones are wanted.
-    pub fn add_touched(&mut self) -> Option<Refusal> {
+    /// Takes notice of a frame in which something touches the film with this force. Says so once
+    /// there were as many as good ones are wanted.
+    pub fn add_touched(&mut self, touch: MicroNewtons) -> Option<Refusal> {
         self.touched = self.touched.saturating_add(1);
-        (self.touched >= self.wanted).then_some(Refusal::Touched)
+        self.touch = touch;
+        (self.touched >= self.wanted).then_some(Refusal::Touched(touch))
     }
 
     /// Whether frames are taken in which something touches the film.
@@ -122,9 +127,9 @@ impl TareBuilder {
         self.insists
     }
 
-    /// Whether something touched the film in a frame.
-    pub fn saw_touch(&self) -> bool {
-        self.touched > 0
+    /// The force of the last frame in which something touched the film, if any.
+    pub fn saw_touch(&self) -> Option<MicroNewtons> {
+        (self.touched > 0).then_some(self.touch)
     }
 
     /// The largest standard deviation of a marker's coordinate over the frames that were taken, to
@@ -335,9 +340,11 @@ mod tests {
     #[test]
     fn as_many_touched_frames_as_good_ones_are_wanted_end_it() {
         let mut builder = TareBuilder::new(2).unwrap();
-        assert_eq!(builder.add_touched(), None);
-        assert!(builder.saw_touch());
-        assert_eq!(builder.add_touched(), Some(Refusal::Touched));
+        assert_eq!(builder.saw_touch(), None);
+        let [first, last] = [3_000, 4_000].map(MicroNewtons);
+        assert_eq!(builder.add_touched(first), None);
+        assert_eq!(builder.saw_touch(), Some(first));
+        assert_eq!(builder.add_touched(last), Some(Refusal::Touched(last)));
     }
 
     #[test]

@@ -89,6 +89,8 @@ fn the_sensing_runs_from_itcm() {
         "14CovarianceGrid3new",
         "7Resting8of_model",
         "7Resting5touch",
+        "7Resting13touch_of_unit",
+        "7Resting8touch_by",
         "7Resting9set_drift",
         "7forward5drift",
         "5force10of_outputs",

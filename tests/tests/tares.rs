@@ -66,30 +66,37 @@ fn built(random: &mut Random) -> Options {
     }
 }
 
-fn honest_units_are_tared(units: u64) {
+/// Each is tared twice, the second time in other light; the refusals.
+fn refused_tares(units: u64) -> Vec<String> {
     let mut sensor = sensor();
     let mut random = Random::new(3);
+    let mut refused = Vec::new();
     for number in 0..units {
         let mut options = built(&mut random);
         sensor.forget_tare();
-        // The second time in other light.
         for times in [1.0, between(&mut random, 0.8, 1.2)] {
             options.gain *= times;
             let outcome = sensor.tare(FRAMES, at_rest(&scene(&options, number)));
-            assert!(outcome.unwrap().is_ok(), "{number}: {options:?}");
+            if let Err(refusal) = outcome.unwrap() {
+                refused.push(format!("{refusal:?}: unit {number}, {options:?}"));
+            }
         }
     }
+    refused
 }
 
 #[test]
 fn units_as_people_build_them_are_tared() {
-    honest_units_are_tared(40);
+    let refused = refused_tares(40);
+    assert!(refused.is_empty(), "{}", refused.join("\n"));
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn a_thousand_units_as_people_build_them_are_tared() {
-    honest_units_are_tared(1_000);
+fn of_ten_thousand_tares_of_untouched_films_one_in_a_thousand_may_be_refused() {
+    let refused = refused_tares(5_000);
+    println!("{} of 10,000 tares were refused", refused.len());
+    assert!(refused.len() <= 10, "{}", refused.join("\n"));
 }
 
 /// A disc that covers each of these markers so far from one side, or grows on it.
@@ -228,7 +235,8 @@ fn a_film_that_moves_or_is_pressed_is_refused() {
         let frames = pressed(newton).map(|(load, number)| clean.render_load(&load, number));
         sensor.tare(FRAMES, frames.map(Result::unwrap)).unwrap()
     };
-    assert_eq!(tare(|n| 0.002 * (n % 4) as f64), Err(Refusal::Touched));
+    let moving = tare(|n| 0.002 * (n % 4) as f64);
+    assert!(matches!(moving, Err(Refusal::Touched(_))), "{moving:?}");
     assert_eq!(tare(|_| 0.2), Err(Refusal::NotAtRest));
     assert!(tare(|_| 0.0).is_ok());
 }
@@ -248,7 +256,11 @@ fn what_still_presses_is_refused_and_a_camera_that_moved_is_tared() {
     for force_n in [5e-4, 1e-3, 1.5e-3] {
         for place_mm in [[0.0, 0.0], [2.0, -1.0], [-3.5, 3.5]] {
             let outcome = sensor().tare(FRAMES, pressed(force_n, place_mm)).unwrap();
-            assert_eq!(outcome, Err(Refusal::Touched), "{force_n} {place_mm:?}");
+            let Err(Refusal::Touched(looks_like)) = outcome else {
+                panic!("{force_n} N at {place_mm:?} mm: {outcome:?}");
+            };
+            let off = f64::from(looks_like.0) * 1e-6 / force_n - 1.0;
+            assert!(off.abs() < 0.4, "{force_n} N looks like {looks_like:?}");
         }
     }
     for (shift_px, roll_deg, longer) in [
@@ -271,6 +283,53 @@ fn what_still_presses_is_refused_and_a_camera_that_moved_is_tared() {
             outcome.is_ok(),
             "{shift_px:?} {roll_deg} {longer}: {outcome:?}"
         );
+    }
+}
+
+/// Of units that nothing is known of, pressed by so much when they are tared: how many were
+/// refused, how many forces after the tares that were taken are right, and which are beyond what is
+/// stated.
+fn first_tares(units: u64, force_n: f64) -> (u64, usize, Vec<String>) {
+    let mut sensor = sensor();
+    let mut random = Random::new(11);
+    let (mut refused, mut told, mut wrong) = (0, 0, Vec::new());
+    for number in 0..units {
+        let scene = scene(&built(&mut random), number);
+        let place_mm = [0; 2].map(|_| between(&mut random, -4.0, 4.0));
+        let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
+        let load = load.with_offset_mm(place_mm).unwrap();
+        sensor.forget_tare();
+        let frames = 0..4 * u64::from(FRAMES);
+        let frames = frames.map(|number| scene.render_load(&load, number).unwrap());
+        if sensor.tare(FRAMES, frames).unwrap().is_err() {
+            refused += 1;
+            continue;
+        }
+        for number in 0..PRESSED as u64 {
+            let load = PRESSES.draw(&mut random).unwrap();
+            let frame = scene.render_load(&load, number).unwrap();
+            match Judged::of(&sensor.sense(&frame), &frame.truth) {
+                Judged::Right => told += 1,
+                Judged::Wrong(how) => wrong.push(how),
+                Judged::Refused(_) => {}
+            }
+        }
+    }
+    (refused, told, wrong)
+}
+
+/// As far as gluing, lens and camera leave it to be seen.
+#[test]
+fn a_first_tare_of_a_pressed_film_is_refused_or_within_what_is_stated() {
+    for (force_n, least) in [(0.002, 0), (0.005, 30), (0.01, 54)] {
+        let (refused, told, wrong) = first_tares(60, force_n);
+        assert!(
+            refused >= least,
+            "{force_n} N: {refused} of 60 were refused"
+        );
+        // The place of some is a tenth farther off than what is stated.
+        let most = (told + wrong.len()) / 25;
+        assert!(wrong.len() <= most, "{force_n} N: {}", wrong.join("\n"));
     }
 }
 

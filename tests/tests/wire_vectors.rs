@@ -287,6 +287,7 @@ fn settings() -> DeviceMessage {
         failures: 0,
         temporal: OWN,
         rezeroed: Px(1_311),
+        seen: Some(MilliPx(100)),
         drift: Some(Px(20_316)),
         camera: camera(),
     })
@@ -303,11 +304,20 @@ fn health() -> DeviceMessage {
     })
 }
 
+/// Of a camera that moved: 0.2 px to the right and 0.1 px up, by 12 m° and 0.3 %.
+const MOVED: Moved = Moved {
+    farthest: Px(20_316),
+    shift: (Px(13_107), Px(-6_554)),
+    turn: MilliDegrees(12),
+    larger: Q::from_bits(197),
+    beside: Px(524),
+};
+
 fn tared() -> DeviceMessage {
     DeviceMessage::Tared(TareReport {
         rest: rest(),
         spread: Px(789),
-        moved: Some(Px(20_316)),
+        moved: Some(MOVED),
     })
 }
 
@@ -375,7 +385,15 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("settings", settings()),
         ("tared", tared()),
         ("health", health()),
-        ("reply-touched", reply(7, Outcome::Touched)),
+        (
+            "reply-touched",
+            reply(
+                7,
+                Outcome::Touched {
+                    looks_like: MicroNewtons(1_043),
+                },
+            ),
+        ),
         ("reply-worn", reply(14, Outcome::Worn)),
         ("reply-model-unusable", reply(18, Outcome::ModelUnusable)),
         ("reply-another-sensor", reply(18, Outcome::AnotherSensor)),

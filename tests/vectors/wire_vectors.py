@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x33549E33729C10D1
+SCHEMA = 0x7F9AF0A45B294C69
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -306,6 +306,8 @@ DEVICE = {
         unsigned("failures", 0),
         *OWN,
         signed("rezeroed_q16", 1_311),
+        raw("seen: Some", [1]),
+        unsigned("seen_mpx", 100),
         raw("drift: Some", [1]),
         signed("drift_q16", 20_316),
         *CAMERA,
@@ -330,13 +332,21 @@ DEVICE = {
         *REST[1:],
         signed("spread_q16", 789),
         raw("moved: Some", [1]),
-        signed("moved_q16", 20_316),
+        signed("farthest_q16", 20_316),
+        signed("shift: x_q16", 13_107),
+        signed("y_q16", -6_554),
+        signed("turn_mdeg", 12),
+        signed("larger_q16", 197),
+        signed("beside_q16", 524),
     ],
     "reply-worn": [raw("Reply", [4]), unsigned("id", 14), raw("outcome: Worn", [10])],
     "reply-model-unusable": [
         raw("Reply", [4]), unsigned("id", 18), raw("outcome: ModelUnusable", [11]),
     ],
-    "reply-touched": [raw("Reply", [4]), unsigned("id", 7), raw("outcome: Touched", [13])],
+    "reply-touched": [
+        raw("Reply", [4]), unsigned("id", 7), raw("outcome: Touched", [13]),
+        signed("looks_like_un", 1_043),
+    ],
     "reply-another-sensor": [
         raw("Reply", [4]), unsigned("id", 18), raw("outcome: AnotherSensor", [12]),
     ],

@@ -104,6 +104,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             failures: u32::MAX,
             temporal: longest_temporal(),
             rezeroed: Px(i32::MIN),
+            seen: Some(MilliPx(u16::MAX)),
             drift: Some(Px(i32::MIN)),
             camera: longest_camera_report(),
         }),
@@ -118,7 +119,13 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
         DeviceMessage::Tared(TareReport {
             rest: longest_rest(),
             spread: Px(i32::MIN),
-            moved: Some(Px(i32::MIN)),
+            moved: Some(Moved {
+                farthest: Px(i32::MIN),
+                shift: (Px(i32::MIN), Px(i32::MIN)),
+                turn: MilliDegrees(i32::MIN),
+                larger: Q::from_bits(i32::MIN),
+                beside: Px(i32::MIN),
+            }),
         }),
     ]
 }
@@ -482,7 +489,9 @@ fn any_reply() -> impl Strategy<Value = Reply> {
         Just(Outcome::Worn),
         Just(Outcome::ModelUnusable),
         Just(Outcome::AnotherSensor),
-        Just(Outcome::Touched),
+        any::<i32>().prop_map(|looks_like| Outcome::Touched {
+            looks_like: MicroNewtons(looks_like)
+        }),
     ];
     (any::<u16>(), outcome).prop_map(|(id, outcome)| Reply { id, outcome })
 }
@@ -551,13 +560,13 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         proptest::option::of(any_rest()),
         any_temporal(),
     );
-    let numbers = any::<([u32; 2], i32, Option<i32>)>();
+    let numbers = any::<([u32; 2], i32, Option<u16>, Option<i32>)>();
     (used, any_selection(), found, numbers, any_camera_report()).prop_map(
         |(
             (name, threshold, tare, temporal),
             kept,
             found,
-            ([erases, failures], rezeroed, drift),
+            ([erases, failures], rezeroed, seen, drift),
             camera,
         )| {
             SettingsReport {
@@ -570,6 +579,7 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
                 failures,
                 temporal,
                 rezeroed: Px(rezeroed),
+                seen: seen.map(MilliPx),
                 drift: drift.map(Px),
                 camera,
             }
@@ -601,10 +611,18 @@ fn any_health() -> impl Strategy<Value = Health> {
 }
 
 fn any_tared() -> impl Strategy<Value = TareReport> {
-    (any_rest(), any::<(i32, Option<i32>)>()).prop_map(|(rest, (spread, moved))| TareReport {
+    let moved = any::<[i32; 6]>().prop_map(|[farthest, x, y, turn, larger, beside]| Moved {
+        farthest: Px(farthest),
+        shift: (Px(x), Px(y)),
+        turn: MilliDegrees(turn),
+        larger: Q::from_bits(larger),
+        beside: Px(beside),
+    });
+    let moved = proptest::option::of(moved);
+    (any_rest(), any::<i32>(), moved).prop_map(|(rest, spread, moved)| TareReport {
         rest,
         spread: Px(spread),
-        moved: moved.map(Px),
+        moved,
     })
 }
 

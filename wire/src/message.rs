@@ -11,6 +11,7 @@ use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::MicroNewtons;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -396,6 +397,10 @@ pub enum Outcome {
     /// Refused: the model was made for another sensor, camera or frame. A [`LogLine`] before this
     /// says which.
     AnotherSensor,
-    /// Refused: something touches the film, as the rest position from before tells.
-    Touched,
+    /// Refused: something touches the film, as the rest position from before tells, that of the
+    /// unit's calibration, or how units are built.
+    Touched {
+        /// The force that it looks like, µN.
+        looks_like: MicroNewtons,
+    },
 }

@@ -7,7 +7,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
-use hivtac_terms::units::{Microseconds, Px, Sixteenths};
+use hivtac_terms::units::{Microseconds, MilliDegrees, MilliPx, Px, Sixteenths};
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +57,10 @@ pub struct SettingsReport {
     /// How far re-zeroing moved the rest position that is in use from `tare`: the coordinate of a
     /// marker that it moved farthest.
     pub rezeroed: Px,
+    /// How far from the rest position in use the untouched film was seen last, a mean of a second:
+    /// the coordinate of a marker that was farthest. `None` until it was seen, and without a rest
+    /// position.
+    pub seen: Option<MilliPx>,
     /// How far the rest position in use is from the kept one, by the marker that moved most: the
     /// drift since then. `None` unless there are both, for the same frames.
     pub drift: Option<Px>,
@@ -84,9 +88,23 @@ pub struct TareReport {
     pub rest: RestPosition,
     /// Largest standard deviation of a marker's coordinate over the frames.
     pub spread: Px,
-    /// How far it is from the rest position before, by the marker that moved most; `None` when
-    /// there was none.
-    pub moved: Option<Px>,
+    /// How far it is from the rest position before; `None` when there was none.
+    pub moved: Option<Moved>,
+}
+
+/// How far a rest position is from another one, and what a camera's motion explains of that.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Moved {
+    /// How far the marker moved that moved most.
+    pub farthest: Px,
+    /// How far the markers' middle moved, (x, y).
+    pub shift: (Px, Px),
+    /// How far they turned about it, x towards y.
+    pub turn: MilliDegrees,
+    /// How much larger their pattern is, in parts of it.
+    pub larger: Q<16>,
+    /// How far beside that they are: the coordinate of a marker that is farthest.
+    pub beside: Px,
 }
 
 /// Some of the settings.

@@ -11,7 +11,7 @@ use crate::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before there is a frame.
@@ -32,6 +32,14 @@ pub struct Resting {
 const UNEXPLAINED_BLURRED: f32 = 5.0;
 /// Where the search for a light touch begins, in parts of the largest size.
 const FIRST_SIZE: f32 = 0.1;
+/// How exactly units are built, as standard deviations: a marker's place along each axis, mm; and
+/// whatever shift and turn its camera has, in parts of the pattern's radius, its focal length and
+/// its distance from the film.
+const GLUED_MM: f32 = 0.15;
+const BUILT: Drift = Drift {
+    unseen: [0.1, 0.1, 0.025],
+    ..Drift::NONE
+};
 /// Areas at which a marker's noise is known, in parts of the one at rest.
 const AREAS: [f32; 2] = [0.5, 6.0];
 
@@ -86,17 +94,48 @@ impl Resting {
         }
     }
 
-    /// The force that another rest position looks like, µN, and its standard uncertainty by noise,
-    /// whatever the camera did.
+    /// The force that another rest position of a unit looks like, µN, and its standard uncertainty
+    /// by noise, whatever the camera did.
     pub fn touch(
         model: &Model<'_>,
         rest: &Rest,
         other: &Rest,
     ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
+        Self::touch_by(
+            model,
+            rest,
+            other,
+            &Drift::MOUNTED_ANEW,
+            FrameNoise::AS_MODELLED,
+        )
+    }
+
+    /// The same of a unit of which no rest position is known, built like the model's.
+    pub fn touch_of_unit(
+        model: &Model<'_>,
+        other: &Rest,
+    ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
+        let forward = model.forward.as_ref()?;
+        let scale = forward.rest_image.mounting(&model.rest).scale();
+        let [away, _] = forward.rest_image.film_mm[0];
+        let noise = FrameNoise {
+            blur: Px((GLUED_MM / away / scale * 65_536.0) as i32),
+            ..FrameNoise::AS_MODELLED
+        };
+        Self::touch_by(model, &model.rest, other, &BUILT, noise)
+    }
+
+    fn touch_by(
+        model: &Model<'_>,
+        rest: &Rest,
+        other: &Rest,
+        drift: &Drift,
+        noise: FrameNoise,
+    ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
         let forward = model.forward.as_ref()?;
         let mut resting = Resting::of_model(model, rest)?;
-        resting.set_drift(&Drift::MOUNTED_ANEW);
-        let observed = resting.observed(forward, &other.markers(), FrameNoise::AS_MODELLED);
+        resting.set_drift(drift);
+        let observed = resting.observed(forward, &other.markers(), noise);
         let guess = Pose {
             size: FIRST_SIZE * forward.limits.size,
             place_mm: forward.rest_image.where_most(&observed.moved),

@@ -41,7 +41,7 @@ pub use covariance::{Covariance, CovarianceGrid, KNOTS, LARGEST_STEP, Unknown, W
 pub use descent::Descent;
 pub use drift::Drift;
 pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED, stated};
-pub use mounting::{Mounting, RestImage};
+pub use mounting::{CameraMotion, Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
 pub use predict::{DOTS, MOST_FUNCTIONS, Markers, Prediction, Tables};
 pub(crate) use solve::square;

@@ -131,27 +131,66 @@ fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
     [along / square, across / square]
 }
 
+/// How a camera moved over a film since it was seen with its markers elsewhere, as far as a shift,
+/// a turn and a change of scale explain that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraMotion {
+    /// How far the markers' middle moved, px.
+    pub shift_px: [f32; 2],
+    /// What brings the markers back, as seen from their middle, as a complex number: its argument
+    /// is the turn, x towards y, its absolute value the scale, either the other way round.
+    pub back: [f32; 2],
+    /// How far beside where they were the markers are then: the coordinate that is farthest, px.
+    pub beside_px: f32,
+    /// The pattern's radius before, px.
+    radius_px: f32,
+}
+
+impl CameraMotion {
+    /// From `before` to `now`.
+    pub fn between(before: &Rest, now: &Rest) -> CameraMotion {
+        let places = [now, before].map(places_px);
+        let [at, at_before] = places.each_ref().map(middle);
+        let [seen, own] = places.each_ref().map(about_middle);
+        let back = similarity(&seen, &own);
+        let beside = |k: usize| {
+            let [x, y] = turned(back, seen[k]);
+            (x - own[k][0]).abs().max((y - own[k][1]).abs())
+        };
+        CameraMotion {
+            shift_px: [at[0] - at_before[0], at[1] - at_before[1]],
+            back,
+            beside_px: (0..DOTS).map(beside).fold(0.0, f32::max),
+            radius_px: radius(&own),
+        }
+    }
+
+    /// How many times as large the pattern is seen as before.
+    pub fn times(&self) -> f32 {
+        let [along, across] = self.back;
+        1.0 / sqrt(along * along + across * across)
+    }
+
+    /// Whether it is as small as of a unit's own camera that was mounted anew.
+    fn is_remounting(&self) -> bool {
+        let [along, across] = self.back;
+        let [x, y] = self.shift_px.map(f32::abs);
+        let scale = sqrt(along * along + across * across);
+        x.max(y) <= LARGEST_SHIFT * self.radius_px
+            && across.abs() <= LARGEST_TURN
+            && (scale - 1.0).abs() <= LARGEST_SCALE
+            && self.beside_px <= NEAR.to_f32()
+    }
+}
+
 impl Mounting {
     /// The same film, seen as at `rest` by a camera that moved since it was seen as at `own`.
     /// `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of scale of
     /// 1 % bring all markers within [`NEAR`] of that: another unit's film.
     pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
-        let places = [rest, own].map(places_px);
-        let [at, own_at] = places.each_ref().map(middle);
-        let [seen, own] = places.each_ref().map(about_middle);
-        let [along, across] = similarity(&seen, &own);
-        let beside = |k: usize| {
-            let [x, y] = turned([along, across], seen[k]);
-            (x - own[k][0]).abs().max((y - own[k][1]).abs())
-        };
-        let shift = (at[0] - own_at[0]).abs().max((at[1] - own_at[1]).abs());
-        let scale = sqrt(along * along + across * across);
-        let is_own = shift <= LARGEST_SHIFT * radius(&own)
-            && across.abs() <= LARGEST_TURN
-            && (scale - 1.0).abs() <= LARGEST_SCALE
-            && (0..DOTS).all(|k| beside(k) <= NEAR.to_f32());
-        is_own.then(|| Mounting {
-            per_px: turned(self.per_px, [along, across]),
+        let motion = CameraMotion::between(own, rest);
+        motion.is_remounting().then(|| Mounting {
+            per_px: turned(self.per_px, motion.back),
             ..*self
         })
     }
@@ -252,6 +291,27 @@ mod tests {
         let [xx, xy, yy] = REST.noise(1, [4.0, 1.0]);
         assert!((xx - 2.5).abs() < 1e-5 && (xy + 1.5).abs() < 1e-5 && (yy - 2.5).abs() < 1e-5);
         assert_eq!(REST.noise(4, [4.0, 1.0]), [4.0, 0.0, 1.0]);
+    }
+
+    /// Shifted by (2, −1) px, turned by 1°, 1 % larger, and one marker 0.2 px beside that.
+    #[test]
+    fn a_camera_that_moved_is_told_by_shift_turn_and_scale() {
+        let focal = [178.5, 0.0];
+        let before = rest([[0.0; 2]; 4], focal, [160.0, 120.0]);
+        let turn = 1f32.to_radians();
+        let moved = focal.map(|_| 178.5 * 1.01);
+        let moved = [moved[0] * turn.cos(), moved[1] * turn.sin()];
+        let now = rest([[0.0; 2]; 4], moved, [162.0, 119.0]);
+        let motion = CameraMotion::between(&before, &now);
+        let [along, across] = motion.back;
+        assert!((motion.shift_px[0] - 2.0).abs() < 1e-3 && (motion.shift_px[1] + 1.0).abs() < 1e-3);
+        assert!((motion.times() - 1.01).abs() < 1e-5, "{motion:?}");
+        assert!((-across.atan2(along) - turn).abs() < 1e-5, "{motion:?}");
+        assert!(motion.beside_px < 1e-3, "{motion:?}");
+        let mut pulled = now;
+        pulled.features.centroids[1].0.0 += 13_107;
+        let beside = CameraMotion::between(&before, &pulled).beside_px;
+        assert!((0.05..0.2).contains(&beside), "{beside}");
     }
 
     #[test]

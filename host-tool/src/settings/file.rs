@@ -86,6 +86,8 @@ pub struct Kept {
     file: File,
     /// px.
     rezeroed_px: f64,
+    /// px.
+    seen_px: Option<f64>,
     kept: KeptParts,
     found: &'static str,
     erases: u32,
@@ -116,6 +118,7 @@ impl Kept {
         Kept {
             file: File::new(device_id, report),
             rezeroed_px: report.rezeroed.to_f64(),
+            seen_px: report.seen.map(|seen| f64::from(seen.0) * 1e-3),
             kept: KeptParts {
                 name,
                 threshold,
@@ -342,6 +345,7 @@ mod tests {
             failures: 0,
             temporal: TemporalSettings::default(),
             rezeroed: Px(0),
+            seen: None,
             drift: None,
             camera: camera(),
         }

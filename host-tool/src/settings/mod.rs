@@ -16,7 +16,6 @@ use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
 use hivtac_terms::camera::CameraSettings;
-use hivtac_terms::units::Px;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
 use serde_json::{Value, json};
@@ -267,6 +266,19 @@ impl Device {
     }
 }
 
+/// What became of a rest position since it was taken, to stand behind that: how far re-zeroing
+/// moved it, and how far from it the untouched film was seen last, px.
+pub fn rest_text(rezeroed_px: f64, seen_px: Option<f64>) -> String {
+    let mut text = String::new();
+    if rezeroed_px != 0.0 {
+        text += &format!("; re-zeroed by {rezeroed_px:.3} px");
+    }
+    if let Some(seen) = seen_px {
+        text += &format!("; untouched, last seen {seen:.3} px from there");
+    }
+    text
+}
+
 fn lines(report: &SettingsReport) -> Vec<String> {
     let until = |kept: bool| match kept {
         true => "kept",
@@ -276,11 +288,9 @@ fn lines(report: &SettingsReport) -> Vec<String> {
         "" => "none".to_owned(),
         name => shown(name),
     };
-    let tare = match (report.tare, report.rezeroed) {
-        (None, _) => "none".to_owned(),
-        (Some(_), Px(0)) => "taken".to_owned(),
-        (Some(_), moved) => format!("taken; re-zeroed by {:.3} px", moved.to_f64()),
-    };
+    let taken = report.tare.map_or("none", |_| "taken");
+    let seen_px = report.seen.map(|seen| f64::from(seen.0) * 1e-3);
+    let tare = taken.to_owned() + &rest_text(report.rezeroed.to_f64(), seen_px);
     let found = match report.found {
         Found::Nothing => "nothing was ever kept",
         Found::Settings => "settings found at the start",

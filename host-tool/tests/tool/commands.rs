@@ -3,6 +3,7 @@
 use crate::fake::*;
 use crate::run::*;
 use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
+use hivtac_terms::units::MicroNewtons;
 use hivtac_wire::frame::encode;
 use hivtac_wire::message::*;
 use hivtac_wire::version::SCHEMA_HASH;
@@ -69,6 +70,8 @@ fn info_as_json() {
     assert_eq!(info["stats"]["frames_exposed"], 0);
     assert_eq!(info["model"]["source"], "built-in");
     assert_eq!(info["tare"]["drift_px"], 20_316.0 / 65_536.0);
+    assert_eq!(info["tare"]["rezeroed_px"], 0.0);
+    assert_eq!(info["tare"]["seen_px"], serde_json::Value::Null);
     assert_eq!(run.stdout.lines().count(), 1);
 }
 
@@ -207,7 +210,9 @@ fn a_tare_is_taken_refused_or_not_answered() {
             Some(0),
             "tare taken over 64 frames: markers at (100.00, 60.00), (220.00, 60.00), \
              (220.00, 180.00), \
-             (100.00, 180.00) px, spread 0.012 px, 0.310 px from the rest before\n"
+             (100.00, 180.00) px, spread 0.012 px, 0.310 px from the rest before: as if the camera \
+             had shifted the picture by (0.20, -0.10) px, turned it by 0.01° and enlarged it by \
+             0.30 %, but for 0.008 px\n"
         )
     );
     assert_eq!(
@@ -218,14 +223,18 @@ fn a_tare_is_taken_refused_or_not_answered() {
     let done = run(&["tare", "--force", "--json", "--port", &insisting.port]);
     let tared: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
     assert_eq!(tared["markers"][2], serde_json::json!([220.0, 180.0]));
-    assert_eq!(tared["moved_px"], 20_316.0 / 65_536.0);
+    assert_eq!(tared["moved"]["farthest_px"], 20_316.0 / 65_536.0);
     assert_eq!(
         insisting.commands.iter().collect::<Vec<_>>(),
         [Request::TareAnyway { frames: 32 }]
     );
-    let touched = run(&["tare", "--port", &device(Some(Outcome::Touched)).port]);
+    let looks_like = MicroNewtons(1_043);
+    let touch = Outcome::Touched { looks_like };
+    let touched = run(&["tare", "--port", &device(Some(touch)).port]);
     assert_eq!(touched.code, Some(6));
-    assert!(touched.stderr.contains("--force"), "{}", touched.stderr);
+    for word in ["by 1.0 mN", "--force"] {
+        assert!(touched.stderr.contains(word), "{}", touched.stderr);
+    }
     let blind = run(&["tare", "--port", &device(Some(Outcome::NoGoodFrames)).port]);
     assert_eq!(blind.code, Some(6));
     assert_eq!(
@@ -400,7 +409,7 @@ fn commands_tell_programs_what_they_did() {
     };
     let tare = told(&["tare", "--frames", "8", "--keep"]);
     assert_eq!((&tare["frames"], &tare["kept"]), (&8.into(), &true.into()));
-    assert_eq!(tare["moved_px"], 20_316.0 / 65_536.0);
+    assert_eq!(tare["moved"]["farthest_px"], 20_316.0 / 65_536.0);
     assert_eq!(told(&["expose"]), serde_json::json!({ "exposed": true }));
     let threshold = told(&["threshold", "--model"]);
     assert_eq!(threshold["threshold"]["saturation_low"], 100);

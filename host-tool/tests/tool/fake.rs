@@ -136,7 +136,7 @@ impl Conversation {
                         self.send(DeviceMessage::Tared(TareReport {
                             rest: self.settings.tare.unwrap(),
                             spread: Px(789),
-                            moved: Some(Px(20_316)),
+                            moved: Some(MOVED),
                         }));
                     }
                     self.reply(id, outcome);
@@ -212,6 +212,15 @@ pub fn hello() -> DeviceHello {
 }
 
 /// Of a device with a name that is kept, a tare that is not, and the model's threshold.
+/// What a tare's report says of the rest position before.
+pub const MOVED: Moved = Moved {
+    farthest: Px(20_316),
+    shift: (Px(13_107), Px(-6_554)),
+    turn: MilliDegrees(12),
+    larger: Q::from_bits(197),
+    beside: Px(524),
+};
+
 pub fn settings() -> SettingsReport {
     let marker = |x: i32, y: i32| Marker {
         x: Px(x << 16),
@@ -246,6 +255,7 @@ pub fn settings() -> SettingsReport {
         failures: 0,
         temporal: TemporalSettings::default(),
         rezeroed: Px(0),
+        seen: None,
         drift: Some(Px(20_316)),
         camera: camera(),
     }

@@ -308,14 +308,21 @@ fn a_limit_out_of_its_range_changes_nothing() {
 
 #[test]
 fn a_re_zeroed_rest_position_is_told() {
-    let script: Script = Box::new(|device| {
-        device.settings.rezeroed = Px(3 << 12);
-        device.serve();
-    });
-    let device = FakeDevice::on_tcp([script]);
-    let run = run(&["settings", "get", "--port", &device.port]);
-    let line = "tare       taken; re-zeroed by 0.188 px (until restart)\n";
-    assert!(run.stdout.contains(line), "{}", run.stdout);
+    let script = || -> Script {
+        Box::new(|device| {
+            device.settings.rezeroed = Px(3 << 12);
+            device.settings.seen = Some(MilliPx(62));
+            device.serve();
+        })
+    };
+    let device = FakeDevice::on_tcp([script(), script()]);
+    let became = "re-zeroed by 0.188 px; untouched, last seen 0.062 px from there";
+    let shown = run(&["settings", "get", "--port", &device.port]).stdout;
+    let line = format!("tare       taken; {became} (until restart)\n");
+    assert!(shown.contains(&line), "{shown}");
+    let shown = run(&["info", "--port", &device.port]).stdout;
+    let line = format!("0.310 px from the kept one; {became}\n");
+    assert!(shown.contains(&line), "{shown}");
 }
 
 /// What `docs/using.md` says that these print.

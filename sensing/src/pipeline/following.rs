@@ -7,7 +7,7 @@ use hivtac_force::rest::Rest;
 use hivtac_markers::tables::Table;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{TemporalError, TemporalSettings};
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MilliPx, Px};
 
 /// Frames that do not show where the film rests. Nothing needs to explain them; but the markers of
 /// another mask are no rest position's.
@@ -57,6 +57,12 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// The rest position as it was taken, without what re-zeroing made of it.
     pub fn taken(&self) -> Option<&Rest> {
         self.tare.as_ref().map(Tare::taken)
+    }
+
+    /// How far from the rest position the untouched film was seen last: the coordinate of a marker
+    /// that was farthest. `None` until it was seen.
+    pub fn rest_seen(&self) -> Option<MilliPx> {
+        self.tare.as_ref().and_then(Tare::seen)
     }
 
     /// How far re-zeroing moved the coordinate of the rest position that it moved farthest.
@@ -130,7 +136,9 @@ mod tests {
     #[test]
     fn a_rest_that_moved_is_told_until_the_next_tare() {
         let mut sensor = tared();
+        assert_eq!(sensor.rest_seen(), None);
         shows_drift(&mut sensor);
+        assert_eq!(sensor.rest_seen(), Some(MilliPx(100)));
         let pressed = frame(Some(pressed(100_000, 1_000)), Px::from_int(20));
         let moved = Status::REST_MOVED | Status::CONTACT;
         let followed = sensor.follow(moment(200), &pressed);
@@ -145,6 +153,17 @@ mod tests {
         sensor.set_tare(Some(rest(TENTH)), Drift::NONE);
         let followed = sensor.follow(moment(202), &pressed);
         assert!(!followed.status.contains(Status::REST_MOVED));
+    }
+
+    /// What nobody saw of a kept rest position is known once the film was seen.
+    #[test]
+    fn what_was_seen_takes_the_place_of_what_nobody_saw() {
+        let mut sensor = tared();
+        sensor.set_tare(Some(rest(Px(0))), Drift::UNSEEN);
+        shows_drift(&mut sensor);
+        let drift = *sensor.tare.unwrap().drift();
+        assert_eq!(drift.unseen, Drift::NONE.unseen);
+        assert!((drift.farthest_px() - 0.1).abs() < 1e-3, "{drift:?}");
     }
 
     /// Markers that are seen in another way rest elsewhere, and a device that begins afresh has no
