@@ -150,9 +150,9 @@ static UPDATED: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 /// A folder, and in it a flash.
-struct Device {
+pub struct Device {
     _directory: tempfile::TempDir,
-    flash: PathBuf,
+    pub flash: PathBuf,
 }
 
 impl Device {
@@ -178,7 +178,8 @@ impl Device {
         Contents::load(&self.flash).unwrap()
     }
 
-    fn updated() -> Device {
+    /// One with a model of its own, as if it were calibrated.
+    pub fn updated() -> Device {
         Device::new(Some(&UPDATED))
     }
 }

@@ -1,12 +1,18 @@
 //! A tare of the flashed firmware: taken of a film at rest, refused with the reason otherwise.
 
 use crate::common::{Run, Setup, command, firmware};
+use crate::models::Device;
 use hivtac_rig::script::Action;
+use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::{Rezero, TemporalSettings};
+use hivtac_terms::units::{Milliseconds, Px};
 use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample};
 use hivtac_wire::settings::TareReport;
 
 const ASKED: u16 = 40;
+/// Two means of a second of the untouched film, behind the start.
+const REZEROED_MS: u64 = 3_000;
 
 fn tared(scene: &'static str, at_ms: u64) -> Run {
     let tare = command(ASKED, Request::Tare { frames: 4 });
@@ -57,10 +63,11 @@ type Touch = std::ops::Range<f64>;
 /// The answers to these commands, each sent at its time; where a touch is expected, one in that
 /// range, mN.
 fn answered(scene: &'static str, asked: &[(u64, Request, Result<Outcome, Touch>)]) -> Run {
-    let mut setup = Setup {
-        scene,
-        ..Setup::new(firmware(), 300)
-    };
+    let setup = Setup::new(firmware(), 300);
+    answered_by(Setup { scene, ..setup }, asked)
+}
+
+fn answered_by(mut setup: Setup, asked: &[(u64, Request, Result<Outcome, Touch>)]) -> Run {
     for (nth, (at, request, _)) in (0..).zip(asked) {
         let command = command(ASKED + nth, request.clone());
         setup = setup.at(*at, Action::Send(command));
@@ -127,6 +134,68 @@ fn what_still_presses_is_no_rest() {
             (200, Request::Tare { frames: 4 }, Err(0.9..1.1)),
         ],
     );
+}
+
+/// Of a unit of which nothing is known a press of 10 mN is more than gluing, lens and camera do; of
+/// one that was calibrated a millinewton is more than nothing.
+#[test]
+fn a_first_tare_of_a_pressed_film_is_refused() {
+    let tare = |touch| [(200, Request::Tare { frames: 4 }, Err(touch))];
+    answered("tests/pressed.toml", &tare(7.0..13.0));
+    let calibrated = Device::updated();
+    let setup = Setup {
+        scene: "tests/residual.toml",
+        flash: Some(calibrated.flash.clone()),
+        ..Setup::new(firmware(), 300)
+    };
+    answered_by(setup, &tare(0.7..1.4));
+}
+
+/// A rest position that is 0.1 px off: a second of the untouched film tells, and re-zeroing goes
+/// towards it.
+#[test]
+fn a_rest_position_that_is_off_is_seen_and_followed() {
+    let mut rest = report(&tared("rest", 200)).rest;
+    for marker in &mut rest.markers {
+        marker.x.0 -= 6_554;
+    }
+    rest.rect_center.0.0 -= 6_554;
+    let temporal = TemporalSettings {
+        rezero: Some(Rezero {
+            after: Milliseconds(1_000),
+            ..Rezero::default()
+        }),
+        ..TemporalSettings::USUAL
+    };
+    let setup = Setup {
+        scene: "rest",
+        ..Setup::new(firmware(), REZEROED_MS)
+    };
+    let slow = CameraSettings {
+        rate: Rate::Quarter,
+        ..CameraSettings::default()
+    };
+    let run = answered_by(
+        setup,
+        &[
+            (165, Request::SetCamera(slow), Ok(Outcome::Done)),
+            (170, Request::SetTemporal(temporal), Ok(Outcome::Done)),
+            (180, Request::SetTare(Some(rest)), Ok(Outcome::Done)),
+            (REZEROED_MS - 10, Request::GetSettings, Ok(Outcome::Done)),
+        ],
+    );
+    for bit in [Status::REST_MOVED, Status::REZEROED] {
+        let told = run
+            .samples()
+            .into_iter()
+            .any(|sample| sample.status.contains(bit));
+        assert!(told, "{bit:?}");
+    }
+    let settings = run.settings();
+    // It went once, by the usual rate.
+    assert_eq!(settings.rezeroed, Px(327));
+    let seen = settings.seen.expect("it was seen").0;
+    assert!((85..=105).contains(&seen), "{seen} thousandths of a pixel");
 }
 
 /// A rest position that no frame has confirmed: what the camera may have shifted since is stated.

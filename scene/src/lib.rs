@@ -62,7 +62,9 @@ pub use format::Format;
 #[cfg(feature = "jpeg")]
 pub use format::JPEG_QUALITY;
 pub use frame::{Frame, MarkerTruth, Truth};
-pub use hivtac_film::{Contact, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM};
+pub use hivtac_film::{
+    Contact, DiscMotion, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed,
+};
 pub use hivtac_terms::geometry::Preset;
 pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
 pub use mechanics::{Mechanics, Stiffness};

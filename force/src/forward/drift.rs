@@ -23,14 +23,15 @@ impl Drift {
         seen_px: [[0.0; 2]; DOTS],
     };
 
-    /// Of a rest position that no frame of the untouched film has confirmed: 0.08 px at 320×240.
+    /// Of a rest position that no frame of the untouched film has confirmed: 0.08 px at 320×240,
+    /// and half as much again by a change of scale, which looks like a press.
     pub const UNSEEN: Drift = Drift {
-        unseen: [1e-3; 3],
+        unseen: [1e-3, 1e-3, 1.5e-3],
         ..Drift::NONE
     };
 
-    /// Of a camera that may have been mounted anew: any shift and turn. A change of scale is as
-    /// small as before: a press looks like a larger one.
+    /// Of a camera that may have been mounted anew: any shift and turn. A change of scale is
+    /// small: a press looks like a larger one.
     pub const MOUNTED_ANEW: Drift = Drift {
         unseen: [0.1, 0.1, 1e-3],
         ..Drift::NONE

@@ -10,6 +10,7 @@ mod firmware;
 mod health;
 mod monitor;
 mod recordings;
+mod rests;
 mod run;
 mod sense;
 mod serve;

@@ -9,7 +9,7 @@ use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
+pub static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
 
 const BACKGROUND: Rgb<u8> = Rgb([66, 81, 90]);
 const RED: Rgb<u8> = Rgb([206, 28, 33]);
@@ -78,28 +78,29 @@ fn covered() -> Frame {
     scene.render_load(&Load::REST, 7).unwrap()
 }
 
-fn photograph(frame: &Frame) -> RgbImage {
+pub fn photograph(frame: &Frame) -> RgbImage {
     RgbImage::from_raw(frame.width, frame.height, frame.to_rgb888()).unwrap()
 }
 
-struct Folder(TempDir);
+/// A folder for pictures, while it is held.
+pub struct Folder(TempDir);
 
 impl Folder {
-    fn new() -> Folder {
+    pub fn new() -> Folder {
         Folder(TempDir::new().unwrap())
     }
 
-    fn path(&self, name: &str) -> String {
+    pub fn path(&self, name: &str) -> String {
         self.0.path().join(name).to_str().unwrap().to_owned()
     }
 
-    fn save(&self, name: &str, picture: &RgbImage) -> String {
+    pub fn save(&self, name: &str, picture: &RgbImage) -> String {
         picture.save(self.path(name)).unwrap();
         self.path(name)
     }
 }
 
-fn json_of(run: &Finished) -> Value {
+pub fn json_of(run: &Finished) -> Value {
     assert_eq!(run.code, Some(0), "{run:?}");
     assert_eq!(run.stdout.lines().count(), 1, "{run:?}");
     serde_json::from_str(&run.stdout).unwrap()

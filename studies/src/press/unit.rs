@@ -114,6 +114,13 @@ impl TestedUnit {
         }
     }
 
+    /// The film under a press, where it is not the scene's.
+    #[cfg(test)]
+    pub fn pressed(&self, load: &Load) -> Option<Result<hivtac_film::Pressed>> {
+        let film = self.real.as_ref()?;
+        Some(self.with_tip(*load).and_then(|load| film.press(&load)))
+    }
+
     fn truth(&self, load: &Load) -> Result<Truth> {
         let load = self.with_tip(*load)?;
         match &self.real {

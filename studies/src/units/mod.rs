@@ -2,6 +2,8 @@
 
 mod bench;
 mod real;
+#[cfg(test)]
+mod stretched;
 
 use std::fmt::Write;
 use std::path::PathBuf;

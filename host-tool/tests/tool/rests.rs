@@ -1,0 +1,206 @@
+//! Rest positions that are wrong: `hivtac sense` refuses them with the reason, or what it says
+//! afterwards is within three stated standard uncertainties. Of a unit of which nothing is known, of
+//! one that was calibrated, and of one with a stretched film.
+
+use crate::run::run;
+use crate::sense::{Folder, MODEL, json_of, photograph};
+use hivtac_scene::{DiscMotion, Frame, Load, Mounting, Options, Preset, Pressed, Scene};
+use hivtac_wire::frame::CRC32;
+use serde_json::Value;
+
+/// A unit whose film is stretched by 2.6 % along x and 2.4 % along y, as finite elements have it,
+/// and its model after ten loads: `cargo test --profile tools -p hivtac-studies -- --ignored
+/// a_stretched_unit_is_written`.
+static STRETCHED: &[u8] = include_bytes!("stretched/model.hvtm");
+static FILM: &str = include_str!("stretched/film.json");
+
+/// What a tare is taken under, and what is read afterwards, N.
+const RESIDUAL_N: [f64; 5] = [5e-4, 1e-3, 1.5e-3, 2e-3, 1e-2];
+const PRESS_N: f64 = 0.1;
+/// Where, mm.
+const PLACE_MM: [f64; 2] = [1.0, -0.5];
+/// How cameras move: to the right and down, px, and how much larger the picture becomes.
+const MOTIONS: [([f64; 2], f64); 5] = [
+    ([0.1, 0.0], 0.0),
+    ([0.0, 0.2], 0.0),
+    ([0.3, 0.0], 0.0),
+    ([-0.2, 0.2], 0.0),
+    ([0.0, 0.0], 3e-3),
+];
+/// Standard uncertainties that an error may have.
+const SIGMAS: f64 = 3.0;
+
+/// A simulated unit and its model.
+struct Unit {
+    name: &'static str,
+    model: Vec<u8>,
+    options: Options,
+    /// Its film under forces, N, where it is not the nominal one.
+    film: Option<Vec<(f64, Pressed)>>,
+}
+
+fn units() -> [Unit; 3] {
+    let nominal = |name, model| Unit {
+        name,
+        model,
+        options: Options::default(),
+        film: None,
+    };
+    [
+        nominal("default", MODEL.to_vec()),
+        nominal("calibrated", calibrated()),
+        stretched(),
+    ]
+}
+
+/// The built-in model as of a unit that was calibrated: origin, unit, and the checksum that fits.
+fn calibrated() -> Vec<u8> {
+    let mut file = MODEL.to_vec();
+    file[62] = 1;
+    file[64..76].copy_from_slice(b"nominal-unit");
+    let end = file.len() - 4;
+    let crc = CRC32.checksum(&file[..end]);
+    file[end..].copy_from_slice(&crc.to_le_bytes());
+    file
+}
+
+fn stretched() -> Unit {
+    let told: Value = serde_json::from_str(FILM).unwrap();
+    let mut options = Options {
+        glued_mm: serde_json::from_value(told["glued_mm"].clone()).unwrap(),
+        mounting: Mounting {
+            shift_px: serde_json::from_value(told["shift_px"].clone()).unwrap(),
+            roll_deg: told["roll_deg"].as_f64().unwrap(),
+        },
+        ..Options::default()
+    };
+    options.lens.pitch_um = told["pitch_um"].as_f64();
+    let states = told["states"].as_array().unwrap().iter();
+    Unit {
+        name: "stretched",
+        model: STRETCHED.to_vec(),
+        options,
+        film: Some(states.map(state).collect()),
+    }
+}
+
+/// A force, N, and the film under it.
+fn state(told: &Value) -> (f64, Pressed) {
+    let force_n: [f64; 3] = serde_json::from_value(told["force_n"].clone()).unwrap();
+    let discs: [[[f64; 3]; 3]; 4] = serde_json::from_value(told["discs"].clone()).unwrap();
+    let pressed = Pressed {
+        force_n,
+        touches_mm: serde_json::from_value(told["touches_mm"].clone()).unwrap(),
+        centres_mm: serde_json::from_value(told["centres_mm"].clone()).unwrap(),
+        discs: discs.map(|[moved_mm, along_x, along_y]| DiscMotion {
+            moved_mm,
+            along_x,
+            along_y,
+        }),
+        ..Pressed::default()
+    };
+    (force_n[2].abs(), pressed)
+}
+
+impl Unit {
+    /// Under a straight force, behind a camera that shifted, px, and whose picture became larger.
+    fn frame(&self, force_n: f64, ([right, down], larger): ([f64; 2], f64), number: u64) -> Frame {
+        let mut options = self.options.clone();
+        let [x, y] = options.mounting.shift_px;
+        options.mounting.shift_px = [x + right, y + down];
+        options.lens.pitch_um = Some(options.lens.pitch_um.unwrap_or(12.0) / (1.0 + larger));
+        let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
+        let scene = scene.with_options(options).unwrap();
+        let load = match force_n {
+            0.0 => Load::REST,
+            _ => Load::from_angles(force_n, 0.0, 0.0).unwrap(),
+        };
+        let load = load.with_offset_mm(PLACE_MM).unwrap();
+        let Some(film) = &self.film else {
+            return scene.render_load(&load, number).unwrap();
+        };
+        let near = |(of_n, _): &&(f64, Pressed)| (of_n - force_n).abs() < 1e-6;
+        let (_, pressed) = film.iter().find(near).expect("a force of the film's");
+        scene.render_pressed(*pressed, &load, number)
+    }
+
+    /// What `hivtac sense` says of a press after a tare.
+    fn sense(&self, tare: &Frame, press: &Frame) -> Result<Value, String> {
+        let folder = Folder::new();
+        let model = folder.path("model.hvtm");
+        std::fs::write(&model, &self.model).unwrap();
+        let [tare, press] = [("tare.png", tare), ("press.png", press)]
+            .map(|(name, frame)| folder.save(name, &photograph(frame)));
+        let sense = [
+            "sense", "--json", "--model", &model, "--tare", &tare, &press,
+        ];
+        let done = run(&sense);
+        match done.code {
+            Some(0) => Ok(json_of(&done)),
+            _ => Err(done.stderr),
+        }
+    }
+}
+
+/// What a refusal says that the film looks touched by.
+fn millinewtons(why: &str) -> Option<f64> {
+    let (_, by) = why.split_once("looks touched, by ")?;
+    by.split_once(" mN")?.0.parse().ok()
+}
+
+/// How many stated standard uncertainties the press is off, in the part that is off most.
+fn off(found: &Value) -> f64 {
+    let force = &found["force"];
+    assert!(force.is_object(), "{found}");
+    let number = |name: &str| force[name].as_f64().unwrap();
+    let direction_deg = number("alpha_deg").hypot(number("beta_deg"));
+    let place_mm = (number("place_x_mm") - PLACE_MM[0]).hypot(number("place_y_mm") - PLACE_MM[1]);
+    let parts = [
+        direction_deg / number("direction_sigma_deg"),
+        (number("magnitude_n") - PRESS_N).abs() / number("magnitude_sigma_n"),
+        place_mm / number("place_sigma_mm"),
+    ];
+    parts.into_iter().fold(0.0, f64::max)
+}
+
+/// Silicone that has not recovered, or a finger. Beside a calibration it is refused with the force
+/// that it looks like; without one 10 mN are, and what is less is covered.
+#[test]
+fn a_tare_of_a_pressed_film_is_refused_or_covered() {
+    for unit in units() {
+        let press = unit.frame(PRESS_N, ([0.0; 2], 0.0), 2);
+        for force_n in RESIDUAL_N {
+            let tare = unit.frame(force_n, ([0.0; 2], 0.0), 1);
+            let at = format!("{}, {} mN", unit.name, 1e3 * force_n);
+            match unit.sense(&tare, &press) {
+                Ok(found) => {
+                    let is_known = unit.name == "calibrated" || force_n == 1e-2;
+                    assert!(!is_known && off(&found) < SIGMAS, "{at}: {found}");
+                }
+                Err(why) => {
+                    let looks_like = 1e-3 * millinewtons(&why).unwrap_or_else(|| panic!("{why}"));
+                    assert!((looks_like / force_n - 1.0).abs() < 0.3, "{at}: {why}");
+                }
+            }
+        }
+    }
+}
+
+/// A camera that moved since the tare, and one that moved before it.
+#[test]
+fn a_camera_that_moved_is_covered_or_tared() {
+    for unit in units() {
+        for motion in MOTIONS {
+            let press = unit.frame(PRESS_N, motion, 2);
+            let at = format!("{}, {motion:?}", unit.name);
+            for of in [([0.0; 2], 0.0), motion] {
+                let tare = unit.frame(0.0, of, 1);
+                let found = unit
+                    .sense(&tare, &press)
+                    .unwrap_or_else(|why| panic!("{at}: {why}"));
+                let off = off(&found);
+                assert!(off < SIGMAS, "{at}, tared at {of:?}: {off} σ, {found}");
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The files of a unit with a stretched film, which tests of the host tool render and measure.
+
+use std::fs;
+use std::path::Path;
+
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
+use hivtac_film::DiscMotion;
+use hivtac_scene::Load;
+use hivtac_sensing::model::Model;
+use serde_json::{Value, json};
+
+use super::own_weights;
+use crate::anywhere::WEIGHTS;
+use crate::press::TestedUnit;
+
+/// The film with this number is stretched by 2.6 % along x and 2.4 % along y.
+const NUMBER: u64 = 16;
+/// Straight presses at this place, mm: those that a tare may be taken under, and one that is read
+/// afterwards, N.
+const PLACE_MM: [f64; 2] = [1.0, -0.5];
+const FORCES_N: [f64; 6] = [5e-4, 1e-3, 1.5e-3, 2e-3, 1e-2, 0.1];
+
+/// Calibrates it by ten loads, and writes its model and how its film moves.
+#[test]
+#[ignore = "writes host-tool/tests/tool/stretched"]
+fn a_stretched_unit_is_written() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let weights = Weights::load(&root.join(WEIGHTS)).unwrap();
+    let file = export(&weights).unwrap();
+    let model = Model::parse(&file).unwrap();
+    let unit = TestedUnit::with_real_film(&model.conditions, NUMBER, None).unwrap();
+    let mut tared = unit.tare(&model).unwrap();
+    let own = export(&own_weights(&weights, &unit, &mut tared, NUMBER).unwrap()).unwrap();
+    let loads = FORCES_N.map(|force_n| {
+        let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
+        load.with_offset_mm(PLACE_MM).unwrap()
+    });
+    let states: Vec<Value> = [Load::REST]
+        .iter()
+        .chain(&loads)
+        .map(|load| state(&unit, load))
+        .collect();
+    let options = unit.scene().options();
+    let told = json!({
+        "shift_px": options.mounting.shift_px,
+        "roll_deg": options.mounting.roll_deg,
+        "pitch_um": options.lens.pitch_um,
+        "glued_mm": options.glued_mm,
+        "states": states,
+    });
+    let folder = root.join("host-tool/tests/tool/stretched");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("model.hvtm"), own).unwrap();
+    fs::write(folder.join("film.json"), format!("{told}\n")).unwrap();
+}
+
+/// How the film is under a load.
+fn state(unit: &TestedUnit, load: &Load) -> Value {
+    let pressed = unit
+        .pressed(load)
+        .expect("a film that is not the scene's")
+        .unwrap();
+    let motion = |disc: DiscMotion| [disc.moved_mm, disc.along_x, disc.along_y];
+    json!({
+        "force_n": pressed.force_n,
+        "touches_mm": pressed.touches_mm,
+        "centres_mm": pressed.centres_mm,
+        "discs": pressed.discs.map(motion),
+    })
+}
