@@ -1,6 +1,6 @@
 //! Rest positions that are wrong: `hivtac sense` refuses them with the reason, or what it says
-//! afterwards is within three stated standard uncertainties. Of a unit of which nothing is known, of
-//! one that was calibrated, and of one with a stretched film.
+//! afterwards is within three stated standard uncertainties. Of a unit of which nothing is known,
+//! of one that was calibrated, and of one with a stretched film.
 
 use crate::run::run;
 use crate::sense::{Folder, MODEL, json_of, photograph};
