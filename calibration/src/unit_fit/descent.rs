@@ -166,6 +166,7 @@ impl Problem<'_> {
         Problem {
             bench: self.bench,
             loads,
+            family: self.family,
             priors: self.priors.clone(),
             trust: self.trust,
         }

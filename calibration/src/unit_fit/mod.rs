@@ -70,6 +70,7 @@ pub fn fit(
     let problem = |family| Problem {
         bench,
         loads,
+        family,
         priors: numbers::priors(family, bench.dots_mm.len(), stage_mm, from),
         trust: Trust::WHOLE,
     };

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::descent::Found;
 use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
-use super::numbers::Number;
+use super::numbers::{Family, Number};
 use super::problem::{At, Problem, Rates, mesh_part, near_tip};
 use crate::forward::{
     Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
@@ -86,9 +86,9 @@ impl OwnFilm {
         let field = Field::new(problem, &found.at)?;
         let made = &found.at.made;
         let (tables, left) = tables_of(&field, &made.dots_mm)?;
-        let noise = found.scatter().sqrt();
-        let beside = left
-            .hypot(problem.bench.noise_px * (noise * noise - 1.0).max(0.0).sqrt() / made.focal_px);
+        // A scatter beyond the noise is what no number explains.
+        let scatter_px = problem.bench.noise_px * (found.scatter() - 1.0).sqrt();
+        let beside = left.hypot(scatter_px.hypot(mesh_px(problem.family)) / made.focal_px);
         let covariance = left_open(problem, found, &field, beside)?;
         let (sin, cos) = libm::sincos(made.roll_deg.to_radians());
         Ok(Self {
@@ -190,6 +190,15 @@ impl OwnFilm {
                 .collect::<Option<_>>()
                 .context("film.own: a covariance of other markers")?,
         })
+    }
+}
+
+/// What a fit's mesh leaves of the motion under the largest load, standard uncertainty of each
+/// coordinate, px at 320×240: where many numbers are open, they stand for it.
+fn mesh_px(family: Family) -> f64 {
+    match family {
+        Family::Nominal => 0.01,
+        Family::Real => 0.0,
     }
 }
 

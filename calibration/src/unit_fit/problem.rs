@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::equations::{LoadEquations, LoadSlopes, Normal};
 use super::linear::{Matrix, inverse};
 use super::load::UNKNOWNS;
-use super::numbers::{self, Number, Prior};
+use super::numbers::{self, Family, Number, Prior};
 use super::seen::View;
 use super::{COARSE, FINENESS};
 use crate::loads::SeenLoad;
@@ -43,6 +43,7 @@ pub struct Bench {
 pub struct Problem<'a> {
     pub bench: &'a Bench,
     pub loads: &'a [SeenLoad],
+    pub family: Family,
     pub priors: Vec<Prior>,
     pub trust: Trust,
 }
