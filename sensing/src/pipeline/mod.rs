@@ -184,8 +184,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// Sets the rest position of this unit, from which the film may have drifted since it was taken,
-    /// or goes back to the model's. One that is not [sound](Rest::is_sound) is as none.
+    /// Sets the rest position of this unit, from which the film may have drifted since it was
+    /// taken, or goes back to the model's. One that is not [sound](Rest::is_sound) is as none.
     pub fn set_tare(&mut self, rest: Option<Rest>, drift: Drift) {
         let rest = rest.filter(Rest::is_sound);
         self.tare = rest.map(|rest| Tare::new(rest, drift));
