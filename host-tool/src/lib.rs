@@ -1,8 +1,8 @@
 //! A conversation with a HiVTac sensor, for programs on the host: where it is ([`port`]), what is
 //! said ([`link`]), which sensor a name means ([`named`]), how it fails ([`failure`]), its pictures
 //! ([`frame`], [`look`]) and those in files ([`picture`], [`raw`], [`files`]), what its thresholds
-//! say ([`threshold`]), how its texts are shown ([`shown`]), what was recorded of it
-//! ([`recording`]), and how a program is interrupted ([`stop`]).
+//! say ([`threshold`]), how its texts are shown ([`shown`]), a live page of it ([`page`]), what was
+//! recorded of it ([`recording`]), and how a program is interrupted ([`stop`]).
 
 pub mod failure;
 pub mod files;
@@ -10,6 +10,7 @@ pub mod frame;
 pub mod link;
 pub mod look;
 pub mod named;
+pub mod page;
 pub mod picture;
 pub mod port;
 pub mod raw;

@@ -3,7 +3,7 @@
 use crate::decimal::{Millionths, Thousandths};
 use crate::force_json::{ForceJson, PlaceJson};
 use crate::truth::Truth;
-use hivtac_host::shown::shown_json;
+pub use hivtac_host::shown::to_json;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
@@ -190,13 +190,6 @@ fn json_row(row: &Row) -> String {
         truth: row.truth,
     };
     to_json(&json)
-}
-
-/// A JSON object without a line end.
-pub fn to_json(value: &impl Serialize) -> String {
-    // Only maps with odd keys and failing `Serialize` implementations give an error; there are none
-    // here.
-    shown_json(&serde_json::to_string(value).expect("plain data becomes JSON"))
 }
 
 fn csv_header(truth: bool) -> String {

@@ -1,5 +1,7 @@
 //! Text from a device, for a terminal: what would act on it instead of being read is escaped.
 
+use serde::Serialize;
+
 /// The text with every character escaped (`\\u{1b}`) that a terminal or a reader could take for
 /// something else: controls, line ends, and what turns the direction of text or is invisible.
 pub fn shown(text: &str) -> String {
@@ -17,6 +19,13 @@ pub fn shown_json(text: &str) -> String {
         false => c.to_string(),
     };
     text.chars().map(escaped).collect()
+}
+
+/// A JSON object without a line end.
+pub fn to_json(value: &impl Serialize) -> String {
+    // Only maps with odd keys and failing `Serialize` implementations give an error; there are none
+    // here.
+    shown_json(&serde_json::to_string(value).expect("plain data becomes JSON"))
 }
 
 /// A microcontroller's unique number: 24 hexadecimal digits.

@@ -1,7 +1,9 @@
-//! The page of `hivtac view` in a real browser, before the firmware in the rig.
+//! The page of `hivtac view`, and that of a recording, in a real browser, before the firmware in
+//! the rig.
 
 use std::env;
-use std::io::{BufRead, BufReader};
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
@@ -14,6 +16,11 @@ const PAGE: [u32; 2] = [1280, 1000];
 /// How the page looks at the film to begin with, radians: turned about z, and from above.
 const YAW: f64 = -0.5;
 const PITCH: f64 = 0.5;
+
+/// A press that stays, where and how hard: a place in the first row but one, the last column but
+/// one, and the last range of forces.
+const STAYS: &str = "[film]\noffset_mm = [2.2, -1.5]\n[load]\nmotion = \"press\"\n[load.press]\n\
+                     force_n = 0.18\nstart_s = 1.2\nrise_s = 0.3\nhold_s = 60.0\n";
 
 /// A tool that serves its page. Killed when it is dropped.
 struct View {
@@ -42,6 +49,35 @@ impl View {
         let address = said.trim().strip_prefix("ready ");
         View {
             address: address.expect("an address").to_owned(),
+            process,
+        }
+    }
+}
+
+impl View {
+    /// Of a recording of presses anywhere from the port `sensor` in a folder.
+    fn of_recording(folder: &Path) -> View {
+        let record = ["collect", "record", "--into", "unit", "--port", "sensor"];
+        let mut process = Command::new(artifact::named_by("HIVTAC_CALIBRATE"))
+            .args(record)
+            .args(["--timeout", "60", "--rest-seconds", "0.3"])
+            .args(["--free", "60", "--view"])
+            .current_dir(folder)
+            .stdin(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
+        let address = said.find_map(|line| {
+            let (_, address) = line.ok()?.split_once("in a browser: ")?;
+            Some(address.to_owned())
+        });
+        // What it says later is read by nobody, and shall not stop it.
+        std::thread::spawn(move || said.for_each(drop));
+        let mut stdin = process.stdin.take().unwrap();
+        stdin.write_all(b"\n\n").unwrap();
+        View {
+            address: address.expect("an address"),
             process,
         }
     }
@@ -191,4 +227,37 @@ fn the_page_shows_the_truth_and_does_what_it_is_told() {
         refused.as_str().unwrap().contains("Open the whole address"),
         "{refused}"
     );
+}
+
+#[test]
+#[ignore = "slow, and needs Chromium: run by cargo xtask test --all"]
+fn the_page_of_a_recording_shows_what_is_covered() {
+    let folder = tempfile::tempdir().unwrap();
+    let [link, scene] = ["sensor", "press.toml"].map(|name| folder.path().join(name));
+    fs::write(&scene, STAYS).unwrap();
+    let [scene, link] = [&scene, &link].map(|path| path.to_str().unwrap());
+    let _rig = Rig::start(&["--scene", scene, "--pty-link", link]).unwrap();
+    let view = View::of_recording(folder.path());
+    let mut browser = Browser::open(&view.address, PAGE).unwrap();
+    let place = format!("{}?.children[2]?.rows[1].cells[3].className", part("maps"));
+    let is = |classes: &str| format!("{place} === '{classes}'");
+    browser.until(&is("covered pressed")).unwrap();
+    let all = format!("{}.querySelectorAll('.pressed').length", part("maps"));
+    assert_eq!(browser.value(&all).unwrap(), 1);
+    let text = |name: &str| format!("{}.textContent", part(name));
+    let line = browser.value(&text("covered")).unwrap();
+    let line = line.as_str().unwrap();
+    assert!(
+        line.contains(" of 71 covered") && line.contains("press"),
+        "{line}"
+    );
+    let now = browser.value(&text("pressed")).unwrap();
+    assert!(now.as_str().unwrap().contains("mN at x +2."), "{now}");
+    for name in ["buttons", "camera"] {
+        let hidden = format!("{}.hidden", part(name));
+        assert_eq!(browser.value(&hidden).unwrap(), true, "{name}");
+    }
+    if let Some(folder) = screenshots() {
+        browser.keep(&folder.join("coverage.png")).unwrap();
+    }
 }

@@ -49,7 +49,7 @@ fn press(time_s: f64) -> ([f64; 2], f64) {
 }
 
 /// A sensor under that hand; its own model feels a fifth too little.
-fn sensor(after: usize) -> FakeSensor {
+pub fn sensor(after: usize) -> FakeSensor {
     let mut time_s = 0.0;
     let film = move |frame, _| {
         time_s += FRAME_S;
@@ -88,7 +88,7 @@ fn gauge_file(here: &Path, span_s: f64) {
     std::fs::write(here.join("gauge.csv"), gauge.lines(&forces).unwrap()).unwrap();
 }
 
-fn record<'a>(port: &'a str, free_s: &'a str) -> Vec<&'a str> {
+pub fn record<'a>(port: &'a str, free_s: &'a str) -> Vec<&'a str> {
     let record = ["collect", "record", "--into", "unit", "--port", port];
     let more = ["--rest-seconds", "0.5", "--free", free_s, "--axis", "0,0"];
     [&record[..], &more].concat()

@@ -6,3 +6,4 @@ mod free;
 mod from_file;
 mod guided;
 mod over_serial;
+mod watched;

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use hivtac_host::page::{Covered, Map};
+
 /// Places along x and along y.
 const SIDE: usize = 5;
 /// They reach so far from the film's middle, mm; a press a little farther out counts for the last.
@@ -185,15 +187,41 @@ impl Coverage {
     }
 
     /// A map for each range, as the camera sees the film, with what is pressed now.
+    pub fn maps(&self, now: Option<Cell>) -> Vec<Map> {
+        let of_size = |size: usize| {
+            let row = |row: usize| {
+                let place = |column: usize| self.covered(Cell { size, row, column });
+                (0..SIDE).map(place).collect()
+            };
+            let [least, most] = SIZES_MN[size];
+            let here = now.filter(|cell| cell.size == size);
+            Map {
+                name: format!("{least}–{most} mN"),
+                places: (0..SIDE).map(row).collect(),
+                pressed: here.map(|cell| [cell.row, cell.column]),
+            }
+        };
+        (0..SIZES).map(of_size).collect()
+    }
+
+    fn covered(&self, cell: Cell) -> Covered {
+        let seconds = self.seconds[cell.size][cell.row][cell.column];
+        match self.is_covered(cell) {
+            true => Covered::Covered,
+            false if seconds > 0.0 => Covered::Begun,
+            false if cell.is_needed() => Covered::Missing,
+            false => Covered::Unneeded,
+        }
+    }
+
+    /// The maps beside each other, for a terminal.
     pub fn picture(&self, now: Option<Cell>) -> [String; PICTURE_LINES] {
-        let heading = SIZES_MN.map(|[least, most]| format!("{:<13}", format!("{least}–{most} mN")));
         let mut lines: [String; PICTURE_LINES] = Default::default();
-        lines[0] = heading.concat();
-        for (row, line) in lines.iter_mut().skip(1).enumerate() {
-            for size in 0..SIZES {
-                for column in 0..SIDE {
-                    let cell = Cell { size, row, column };
-                    line.push(self.sign(cell, now));
+        for map in self.maps(now) {
+            lines[0] += &format!("{:<13}", map.name);
+            for (row, (line, places)) in lines.iter_mut().skip(1).zip(&map.places).enumerate() {
+                for (column, place) in places.iter().enumerate() {
+                    line.push(sign(*place, map.pressed == Some([row, column])));
                     line.push(' ');
                 }
                 line.push_str("   ");
@@ -201,17 +229,16 @@ impl Coverage {
         }
         lines.map(|line| line.trim_end().to_owned())
     }
+}
 
-    fn sign(&self, cell: Cell, now: Option<Cell>) -> char {
-        let seconds = self.seconds[cell.size][cell.row][cell.column];
-        match (now == Some(cell), self.is_covered(cell)) {
-            (true, true) => '●',
-            (true, false) => '○',
-            (false, true) => '█',
-            (false, false) if seconds > 0.0 => '▒',
-            (false, false) if cell.is_needed() => '·',
-            (false, false) => ' ',
-        }
+fn sign(place: Covered, is_pressed: bool) -> char {
+    match (is_pressed, place) {
+        (true, Covered::Covered) => '●',
+        (true, _) => '○',
+        (false, Covered::Covered) => '█',
+        (false, Covered::Begun) => '▒',
+        (false, Covered::Missing) => '·',
+        (false, Covered::Unneeded) => ' ',
     }
 }
 

@@ -3,6 +3,7 @@
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
+use hivtac_host::page;
 use hivtac_wire::message::Sample;
 
 use super::coverage::{Cell, Coverage, PICTURE_LINES};
@@ -115,17 +116,46 @@ impl FreeTake {
 
     /// The map, what is pressed, and what to do; each line as if it were alone on the terminal.
     fn block(&self, sample: &Sample) -> String {
-        let cell = |(place_mm, force_n)| Cell::of(place_mm, force_n);
-        let picture = self.coverage.picture(self.now.and_then(cell));
-        let now = match self.now {
+        let picture = self.coverage.picture(self.cell());
+        let lines = picture
+            .into_iter()
+            .chain([self.pressed(sample), self.line()]);
+        lines.map(|line| format!("\r{line}\x1b[K\n")).collect()
+    }
+
+    /// The same for a page.
+    pub fn told(&self, sample: &Sample) -> page::Coverage {
+        page::Coverage {
+            maps: self.coverage.maps(self.cell()),
+            now: self.pressed(sample),
+            line: self.line(),
+        }
+    }
+
+    /// What a page is told in the end.
+    pub fn told_at_the_end(&self) -> page::Coverage {
+        page::Coverage {
+            maps: self.coverage.maps(None),
+            now: String::new(),
+            line: self.end(),
+        }
+    }
+
+    /// Where what is pressed now counts.
+    fn cell(&self) -> Option<Cell> {
+        let (place_mm, force_n) = self.now?;
+        Cell::of(place_mm, force_n)
+    }
+
+    /// What is pressed now, in words.
+    fn pressed(&self, sample: &Sample) -> String {
+        match self.now {
             Some(([x, y], force_n)) => {
                 format!("{:4.0} mN at x {x:+.1}, y {y:+.1} mm", 1e3 * force_n)
             }
             None if sample.markers.is_some() => "nothing presses the film".to_owned(),
             None => "NO four markers are seen".to_owned(),
-        };
-        let lines = picture.into_iter().chain([now, self.line()]);
-        lines.map(|line| format!("\r{line}\x1b[K\n")).collect()
+        }
     }
 
     /// What is covered and what to do, on one line.

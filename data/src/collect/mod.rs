@@ -25,6 +25,7 @@ pub mod report;
 pub mod series;
 pub mod simulated;
 mod take;
+mod watched;
 
 use std::path::PathBuf;
 

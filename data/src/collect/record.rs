@@ -15,6 +15,7 @@ use super::free::FreeTake;
 use super::gauge_port::{GaugeArgs, GaugePort};
 use super::poses::{self, Person, Pose, Task};
 use super::take::{Heard, Take};
+use super::watched::Watched;
 
 /// Options of `collect record`.
 #[derive(Debug, clap::Args)]
@@ -58,6 +59,10 @@ pub struct FreeArgs {
     #[arg(long, value_name = "α,β", value_parser = axis, default_value = "0,0")]
     #[arg(allow_hyphen_values = true, requires = "free")]
     pub axis: Pose,
+    /// Show what such presses cover on a live page, too, as `hivtac view` shows a sensor; the
+    /// address is said.
+    #[arg(long, requires = "free")]
+    pub view: bool,
 }
 
 impl FreeArgs {
@@ -129,6 +134,8 @@ pub fn record_tasks(args: &RecordArgs, tasks: Option<Vec<Task>>) -> Result<()> {
     let address = args.port.as_deref().map_or(Address::Find, Address::parse);
     let (link, hello) = Link::connect(&address, patience)?;
     let folder = Folder::open(&args.into, &conditions_of(&hello)?)?;
+    let is_watched = args.free.view;
+    let watched = is_watched.then(|| Watched::serve(&link, &hello, patience));
     let begun = Instant::now();
     let gauge = GaugePort::listen(&args.gauge, folder.gauge.try_clone()?, folder.run, begun)?;
     let mut recorder = Recorder {
@@ -141,6 +148,7 @@ pub fn record_tasks(args: &RecordArgs, tasks: Option<Vec<Task>>) -> Result<()> {
         shown: begun,
         zero_n: None,
         free: None,
+        watched: watched.transpose()?,
     };
     let result = recorder.run(args, tasks.as_deref());
     let gauge = recorder.gauge.as_mut().map_or(Ok(()), GaugePort::finish);
@@ -166,6 +174,8 @@ struct Recorder {
     zero_n: Option<f64>,
     /// The take of presses anywhere that goes on.
     free: Option<FreeTake>,
+    /// The live page, when it is wanted.
+    watched: Option<Watched>,
 }
 
 impl Recorder {
@@ -199,6 +209,9 @@ impl Recorder {
             let take = take?;
             if let Some(free) = free {
                 eprintln!("{}", free.end());
+                if let Some(watched) = &mut self.watched {
+                    watched.ended(free.told_at_the_end());
+                }
             }
             let is_felt = take.felt_n.is_none_or(|force_n| force_n >= LEAST_FELT_N);
             if task.must_be_felt && !is_felt {
@@ -267,10 +280,14 @@ impl Recorder {
     /// Records for so long on the sensor's clock.
     fn take(&mut self, task: Option<&Task>, seconds: f64) -> Result<Take> {
         let pose = task.map(|task| task.pose);
-        match task {
-            Some(task) if self.free.is_some() => eprintln!("Recording: {}.", task.press),
-            Some(task) => eprintln!("Recording for {seconds} s: {}.", task.press),
-            None => eprintln!("Recording the untouched film for {seconds} s."),
+        let text = match task {
+            Some(task) if self.free.is_some() => format!("Recording: {}.", task.press),
+            Some(task) => format!("Recording for {seconds} s: {}.", task.press),
+            None => format!("Recording the untouched film for {seconds} s."),
+        };
+        eprintln!("{text}");
+        if let Some(watched) = &mut self.watched {
+            watched.recording(true, text);
         }
         let mut heard = Heard::from(self.gauge_readings()?);
         let mut take = Take::default();
@@ -363,6 +380,10 @@ impl Recorder {
                         }
                     }
                     None => self.show(&sample, gauge_n),
+                }
+                if let Some(watched) = &mut self.watched {
+                    let free = self.free.as_ref();
+                    watched.sample(&sample, take, || free.map(|free| free.told(&sample)));
                 }
             }
             DeviceMessage::Log(line) => eprintln!("{}", log_text(&line)),

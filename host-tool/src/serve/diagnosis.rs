@@ -1,8 +1,8 @@
 //! How a device stands, for `/diagnostics`.
 
 use crate::ros::{Diagnosis, Level};
-use crate::view::lights::{self, Light};
 use crate::view::state::State;
+use hivtac_host::page::lights::{self, Light};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::status::Status;
 

@@ -1,29 +1,19 @@
 //! `hivtac view`: a live page in a browser of this computer.
 
-mod events;
-mod feed;
-pub mod lights;
-mod order;
 mod owner;
 mod picture;
 mod recorder;
-mod request;
-mod response;
-mod server;
 pub mod state;
-mod token;
-mod unstalled;
 
 use crate::output::{Reader, print};
-use feed::Feed;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
+use hivtac_host::page::{Feed, Sensor, Server};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use owner::Owner;
 use recorder::Recorder;
 use serde_json::json;
-use server::{Sensor, Server};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
@@ -98,5 +88,9 @@ fn open(address: &Address, options: &Options) -> Result<(Sensor, Opened), Failur
         posted,
         Recorder::new(&options.folder),
     );
-    Ok((Sensor { feed, orders }, (owner, link)))
+    let sensor = Sensor {
+        feed,
+        orders: Some(orders),
+    };
+    Ok((sensor, (owner, link)))
 }

@@ -1,8 +1,7 @@
 //! The one thread that talks to a device for the page: keeps what it sends, and does what the page
 //! orders.
 
-use super::feed::Feed;
-use super::order::{Answer, Order, Posted};
+use super::picture;
 use super::recorder::Recorder;
 use super::state::State;
 use crate::command::usual_tare;
@@ -10,6 +9,7 @@ use crate::follow::{Follower, follow};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::take;
 use hivtac_host::link::Link;
+use hivtac_host::page::{Answer, Feed, Order, Posted};
 use hivtac_host::port::Address;
 use hivtac_wire::decoder::Rejected;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
@@ -173,7 +173,9 @@ impl Owner {
         let watched = &mut self.watched;
         let taken = take(link, self.patience, |message| watched.message(message))?;
         let hello = self.watched.state.hello.clone();
-        Ok(Answer::Picture(Box::new((taken, hello))))
+        Ok(Answer::Picture(Box::new(move || {
+            picture::bytes(&taken, &hello)
+        })))
     }
 }
 

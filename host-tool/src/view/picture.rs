@@ -1,11 +1,11 @@
 //! A frame for the page: a line of JSON, then its pixels, then its mask.
 
-use super::state::Limits;
 use crate::finding::MarkerJson;
 use crate::focus::Focus;
 use crate::lines::to_json;
 use hivtac_host::frame::Taken;
 use hivtac_host::look::{self, PASSED};
+use hivtac_host::page::Limits;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::DeviceHello;
 use serde::Serialize;

@@ -2,9 +2,9 @@
 
 use crate::record::{Heard, Recording};
 use hivtac_host::failure::Failure;
+use hivtac_host::page;
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -23,15 +23,6 @@ struct UnderWay {
     recording: Recording,
     name: String,
     flushed: Instant,
-}
-
-/// How it stands, for the page.
-#[derive(Debug, PartialEq, Eq, Serialize)]
-pub struct Told {
-    /// Whether a file is under way.
-    on: bool,
-    /// Which, and what came; or what became of the last one.
-    text: String,
 }
 
 impl Recorder {
@@ -95,15 +86,15 @@ impl Recorder {
     }
 
     /// How it stands.
-    pub fn told(&self) -> Told {
+    pub fn told(&self) -> page::Recording {
         match &self.under_way {
             Some(UnderWay {
                 name, recording, ..
-            }) => Told {
+            }) => page::Recording {
                 on: true,
                 text: format!("recording {name}: {}", recording.progress()),
             },
-            None => Told {
+            None => page::Recording {
                 on: false,
                 text: self.last.clone(),
             },

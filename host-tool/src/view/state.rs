@@ -1,15 +1,10 @@
 //! How a device stands: who it is, whether it is there, its rate, losses and latency.
 
-use super::recorder;
-use crate::lines::to_json;
 use crate::tally::Tally;
 use hivtac_host::link::log_text;
-use hivtac_host::shown::{shown, unit_number};
-use hivtac_host::threshold;
-use hivtac_terms::threshold::Threshold;
+use hivtac_host::page::{Recording, Told};
 use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLine, Sample, Stats};
-use serde::Serialize;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 /// Samples that the rate is taken from.
 const RATE_OF: usize = 256;
@@ -101,70 +96,19 @@ impl State {
     }
 
     /// One JSON object; `recording` is how that stands.
-    pub fn json(&self, recording: recorder::Told) -> String {
-        let hello = &self.hello;
-        let model = hello.model.as_ref();
-        to_json(&Told {
-            port: &self.port,
-            trouble: self.trouble.as_deref(),
-            name: shown(&hello.name),
-            unit: unit_number(&hello.device_id),
-            board: shown(&hello.board),
-            firmware: shown(&hello.firmware),
-            model: model.map(|model| shown(&model.name)),
-            simulated: model.is_some_and(|model| model.simulated),
-            threshold: Limits::of(&hello.threshold),
-            model_threshold: model.map(|model| Limits::of(&model.threshold)),
+    pub fn json(&self, recording: Recording) -> String {
+        let told = Told {
+            trouble: self.trouble.clone(),
             rate_hz: self.rate_hz(),
             lost: self.tally.lost(),
             causes: self.tally.causes(),
             latency_us: self.stats.map(|stats| stats.latency_us),
             processing_us: self.stats.map(|stats| stats.processing_us),
             recording,
-            lines: &self.lines,
-        })
-    }
-}
-
-/// The state as the page reads it.
-#[derive(Serialize)]
-struct Told<'s> {
-    port: &'s str,
-    trouble: Option<&'s str>,
-    /// What its user calls it; empty when nothing.
-    name: String,
-    unit: String,
-    board: String,
-    firmware: String,
-    model: Option<String>,
-    simulated: bool,
-    threshold: Limits,
-    model_threshold: Option<Limits>,
-    rate_hz: Option<f64>,
-    lost: u64,
-    causes: BTreeMap<&'static str, u64>,
-    latency_us: Option<u32>,
-    processing_us: Option<u32>,
-    recording: recorder::Told,
-    lines: &'s VecDeque<String>,
-}
-
-/// A threshold as the page reads and writes it.
-#[derive(Serialize)]
-pub struct Limits {
-    format: &'static str,
-    limits: [u8; 6],
-    text: String,
-}
-
-impl Limits {
-    /// Of a threshold.
-    pub fn of(wanted: &Threshold) -> Limits {
-        Limits {
-            format: wanted.format().name(),
-            limits: wanted.limits(),
-            text: threshold::text(wanted),
-        }
+            lines: self.lines.iter().cloned().collect(),
+            ..Told::of(&self.port, &self.hello)
+        };
+        told.json()
     }
 }
 
@@ -207,8 +151,7 @@ mod tests {
     }
 
     fn json(state: &State) -> serde_json::Value {
-        let nothing = recorder::Recorder::new(std::path::Path::new(".")).told();
-        serde_json::from_str(&state.json(nothing)).unwrap()
+        serde_json::from_str(&state.json(Recording::default())).unwrap()
     }
 
     #[test]

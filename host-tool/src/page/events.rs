@@ -3,8 +3,8 @@
 use super::feed::{Cursor, Feed, News};
 use super::lights;
 use super::response::{EVENTS, begin};
-use crate::lines::to_json;
-use hivtac_host::stop;
+use crate::shown::to_json;
+use crate::stop;
 use hivtac_terms::force::Force;
 use hivtac_wire::message::Sample;
 use serde::Serialize;
@@ -17,8 +17,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(33);
 /// Time after which a silent stream says that it is there, which finds out whether its reader is.
 const SAY_SOMETHING_EVERY: Duration = Duration::from_secs(5);
 
-/// Sends events until the reader is gone or too slow, or the program is to end.
-pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>]) -> io::Result<()> {
+/// Sends events until the reader is gone or too slow, or the program is to end. Says whether the
+/// sensors obey the page.
+pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>], obeys: bool) -> io::Result<()> {
     begin(out, EVENTS)?;
     let mut readers: Vec<(&Feed, Cursor)> =
         feeds.iter().map(|feed| (&**feed, feed.begin())).collect();
@@ -26,6 +27,7 @@ pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>]) -> io::Result<()> {
         "hello",
         &Hello {
             sensors: feeds.len(),
+            obeys,
             lights: lights::all(),
         },
     );
@@ -85,6 +87,7 @@ fn told(sensor: usize, news: &News) -> String {
 #[derive(Serialize)]
 struct Hello {
     sensors: usize,
+    obeys: bool,
     lights: Vec<lights::Light>,
 }
 

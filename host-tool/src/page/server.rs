@@ -3,12 +3,11 @@
 use super::events;
 use super::feed::Feed;
 use super::order::{self, Answer, Order, Posted};
-use super::picture;
 use super::request::{self, Method, Request, Timed};
 use super::response::{self, BYTES, CSS, HTML, JSON, SCRIPT, Status};
 use super::token::Token;
 use super::unstalled::Unstalled;
-use hivtac_host::failure::Failure;
+use crate::failure::Failure;
 use serde_json::json;
 use std::io;
 use std::net::{TcpListener, TcpStream};
@@ -25,23 +24,24 @@ const REQUEST_PATIENCE: Duration = Duration::from_secs(5);
 const ORDER_PATIENCE: Duration = Duration::from_secs(15);
 
 /// The page's files: path, kind and text.
-const FILES: [(&str, &str, &str); 8] = [
-    ("/", HTML, include_str!("page/index.html")),
-    ("/style.css", CSS, include_str!("page/style.css")),
-    ("/main.js", SCRIPT, include_str!("page/main.js")),
-    ("/sensor.js", SCRIPT, include_str!("page/sensor.js")),
-    ("/arrow.js", SCRIPT, include_str!("page/arrow.js")),
-    ("/chart.js", SCRIPT, include_str!("page/chart.js")),
-    ("/picture.js", SCRIPT, include_str!("page/picture.js")),
-    ("/threshold.js", SCRIPT, include_str!("page/threshold.js")),
+const FILES: [(&str, &str, &str); 9] = [
+    ("/", HTML, include_str!("files/index.html")),
+    ("/style.css", CSS, include_str!("files/style.css")),
+    ("/main.js", SCRIPT, include_str!("files/main.js")),
+    ("/sensor.js", SCRIPT, include_str!("files/sensor.js")),
+    ("/arrow.js", SCRIPT, include_str!("files/arrow.js")),
+    ("/chart.js", SCRIPT, include_str!("files/chart.js")),
+    ("/coverage.js", SCRIPT, include_str!("files/coverage.js")),
+    ("/picture.js", SCRIPT, include_str!("files/picture.js")),
+    ("/threshold.js", SCRIPT, include_str!("files/threshold.js")),
 ];
 
 /// A device as its visitors see it.
 pub struct Sensor {
     /// What it tells.
     pub feed: Arc<Feed>,
-    /// Where its orders go.
-    pub orders: SyncSender<Posted>,
+    /// Where its orders go; nowhere when it is shown and no more.
+    pub orders: Option<SyncSender<Posted>>,
 }
 
 /// A server that listens.
@@ -165,7 +165,9 @@ impl Visit {
             },
             (Method::Get, ..) if path == "/events" => {
                 let feeds = self.server.sensors.iter().map(|sensor| sensor.feed.clone());
-                events::stream(out, &feeds.collect::<Vec<_>>())
+                let mut orders = self.server.sensors.iter().map(|sensor| &sensor.orders);
+                let obeys = orders.all(Option::is_some);
+                events::stream(out, &feeds.collect::<Vec<_>>(), obeys)
             }
             (Method::Post, ..) if path == "/order" => self.order(out, &request.body),
             (Method::Post, Some(_), _) => response::refuse(out, Status::Method),
@@ -175,11 +177,7 @@ impl Visit {
 
     fn picture(&self, out: &mut Unstalled<'_>, sensor: usize) -> io::Result<()> {
         match self.ask(sensor, Order::Picture) {
-            Ok(Answer::Picture(picture)) => {
-                let (taken, device) = *picture;
-                let bytes = picture::bytes(&taken, &device);
-                response::send(out, Status::Ok, BYTES, &bytes)
-            }
+            Ok(Answer::Picture(picture)) => response::send(out, Status::Ok, BYTES, &picture()),
             Ok(Answer::Failed(why)) => said(out, false, &why),
             Ok(Answer::Done(_)) => response::refuse(out, Status::NotFound),
             Err(status) => response::refuse(out, status),
@@ -202,8 +200,12 @@ impl Visit {
     /// Has a device do something, and waits for it.
     fn ask(&self, sensor: usize, order: Order) -> Result<Answer, Status> {
         let sensor = self.server.sensors.get(sensor).ok_or(Status::NotFound)?;
+        let Some(orders) = &sensor.orders else {
+            let why = "this page shows the sensor and no more: it is being recorded".to_owned();
+            return Ok(Answer::Failed(why));
+        };
         let (posted, answers) = Posted::new(order);
-        match sensor.orders.try_send(posted) {
+        match orders.try_send(posted) {
             Ok(()) => (),
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => return Err(Status::Busy),
         }

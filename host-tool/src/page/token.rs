@@ -1,6 +1,6 @@
 //! The secret in the address of the page: who does not know it gets nothing.
 
-use hivtac_host::failure::Failure;
+use crate::failure::Failure;
 use std::fmt::Write;
 
 /// Random bytes of a token.

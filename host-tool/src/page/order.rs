@@ -1,8 +1,6 @@
 //! What the page asks of a device: read from JSON, carried to the device's thread, and answered.
 
-use hivtac_host::frame::Taken;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
-use hivtac_wire::message::DeviceHello;
 use serde::Deserialize;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -31,8 +29,8 @@ pub enum Answer {
     Done(String),
     /// Not done, and why.
     Failed(String),
-    /// The frame, and the device that took it.
-    Picture(Box<(Taken, DeviceHello)>),
+    /// The frame, as bytes for the page once they are asked for: making them takes long.
+    Picture(Box<dyn FnOnce() -> Vec<u8> + Send>),
 }
 
 /// An order on its way to the device's thread.

@@ -2,6 +2,7 @@
 
 import { Arrow } from "./arrow.js";
 import { Chart } from "./chart.js";
+import { Coverage } from "./coverage.js";
 import { Picture } from "./picture.js";
 import { Threshold } from "./threshold.js";
 
@@ -40,7 +41,7 @@ function sigmas({ vector, magnitude, magnitudeSigma, directionSigma }) {
 }
 
 export class SensorView {
-  constructor(number, lights) {
+  constructor(number, lights, obeys) {
     const template = document.getElementById("sensor");
     this.element = template.content.firstElementChild.cloneNode(true);
     this.number = number;
@@ -54,7 +55,11 @@ export class SensorView {
     this.size = new Chart(this.part("size"), ["size"], true);
     this.components = new Chart(this.part("components"), ["x", "y", "z"], false);
     const order = (what, more) => this.order(what, more);
+    // What is being recorded is shown and no more.
+    for (const name of ["buttons", "camera"]) this.part(name).hidden = !obeys;
+    this.part("picture-on").checked = obeys;
     this.picture = new Picture(number, (name) => this.part(name));
+    this.coverage = new Coverage((name) => this.part(name));
     this.threshold = new Threshold(this.part("sliders"), order);
     for (const button of this.element.querySelectorAll("[data-do]")) {
       button.addEventListener("click", () => this.press(button));
@@ -79,7 +84,7 @@ export class SensorView {
       this.say("answer", answer.text);
       return answer.done === true;
     } catch {
-      this.say("answer", "hivtac view does not answer");
+      this.say("answer", "nothing answers");
       return false;
     }
   }
@@ -93,6 +98,7 @@ export class SensorView {
   }
 
   key(key) {
+    if (this.part("buttons").hidden) return;
     if (key === "t") this.press(this.element.querySelector('[data-do="tare"]'));
     if (key === "r") this.press(this.part("record"));
     if (key === "p") this.part("picture-on").click();
@@ -144,6 +150,7 @@ export class SensorView {
     const model = state.model_threshold;
     this.say("model-threshold", model ? `the model's: ${model.text}` : "");
     this.threshold.show(state.threshold);
+    this.coverage.show(state.coverage);
   }
 
   gone() {

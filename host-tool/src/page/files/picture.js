@@ -50,7 +50,7 @@ export class Picture {
       this.draw();
       return null;
     } catch {
-      return "hivtac view does not answer";
+      return "nothing answers";
     }
   }
 

@@ -8,8 +8,9 @@ let views = [];
 
 function begin(hello) {
   room.replaceChildren();
+  document.getElementById("keys").hidden = !hello.obeys;
   views = Array.from({ length: hello.sensors }, (_, number) => {
-    const view = new SensorView(number, hello.lights);
+    const view = new SensorView(number, hello.lights, hello.obeys);
     room.append(view.element);
     return view;
   });
@@ -25,7 +26,7 @@ function listen() {
   on("state", ({ sensor, state }) => views[sensor].state(state));
   on("samples", ({ sensor, skipped, samples }) => views[sensor].samples(samples, skipped));
   events.onerror = () => {
-    link.textContent = "hivtac view has ended or does not answer: start it again, and open the " +
+    link.textContent = "hivtac has ended or does not answer: start it again, and open the " +
       "address that it prints";
     views.forEach((view) => view.gone());
   };

@@ -1,0 +1,90 @@
+//! A recording on a live page: what the sensor says, what is recorded, and what it covers.
+
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use hivtac_host::link::Link;
+use hivtac_host::page::{Coverage, Feed, Recording, Sensor, Server, Told};
+use hivtac_wire::message::{DeviceHello, Sample};
+
+use super::take::Take;
+
+/// Time between two tellings of what is covered.
+const TELL_EVERY: Duration = Duration::from_millis(200);
+
+/// What the page is told.
+pub(super) struct Watched {
+    feed: Arc<Feed>,
+    told: Told,
+    at: Instant,
+}
+
+impl Watched {
+    /// Serves the page as long as the program runs, and says where.
+    ///
+    /// # Errors
+    /// When this computer has no port for it.
+    pub fn serve(link: &Link, hello: &DeviceHello, patience: Duration) -> Result<Self> {
+        let feed = Arc::new(Feed::default());
+        let sensor = Sensor {
+            feed: feed.clone(),
+            orders: None,
+        };
+        let server = Arc::new(Server::new(0, vec![sensor], patience)?);
+        eprintln!("Watch it in a browser: {}", server.address());
+        thread::spawn(move || server.run());
+        let mut watched = Self {
+            feed,
+            told: Told::of(&link.name, hello),
+            at: Instant::now(),
+        };
+        watched.recording(
+            false,
+            "not recording yet: the terminal says what to do".to_owned(),
+        );
+        Ok(watched)
+    }
+
+    /// How the recording stands.
+    pub fn recording(&mut self, on: bool, text: String) {
+        self.told.recording = Recording { on, text };
+        self.tell();
+    }
+
+    /// A sample came, of a take that has so much; `coverage` says what it covers.
+    pub fn sample(
+        &mut self,
+        sample: &Sample,
+        take: &Take,
+        coverage: impl Fn() -> Option<Coverage>,
+    ) {
+        self.feed.sample(sample.clone());
+        if self.at.elapsed() < TELL_EVERY {
+            return;
+        }
+        let lasted_us = take
+            .last_us
+            .saturating_sub(take.first_us.unwrap_or(take.last_us));
+        let steps = take.samples.saturating_sub(1) as f64;
+        self.told.rate_hz = (lasted_us > 0).then(|| 1e6 * steps / lasted_us as f64);
+        self.told.lost = take.lost.into();
+        self.told.coverage = coverage().or(self.told.coverage.take());
+        self.tell();
+    }
+
+    /// A take of presses anywhere has ended: what there is of it.
+    pub fn ended(&mut self, coverage: Coverage) {
+        self.told.coverage = Some(coverage);
+        self.recording(
+            false,
+            "recorded: the terminal says what comes next".to_owned(),
+        );
+    }
+
+    fn tell(&mut self) {
+        self.at = Instant::now();
+        self.feed.state(self.told.json());
+    }
+}
