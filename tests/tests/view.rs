@@ -69,7 +69,8 @@ impl View {
             .unwrap();
         let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
         let address = said.find_map(|line| {
-            let (_, address) = line.ok()?.split_once("in a browser: ")?;
+            let line = line.ok()?;
+            let (_, address) = line.split_once("in a browser: ")?;
             Some(address.to_owned())
         });
         // What it says later is read by nobody, and shall not stop it.

@@ -21,7 +21,7 @@ const TAUT: f64 = 1e-3;
 /// How far a descent trusts what is seen, one after the other.
 const TRUSTS: [Trust; 3] = [apart(100.0), apart(10.0), Trust::WHOLE];
 /// χ² over the coordinates that are seen of a fit that explains them.
-const EXPLAINED: f64 = 1.4;
+pub const EXPLAINED: f64 = 1.4;
 /// χ² of the nominal family is at most so many standard deviations above what chance makes.
 const BY_CHANCE: f64 = 3.0;
 /// Steps at most, and the change of χ² that ends them.

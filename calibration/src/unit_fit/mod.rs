@@ -9,12 +9,14 @@
 //! | `problem` | numbers and loads held against what is seen |
 //! | `equations` | that linearized, as normal equations |
 //! | `descent` | Gauss–Newton steps to what explains it best |
+//! | `explained` | what χ² says of the loads, in words |
 //! | `left_out` | how good the fit is on loads left out of it |
 //! | `field` | from few solved places of the tip to every place |
 //! | `own` | the unit's tables and what is not known of them, for its model file |
 
 mod descent;
 mod equations;
+mod explained;
 mod field;
 mod left_out;
 mod linear;
@@ -29,6 +31,7 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
+use explained::Explained;
 pub use left_out::LeftOut;
 use numbers::Family;
 pub use own::{FoundNumber, OwnFilm};
@@ -53,6 +56,8 @@ pub struct Fit {
     pub own: OwnFilm,
     /// χ² of what is seen and of what was known before, over the coordinates that are seen.
     pub chi_square: f64,
+    /// The load that is explained worst.
+    worst: SeenLoad,
     /// Each load, left out of the fit.
     pub left_out: Vec<LeftOut>,
 }
@@ -88,6 +93,7 @@ pub fn fit(
     );
     Ok(Fit {
         chi_square: found.chi_square(),
+        worst: loads[found.worst()],
         left_out: found.left_out(&problem)?,
         own: OwnFilm::new(&problem, &found)?,
     })
@@ -95,11 +101,11 @@ pub fn fit(
 
 impl fmt::Display for Fit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "χ² of what is seen, over its coordinates: {:.2}",
-            self.chi_square
-        )?;
+        let explained = Explained {
+            chi_square: self.chi_square,
+            worst: &self.worst,
+        };
+        writeln!(f, "{explained}")?;
         for FoundNumber { name, value, sigma } in &self.own.numbers {
             writeln!(f, "{name:<46} {value:>9.4} ± {sigma:.4}")?;
         }
