@@ -7,3 +7,4 @@ mod from_file;
 mod guided;
 mod over_serial;
 mod watched;
+mod weights;

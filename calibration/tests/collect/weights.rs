@@ -1,0 +1,107 @@
+//! `unit --into` with weights and a watch instead of a gauge.
+
+use std::sync::{Arc, Mutex};
+
+use hivtac_data::dataset::Dataset;
+use hivtac_terms::force::Force;
+use hivtac_terms::status::Status;
+use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
+use hivtac_wire::message::Sample;
+
+use crate::fake::*;
+
+/// Seconds from frame to frame.
+const FRAME_S: f64 = 0.04;
+/// The weights, g, and from when to when of its take each rests, s.
+const WEIGHTS: [(f64, [f64; 2]); 3] = [(5.0, [2.3, 8.6]), (10.0, [1.4, 10.1]), (20.0, [3.2, 13.9])];
+/// The force of a gram, N.
+const GRAM_N: f64 = 9.806_65e-3;
+
+/// A weight that is put on within a tenth of a second, g, so long after its take began, s.
+fn grams(load: usize, time_s: f64) -> f64 {
+    let (grams, [on_s, off_s]) = WEIGHTS[load];
+    let part = ((time_s - on_s) / 0.1).min((off_s - time_s) / 0.1);
+    grams * part.clamp(0.0, 1.0)
+}
+
+/// A formula of a film that looks up, under these weights; tells when each take began, s.
+fn sensor(begun: Arc<Mutex<Vec<f64>>>) -> FakeSensor {
+    let (mut time_s, mut begun_s, mut last_start) = (0.0, 0.0, 0);
+    let film = move |frame, start: u32| {
+        time_s += FRAME_S;
+        if start != last_start {
+            (begun_s, last_start) = (time_s, start);
+            begun.lock().unwrap().push(time_s);
+        }
+        let load = (start as usize).checked_sub(2);
+        let size_n = load.map_or(0.0, |load| GRAM_N * grams(load, time_s - begun_s));
+        let felt = (1e6 * size_n) as i32;
+        Sample {
+            sequence: frame,
+            frame,
+            time_us: (time_s * 1e6) as u64,
+            status: Status::NOT_CALIBRATED,
+            force: Some(Force {
+                alpha: MilliDegrees(0),
+                beta: MilliDegrees(0),
+                magnitude: MicroNewtons(felt),
+                cartesian: [0, 0, -felt].map(MicroNewtons),
+                direction_sigma: UnsignedMilliDegrees(10_000),
+                magnitude_sigma: UnsignedMicroNewtons(20_000),
+                place: None,
+            }),
+            markers: Some(markers(force_n(size_n, [0.0; 2]))),
+        }
+    };
+    FakeSensor::of_film(Box::new(film), usize::MAX)
+}
+
+/// What somebody notes by a watch that shows seconds, 50 s at the sensor's start: four lines a
+/// weight; the takes, that of the untouched film first, began then.
+fn notes(begun_s: &[f64]) -> String {
+    let mut text = "s,weight\n50,0 g\n".to_owned();
+    for (load, (grams, [on_s, off_s])) in WEIGHTS.iter().enumerate() {
+        let at_s = 50.0 + begun_s[load + 1];
+        for (time_s, grams) in [
+            ((at_s + on_s).floor(), 0.0),
+            ((at_s + on_s + 0.1).ceil(), *grams),
+            ((at_s + off_s - 0.1).floor(), *grams),
+            ((at_s + off_s).ceil(), 0.0),
+        ] {
+            text += &format!("{time_s},{grams} g\n");
+        }
+    }
+    text
+}
+
+/// The loads are those of the weights; three are too few for a fit, which is said.
+#[test]
+fn a_person_with_weights_is_led_to_loads() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    std::fs::write(here.join("poses.csv"), "0,0,0,0\n0,0,0,0\n0,0,0,0\n").unwrap();
+    let begun = Arc::default();
+    let sensor = sensor(Arc::clone(&begun));
+    let unit = ["unit", "--into", "unit", "--poses", "poses.csv"];
+    let bench = ["--port", &sensor.port, "--seconds", "16"];
+    let more = ["--rest-seconds", "1"];
+    let (_, said) = run(here, &[&unit[..], &bench, &more].concat(), "\n\n\n\n");
+    assert!(said.contains("name the file that it recorded"), "{said}");
+    std::fs::write(here.join("weights.csv"), notes(&begun.lock().unwrap())).unwrap();
+    let arguments = [&unit[..], &["--gauge", "weights.csv"]].concat();
+    let (output, said) = run(here, &arguments, "");
+    let stdout = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        stdout.contains("they are in unit/loads.csv"),
+        "{stdout}: {said}"
+    );
+    assert!(said.contains("shows 3 loads: 4 at least"), "{said}");
+    let data = Dataset::load(&here.join("unit/loads.csv")).unwrap();
+    let mut frames = [0; WEIGHTS.len()];
+    for row in data.rows.iter().filter(|row| row.force_n != [0.0; 3]) {
+        let is_its = |(grams, _): &(f64, [f64; 2])| (row.force_n[2] + grams * GRAM_N).abs() < 1e-4;
+        let weight = WEIGHTS.iter().position(is_its);
+        frames[weight.unwrap_or_else(|| panic!("{row:?}"))] += 1;
+    }
+    assert!(frames.iter().all(|count| *count > 39), "{frames:?}");
+}
