@@ -63,6 +63,11 @@ fn from_tip(pressed: &Pressed, place: [f64; 2]) -> [f64; 2] {
     })
 }
 
+/// How far the film goes at a place where its markers go so far, roughly.
+pub fn from_markers(at_markers: f64, place: [f64; 2]) -> f64 {
+    at_markers * share(place) / share([MARKER_REST_MM; 2])
+}
+
 /// The part of the tip's depth that a place takes under a straight press, from the full solution at
 /// 0.02 and 0.25 N (within 0.03): 1 at the tip, 0.70 and 0.67 at the markers, 0.36 and 0.39 in the
 /// middle of an edge, 0 at the posts.

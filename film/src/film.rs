@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use crate::label::{Felt, Reached, Stage};
 use crate::reduced::{
-    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit,
+    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit, Weight,
 };
 use crate::{Contact, DiscMotion, FilmError, Load, MARKER_CENTRES_MM, field};
 
@@ -29,8 +29,18 @@ static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
     Film {
         tables: Arc::new(tables.expect("the committed tables are a film's")),
         unit: Unit::default(),
+        down: None,
     }
 });
+
+/// What its own weight does.
+static WEIGHT: LazyLock<Weight> = LazyLock::new(|| {
+    let weight = Weight::from_bytes(include_bytes!("../data/weight.bin"));
+    weight.expect("the committed table is one of weight")
+});
+
+/// How far from one a direction's length may be.
+const UNIT_LENGTH: f64 = 1e-3;
 
 /// The film by its tables: markers within 0.1 px of the full solution at 320×240
 /// (`shell/README.md`); the film between them roughly.
@@ -38,6 +48,8 @@ static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
 pub struct Film {
     tables: Arc<Tables>,
     unit: Unit,
+    /// Where gravity pulls, in parts of g; none: it weighs nothing.
+    down: Option<[f64; 3]>,
 }
 
 impl Default for Film {
@@ -58,6 +70,24 @@ impl Film {
             unit,
             ..NOMINAL.clone()
         })
+    }
+
+    /// The same film with a weight, held so that gravity pulls along `down`, a unit vector in the
+    /// film's frame; of none it weighs nothing. Markers are within 0.1 px of the full solution
+    /// (`shell/README.md`) at rest and from 20 mN on.
+    ///
+    /// # Errors
+    /// When `down` is no unit vector.
+    pub fn with_down(self, down: Option<[f64; 3]>) -> Result<Film, FilmError> {
+        let length = |[x, y, z]: [f64; 3]| libm::sqrt(x * x + y * y + z * z);
+        let length = down.map_or(1.0, length);
+        if !((length - 1.0).abs() <= UNIT_LENGTH) {
+            return Err(FilmError::Load(format!(
+                "down is {length} long: use a vector of length 1, such as [0, 0, -1]"
+            )));
+        }
+        let down = down.map(|down| down.map(|part| part / length));
+        Ok(Film { down, ..self })
     }
 
     /// Whether the film can take this load.
@@ -87,6 +117,13 @@ impl Film {
             }
             return within("|F|", load.magnitude_n(), MAX_FORCE_N, "N");
         }
+        if self.down.is_some() {
+            return Err(FilmError::Load(format!(
+                "the contact is {} and the film has a weight: what its tip's way means is known \
+                 of a weightless film alone; use the contact force, or leave down out",
+                load.contact()
+            )));
+        }
         within("|F_x / F_z|", (x / z).abs(), MAX_TANGENT, "(12°)")?;
         within("|F_y / F_z|", (y / z).abs(), MAX_TANGENT, "(12°)")?;
         for part in load.offset_mm() {
@@ -98,6 +135,15 @@ impl Film {
     /// The film under a load that [`Film::check`] accepts. Under another one it stays at the
     /// tables' limit.
     pub fn press(&self, load: &Load) -> Pressed {
+        let pressed = self.pressed(load);
+        match self.down {
+            None => pressed,
+            Some(down) => self.weighted(pressed, down),
+        }
+    }
+
+    /// As if it weighed nothing.
+    fn pressed(&self, load: &Load) -> Pressed {
         if load.magnitude_n() == 0.0 {
             return Pressed {
                 touches_mm: load.offset_mm(),
@@ -116,14 +162,32 @@ impl Film {
         }
     }
 
+    /// With what weight does to a film that is pressed so.
+    fn weighted(&self, mut pressed: Pressed, down: [f64; 3]) -> Pressed {
+        let pose = self.pose(pressed.force_n, pressed.touches_mm);
+        let mut sag_mm = 0.0;
+        for (k, disc) in pressed.discs.iter_mut().enumerate() {
+            let more = WEIGHT.disc(&pose, down, &self.unit, k);
+            *disc = sum(disc, &more);
+            sag_mm += more.moved_mm[2] / 4.0;
+        }
+        pressed.tip_mm[2] += field::from_markers(sag_mm, pressed.touches_mm);
+        pressed
+    }
+
     /// How the film around one marker moves, by its identity 0–3: [`Self::press`] without what it
     /// says of the others and of the tip.
     pub fn marker_motion(&self, load: &Load, marker: usize) -> DiscMotion {
-        if load.magnitude_n() == 0.0 {
-            return DiscMotion::default();
+        let mut pose = Pose::default();
+        let mut disc = DiscMotion::default();
+        if load.magnitude_n() > 0.0 {
+            (pose, _) = self.reached(load);
+            disc = (self.tables).disc(&pose, load.tip_radius_mm(), &self.unit, marker);
         }
-        let (pose, _) = self.reached(load);
-        (self.tables).disc(&pose, load.tip_radius_mm(), &self.unit, marker)
+        match self.down {
+            None => disc,
+            Some(down) => sum(&disc, &WEIGHT.disc(&pose, down, &self.unit, marker)),
+        }
     }
 
     /// The load and the force, N, that a load which presses comes to.
@@ -225,6 +289,15 @@ impl Pressed {
     /// distracts, not for one that measures.
     pub fn displacement(&self, rest_mm: [f64; 2]) -> [f64; 3] {
         field::displacement(self, rest_mm)
+    }
+}
+
+fn sum(a: &DiscMotion, b: &DiscMotion) -> DiscMotion {
+    let sum = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|c| a[c] + b[c]);
+    DiscMotion {
+        moved_mm: sum(a.moved_mm, b.moved_mm),
+        along_x: sum(a.along_x, b.along_x),
+        along_y: sum(a.along_y, b.along_y),
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::{Contact, Load, SceneError};
 use hivtac_film::DiscMotion;
 use hivtac_film::reduced::{NOMINAL_RADIUS_MM, Unit};
-use hivtac_film::{Film, Pressed};
+use hivtac_film::{Film, FilmError, Pressed};
 
 /// What the scene takes of the film's answer to a load.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +17,8 @@ pub struct Mechanics {
     /// Whether a tilted force moves it sideways; without, |F| presses straight, whatever its
     /// direction.
     pub lateral: bool,
+    /// Where gravity pulls on it, a unit vector in the film's frame; `None`: it weighs nothing.
+    pub down: Option<[f64; 3]>,
     /// How it differs from the nominal film.
     pub unit: Unit,
     /// What the labels of loads mean that do not say so themselves.
@@ -51,6 +53,7 @@ impl Default for Mechanics {
             surface: crate::Surface::CameraSide,
             stiffness: Stiffness::Computed,
             lateral: true,
+            down: None,
             unit: Unit::default(),
             contact: Contact::Force,
             offset_mm: [0.0; 2],
@@ -65,10 +68,15 @@ impl Mechanics {
     /// # Errors
     /// When a film differs too much from the nominal one, or a contact cannot be.
     pub(crate) fn film(&self, markers_mm: [[f64; 2]; 4]) -> Result<Film, SceneError> {
+        if self.down.is_some() && self.stiffness == Stiffness::Linear {
+            let why = "a linear film weighs nothing: leave down out, or use computed".to_owned();
+            return Err(FilmError::Load(why).into());
+        }
         let film = Film::of(Unit {
             markers_mm,
             ..self.unit
         })?;
+        let film = film.with_down(self.down)?;
         film.check(&self.completed(&Load::REST.with_contact(self.contact)?))?;
         Ok(film)
     }

@@ -13,11 +13,14 @@ use std::time::Instant;
 use hivtac_film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::{Solved, octant, solve_place};
-use hivtac_shell::{Check, Design, ShellError, check, paper_camera, record, tables};
+use hivtac_shell::{
+    Check, Design, Domain, ShellError, check, paper_camera, record, tables, weight,
+};
 
-const USAGE: &str = "reduce FOLDER [--check]
+const USAGE: &str = "reduce FOLDER [--weight|--check]
 Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are \
 incomplete.
+--weight: makes FOLDER/weight.bin, what the film's own weight does, instead
 --check: hold the film that is built in against the full solution instead";
 
 /// Loads of a check.
@@ -31,6 +34,11 @@ const DOMAINS_MM: [(f64, [f64; 2]); 4] = [
     (4.0, [1.0, LARGEST_RADIUS_MM]),
 ];
 
+/// Forces under which weight is checked, N, how tilted they are at most, and where it pulls.
+const WEIGHT_N: [[f64; 2]; 2] = [[0.002, 0.02], [0.02, 0.2]];
+const WEIGHT_RATIO: f64 = 0.4;
+const DOWN: [[f64; 3]; 3] = [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.8, 0.0, 0.6]];
+
 fn main() -> ExitCode {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
@@ -38,6 +46,7 @@ fn main() -> ExitCode {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let done = match words.as_slice() {
         [folder] => reduce(Path::new(folder)),
+        [folder, "--weight"] => weigh(Path::new(folder)),
         [_, "--check"] => look(),
         _ => Err(USAGE.into()),
     };
@@ -61,6 +70,18 @@ fn reduce(folder: &Path) -> Result<(), Box<dyn Error>> {
         path.display(),
         bytes.len()
     );
+    Ok(())
+}
+
+fn weigh(folder: &Path) -> Result<(), Box<dyn Error>> {
+    let design = Design {
+        gauss_points: 2,
+        ..Design::default()
+    };
+    let bytes = weight(&design, threads()?, progress("weight"))?.to_bytes();
+    let path = folder.join("weight.bin");
+    std::fs::write(&path, &bytes)?;
+    println!("{}: {} bytes", path.display(), bytes.len());
     Ok(())
 }
 
@@ -120,12 +141,19 @@ fn read(path: &Path) -> Result<Vec<Solved>, Box<dyn Error>> {
 }
 
 fn look() -> Result<(), Box<dyn Error>> {
-    for (reach_mm, radii_mm) in DOMAINS_MM {
-        let unit = Unit::default();
+    let weightless = DOMAINS_MM.map(|(reach_mm, radii_mm)| Domain::within(reach_mm, radii_mm));
+    let heavy = WEIGHT_N.iter().flat_map(|force_n| {
+        DOWN.map(|down| Domain {
+            force_n: *force_n,
+            ratio: WEIGHT_RATIO,
+            down: Some(down),
+            ..Domain::within(4.0, [NOMINAL_RADIUS_MM; 2])
+        })
+    });
+    for domain in weightless.into_iter().chain(heavy) {
         let found = check(
-            &unit,
-            reach_mm,
-            radii_mm,
+            &Unit::default(),
+            &domain,
             LOADS,
             threads()?,
             progress("check"),
@@ -137,10 +165,18 @@ fn look() -> Result<(), Box<dyn Error>> {
             worst_tip_mm,
             ..
         } = found;
-        let [from, to] = radii_mm;
+        let Domain {
+            force_n: [least_n, most_n],
+            reach_mm,
+            radii_mm: [from, to],
+            down,
+            ..
+        } = domain;
+        let weight = down.map_or("no weight".to_owned(), |down| format!("down {down:?}"));
         println!(
-            "{loads} loads within ±{reach_mm} mm, tips of {from} to {to} mm: rms {rms_px:.4} px, \
-             at most {worst_px:.3} px; the tip within {worst_tip_mm:.3} mm"
+            "{loads} loads of {least_n} to {most_n} N within ±{reach_mm} mm, tips of {from} to \
+             {to} mm, {weight}: rms {rms_px:.4} px, at most {worst_px:.3} px; the tip within \
+             {worst_tip_mm:.3} mm"
         );
         if let Some(load) = found.worst_at {
             println!("  the largest at {load:?}");

@@ -28,25 +28,53 @@ pub struct Check {
     pub worst_tip_mm: f64,
 }
 
-/// Holds the reduced film against the full solution of a unit at so many random loads: |F| to
-/// 0.25 N, tangential over normal to 0.8, places within ±`reach_mm`, the tip's radius within the
-/// given ones, mm.
+/// Loads at which the film is held against the full solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Domain {
+    /// |F|, N.
+    pub force_n: [f64; 2],
+    /// Tangential over normal force at most.
+    pub ratio: f64,
+    /// How far from the middle they are along x and y, mm.
+    pub reach_mm: f64,
+    /// The tip's radius, mm.
+    pub radii_mm: [f64; 2],
+    /// Where gravity pulls; of none the film weighs nothing.
+    pub down: Option<[f64; 3]>,
+}
+
+impl Domain {
+    /// All forces on a weightless film.
+    pub fn within(reach_mm: f64, radii_mm: [f64; 2]) -> Domain {
+        Domain {
+            force_n: FORCE_N,
+            ratio: MAX_RATIO,
+            reach_mm,
+            radii_mm,
+            down: None,
+        }
+    }
+}
+
+/// Holds the reduced film against the full solution of a unit at so many random loads.
 ///
 /// # Errors
 /// When the film cannot be made or an equilibrium is not found.
 pub fn check(
     unit: &Unit,
-    reach_mm: f64,
-    radii_mm: [f64; 2],
+    domain: &Domain,
     loads: usize,
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Check, ShellError> {
-    let reduced = ReducedFilm::of(*unit)?;
-    let cases = (0..loads).map(|index| case(index, reach_mm, radii_mm));
+    let reduced = ReducedFilm::of(*unit)?.with_down(domain.down)?;
+    let cases = (0..loads).map(|index| case(index, domain));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let camera = Camera::new(Preset::Ov7725, 320, 240)?;
-    let design = Design::of(unit);
+    let design = Design {
+        down: domain.down.unwrap_or_default(),
+        ..Design::of(unit)
+    };
     let errors = in_parallel(&design, &cases, threads, progress, |film, load| {
         errors(film, &reduced, load, &camera)
     })?;
@@ -88,11 +116,18 @@ fn errors(
 }
 
 /// A load of the stated domain, from a sequence that fills it evenly.
-fn case(index: usize, reach_mm: f64, radii_mm: [f64; 2]) -> Result<Load, FilmError> {
+fn case(index: usize, domain: &Domain) -> Result<Load, FilmError> {
+    let Domain {
+        force_n,
+        ratio,
+        reach_mm,
+        radii_mm,
+        ..
+    } = *domain;
     let part = |base| halton(index + 1000, base);
     let between = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
-    let size_n = between(FORCE_N, part(2));
-    let (tilt, turn) = ((MAX_RATIO * part(3).sqrt()).atan(), 2.0 * PI * part(5));
+    let size_n = between(force_n, part(2));
+    let (tilt, turn) = ((ratio * part(3).sqrt()).atan(), 2.0 * PI * part(5));
     let place = [7, 11].map(|base| reach_mm * (2.0 * part(base) - 1.0));
     let radius = between(radii_mm, part(13));
     let sideways = size_n * tilt.sin();

@@ -30,9 +30,10 @@ mod tables;
 #[cfg(test)]
 mod verification;
 mod view;
+mod weight;
 
 pub use answers::{Change, Response};
-pub use check::{Check, check};
+pub use check::{Check, Domain, check};
 pub use design::Design;
 pub use error::ShellError;
 pub use film::{Contact, Equilibrium, Film, Touch};
@@ -41,3 +42,4 @@ pub use path::halton;
 pub use point::{DENSITY_KG_PER_M3, Law, Material};
 pub use tables::tables;
 pub use view::{Marker, markers, markers_on, paper_camera, pressed, pressed_on};
+pub use weight::weight;

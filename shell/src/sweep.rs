@@ -69,7 +69,7 @@ pub fn solve_place(
     Ok(solved)
 }
 
-fn tilts() -> Vec<[f64; 2]> {
+pub(crate) fn tilts() -> Vec<[f64; 2]> {
     let ring = |(radius, turn): (f64, f64)| {
         (0..4).map(move |k| {
             let angle = (turn + 90.0 * f64::from(k)).to_radians();
@@ -101,11 +101,16 @@ fn look(
     })
 }
 
-fn discs(film: &Film, state: &Equilibrium, thicker: f64, camera: &Camera) -> [DiscMotion; 4] {
+pub(crate) fn discs(
+    film: &Film,
+    state: &Equilibrium,
+    thicker: f64,
+    camera: &Camera,
+) -> [DiscMotion; 4] {
     MARKERS.map(|disc| seen_motion(|rest| film.surface(state, rest, thicker), &disc, camera))
 }
 
-fn answered_by(
+pub(crate) fn answered_by(
     film: &Film,
     state: &Equilibrium,
     camera: &Camera,

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use hivtac_film::Film as ReducedFilm;
 use hivtac_film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_scene::{Camera, Contact, Disc, Load, Preset};
-use hivtac_shell::{Design, Film, check, press_load};
+use hivtac_shell::{Design, Domain, Film, check, press_load};
 
 /// How far the reduced film's markers may be off, px at 320×240 `ov7725`.
 const MOST_PX: f64 = 0.1;
@@ -83,6 +83,54 @@ fn a_film_built_by_hand_is_its_full_solution() {
     agree(&unit, &cases.map(load), MOST_PX_OF_A_UNIT);
 }
 
+/// How far the images of the reduced film with its weight are off, px, at rest and under loads.
+fn weight_off_px(down: [f64; 3], loads: &[Load]) -> f64 {
+    let reduced = ReducedFilm::default().with_down(Some(down)).unwrap();
+    let heavy = Design {
+        down,
+        ..Design::default()
+    };
+    let mut films = [Design::default(), heavy].map(|design| Film::new(&design).unwrap());
+    let mut worst = 0.0_f64;
+    for load in loads {
+        let [without, with] = films.each_mut().map(|film| press_load(film, load).unwrap());
+        let pressed = [ReducedFilm::default(), reduced.clone()].map(|film| film.press(load));
+        for disc in reduced.markers_mm().map(Disc::marker) {
+            let full = [(&films[0], &without), (&films[1], &with)].map(|(film, loaded)| {
+                disc.centroid_px(|rest| film.displacement(&loaded.state, rest), &CAMERA)
+            });
+            let ours =
+                pressed.map(|film| disc.centroid_px(|rest| film.displacement(rest), &CAMERA));
+            let effect = |[without, with]: [[f64; 2]; 2]| [0, 1].map(|c| with[c] - without[c]);
+            let ([x, y], [a, b]) = (effect(full), effect(ours));
+            worst = worst.max((a - x).hypot(b - y));
+        }
+    }
+    worst
+}
+
+/// What weight adds, apart from what tables are off without it.
+#[test]
+fn weight_does_what_the_full_solution_says() {
+    let cases = [
+        ([0.0, 0.0, -0.02], [0.0, 0.0], 0.5),
+        ([0.01, -0.02, -0.06], [-2.3, 3.2], 0.5),
+        ([0.0, 0.0, -0.2], [3.0, 2.2], 0.5),
+    ];
+    for down in [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [0.48, 0.64, -0.6],
+        [0.0, -0.8, 0.6],
+    ] {
+        let at_rest = weight_off_px(down, &[Load::REST]);
+        let pressed = weight_off_px(down, &cases.map(load));
+        let light = weight_off_px(down, &[load(([0.0, 0.0, -0.004], [1.0, -2.0], 0.5))]);
+        println!("{down:?}: {at_rest:.4}, {pressed:.4}, at 4 mN {light:.4} px");
+        assert!(at_rest < 0.005 && pressed < 0.04 && light < 0.5);
+    }
+}
+
 #[test]
 fn labels_of_a_stage_are_the_full_solution() {
     let label = |n: f64, alpha: f64, beta: f64, contact: Contact| {
@@ -104,7 +152,8 @@ fn labels_of_a_stage_are_the_full_solution() {
 fn tables_are_the_full_solution_everywhere() {
     let threads = std::thread::available_parallelism().unwrap().get();
     let check = |radii_mm, loads| {
-        check(&Unit::default(), 4.0, radii_mm, loads, threads, |_, _| ()).unwrap()
+        let domain = Domain::within(4.0, radii_mm);
+        check(&Unit::default(), &domain, loads, threads, |_, _| ()).unwrap()
     };
     let nominal = check([NOMINAL_RADIUS_MM; 2], 40);
     assert!(nominal.worst_px < MOST_PX, "{nominal:?}");

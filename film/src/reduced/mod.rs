@@ -9,6 +9,7 @@ mod table;
 mod tables;
 mod terms;
 mod unit;
+mod weight;
 
 pub use axis::Axis;
 pub use pose::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose};
@@ -16,3 +17,4 @@ pub use table::Table;
 pub use tables::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Tables, rho};
 pub use terms::Terms;
 pub use unit::Unit;
+pub use weight::{AS_A_PRESS_N, Pull, Weight};

@@ -79,8 +79,8 @@ impl Pose {
     }
 }
 
-/// The root s of linear·s + s³ = f, for f ≥ 0 and linear > 0.
-fn size_of(f: f64, linear: f64) -> f64 {
+/// The root s of linear·s + s³ = f, for linear > 0.
+pub(super) fn size_of(f: f64, linear: f64) -> f64 {
     // Cardano's formula without cancellation: s = 2 √(linear / 3) sinh(asinh(…) / 3).
     let scale = 2.0 * libm::sqrt(linear / 3.0);
     let argument = 3.0 * f / (linear * scale);

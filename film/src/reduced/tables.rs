@@ -296,7 +296,7 @@ fn swapped(parts: Parts) -> Parts {
 }
 
 /// A disc's motion seen in a mirror.
-fn mirrored_disc(disc: DiscMotion, [sx, sy]: [f64; 2]) -> DiscMotion {
+pub(super) fn mirrored_disc(disc: DiscMotion, [sx, sy]: [f64; 2]) -> DiscMotion {
     let mirror = |[x, y, z]: [f64; 3], sign: f64| [sign * sx * x, sign * sy * y, sign * z];
     DiscMotion {
         moved_mm: mirror(disc.moved_mm, 1.0),

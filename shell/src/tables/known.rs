@@ -99,7 +99,8 @@ impl<'a> Sweeps<'a> {
     }
 }
 
-fn same(a: [f64; 2], b: [f64; 2]) -> bool {
+/// Whether two places are one.
+pub fn same(a: [f64; 2], b: [f64; 2]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME_PLACE_MM)
 }
 

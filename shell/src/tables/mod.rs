@@ -8,8 +8,10 @@ use hivtac_film::reduced::{Kind, Tables};
 
 use crate::ShellError;
 use crate::sweep::Solved;
-use fit::{nearest, splines};
+pub(crate) use fit::{Known, nearest, splines};
 use known::Sweeps;
+pub(crate) use known::same;
+pub(crate) use symmetry::Mirror;
 
 /// Two places are the same that are so near, mm.
 const SAME_PLACE_MM: f64 = 1e-9;

@@ -39,6 +39,10 @@ pub struct FilmArgs {
         allow_hyphen_values = true
     )]
     offset_mm: Offset,
+    /// Where gravity pulls, a vector of length one in the film's frame; without it the film weighs
+    /// nothing.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    down: Option<Down>,
     /// The tables that scenes use, or the finite elements that they were made from.
     #[arg(long, value_enum, default_value_t = Solver::Reduced)]
     solver: Solver,
@@ -92,6 +96,19 @@ impl FromStr for Offset {
     }
 }
 
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Down([f64; 3]);
+
+impl FromStr for Down {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Down, String> {
+        let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+        let down = parts.ok().and_then(|parts| parts.try_into().ok());
+        Ok(Down(down.ok_or("use three numbers, such as 0,0.6,-0.8")?))
+    }
+}
+
 /// The film under a load.
 struct Answer {
     tip_mm: [f64; 3],
@@ -115,8 +132,8 @@ impl FilmArgs {
         let load = load.with_offset_mm(self.offset_mm.0)?;
         let camera = Camera::new(self.preset, SIZE[0], SIZE[1])?;
         let answer = match self.solver {
-            Solver::Reduced => reduced(&load, &camera)?,
-            Solver::Full => full(&load, &camera)?,
+            Solver::Reduced => reduced(&load, self.down, &camera)?,
+            Solver::Full => full(&load, self.down, &camera)?,
         };
         if self.json {
             println!("{}", serde_json::to_string_pretty(&answer.to_json())?);
@@ -127,8 +144,8 @@ impl FilmArgs {
     }
 }
 
-fn reduced(load: &Load, camera: &Camera) -> Result<Answer> {
-    let film = Film::default();
+fn reduced(load: &Load, down: Option<Down>, camera: &Camera) -> Result<Answer> {
+    let film = Film::default().with_down(down.map(|down| down.0))?;
     film.check(load)?;
     let pressed = film.press(load);
     Ok(Answer {
@@ -141,10 +158,13 @@ fn reduced(load: &Load, camera: &Camera) -> Result<Answer> {
     })
 }
 
-fn full(load: &Load, camera: &Camera) -> Result<Answer> {
+fn full(load: &Load, down: Option<Down>, camera: &Camera) -> Result<Answer> {
     use hivtac_shell::{Design, Film, markers, press_load};
 
-    let mut film = Film::new(&Design::default())?;
+    let mut film = Film::new(&Design {
+        down: down.map_or([0.0; 3], |down| down.0),
+        ..Design::default()
+    })?;
     let state = press_load(&mut film, load)?.state;
     Ok(Answer {
         tip_mm: state.tip_mm,
