@@ -49,6 +49,32 @@ impl Rest {
         })
     }
 
+    /// The same whose markers lie so many px farther. The bounding rectangle of a mean is not the
+    /// mean of rectangles: what it changes by is added.
+    pub fn displaced(&self, px: &[[f32; 2]; 4]) -> Rest {
+        let mut markers = self.markers();
+        let before = Features::of_markers(&markers);
+        for (marker, [x, y]) in markers.iter_mut().zip(px) {
+            marker.x.0 = marker.x.0.saturating_add(Px::of_f32(*x).0);
+            marker.y.0 = marker.y.0.saturating_add(Px::of_f32(*y).0);
+        }
+        let after = Features::of_markers(&markers);
+        let (center, area) = (self.features.rect_center, self.features.rect_area);
+        let shifted =
+            |of: Px, from: Px, to: Px| Px(of.0.saturating_add(to.0.saturating_sub(from.0)));
+        Rest {
+            features: Features {
+                centroids: after.centroids,
+                rect_center: (
+                    shifted(center.0, before.rect_center.0, after.rect_center.0),
+                    shifted(center.1, before.rect_center.1, after.rect_center.1),
+                ),
+                rect_area: area.saturating_add(after.rect_area - before.rect_area),
+            },
+            areas: self.areas,
+        }
+    }
+
     /// Whether it can be a rest position: inside the largest picture, with markers of at least a
     /// pixel.
     pub fn is_sound(&self) -> bool {

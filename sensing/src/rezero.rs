@@ -18,7 +18,7 @@
 //! force of some mN, and at most 2 mN of one of 0.1 N.
 
 use hivtac_force::features::Features;
-use hivtac_force::forward::Drift;
+use hivtac_force::forward::{Drift, Gravity, Markers};
 use hivtac_force::rest::Rest;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::status::Status;
@@ -51,6 +51,10 @@ pub(crate) enum Told {
 pub(crate) struct Tare {
     /// As it was taken.
     taken: Rest,
+    /// Gravity then, in parts of g in the film's frame; `None` where nobody said.
+    down: Option<Gravity>,
+    /// Where it is as gravity is now.
+    hung: Rest,
     /// How far re-zeroing moved it from there: x and y of markers 0–3.
     moved: [Px; 8],
     /// Where that is.
@@ -100,10 +104,13 @@ impl Mean {
 }
 
 impl Tare {
-    /// A rest position that was taken, and from which the film may have drifted since.
-    pub fn new(taken: Rest, drift: Drift) -> Tare {
+    /// A rest position that was taken under a gravity, if that is known, and from which the film may
+    /// have drifted since.
+    pub fn new(taken: Rest, drift: Drift, down: Option<Gravity>) -> Tare {
         Tare {
             taken,
+            down,
+            hung: taken,
             moved: [Px(0); 8],
             rest: taken,
             drift,
@@ -120,6 +127,28 @@ impl Tare {
     /// The rest position as it was taken.
     pub fn taken(&self) -> &Rest {
         &self.taken
+    }
+
+    /// Gravity when it was taken.
+    pub fn down(&self) -> Option<Gravity> {
+        self.down
+    }
+
+    /// Says where it is as gravity is now; what was followed stays.
+    pub fn hang(&mut self, hung: Rest) {
+        if self.hung != hung {
+            self.hung = hung;
+            self.quiet = None;
+            self.rezero();
+        }
+    }
+
+    fn rezero(&mut self) {
+        let mut px = Markers::default();
+        for (px, moved) in px.as_flattened_mut().iter_mut().zip(self.moved) {
+            *px = moved.to_f32();
+        }
+        self.rest = self.hung.displaced(&px);
     }
 
     /// The one that is measured against.
@@ -187,7 +216,7 @@ impl Tare {
         if !is_due {
             return Told::Nothing;
         }
-        let there = mean.beside(&self.taken);
+        let there = mean.beside(&self.hung);
         let quiet_us = mean.begun_us.saturating_sub(quiet.since_us);
         let is_long = |limits: &&Rezero| quiet_us >= u64::from(limits.after.0) * 1_000;
         let before = self.moved;
@@ -203,7 +232,7 @@ impl Tare {
         if self.moved == before {
             return Told::Drift;
         }
-        self.rest = displaced(&self.taken, &self.moved);
+        self.rezero();
         Told::Moved
     }
 
@@ -233,31 +262,6 @@ fn take(mean: &mut Mean, features: &Features) {
 fn coordinates(rest: &Rest) -> impl Iterator<Item = Px> {
     let centroids = rest.features.centroids;
     centroids.into_iter().flat_map(|(x, y)| [x, y])
-}
-
-/// A rest position whose markers lie so much farther. The bounding rectangle of a mean is not the
-/// mean of rectangles: what it changes by is added.
-fn displaced(rest: &Rest, moved: &[Px; 8]) -> Rest {
-    let mut markers = rest.markers();
-    let before = Features::of_markers(&markers);
-    for (marker, by) in markers.iter_mut().zip(moved.chunks_exact(2)) {
-        marker.x.0 = marker.x.0.saturating_add(by[0].0);
-        marker.y.0 = marker.y.0.saturating_add(by[1].0);
-    }
-    let after = Features::of_markers(&markers);
-    let (center, area) = (rest.features.rect_center, rest.features.rect_area);
-    let shifted = |of: Px, from: Px, to: Px| Px(of.0.saturating_add(to.0.saturating_sub(from.0)));
-    Rest {
-        features: Features {
-            centroids: after.centroids,
-            rect_center: (
-                shifted(center.0, before.rect_center.0, after.rect_center.0),
-                shifted(center.1, before.rect_center.1, after.rect_center.1),
-            ),
-            rect_area: area.saturating_add(after.rect_area - before.rect_area),
-        },
-        areas: rest.areas,
-    }
 }
 
 #[cfg(test)]
@@ -297,7 +301,7 @@ mod tests {
         fn new() -> Self {
             let rest = Rest::of_markers(&shifted(Px(0)));
             Self {
-                tare: Tare::new(rest, Drift::NONE),
+                tare: Tare::new(rest, Drift::NONE, None),
                 time_us: 5_000_000,
             }
         }

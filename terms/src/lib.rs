@@ -10,6 +10,7 @@ extern crate std;
 
 pub mod camera;
 pub mod conditions;
+pub mod down;
 pub mod force;
 pub mod geometry;
 pub mod hsv;

@@ -73,6 +73,9 @@ bits! {
     /// The untouched film was seen last beside its rest position; standard uncertainties include
     /// that.
     REST_MOVED = 23, "rest_moved";
+    /// The film may hang otherwise than when its rest position was taken, and nobody said how, or
+    /// the model does not know what that does; where it knows, standard uncertainties include it.
+    WEIGHT_UNKNOWN = 24, "weight_unknown";
 }
 
 impl Status {

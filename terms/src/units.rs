@@ -29,6 +29,11 @@ impl Px {
         Px(length.bits().clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }
 
+    /// Of a value in pixels, to the step below; at the limits of 32 bits beyond them.
+    pub const fn of_f32(px: f32) -> Px {
+        Px((px * 65_536.0) as i32)
+    }
+
     /// The value in pixels, to 2⁻²⁴ of it.
     pub fn to_f32(self) -> f32 {
         self.0 as f32 / 65_536.0

@@ -91,7 +91,7 @@ impl Judged {
 }
 
 /// How far a force is off: of the direction, degrees, of |F|, mN, and of the place, mm.
-fn errors(force: &Force, truth: &Truth) -> [f64; 3] {
+pub fn errors(force: &Force, truth: &Truth) -> [f64; 3] {
     let found = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let [size, true_size] = [found, truth.on_film_n].map(length);
     let off_mn = 1e3 * (size - true_size).abs();

@@ -13,6 +13,7 @@ use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
 use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::down::Down;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
@@ -247,6 +248,11 @@ impl TaredSensor {
     /// Another unit: there is no rest position of it.
     pub fn forget_tare(&mut self) {
         self.sensor.set_tare(None, Drift::NONE);
+    }
+
+    /// What is known of gravity from now on.
+    pub fn set_down(&mut self, down: Down) {
+        self.sensor.set_down(down);
     }
 
     /// The rest position stays, but no frame has confirmed it.

@@ -23,5 +23,6 @@ mod snapshots;
 mod status_bits;
 mod steps;
 mod tares;
+mod turned;
 mod view;
 mod wire_vectors;

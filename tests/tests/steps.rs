@@ -257,12 +257,12 @@ fn damaged_sections_do_no_harm() {
     assert!(read > 1_000);
 }
 
-/// A section says how many markers it is for, and whose covariances it has.
+/// A section says how many markers it is for, and which parts it has.
 #[test]
 fn a_section_of_other_markers_is_refused() {
     let file = models::anywhere(1);
     let section = &file[FORWARD_OFFSET..file.len() - 4];
-    for (at, value, name) in [(2, 8, "markers"), (3, 4, "covariances")] {
+    for (at, value, name) in [(2, 8, "markers"), (3, 8, "parts")] {
         let mut changed = section.to_vec();
         changed[at] = value;
         let refused = Forward::parse(&changed).err();

@@ -11,15 +11,16 @@ mod noise;
 mod others;
 mod tables;
 mod unit;
+mod weight;
 
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_film::Film;
-use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Unit};
-use hivtac_scene::{Camera, Disc, FILM_DISTANCE_MM, Preset};
+use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
+use hivtac_scene::{Camera, Disc, FILM_DISTANCE_MM, Load, Preset};
 use hivtac_sensing::forward::{self, DOTS, Limits, RestImage, Stiffness};
-use hivtac_sensing::model::{ForwardSpec, TablesSpec};
+use hivtac_sensing::model::{ForwardSpec, TablesSpec, WeightSpec};
 use serde::{Deserialize, Serialize};
 
 use crate::unit_fit::OwnFilm;
@@ -32,6 +33,7 @@ pub use noise::Noise;
 pub use others::OtherUnits;
 pub use tables::{Dot, UnitSetup, tables};
 pub use unit::Known;
+pub use weight::{Weighed, weight};
 
 /// What is known of a unit's film and camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -166,6 +168,7 @@ impl FilmModel {
             tables: nominal.tables,
             own: (self.beside_px > 0.0).then(|| even(self.beside_px / FOCAL_PX)),
             other: self.others.as_deref().map(OtherUnits::spec),
+            weight: Some(nominal.weight),
         })
     }
 }
@@ -175,6 +178,22 @@ impl FilmModel {
 struct Nominal {
     stiffness: Stiffness,
     tables: TablesSpec,
+    weight: WeightSpec,
+}
+
+impl Weighed for UnitSetup<'_> {
+    fn moved(&self, pose: &Pose, down: [f64; 3]) -> Result<Moved> {
+        let down = Some(down).filter(|down| *down != [0.0; 3]);
+        let film = Film::of(self.unit)?.with_down(down)?;
+        let mut moved = Moved::default();
+        for (marker, place) in moved.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            *place = match pose.size > 0.0 {
+                true => UnitSetup::moved(self, &film, pose, marker)?,
+                false => self.moved_by(&film, &Load::REST, marker)?,
+            };
+        }
+        Ok(moved)
+    }
 }
 
 fn nominal(camera: &Camera) -> Result<Nominal> {
@@ -189,9 +208,11 @@ fn nominal(camera: &Camera) -> Result<Nominal> {
         camera,
     };
     let [linear_n, cubic_n] = setup.stiffness_n().map(|part| part as f32);
+    let stiffness = Stiffness { linear_n, cubic_n };
     let nominal = Nominal {
-        stiffness: Stiffness { linear_n, cubic_n },
+        stiffness,
         tables: setup.tables()?.0,
+        weight: weight(&setup, stiffness, [0.0; 3])?,
     };
     *made = Some(nominal.clone());
     Ok(nominal)
@@ -325,6 +346,75 @@ mod tests {
             }
         }
         [(sum / count).sqrt(), worst]
+    }
+
+    /// How far the chip is off what weight does under loads of these sizes, N, from how the film
+    /// hangs at rest, px at 320×240: root mean square and largest.
+    fn weight_off_px(sizes_n: [f64; 2]) -> [f64; 2] {
+        let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
+        let setup = UnitSetup {
+            unit: Unit::default(),
+            tip_radius_mm: NOMINAL_RADIUS_MM,
+            camera: &camera,
+        };
+        let bytes = film_model().spec().unwrap().to_bytes();
+        let forward = forward::Forward::parse(&bytes).unwrap();
+        let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
+        for (number, pose) in poses().enumerate() {
+            let force_n = sizes_n[0] + (sizes_n[1] - sizes_n[0]) * halton(number as u32, 2);
+            let own = Pose::of_force([0.0, 0.0, -force_n], pose.place_mm, [1.0; 2]);
+            let pose = Pose {
+                tilt: pose.tilt.map(|part| 0.5 * part),
+                ..own
+            };
+            let turn = |base| 6.2 * halton(number as u32 + 7, base);
+            let (z, angle) = (libm::cos(turn(3)), turn(5));
+            let along = (1.0 - z * z).sqrt();
+            let down = [along * libm::cos(angle), along * libm::sin(angle), z];
+            let at = |pose: &Pose, down| Weighed::moved(&setup, pose, down).unwrap();
+            let rest = Pose::default();
+            let turned = forward::Turned::From {
+                before: [0.0; 3],
+                now: down.map(|part| part as f32),
+            };
+            let hanging = forward.hanging(turned, true).unwrap();
+            let mut told = forward::Prediction::default();
+            let chip = forward::Pose {
+                size: pose.size as f32,
+                tilt: pose.tilt.map(|part| part as f32),
+                place_mm: pose.place_mm.map(|part| part as f32),
+            };
+            let mut covariance = forward::Covariance::default();
+            hanging.add_to(
+                &chip,
+                &forward.stiffness,
+                &forward.limits,
+                &mut told,
+                &mut covariance,
+            );
+            for c in 0..8 {
+                let with = at(&pose, down)[c] - at(&rest, down)[c];
+                let without = at(&pose, [0.0; 3])[c] - at(&rest, [0.0; 3])[c];
+                let off = camera.focal_px() * (f64::from(told.moved[c]) - (with - without));
+                sum += off * off;
+                worst = worst.max(off.abs());
+                count += 1.0;
+            }
+        }
+        [(sum / count).sqrt(), worst]
+    }
+
+    #[test]
+    fn the_chip_knows_what_weight_does() {
+        for (sizes_n, most) in [
+            ([0.02, 0.05], [0.02, 0.15]),
+            ([0.05, 0.2], [0.02, 0.15]),
+            ([0.002, 0.02], [0.2, 2.0]),
+        ] {
+            let [rms, worst] = weight_off_px(sizes_n);
+            println!("{sizes_n:?} N: {rms:.4}, {worst:.4} px");
+            assert!(rms < most[0] && worst < most[1], "{rms} {worst} px");
+        }
     }
 
     #[test]

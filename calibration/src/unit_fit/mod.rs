@@ -34,6 +34,7 @@ use crate::loads::SeenLoad;
 use explained::Explained;
 pub use left_out::LeftOut;
 use numbers::Family;
+pub(crate) use linear::inverse;
 pub use own::{FoundNumber, OwnFilm};
 pub use problem::Bench;
 use problem::{Problem, Trust};

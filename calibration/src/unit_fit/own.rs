@@ -156,6 +156,7 @@ impl OwnFilm {
             tables: self.tables(),
             own: Some(self.covariance()?),
             other: None,
+            weight: None,
         })
     }
 

@@ -2,8 +2,8 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::forward::{
-    Column, Covariance, DOTS, Drift, Estimate, Forward, Markers, Mounting, Noise, Observed, Pose,
-    Sigma, Strength,
+    Column, Covariance, DOTS, Drift, Estimate, Forward, Hanging, Markers, Mounting, Noise,
+    Observed, Pose, Sigma, Strength, Turned,
 };
 use crate::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::network::Output;
@@ -24,6 +24,8 @@ pub struct Resting {
     areas: [f32; DOTS],
     /// How far that may be from where the film rests; `None` where it is known.
     drift: Option<Covariance>,
+    /// What the film's own weight does; `None` where the tables and the rest position have it.
+    hanging: Option<Hanging>,
 }
 
 /// What is left over of markers that are known less well, in parts of its variance, is seldom more
@@ -44,11 +46,19 @@ const BUILT: Drift = Drift {
 const AREAS: [f32; 2] = [0.5, 6.0];
 
 impl Resting {
-    /// For a model that takes steps, and markers that rest there.
+    /// For a model that takes steps, and markers that rest there; the film's weight is no matter: it
+    /// hangs as it did when the rest position was taken.
     pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
-        let forward = model.forward.as_ref()?;
-        let is_calibrated = !model.is_simulated();
-        (forward.steps > 0).then(|| Resting::new(forward, rest, &model.rest, is_calibrated))
+        Resting::of_turned(model, rest, None)
+    }
+
+    /// The same of a sensor that was turned since, and markers that rest there as gravity is now.
+    pub fn of_turned(model: &Model<'_>, rest: &Rest, turned: Option<Turned>) -> Option<Resting> {
+        let forward = model.forward.as_ref().filter(|forward| forward.steps > 0)?;
+        let flat = turned.map_or(*rest, |turned| forward.as_made(rest, turned));
+        let mut resting = Resting::new(forward, rest, &flat, &model.rest, !model.is_simulated());
+        resting.hanging = turned.and_then(|turned| forward.hanging(turned, resting.is_own));
+        Some(resting)
     }
 
     /// Says how far the film may rest from there.
@@ -57,12 +67,18 @@ impl Resting {
         self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
     }
 
-    /// For markers that rest there, by what the model knows of the unit that it was made on; of
-    /// another one by what its rest picture tells. The camera of a unit that was calibrated may
-    /// have been mounted anew.
-    fn new(forward: &Forward<'_>, rest: &Rest, own: &Rest, is_calibrated: bool) -> Resting {
-        let told = forward.rest_image.mounting(rest);
-        let near = own.is_near(&rest.features);
+    /// For markers that rest there, and at `flat` where gravity pulls as it did on the model's film:
+    /// by what the model knows of the unit that it was made on; of another one by what its rest
+    /// picture tells. The camera of a unit that was calibrated may have been mounted anew.
+    fn new(
+        forward: &Forward<'_>,
+        rest: &Rest,
+        flat: &Rest,
+        own: &Rest,
+        is_calibrated: bool,
+    ) -> Resting {
+        let told = forward.rest_image.mounting(flat);
+        let near = own.is_near(&flat.features);
         // The tables are of this unit's own markers.
         let known = Mounting {
             per_px: forward.per_px.unwrap_or(told.per_px),
@@ -70,7 +86,7 @@ impl Resting {
         };
         let own = match near {
             true => Some(known),
-            false => known.remounted(rest, own).filter(|_| is_calibrated),
+            false => known.remounted(flat, own).filter(|_| is_calibrated),
         };
         let is_own = own.is_some();
         let mounting = own.unwrap_or(told);
@@ -91,6 +107,7 @@ impl Resting {
             px: core::array::from_fn(at),
             areas: rest.areas.map(|area| area as f32),
             drift: None,
+            hanging: None,
         }
     }
 
@@ -99,20 +116,19 @@ impl Resting {
     pub fn touch(
         model: &Model<'_>,
         rest: &Rest,
+        turned: Option<Turned>,
         other: &Rest,
     ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
-        Self::touch_by(
-            model,
-            rest,
-            other,
-            &Drift::MOUNTED_ANEW,
-            FrameNoise::AS_MODELLED,
-        )
+        let noise = FrameNoise::AS_MODELLED;
+        Self::touch_by(model, rest, turned, other, (&Drift::MOUNTED_ANEW, noise))
     }
 
-    /// The same of a unit of which no rest position is known, built like the model's.
+    /// The same of a unit of which no rest position is known, built like the model's, which rests
+    /// there as gravity is now.
     pub fn touch_of_unit(
         model: &Model<'_>,
+        rest: &Rest,
+        turned: Option<Turned>,
         other: &Rest,
     ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
         let forward = model.forward.as_ref()?;
@@ -122,18 +138,18 @@ impl Resting {
             blur: Px((GLUED_MM / away / scale * 65_536.0) as i32),
             ..FrameNoise::AS_MODELLED
         };
-        Self::touch_by(model, &model.rest, other, &BUILT, noise)
+        Self::touch_by(model, rest, turned, other, (&BUILT, noise))
     }
 
     fn touch_by(
         model: &Model<'_>,
         rest: &Rest,
+        turned: Option<Turned>,
         other: &Rest,
-        drift: &Drift,
-        noise: FrameNoise,
+        (drift, noise): (&Drift, FrameNoise),
     ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
         let forward = model.forward.as_ref()?;
-        let mut resting = Resting::of_model(model, rest)?;
+        let mut resting = Resting::of_turned(model, rest, turned)?;
         resting.set_drift(drift);
         let observed = resting.observed(forward, &other.markers(), noise);
         let guess = Pose {
@@ -179,10 +195,12 @@ impl Resting {
             noise[k] = forward.rest_image.noise(k, variances);
         }
         let drift = self.drift.as_ref();
+        let hanging = self.hanging.as_ref();
         Observed {
             moved,
             noise,
             drift,
+            hanging,
         }
     }
 

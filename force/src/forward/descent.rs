@@ -197,10 +197,15 @@ impl Linearization {
             unknown,
         } = markers;
         let (tables, limits) = (&forward.tables, &forward.limits);
-        let Prediction { moved, slopes } = tables.predict(&pose, limits, &mounting.beside_mm);
-        let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
-        let mut covariance = unknown.covariance(&pose, limits, &moved);
+        let mut prediction = tables.predict(&pose, limits, &mounting.beside_mm);
+        let mut covariance = unknown.covariance(&pose, limits, &prediction.moved);
         observed.add_to(&mut covariance);
+        if let Some(hanging) = observed.hanging {
+            let stiffness = &forward.stiffness;
+            hanging.add_to(&pose, stiffness, limits, &mut prediction, &mut covariance);
+        }
+        let Prediction { moved, slopes } = prediction;
+        let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
         let white = White::new(&covariance, &slopes, &left, &pose);
         Linearization {
             pose,

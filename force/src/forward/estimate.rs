@@ -6,6 +6,7 @@ use super::mounting::Mounting;
 use super::pose::{Pose, sine_over_angle_and_cosine};
 use super::predict::DOTS;
 use super::solve::{Column, Solved};
+use super::weight::Hanging;
 use super::{Forward, Strength};
 
 /// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
@@ -29,6 +30,8 @@ pub struct Observed<'a> {
     /// How far the rest position may be from where the film rests ([`Drift`](super::Drift)); `None`
     /// where it is known.
     pub drift: Option<&'a Covariance>,
+    /// What the film's own weight does; `None` where the tables and the rest position have it.
+    pub hanging: Option<&'a Hanging>,
 }
 
 impl Observed<'_> {

@@ -19,6 +19,7 @@
 //! | `solve` | eight equations, five unknowns |
 //! | `descent` | steps downhill from a guess |
 //! | `covariance` | what is not known of the unit beside the noise |
+//! | `weight` | what the film's own weight does |
 //! | `estimate` | from guesses to a load, what is left over, standard uncertainties |
 
 use covariance::between;
@@ -35,6 +36,7 @@ mod predict;
 mod solve;
 mod table;
 mod terms;
+pub mod weight;
 
 pub use axis::{Axis, NODES};
 pub use covariance::{Covariance, CovarianceGrid, KNOTS, LARGEST_STEP, Unknown, Whitening};
@@ -50,6 +52,7 @@ pub use table::{Answer, OUTPUTS, Place, Table};
 #[cfg(any(test, feature = "encode"))]
 pub use terms::{EVEN, ODD};
 pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
+pub use weight::{Gravity, Hanging, Turned, Weight};
 
 /// Most steps that a model may ask for.
 pub const MOST_STEPS: u8 = 3;
@@ -81,6 +84,8 @@ pub struct Forward<'a> {
     pub own: Option<CovarianceGrid<'a>>,
     /// Any other unit, of which there is a rest picture; `None` where the file does not say.
     pub other: Option<Others<'a>>,
+    /// What the film's own weight does; `None` where the file does not say.
+    pub weight: Option<Weight<'a>>,
 }
 
 /// What is known of units beside the one that a model was made on.

@@ -200,6 +200,13 @@ impl Mounting {
         turned(self.per_px, px)
     }
 
+    /// The same the other way round.
+    pub fn px(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [a, b] = self.per_px;
+        let square = (a * a + b * b).max(f32::MIN_POSITIVE);
+        turned([a / square, -b / square], [x, y])
+    }
+
     /// Focal lengths per px.
     pub fn scale(&self) -> f32 {
         let [a, b] = self.per_px;

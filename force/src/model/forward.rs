@@ -2,12 +2,13 @@
 
 use super::{ModelError, reader::Reader};
 use crate::forward::{
-    Axis, CovarianceGrid, DOTS, Forward, Limits, MOST_FUNCTIONS, MOST_STEPS, Markers, NODES, Noise,
-    Others, RELATIVE, RestImage, Stiffness, Table, Tables, Terms,
+    Axis, CovarianceGrid, DOTS, EQUATIONS, Forward, Gravity, Limits, MOST_FUNCTIONS, MOST_STEPS,
+    Markers, NODES, Noise, Others, RELATIVE, RestImage, Stiffness, Table, Tables, Terms, Weight,
+    weight,
 };
 #[cfg(any(test, feature = "encode"))]
 use {
-    crate::forward::{EQUATIONS, EVEN, MOST_TILTS, ODD, OUTPUTS},
+    crate::forward::{EVEN, MOST_TILTS, ODD, OUTPUTS},
     alloc::vec::Vec,
 };
 
@@ -21,15 +22,29 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// Which covariances a file has: of its own unit, of others.
-const COVARIANCES: [[bool; 2]; 4] = [[false, false], [true, false], [false, true], [true, true]];
+/// Which parts a file has: the covariance of its own unit, what is known of others, and what the
+/// film's weight does.
+const PARTS: [[bool; 3]; 8] = {
+    const NO: bool = false;
+    const HAS: bool = true;
+    [
+        [NO, NO, NO],
+        [HAS, NO, NO],
+        [NO, HAS, NO],
+        [HAS, HAS, NO],
+        [NO, NO, HAS],
+        [HAS, NO, HAS],
+        [NO, HAS, HAS],
+        [HAS, HAS, HAS],
+    ]
+};
 
 /// Reads the section.
 pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelError> {
     let steps = reader.u8_in("steps", MOST_STEPS, "0 to 3")?;
     let has_camera = reader.choice("camera", &[false, true], "0 or 1")?;
     dots(reader)?;
-    let [has_own, has_other] = reader.choice("covariances", &COVARIANCES, "0 to 3")?;
+    let [has_own, has_other, has_weight] = reader.choice("parts", &PARTS, "0 to 7")?;
     let limits = Limits {
         size: float(reader, "largest size", [1e-3, 10.0], "0.001 to 10")?,
         tilt: float(reader, "largest tilt", [1e-2, 1.0], "0.01 to 1 rad")?,
@@ -55,6 +70,34 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         tables: tables(reader)?,
         own: has_own.then(|| covariances(reader)).transpose()?,
         other: has_other.then(|| others(reader)).transpose()?,
+        weight: has_weight.then(|| weight(reader)).transpose()?,
+    })
+}
+
+fn weight<'a>(reader: &mut Reader<'a>) -> Result<Weight<'a>, ModelError> {
+    let mut down = Gravity::default();
+    for part in &mut down {
+        *part = float(reader, "gravity", [-2.0, 2.0], "-2 to 2 g")?;
+    }
+    let press_n = float(reader, "weight", [0.0, 1.0], "0 to 1 N")?;
+    let unsure = pair(reader, "weight's uncertainty", [0.0, 10.0], "0 to 10")?;
+    let mut at_rest = [[0.0; EQUATIONS]; weight::AT_REST];
+    for part in at_rest.as_flattened_mut() {
+        *part = float(reader, "weight at rest", [-1e3, 1e3], "-1000 to 1000")?;
+    }
+    let offset = reader.offset;
+    let bytes = reader.take(weight::BYTES)?;
+    let under_load = Weight::under_load_of(bytes).ok_or(ModelError::Field {
+        name: "weight under a load",
+        offset,
+        allowed: "steps of 0 to 1000",
+    })?;
+    Ok(Weight {
+        down,
+        press_n,
+        unsure,
+        at_rest,
+        under_load,
     })
 }
 
@@ -221,6 +264,24 @@ pub struct ForwardSpec {
     pub own: Option<CovarianceSpec>,
     /// Any other unit.
     pub other: Option<OthersSpec>,
+    /// What the film's own weight does.
+    pub weight: Option<WeightSpec>,
+}
+
+/// What a film's weight does, to be written. The fields mean what [`Weight`]'s do.
+#[cfg(any(test, feature = "encode"))]
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightSpec {
+    /// Gravity on the model's own film.
+    pub down: Gravity,
+    /// The press that sinks the film as much, N.
+    pub press_n: f32,
+    /// How uncertain all of it is: of the model's own unit, of any other.
+    pub unsure: [f32; 2],
+    /// What it does at rest by each function of gravity, focal lengths.
+    pub at_rest: [[f64; EQUATIONS]; weight::AT_REST],
+    /// What is added by size, function of gravity, coordinate and term, divided by the softness.
+    pub under_load: [[[[f64; weight::TERMS]; EQUATIONS]; weight::UNDER_LOAD]; weight::SIZES],
 }
 
 /// What is known of other units, to be written. The fields mean what [`Others`]' do.
@@ -285,9 +346,14 @@ impl ForwardSpec {
     }
 
     pub(super) fn push(&self, bytes: &mut Vec<u8>) {
-        let covariances = u8::from(self.own.is_some()) + 2 * u8::from(self.other.is_some());
+        let has = [
+            self.own.is_some(),
+            self.other.is_some(),
+            self.weight.is_some(),
+        ];
+        let parts = PARTS.iter().position(|parts| *parts == has).unwrap_or(0);
         let camera = u8::from(self.per_px.is_some());
-        bytes.extend([self.steps, camera, DOTS as u8, covariances]);
+        bytes.extend([self.steps, camera, DOTS as u8, parts as u8]);
         let load = [
             self.limits.size,
             self.limits.tilt,
@@ -311,6 +377,30 @@ impl ForwardSpec {
             let parts = [linear_n, cubic_n].into_iter().chain(other.relative);
             bytes.extend(parts.flat_map(f32::to_le_bytes));
             other.covariance.push(bytes);
+        }
+        if let Some(weight) = &self.weight {
+            weight.push(bytes);
+        }
+    }
+}
+
+#[cfg(any(test, feature = "encode"))]
+impl WeightSpec {
+    /// Each function's step at a size is the largest of its entries over 32,767.
+    fn push(&self, bytes: &mut Vec<u8>) {
+        let parts = self.down.iter().chain([&self.press_n]).chain(&self.unsure);
+        bytes.extend(parts.flat_map(|part| part.to_le_bytes()));
+        let at_rest = self.at_rest.as_flattened().iter();
+        bytes.extend(at_rest.flat_map(|part| (*part as f32).to_le_bytes()));
+        for block in self.under_load.as_flattened() {
+            let entries = block.as_flattened();
+            let largest = entries
+                .iter()
+                .fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            let size = (largest / f64::from(i16::MAX)) as f32;
+            bytes.extend(size.to_le_bytes());
+            let steps = entries.iter().map(|entry| step(*entry, size.into()));
+            bytes.extend(steps.flat_map(i16::to_le_bytes));
         }
     }
 }

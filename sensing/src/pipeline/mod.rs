@@ -3,6 +3,7 @@
 mod again;
 mod ahead;
 mod following;
+mod hanging;
 #[cfg(test)]
 mod marker_tests;
 mod taring;
@@ -28,6 +29,7 @@ use hivtac_markers::scanner::Scanner;
 use hivtac_markers::settings::{Settings, SettingsError};
 use hivtac_markers::tables::{ByteTable, Table};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -63,6 +65,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
     model: Option<Model<'m>>,
     tare: Option<Tare>,
+    down: Down,
     pixels: Formats<T>,
     scanner: Scanner<BLOBS>,
     network: Network,
@@ -85,6 +88,8 @@ struct Prepared {
     resting: Option<Resting>,
     /// The bits that every frame has, whatever it shows.
     standing: Status,
+    /// What is measured against.
+    rest: Option<Rest>,
 }
 
 impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
@@ -101,6 +106,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             },
             model: None,
             tare: None,
+            down: Down::Fixed,
             pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
@@ -187,8 +193,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Sets the rest position of this unit, from which the film may have drifted since it was
     /// taken, or goes back to the model's. One that is not [sound](Rest::is_sound) is as none.
     pub fn set_tare(&mut self, rest: Option<Rest>, drift: Drift) {
+        self.set_tare_under(rest, drift, self.down.told());
+    }
+
+    /// The same of one that was taken under this gravity, or where nobody said which.
+    pub fn set_tare_under(&mut self, rest: Option<Rest>, drift: Drift, down: Option<Direction>) {
         let rest = rest.filter(Rest::is_sound);
-        self.tare = rest.map(|rest| Tare::new(rest, drift));
+        let down = down.map(Direction::to_unit);
+        self.tare = rest.map(|rest| Tare::new(rest, drift, down));
         self.begin_anew();
     }
 
@@ -357,13 +369,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Works out anew what follows from settings, model and tare.
     fn prepare(&mut self) {
+        self.hang();
         self.ahead = Ahead::Off;
         self.look = Look::First;
         self.noise = NoiseLevel::AS_MODELLED;
         let settings = &self.settings;
         // What a model for other frames says of rest and contact does not hold here.
         let fitting = self.fitting_model();
-        let rest = self.tare().or(fitting.map(|model| &model.rest));
+        let rest = self.tare().copied().or_else(|| self.rest_of_model());
         // The same tip presses, whether or not the model is for these frames.
         let reading = self
             .model
@@ -376,9 +389,10 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             finder: Finder::new(settings),
             resting: fitting
                 .zip(rest)
-                .and_then(|(model, rest)| Resting::of_model(model, rest)),
+                .and_then(|(model, rest)| Resting::of_turned(model, &rest, self.turned())),
             trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
             standing: self.standing_status(),
+            rest,
         });
         self.apply_drift();
     }
@@ -387,6 +401,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let mut status = Status::OK;
         if self.tare.is_none() {
             status |= Status::TARE_MISSING;
+        }
+        if self.is_weight_unknown() {
+            status |= Status::WEIGHT_UNKNOWN;
         }
         match &self.model {
             None => status |= Status::MODEL_MISSING,
@@ -442,12 +459,10 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             return None;
         }
         let model = self.model.as_ref()?;
-        let tare = self.tare.as_ref().map_or(&model.rest, Tare::rest);
-        let output = self.network.run(model, features, &tare.features);
-        let resting = self
-            .prepared
-            .as_ref()
-            .and_then(|prepared| prepared.resting.as_ref());
+        let prepared = self.prepared.as_ref()?;
+        let rest = prepared.rest.as_ref().unwrap_or(&model.rest);
+        let output = self.network.run(model, features, &rest.features);
+        let resting = prepared.resting.as_ref();
         let (force, trust) = match model.forward.as_ref().zip(resting) {
             Some((forward, resting)) => {
                 let is_again = matches!(self.look, Look::Again(_));

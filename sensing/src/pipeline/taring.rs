@@ -13,6 +13,8 @@ const TOUCHED: MicroNewtons = MicroNewtons(300);
 /// The same of a unit of which nothing else is known: its markers may be glued as if by less. Seen
 /// of an untouched one in none of 1,500: 2.8 mN at most.
 const TOUCHED_OF_UNIT: MicroNewtons = MicroNewtons(4_000);
+/// The same when gravity pulled otherwise then, which is known to some tenths of that: 1 mN.
+const TOUCHED_AND_TURNED: MicroNewtons = MicroNewtons(1_000);
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Gives a tare the frame that was finished last, of which `measurement` is. A frame without
@@ -54,14 +56,16 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// the calibration of this unit; without either, beside the model's, where no gluing does.
     fn touch(&self, rest: &Rest) -> Option<MicroNewtons> {
         let model = self.fitting_model()?;
-        let own = (!model.is_simulated()).then_some(&model.rest);
+        let (of_model, turned) = (self.rest_of_model()?, self.turned());
+        let own = (!model.is_simulated()).then_some(&of_model);
         let (touch, is_touch) = match self.tare().or(own) {
             Some(before) => {
-                let (magnitude, by_noise) = Resting::touch(model, before, rest)?;
-                (magnitude, is_force(magnitude, by_noise, TOUCHED))
+                let (magnitude, by_noise) = Resting::touch(model, before, turned, rest)?;
+                let least = turned.map_or(TOUCHED, |_| TOUCHED_AND_TURNED);
+                (magnitude, is_force(magnitude, by_noise, least))
             }
             None => {
-                let (magnitude, _) = Resting::touch_of_unit(model, rest)?;
+                let (magnitude, _) = Resting::touch_of_unit(model, &of_model, turned, rest)?;
                 (magnitude, magnitude >= TOUCHED_OF_UNIT)
             }
         };

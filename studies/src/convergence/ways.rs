@@ -115,6 +115,7 @@ impl<'m> Film<'m> {
         let mut random = noise.map(seeded);
         let variances = [away * away, across * across];
         let observed = Observed {
+            hanging: None,
             drift: None,
             moved: shown.moved.map(|part| {
                 // As large both ways as the mean of away and across is.

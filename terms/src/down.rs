@@ -1,0 +1,90 @@
+//! Which way the sensor is held: where gravity pulls on its film.
+
+/// What is known of gravity on a sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub enum Down {
+    /// It pulls as when the rest position was taken: the sensor is never turned.
+    #[default]
+    Fixed,
+    /// The sensor may be turned, and nobody says how.
+    Unknown,
+    /// It pulls this way.
+    Told(Direction),
+}
+
+impl Down {
+    /// Where it pulls, where somebody said.
+    pub fn told(self) -> Option<Direction> {
+        match self {
+            Down::Told(direction) => Some(direction),
+            Down::Fixed | Down::Unknown => None,
+        }
+    }
+}
+
+/// A direction in the film's frame: x right and y down in the image, z away from the camera. Its
+/// length is one to 2 ‰, in thousandths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Direction(pub [i16; 3]);
+
+/// Thousandths of a length of one.
+const ONE: f32 = 1000.0;
+/// The least and the largest square of a length: rounding is at most half a thousandth along each
+/// axis.
+const SQUARES: core::ops::RangeInclusive<i32> = 996_000..=1_004_000;
+
+impl Direction {
+    /// Of a vector of length one.
+    pub fn of_unit(vector: [f32; 3]) -> Direction {
+        let rounded = |part: f32| (ONE * part + 0.5_f32.copysign(part)) as i16;
+        Direction(vector.map(rounded))
+    }
+
+    /// Whether its length is one.
+    pub fn is_sound(self) -> bool {
+        let squares = self
+            .0
+            .iter()
+            .map(|part| i32::from(*part) * i32::from(*part));
+        SQUARES.contains(&squares.fold(0, i32::saturating_add))
+    }
+
+    /// As a vector of length one.
+    pub fn to_unit(self) -> [f32; 3] {
+        self.0.map(|part| f32::from(part) / ONE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_unit_vector_is_a_direction(angle in 0.0f64..6.3, z in -1.0f64..1.0) {
+            let along = (1.0 - z * z).sqrt();
+            let unit = [along * angle.cos(), along * angle.sin(), z].map(|part| part as f32);
+            let direction = Direction::of_unit(unit);
+            prop_assert!(direction.is_sound(), "{:?}", direction);
+            for (a, b) in direction.to_unit().into_iter().zip(unit) {
+                prop_assert!((a - b).abs() <= 5.01e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn a_vector_of_another_length_is_none() {
+        assert!(!Direction([0; 3]).is_sound());
+        assert!(!Direction([i16::MIN; 3]).is_sound());
+        assert_eq!(Direction([600, 0, -800]).to_unit(), [0.6, 0.0, -0.8]);
+    }
+}
