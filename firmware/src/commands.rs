@@ -23,7 +23,10 @@ pub async fn handle(received: Received<HostMessage>) {
         Received::Message(HostMessage::Command(command)) if session::is_open() => {
             obey(command).await;
         }
-        Received::Message(HostMessage::Command(_)) => {}
+        Received::Message(HostMessage::Down(down)) if session::is_open() => {
+            settings::set_down(down)
+        }
+        Received::Message(HostMessage::Command(_) | HostMessage::Down(_)) => {}
     }
 }
 

@@ -157,10 +157,13 @@ fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
         defmt::panic!("the built-in settings are out of range");
     }
     sensor.set_motion(camera::MOTION);
+    settings::set_down(kept.down);
+    sensor.set_down(settings::down());
     let tare = kept.tare.as_ref();
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
         Some(Ok(rest)) => {
-            sensor.set_tare(Some(rest), Drift::UNSEEN);
+            let down = tare.and_then(|tare| tare.down);
+            sensor.set_tare_under(Some(rest), Drift::UNSEEN, down);
         }
         Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
         None => {}

@@ -20,6 +20,7 @@ use crate::{camera, log, model_slots, outbox, settings};
 use core::sync::atomic::Ordering;
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::down::Down;
 use hivtac_wire::kept::{KeptModel, MAX_BYTES, Record};
 use hivtac_wire::message::{DeviceMessage, LogLevel, ModelSource, Outcome};
 use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
@@ -168,6 +169,7 @@ impl Memory {
             temporal,
             rezeroed,
             seen,
+            down,
             ..
         } = used;
         let drift = tare.zip(self.record.tare);
@@ -186,6 +188,7 @@ impl Memory {
                 seen,
                 drift,
                 camera: camera::report(),
+                down,
             }));
         }
         Outcome::Done
@@ -199,6 +202,7 @@ impl Memory {
             tare: used.tare == self.record.tare,
             temporal: used.temporal == self.record.temporal,
             camera: camera::report().settings == self.record.camera,
+            down: used.down == self.record.down,
         }
     }
 
@@ -221,6 +225,9 @@ impl Memory {
         }
         if selection.camera {
             record.camera = camera::report().settings;
+        }
+        if selection.down {
+            record.down = used.down;
         }
         if record == self.record && self.is_kept {
             return Outcome::Done;
@@ -279,6 +286,7 @@ impl Memory {
     async fn reset(&mut self) -> Result<Chosen, Outcome> {
         self.save_or_say(Record::default()).await?;
         settings::set_name(Name::new());
+        settings::set_down(Down::default());
         if camera::report().settings != CameraSettings::default() {
             CAMERA_AFRESH.signal(());
         }

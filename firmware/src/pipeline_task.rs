@@ -208,6 +208,7 @@ impl PipelineTask {
             if band.edge.number != self.newest.wrapping_add(1) {
                 self.sensor.forget_frame();
             }
+            self.sensor.set_down(settings::down());
             self.sensor.begin_frame();
         }
         let fetched = self.bands.fetch(band, capture::finished);
@@ -287,7 +288,9 @@ impl PipelineTask {
             Ok(rest) => {
                 self.give_up_tare();
                 // It was taken at another time.
-                self.use_tare(rest, Drift::UNSEEN);
+                let down = position.and_then(|position| position.down);
+                self.sensor.set_tare_under(rest, Drift::UNSEEN, down);
+                self.follow();
                 Outcome::Done
             }
             Err(outcome) => outcome,

@@ -2,7 +2,7 @@
 //! the USB tasks.
 
 use crate::pipeline_task::Sensor;
-use crate::shared::{NAME, PIPELINE};
+use crate::shared::{DOWN, NAME, PIPELINE};
 use core::cell::Cell;
 use hivtac_sensing::features::Features;
 use hivtac_sensing::forward::CameraMotion;
@@ -10,6 +10,7 @@ use hivtac_sensing::rest::Rest;
 use hivtac_sensing::settings::Settings;
 use hivtac_terms::angle::atan2;
 use hivtac_terms::fixed::Q;
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::root::root;
 use hivtac_terms::temporal::TemporalSettings;
@@ -23,8 +24,8 @@ use hivtac_wire::settings::{Moved, Name, RestPosition, TareReport};
 pub struct OfPipeline {
     /// Its settings.
     pub settings: Settings,
-    /// Its rest position as it was taken, when one was.
-    pub tare: Option<Rest>,
+    /// Its rest position as it was taken, when one was, and gravity then.
+    pub tare: Option<(Rest, Option<Direction>)>,
     /// How far re-zeroing moved it.
     pub rezeroed: Px,
     /// How far from there the untouched film was seen last.
@@ -46,7 +47,7 @@ pub fn follow(sensor: &Sensor, source: ModelSource) {
     });
     let told = OfPipeline {
         settings: *sensor.settings(),
-        tare: sensor.taken().copied(),
+        tare: sensor.taken().map(|rest| (*rest, sensor.down_when_taken())),
         rezeroed: sensor.rezeroed(),
         seen: sensor.rest_seen(),
         temporal: *sensor.temporal(),
@@ -70,6 +71,18 @@ pub fn name() -> Name {
     NAME.lock(copy)
 }
 
+/// Sets what is known of gravity from the next frame on: nothing where it is no direction.
+pub fn set_down(down: Down) {
+    let is_sound = down.told().is_none_or(Direction::is_sound);
+    let known = if is_sound { down } else { Down::Unknown };
+    DOWN.lock(|cell| cell.set(known));
+}
+
+/// What is known of gravity.
+pub fn down() -> Down {
+    DOWN.lock(Cell::get)
+}
+
 fn copy<T: Clone + Default>(cell: &Cell<T>) -> T {
     let value = cell.take();
     cell.set(value.clone());
@@ -90,6 +103,8 @@ pub struct InUse {
     pub seen: Option<MilliPx>,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
+    /// What is known of gravity.
+    pub down: Down,
     /// The threshold of the model.
     of_model: Option<Threshold>,
 }
@@ -114,7 +129,8 @@ pub fn in_use() -> Option<InUse> {
     Some(InUse {
         name: name(),
         threshold: settings.threshold,
-        tare: tare.map(|rest| position(&rest, &settings)),
+        tare: tare.map(|(rest, down)| position(&rest, down, &settings)),
+        down: down(),
         rezeroed,
         seen,
         temporal,
@@ -122,8 +138,8 @@ pub fn in_use() -> Option<InUse> {
     })
 }
 
-/// A rest position and by which settings its markers were seen.
-pub fn position(rest: &Rest, settings: &Settings) -> RestPosition {
+/// A rest position, gravity when it was taken, and by which settings its markers were seen.
+pub fn position(rest: &Rest, down: Option<Direction>, settings: &Settings) -> RestPosition {
     RestPosition {
         format: settings.threshold.format(),
         dilations: settings.dilations,
@@ -131,6 +147,7 @@ pub fn position(rest: &Rest, settings: &Settings) -> RestPosition {
         markers: rest.markers(),
         rect_center: rest.features.rect_center,
         rect_area: rest.features.rect_area,
+        down,
     }
 }
 
@@ -138,7 +155,7 @@ pub fn position(rest: &Rest, settings: &Settings) -> RestPosition {
 pub fn tared(rest: &Rest, sensor: &Sensor, spread: Px) -> TareReport {
     let before = sensor.tare();
     TareReport {
-        rest: position(rest, sensor.settings()),
+        rest: position(rest, sensor.down().told(), sensor.settings()),
         spread,
         moved: before.map(|before| moved(before, rest)),
     }
@@ -194,7 +211,7 @@ pub fn rest(position: &RestPosition, settings: &Settings) -> Result<Rest, Outcom
         },
         areas: position.markers.map(|marker| marker.area),
     };
-    if !seen_so || !rest.is_sound() {
+    if !seen_so || !rest.is_sound() || !position.down.is_none_or(Direction::is_sound) {
         Err(Outcome::InvalidArgument)
     } else if !rest.fits(&settings.geometry) {
         Err(Outcome::NotAtRest)

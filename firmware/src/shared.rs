@@ -40,6 +40,7 @@ use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use hivtac_capture::Edge;
 use hivtac_terms::camera::{CameraSettings, Rate};
+use hivtac_terms::down::Down;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::health::ResetReason;
 use hivtac_wire::message::{DeviceMessage, Sample};
@@ -162,6 +163,11 @@ pub static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
 /// (`settings`).
 pub static NAME: CriticalSectionMutex<Cell<Name>> =
     CriticalSectionMutex::new(Cell::new(Name::new()));
+
+/// What is known of gravity. Written at boot, by the USB tasks and, when all is forgotten, by the
+/// memory task; read by that and, before each frame, by the pipeline (`settings`).
+pub static DOWN: CriticalSectionMutex<Cell<Down>> =
+    CriticalSectionMutex::new(Cell::new(Down::Fixed));
 
 /// What a host asks of the flash. From the USB tasks to the memory task.
 pub static MEMORY_ORDER: Request<MemoryOrder> = Request::new();

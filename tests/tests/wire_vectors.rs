@@ -4,6 +4,7 @@
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -246,8 +247,12 @@ fn rest() -> RestPosition {
         ],
         rect_center: (Px(10_485_760), Px(7_864_320)),
         rect_area: Q::from_int(14_400),
+        down: Some(DOWN),
     }
 }
+
+/// Where gravity pulls.
+const DOWN: Direction = Direction([0, 600, -800]);
 
 const NAME_AND_TARE: Selection = Selection {
     name: true,
@@ -255,6 +260,7 @@ const NAME_AND_TARE: Selection = Selection {
     tare: true,
     temporal: true,
     camera: true,
+    down: false,
 };
 
 const CAMERA: CameraSettings = CameraSettings {
@@ -290,6 +296,7 @@ fn settings() -> DeviceMessage {
         seen: Some(MilliPx(100)),
         drift: Some(Px(20_316)),
         camera: camera(),
+        down: Down::Told(DOWN),
     })
 }
 
@@ -418,6 +425,9 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
     let command = |id, request| HostMessage::Command(Command { id, request });
     [
         ("host-hello", HostMessage::Hello(HelloPrefix::OURS.into())),
+        ("down-told", HostMessage::Down(Down::Told(DOWN))),
+        ("down-unknown", HostMessage::Down(Down::Unknown)),
+        ("down-fixed", HostMessage::Down(Down::Fixed)),
         ("get-info", command(1, Request::GetInfo)),
         ("start", command(2, Request::Start)),
         ("stop", command(3, Request::Stop)),
@@ -531,7 +541,7 @@ fn every_kind_of_message_has_a_vector() {
         .values()
         .filter_map(|message| match message {
             HostMessage::Command(command) => Some(std::mem::discriminant(&command.request)),
-            HostMessage::Hello(_) => None,
+            HostMessage::Hello(_) | HostMessage::Down(_) => None,
         })
         .collect();
     assert_eq!(requests.len(), 23);

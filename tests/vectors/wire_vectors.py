@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x7F9AF0A45B294C69
+SCHEMA = 0xDEE307F06220F68E
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -117,6 +117,8 @@ def at_rate(rate, frames_per_second, shortest, longest):
     ]
 
 
+DOWN = [signed("x_permille", 0), signed("y_permille", 600), signed("z_permille", -800)]
+
 REST = [
     raw("tare: Some", [1]),
     raw("format: Rgb565", [0]),
@@ -128,6 +130,8 @@ REST = [
     signed("rect_center: x_q16", 10_485_760),
     signed("y_q16", 7_864_320),
     signed("rect_area_q16", 943_718_400),
+    raw("down: Some", [1]),
+    *DOWN,
 ]
 
 
@@ -300,7 +304,7 @@ DEVICE = {
         string("name", "thumb"),
         *RED,
         *REST,
-        raw("kept: name, not threshold, tare, temporal, camera", [1, 0, 1, 1, 1]),
+        raw("kept: name, not threshold, tare, temporal, camera, not down", [1, 0, 1, 1, 1, 0]),
         raw("found: Settings", [1]),
         unsigned("erases", 3),
         unsigned("failures", 0),
@@ -316,6 +320,8 @@ DEVICE = {
         *at_rate("full", 156, 24, 6_405),
         *at_rate("half", 78, 47, 12_810),
         *at_rate("quarter", 39, 93, 25_620),
+        raw("down: Told", [2]),
+        *DOWN,
     ],
     "health": [
         raw("Health", [10]),
@@ -354,6 +360,9 @@ DEVICE = {
 
 HOST = {
     "host-hello": hello_start(PROTOCOL, SCHEMA),
+    "down-told": [raw("Down", [2]), raw("Told", [2]), *DOWN],
+    "down-unknown": [raw("Down", [2]), raw("Unknown", [1])],
+    "down-fixed": [raw("Down", [2]), raw("Fixed", [0])],
     "get-info": COMMAND + [unsigned("id", 1), raw("GetInfo", [0])],
     "start": COMMAND + [unsigned("id", 2), raw("Start", [1])],
     "stop": COMMAND + [unsigned("id", 3), raw("Stop", [2])],
@@ -370,7 +379,7 @@ HOST = {
     "set-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), *REST],
     "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
     "keep": COMMAND + [unsigned("id", 14), raw("Keep", [12])]
-    + [raw("name, not threshold, tare, temporal, camera", [1, 0, 1, 1, 1])],
+    + [raw("name, not threshold, tare, temporal, camera, not down", [1, 0, 1, 1, 1, 0])],
     "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
@@ -417,7 +426,7 @@ def rejects():
         "string-too-long": ("body", frame(b"\3\0\0" + varint(97) + b"x" * 97)),
         "cut-body": ("body", frame(reply[:-1])),
         "trailing-byte": ("trailing", frame(reply + b"\0")),
-        "overlong": ("overlong", b"\1" * 257 + b"\0"),
+        "overlong": ("overlong", b"\1" * 289 + b"\0"),
     }
 
 

@@ -7,6 +7,7 @@ use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -107,6 +108,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             seen: Some(MilliPx(u16::MAX)),
             drift: Some(Px(i32::MIN)),
             camera: longest_camera_report(),
+            down: LONGEST_DOWN,
         }),
         DeviceMessage::Health(Health {
             reset: ResetReason::Other,
@@ -169,8 +171,12 @@ pub fn longest_rest() -> RestPosition {
         markers: longest_sample().markers.unwrap(),
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
         rect_area: Q::from_bits(i64::MIN),
+        down: LONGEST_DOWN.told(),
     }
 }
+
+/// A direction, each number as long as it can be.
+pub const LONGEST_DOWN: Down = Down::Told(Direction([i16::MIN; 3]));
 
 /// Temporal settings, each number as long as it can be.
 pub fn longest_temporal() -> TemporalSettings {
@@ -291,7 +297,10 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         protocol: u16::MAX,
         schema: u64::MAX,
     });
-    commands.into_iter().chain([hello]).collect()
+    commands
+        .into_iter()
+        .chain([hello, HostMessage::Down(LONGEST_DOWN)])
+        .collect()
 }
 
 /// Any message a device of this version can send.
@@ -344,7 +353,11 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
     };
-    prop_oneof![Just(HostMessage::Hello(hello)), command]
+    prop_oneof![
+        Just(HostMessage::Hello(hello)),
+        command,
+        any_down().prop_map(HostMessage::Down)
+    ]
 }
 
 fn any_hello() -> impl Strategy<Value = DeviceHello> {
@@ -561,13 +574,14 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         any_temporal(),
     );
     let numbers = any::<([u32; 2], i32, Option<u16>, Option<i32>)>();
-    (used, any_selection(), found, numbers, any_camera_report()).prop_map(
+    let camera = (any_camera_report(), any_down());
+    (used, any_selection(), found, numbers, camera).prop_map(
         |(
             (name, threshold, tare, temporal),
             kept,
             found,
             ([erases, failures], rezeroed, seen, drift),
-            camera,
+            (camera, down),
         )| {
             SettingsReport {
                 name,
@@ -582,6 +596,7 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
                 seen: seen.map(MilliPx),
                 drift: drift.map(Px),
                 camera,
+                down,
             }
         },
     )
@@ -627,13 +642,22 @@ fn any_tared() -> impl Strategy<Value = TareReport> {
 }
 
 fn any_selection() -> impl Strategy<Value = Selection> {
-    any::<[bool; 5]>().prop_map(|[name, threshold, tare, temporal, camera]| Selection {
-        name,
-        threshold,
-        tare,
-        temporal,
-        camera,
-    })
+    any::<[bool; 6]>().prop_map(
+        |[name, threshold, tare, temporal, camera, down]| Selection {
+            name,
+            threshold,
+            tare,
+            temporal,
+            camera,
+            down,
+        },
+    )
+}
+
+/// Any of gravity, also what is no direction.
+pub fn any_down() -> impl Strategy<Value = Down> {
+    let told = any::<[i16; 3]>().prop_map(|parts| Down::Told(Direction(parts)));
+    prop_oneof![Just(Down::Fixed), Just(Down::Unknown), told]
 }
 
 /// Any camera settings.
@@ -698,8 +722,9 @@ pub fn any_rest() -> impl Strategy<Value = RestPosition> {
     let formats = [PixelFormat::Rgb565, PixelFormat::Yuv422, PixelFormat::Mono];
     let format = any::<prop::sample::Index>().prop_map(move |nth| *nth.get(&formats));
     let markers = [any_marker(), any_marker(), any_marker(), any_marker()];
-    (format, any::<(u8, bool, i32, i32, i64)>(), markers).prop_map(
-        |(format, (dilations, weighted, x, y, rect_area), markers)| RestPosition {
+    let seen = (format, any_down());
+    (seen, any::<(u8, bool, i32, i32, i64)>(), markers).prop_map(
+        |((format, down), (dilations, weighted, x, y, rect_area), markers)| RestPosition {
             format,
             dilations,
             centroid: match weighted {
@@ -709,6 +734,7 @@ pub fn any_rest() -> impl Strategy<Value = RestPosition> {
             markers,
             rect_center: (Px(x), Px(y)),
             rect_area: Q::from_bits(rect_area),
+            down: down.told(),
         },
     )
 }

@@ -12,8 +12,9 @@ pub const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Bytes of the checksum.
 pub(crate) const CRC_BYTES: usize = 4;
 
-/// Longest body a device sends in this protocol version: a full part of a snapshot.
-pub const MAX_DEVICE_BODY: usize = 248;
+/// Longest body a device sends in this protocol version: all its settings, each number as long as
+/// it can be.
+pub const MAX_DEVICE_BODY: usize = 268;
 
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 144;
@@ -32,7 +33,7 @@ pub const MAX_HOST_FRAME: usize = frame_length(MAX_HOST_BODY);
 
 /// No protocol version has longer frames from the device. A host's decoder holds this much, so that
 /// it can name the version of any device.
-pub const DEVICE_FRAME_LIMIT: usize = 256;
+pub const DEVICE_FRAME_LIMIT: usize = 288;
 
 /// No protocol version has longer frames from the host. A device's decoder holds this much.
 pub const HOST_FRAME_LIMIT: usize = 256;

@@ -3,15 +3,16 @@
 
 use crate::settings::{Name, RestPosition};
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::down::Down;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
 use serde::{Deserialize, Serialize};
 
 /// First byte of a record. Raised on every change of what follows.
-const VERSION: u8 = 3;
+const VERSION: u8 = 4;
 
 /// Longest record.
-pub const MAX_BYTES: usize = 182;
+pub const MAX_BYTES: usize = 202;
 
 /// All that a device keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,6 +29,8 @@ pub struct Record {
     pub temporal: TemporalSettings,
     /// How the camera is set.
     pub camera: CameraSettings,
+    /// What is known of gravity.
+    pub down: Down,
 }
 
 /// A model file that lies in flash.
@@ -68,10 +71,11 @@ impl Record {
 mod tests {
     use super::*;
     use crate::examples::{
-        any_camera, any_rest, any_temporal, any_threshold, longest_camera, longest_rest,
-        longest_temporal,
+        LONGEST_DOWN, any_camera, any_down, any_rest, any_temporal, any_threshold, longest_camera,
+        longest_rest, longest_temporal,
     };
     use hivtac_terms::camera::Rate;
+    use hivtac_terms::down::Direction;
     use hivtac_terms::threshold::HsvBox;
     use hivtac_terms::units::Microseconds;
     use proptest::prelude::*;
@@ -89,6 +93,7 @@ mod tests {
             }),
             temporal: longest_temporal(),
             camera: longest_camera(),
+            down: LONGEST_DOWN,
         }
     }
 
@@ -102,7 +107,7 @@ mod tests {
 
     /// The record of a device in use must be read by every firmware with this version's number.
     #[test]
-    fn the_bytes_of_version_3() {
+    fn the_bytes_of_version_4() {
         let record = Record {
             name: Name::try_from("thumb").unwrap(),
             threshold: Some(Threshold::Rgb565(HsvBox::of_limits([
@@ -123,11 +128,12 @@ mod tests {
                 gain: None,
                 rate: Rate::Half,
             },
+            down: Down::Told(Direction([0, 600, -800])),
         };
         let bytes = [
-            3, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
+            4, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
             0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c, 0xd0, 0x0f, 0xe8, 0x07, 60, 50, 100, 0, 0, 1, 0xc4,
-            0x13, 0, 1,
+            0x13, 0, 1, 2, 0, 0xb0, 0x09, 0xbf, 0x0c,
         ];
         let mut buffer = [0; MAX_BYTES];
         assert_eq!(record.to_bytes(&mut buffer), bytes);
@@ -156,6 +162,7 @@ mod tests {
             model in proptest::option::of(any::<(u8, u32, u32)>()),
             temporal in any_temporal(),
             camera in any_camera(),
+            down in any_down(),
         ) {
             let record = Record {
                 name: Name::try_from(name.as_str()).unwrap(),
@@ -164,6 +171,7 @@ mod tests {
                 model: model.map(|(slot, bytes, crc)| KeptModel { slot, bytes, crc }),
                 temporal,
                 camera,
+                down,
             };
             let mut buffer = [0; MAX_BYTES];
             prop_assert_eq!(Record::of_bytes(record.to_bytes(&mut buffer)), Ok(record));

@@ -5,6 +5,7 @@ use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport}
 use heapless::{String, Vec};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
@@ -57,6 +58,9 @@ pub enum HostMessage {
     Hello(HostHello),
     /// A request that is answered by exactly one [`Reply`] with the same `id`.
     Command(Command),
+    /// What is known of gravity on the sensor, from the next frame on. Not answered: it may come as
+    /// often as frames do, and the newest counts. What is no direction counts as unknown.
+    Down(Down),
 }
 
 /// The host's first message.

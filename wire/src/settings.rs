@@ -3,6 +3,7 @@
 use heapless::String;
 use hivtac_terms::camera::{CameraLimits, CameraSettings};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
@@ -33,6 +34,8 @@ pub struct RestPosition {
     pub rect_center: (Px, Px),
     /// Its mean area, px².
     pub rect_area: Q<16, i64>,
+    /// Where gravity pulled then; `None` where nobody said.
+    pub down: Option<Direction>,
 }
 
 /// Answer to [`GetSettings`](crate::message::Request::GetSettings).
@@ -66,6 +69,8 @@ pub struct SettingsReport {
     pub drift: Option<Px>,
     /// How the camera is set.
     pub camera: CameraReport,
+    /// What is known of gravity.
+    pub down: Down,
 }
 
 /// How the camera is set, and what it can be set to.
@@ -120,6 +125,8 @@ pub struct Selection {
     pub temporal: bool,
     /// How the camera is set.
     pub camera: bool,
+    /// What is known of gravity.
+    pub down: bool,
 }
 
 impl Selection {
@@ -130,6 +137,7 @@ impl Selection {
         tare: false,
         temporal: false,
         camera: false,
+        down: false,
     };
     /// All of them.
     pub const ALL: Selection = Selection {
@@ -138,6 +146,7 @@ impl Selection {
         tare: true,
         temporal: true,
         camera: true,
+        down: true,
     };
 }
 
