@@ -1,9 +1,11 @@
 //! A conversation with a HiVTac sensor, for programs on the host: where it is ([`port`]), what is
-//! said ([`link`]), which sensor a name means ([`named`]), how it fails ([`failure`]), its pictures
+//! said ([`link`]), which sensor a name means ([`named`]), which way it is held ([`down`]), how it
+//! fails ([`failure`]), its pictures
 //! ([`frame`], [`look`]) and those in files ([`picture`], [`raw`], [`files`]), what its thresholds
 //! say ([`threshold`]), how its texts are shown ([`shown`]), a live page of it ([`page`]), what was
 //! recorded of it ([`recording`]), and how a program is interrupted ([`stop`]).
 
+pub mod down;
 pub mod failure;
 pub mod files;
 pub mod frame;

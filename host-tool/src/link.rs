@@ -4,6 +4,7 @@ use crate::failure::{Failure, Kind};
 use crate::port::{Address, Port};
 use crate::shown::shown;
 use crate::stop;
+use hivtac_terms::down::Down;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
@@ -183,6 +184,15 @@ impl Link {
         let id = self.last_id;
         self.send(&HostMessage::Command(Command { id, request }))?;
         Ok(id)
+    }
+
+    /// Says what is known of gravity on the sensor from its next frame on: as often as is liked, as
+    /// nothing answers.
+    ///
+    /// # Errors
+    /// [`Kind::Lost`] or [`Kind::Interrupted`].
+    pub fn set_down(&mut self, down: Down) -> Result<(), Failure> {
+        self.send(&HostMessage::Down(down))
     }
 
     /// Sends a command and waits for its reply; other messages that come first go to `other`.

@@ -523,6 +523,23 @@ enum SetCommand {
     /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
     #[command(subcommand)]
     Rezero(RezeroCommand),
+    /// Where gravity pulls on the film
+    ///
+    /// The film hangs by its own weight: turned over, it looks pressed by some mN. A sensor that is
+    /// told which way it is held takes that into account, from the next tare on; `none` where it is
+    /// turned and nobody tells how, which the uncertainties then include; `fixed`, as a new device
+    /// has it, where it stays as it was when the tare was taken. x is to the right and y down in
+    /// the image, z away from the camera; the length does not matter.
+    ///
+    /// Example: hivtac settings set down 0 0 -1
+    Down {
+        #[command(flatten)]
+        device: Told,
+        /// X Y Z, `none` or `fixed`
+        #[arg(value_name = "X Y Z|none|fixed", num_args = 1..=3, required = true,
+              allow_negative_numbers = true)]
+        down: Vec<String>,
+    },
     /// How long the camera exposes each row
     ///
     /// Automatic, it finds what the light needs when it starts and with `hivtac expose`, and then
@@ -654,22 +671,25 @@ impl RezeroCommand {
 }
 
 impl SetCommand {
-    fn action(self) -> (Told, settings::Action) {
+    fn action(self) -> Result<(Told, settings::Action), Failure> {
         let (device, change) = match self {
+            SetCommand::Down { device, down } => {
+                return Ok((device, settings::Action::SetDown(settings::down(&down)?)));
+            }
             SetCommand::Name { device, name } => {
-                return (device, settings::Action::SetName(name));
+                return Ok((device, settings::Action::SetName(name)));
             }
             SetCommand::Exposure { device, time } => {
                 let change = camera::Change::Exposure(time);
-                return (device, settings::Action::SetCamera(change));
+                return Ok((device, settings::Action::SetCamera(change)));
             }
             SetCommand::Gain { device, gain } => {
                 let change = camera::Change::Gain(gain);
-                return (device, settings::Action::SetCamera(change));
+                return Ok((device, settings::Action::SetCamera(change)));
             }
             SetCommand::Rate { device, rate } => {
                 let change = camera::Change::Rate(rate);
-                return (device, settings::Action::SetCamera(change));
+                return Ok((device, settings::Action::SetCamera(change)));
             }
             SetCommand::Contact {
                 device,
@@ -695,7 +715,7 @@ impl SetCommand {
             SetCommand::Filter(filter) => filter.change(),
             SetCommand::Rezero(rezero) => rezero.change(),
         };
-        (device, settings::Action::SetTemporal(change))
+        Ok((device, settings::Action::SetTemporal(change)))
     }
 }
 
@@ -705,7 +725,7 @@ impl SettingsCommand {
         let (device, json, action) = match self {
             SettingsCommand::Get { device, json } => (device, json, Action::Get),
             SettingsCommand::Set(command) => {
-                let (Told { device, json }, action) = command.action();
+                let (Told { device, json }, action) = command.action()?;
                 (device, json, action)
             }
             SettingsCommand::Export { device, file, json } => (device, json, Action::Export(file)),

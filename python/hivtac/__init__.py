@@ -249,6 +249,20 @@ class Sensor:
         finally:
             self._tell_log()
 
+    def set_down(self, x: float, y: float, z: float) -> None:
+        """Says where gravity pulls on the film, from its next frame on: a vector of any length, x to
+        the right and y down in the image, z away from the camera. The film hangs by its own weight;
+        told how it is held, a sensor that turns measures on. As often as the robot moves, up to 100
+        times a second: nothing answers. The tare must have been taken when this was told, too.
+
+        Raises `Error` when the vector has no direction.
+        """
+        self._connection.set_down((x, y, z))
+
+    def down_unknown(self) -> None:
+        """Says that nobody knows where gravity pulls: uncertainties include that."""
+        self._connection.set_down(None)
+
     def snapshot(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3): the next whole frame as the sensing reads it, levels of red, green
         and blue.

@@ -3,12 +3,14 @@
 
 use crate::error::{Error, raised};
 use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
+use hivtac_host::down::direction;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame;
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::look;
 use hivtac_host::named;
 use hivtac_host::port::Address;
+use hivtac_terms::down::Down;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel, Request};
 use hivtac_wire::settings::Selection;
 use pyo3::prelude::*;
@@ -194,6 +196,16 @@ impl Connection {
     /// What became of the rest position.
     fn rest(&self, py: Python<'_>) -> PyResult<RestNumbers> {
         self.with(py, |talk| talk.rest(self.patience))
+    }
+
+    /// Says where gravity pulls, by a vector of any length in the film's frame; `None`: nobody
+    /// knows.
+    fn set_down(&self, py: Python<'_>, vector: Option<[f64; 3]>) -> PyResult<()> {
+        let down = match vector {
+            None => Down::Unknown,
+            Some(vector) => Down::Told(direction(vector).map_err(Error::new_err)?),
+        };
+        self.with(py, |talk| talk.link.set_down(down))
     }
 
     /// Number, device time, s, columns and rows of a frame, and its levels of red, green and blue.

@@ -164,6 +164,7 @@ fn talk(
 fn answer(stream: &mut TcpStream, message: HostMessage, tare: Outcome, streaming: &mut bool) {
     match message {
         HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello())),
+        HostMessage::Down(_) => {}
         HostMessage::Command(hivtac_wire::message::Command { id, request }) => {
             let mut outcome = Outcome::Done;
             match request {

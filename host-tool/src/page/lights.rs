@@ -136,6 +136,10 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "the untouched film was seen beside its rest position",
             "leave the film alone for a minute, or take a new tare",
         ),
+        Status::WEIGHT_UNKNOWN => (
+            "the film may hang otherwise than when the tare was taken",
+            "say which way the sensor is held, then take a tare",
+        ),
         Status::UNEXPLAINED => (
             "no single contact explains where the markers are",
             "press with one tip; at rest, take a new tare",

@@ -71,6 +71,12 @@ pub struct Frames {
 }
 
 impl Frames {
+    /// That of forces and places.
+    #[cfg(feature = "ros2")]
+    pub fn film(&self) -> &str {
+        &self.film
+    }
+
     /// `NAME_film` and `NAME_image`.
     pub fn of(name: &str) -> Frames {
         Frames {

@@ -258,6 +258,21 @@ pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker; 4]) -> Vec<u8> {
     cdr.0
 }
 
+/// The frame and the vector of a `geometry_msgs/msg/Vector3Stamped`, as CDR behind its encoding;
+/// `None` of other bytes. Little-endian, as all that runs ROS 2.
+#[cfg(any(test, feature = "ros2"))]
+pub fn vector_stamped(body: &[u8]) -> Option<(&str, [f64; 3])> {
+    const STAMP: usize = 8;
+    let (length, rest) = body.get(STAMP..)?.split_first_chunk()?;
+    let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
+    let frame = rest.get(..length)?.strip_suffix(&[0])?;
+    let behind = (STAMP + 4 + length).next_multiple_of(8);
+    let (parts, _) = body.get(behind..)?.as_chunks();
+    let vector = [parts.first()?, parts.get(1)?, parts.get(2)?];
+    let vector = vector.map(|part| f64::from_le_bytes(*part));
+    Some((std::str::from_utf8(frame).ok()?, vector))
+}
+
 /// What a service of the type `std_srvs/srv/Trigger` answers.
 #[cfg(feature = "ros2")]
 pub fn trigger_reply(success: bool, message: &str) -> Vec<u8> {
@@ -325,6 +340,21 @@ mod tests {
         // 15 bytes are used: the next multiple of 8 is 16.
         assert_eq!(cdr.0[19..28], [0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f]);
         assert_eq!(cdr.0.len(), 20 + 24);
+    }
+
+    #[test]
+    fn a_stamped_vector_is_read_and_nothing_else() {
+        for frame in ["", "hivtac_film", "hivtac_thumb_film"] {
+            let mut cdr = Cdr::new();
+            cdr.header(1_500_000_000, frame);
+            cdr.vector([0.5, -9.0, 1e-3]);
+            let body = &cdr.0[4..];
+            assert_eq!(vector_stamped(body), Some((frame, [0.5, -9.0, 1e-3])));
+            for length in 0..body.len() {
+                assert_eq!(vector_stamped(&body[..length]), None);
+            }
+        }
+        assert_eq!(vector_stamped(&[0xff; 64]), None);
     }
 
     #[test]

@@ -18,7 +18,7 @@ use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::stop;
 use hivtac_wire::message::DeviceHello;
-use sensor::{Event, Sensor, TareOrder, What};
+use sensor::{Event, Sensor, TareOrder, Told, What};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -81,6 +81,7 @@ struct Served {
     name: Option<String>,
     frames: Frames,
     orders: SyncSender<TareOrder>,
+    down: Told,
     not_published: Arc<AtomicU64>,
 }
 
@@ -119,7 +120,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
                 options.patience,
                 about,
                 events.clone(),
-                orders,
+                (orders, served.down.clone()),
                 count,
             );
             let address = &options.addresses[number];
@@ -186,6 +187,7 @@ fn served(options: &Options, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<
             name,
             frames: Frames::of(&frames),
             orders,
+            down: Told::default(),
             not_published: Arc::default(),
         };
         (served, arriving)

@@ -1,24 +1,29 @@
-//! A node of ROS 2: topics, diagnostics, and a service that takes a tare.
+//! A node of ROS 2: topics, diagnostics, a service that takes a tare, and a topic by which it is
+//! told which way the sensor is held.
 //!
 //! Writers are reliable, so that reliable and best-effort subscriptions both get what is written;
 //! one that does not keep up loses the oldest of the last ten messages of a topic.
 
-use super::sensor::{Answer, TareOrder};
+use super::sensor::{Answer, TareOrder, Told};
 use super::{Outlet, Served};
 use crate::output::note;
 use crate::ros::channel::Channel;
-use crate::ros::{DIAGNOSTICS, Definition, trigger_reply};
+use crate::ros::{DIAGNOSTICS, Definition, trigger_reply, vector_stamped};
+use hivtac_host::down::direction;
 use hivtac_host::failure::Failure;
+use hivtac_host::shown::shown;
+use hivtac_terms::down::Down;
 use ros2_client::dds::rustdds::{DomainParticipantBuilder, RTPSEntity};
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Context, Message, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, QosProfile,
-    RmwRequestId, Server, ServiceMapping, ServiceTypeName,
+    RmwRequestId, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
 use serde::de::{Deserialize, Deserializer, SeqAccess, Visitor};
 use serde::ser::{Serialize, SerializeTuple, Serializer};
 use std::fmt;
 use std::net::Ipv4Addr;
+use std::sync::PoisonError;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -29,8 +34,8 @@ const ENCODING: usize = 4;
 /// Bytes in front of a request and its reply, by which Cyclone DDS's clients know which reply is
 /// theirs; other clients are told beside the message.
 const CYCLONES_HEADER: usize = 16;
-/// A request for a tare has no more bytes than this.
-const LONGEST_REQUEST: usize = 64;
+/// What is received has no more bytes than this: a vector with the name of its frame.
+const LONGEST_RECEIVED: usize = 512;
 /// Time between two looks for another node of this name.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
@@ -59,7 +64,7 @@ impl Serialize for Body {
 
 impl<'de> Deserialize<'de> for Body {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Body, D::Error> {
-        deserializer.deserialize_tuple(LONGEST_REQUEST, ToTheEnd)
+        deserializer.deserialize_tuple(LONGEST_RECEIVED, ToTheEnd)
     }
 }
 
@@ -97,6 +102,12 @@ struct Sensor {
     tare: Server<Body, Body>,
     orders: SyncSender<TareOrder>,
     waiting: Vec<Waiting>,
+    gravity: Subscription<Body>,
+    /// The frame that vectors of gravity are in.
+    frame: String,
+    down: Told,
+    /// A vector that cannot be used was told of.
+    is_told: bool,
 }
 
 /// The node.
@@ -201,6 +212,11 @@ fn qos() -> QosProfile {
         .history(History::KeepLast { depth: KEPT })
 }
 
+/// Of what is told as often as it changes: writers of either kind are heard.
+fn best_effort() -> QosProfile {
+    QosProfile::subscription_default().reliability_best_effort()
+}
+
 fn publisher(
     node: &mut Node,
     name: &Name,
@@ -231,12 +247,43 @@ impl Sensor {
             qos(),
             qos(),
         )?;
+        let kind = MessageTypeName::new("geometry_msgs", "Vector3Stamped");
+        let topic = node.create_topic(&Name::new(folder, "gravity")?, kind, &best_effort())?;
         Ok(Sensor {
             publishers,
             tare,
             orders: served.orders.clone(),
             waiting: Vec::new(),
+            gravity: node.create_subscription(&topic, None)?,
+            frame: served.frames.film().to_owned(),
+            down: served.down.clone(),
+            is_told: false,
         })
+    }
+
+    /// Passes on the newest of what was told of gravity.
+    fn hear_gravity(&mut self) {
+        while let Ok(Some((body, _))) = self.gravity.take() {
+            match self.down_of(&body.0) {
+                Ok(down) => {
+                    *self.down.lock().unwrap_or_else(PoisonError::into_inner) = Some(down);
+                }
+                Err(why) if !self.is_told => {
+                    note(&format!("hivtac: a vector of gravity is left out: {why}"));
+                    self.is_told = true;
+                }
+                Err(_) => {}
+            }
+        }
+    }
+
+    fn down_of(&self, body: &[u8]) -> Result<Down, String> {
+        let (frame, vector) = vector_stamped(body).ok_or("it cannot be read")?;
+        if !["", &self.frame].contains(&frame) {
+            let own = &self.frame;
+            return Err(format!("it is in the frame {}, not in {own}", shown(frame)));
+        }
+        direction(vector).map(Down::Told)
     }
 
     /// Passes on what was asked for.
@@ -306,6 +353,7 @@ impl Outlet for Ros2 {
     fn turn(&mut self) {
         for sensor in &mut self.sensors {
             sensor.pass_on();
+            sensor.hear_gravity();
             sensor.answer();
         }
         if self.looked.elapsed() >= LOOK_EVERY {

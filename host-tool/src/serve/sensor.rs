@@ -10,12 +10,13 @@ use crate::ros::Diagnosis;
 use crate::view::state::State;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
+use hivtac_terms::down::Down;
 use hivtac_terms::status::Status;
 use hivtac_wire::decoder::Rejected;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Sample};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Time between two diagnoses.
@@ -45,6 +46,9 @@ pub type Answer = Result<String, String>;
 /// Takes a tare; whoever asked gets the answer here.
 pub struct TareOrder(pub SyncSender<Answer>);
 
+/// What was told last of gravity on a device and is not passed on yet.
+pub type Told = Arc<Mutex<Option<Down>>>;
+
 /// A device that is served.
 pub struct Sensor {
     number: usize,
@@ -57,6 +61,7 @@ pub struct Sensor {
     lost: Option<Instant>,
     events: SyncSender<Event>,
     orders: Receiver<TareOrder>,
+    down: Told,
     not_published: Arc<AtomicU64>,
 }
 
@@ -68,7 +73,7 @@ impl Sensor {
         patience: Duration,
         (port, hello): (String, DeviceHello),
         events: SyncSender<Event>,
-        orders: Receiver<TareOrder>,
+        (orders, down): (Receiver<TareOrder>, Told),
         not_published: Arc<AtomicU64>,
     ) -> Sensor {
         Sensor {
@@ -81,6 +86,7 @@ impl Sensor {
             lost: None,
             events,
             orders,
+            down,
             not_published,
         }
     }
@@ -173,6 +179,14 @@ impl Follower for Sensor {
     fn turn(&mut self, mut link: Option<&mut Link>) -> Result<bool, Failure> {
         if self.diagnosed.elapsed() >= DIAGNOSE_EVERY {
             self.diagnose();
+        }
+        let told = self
+            .down
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        if let Some((link, down)) = link.as_mut().zip(told) {
+            link.set_down(down)?;
         }
         let mut is_asked = false;
         while let Ok(order) = self.orders.try_recv() {

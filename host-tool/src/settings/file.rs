@@ -9,6 +9,7 @@ use hivtac_host::files::read_at_most;
 use hivtac_host::shown::unit_number;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
@@ -36,6 +37,18 @@ pub struct File {
     pub tare: Option<Rest>,
     temporal: TemporalJson,
     camera: CameraJson,
+    #[serde(default)]
+    down: DownJson,
+}
+
+/// What is known of gravity; a direction in thousandths of a length of one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum DownJson {
+    #[default]
+    Fixed,
+    Unknown,
+    Told([i16; 3]),
 }
 
 /// A threshold as everywhere in the tool's JSON.
@@ -69,6 +82,9 @@ pub struct Rest {
     markers: [Seen; 4],
     rect_center_q16: [Px; 2],
     rect_area_q16: Q<16, i64>,
+    /// Where gravity pulled then, thousandths.
+    #[serde(default)]
+    down: Option<[i16; 3]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,6 +119,7 @@ struct KeptParts {
     tare: bool,
     temporal: bool,
     camera: bool,
+    down: bool,
 }
 
 impl Kept {
@@ -114,6 +131,7 @@ impl Kept {
             tare,
             temporal,
             camera,
+            down,
         } = report.kept;
         Kept {
             file: File::new(device_id, report),
@@ -125,6 +143,7 @@ impl Kept {
                 tare,
                 temporal,
                 camera,
+                down,
             },
             found: match report.found {
                 Found::Nothing => "nothing",
@@ -150,6 +169,11 @@ impl File {
             tare: report.tare.as_ref().map(Rest::of),
             temporal: TemporalJson::new(&report.temporal),
             camera: CameraJson::new(&report.camera.settings),
+            down: match report.down {
+                Down::Fixed => DownJson::Fixed,
+                Down::Unknown => DownJson::Unknown,
+                Down::Told(Direction(parts)) => DownJson::Told(parts),
+            },
         }
     }
 
@@ -197,6 +221,15 @@ impl File {
         self.camera.settings()
     }
 
+    /// What is known of gravity.
+    pub fn down(&self) -> Down {
+        match self.down {
+            DownJson::Fixed => Down::Fixed,
+            DownJson::Unknown => Down::Unknown,
+            DownJson::Told(parts) => Down::Told(Direction(parts)),
+        }
+    }
+
     /// The rest position.
     pub fn rest(&self) -> Option<RestPosition> {
         self.tare.as_ref().map(Rest::position)
@@ -241,6 +274,7 @@ impl Rest {
             }),
             rect_center_q16: position.rect_center.into(),
             rect_area_q16: position.rect_area,
+            down: position.down.map(|Direction(parts)| parts),
         }
     }
 
@@ -256,6 +290,7 @@ impl Rest {
             }),
             rect_center: self.rect_center_q16.into(),
             rect_area: self.rect_area_q16,
+            down: self.down.map(Direction),
         }
     }
 }
@@ -289,6 +324,14 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
     file.temporal()
         .check()
         .map_err(|error| format!("a limit is out of range: {error}"))?;
+    let taken = file.tare.and_then(|rest| rest.down).map(Direction);
+    if !taken
+        .into_iter()
+        .chain(file.down().told())
+        .all(Direction::is_sound)
+    {
+        return Err("down is no direction: its length is not 1000 thousandths".to_owned());
+    }
     Ok(file)
 }
 
@@ -338,6 +381,7 @@ mod tests {
                 markers: [0, 1, 2, 3].map(marker),
                 rect_center: (Px(7), Px(8)),
                 rect_area: Q::from_bits(1 << 40),
+                down: Some(Direction([0, 0, -1000])),
             }),
             kept: Selection::ALL,
             found: Found::Settings,
@@ -348,6 +392,7 @@ mod tests {
             seen: None,
             drift: None,
             camera: camera(),
+            down: Down::Told(Direction([0, 600, -800])),
         }
     }
 
@@ -364,6 +409,7 @@ mod tests {
             assert_eq!(read, file);
             assert_eq!((read.threshold(), read.rest()), (threshold, report.tare));
             assert_eq!(read.camera(), report.camera.settings);
+            assert_eq!(read.down(), report.down);
             assert!(read.is_of(&[7; 12]) && !read.is_of(&[8; 12]));
         }
     }
@@ -384,6 +430,7 @@ mod tests {
             ),
             ("\"thumb\"", "\"th\\u001bumb\"", "cannot be seen"),
             ("\"hue_low\":170", "\"hue_low\":200", "means nothing"),
+            ("[0,600,-800]", "[0,600,-80]", "no direction"),
             ("\"hue_low\"", "\"huelow\"", "huelow"),
             ("\"within_ms\":50", "\"within_ms\":5", "10 to 100 ms"),
             ("rgb565", "rgb888", "rgb888"),

@@ -10,12 +10,14 @@ use crate::lines::to_json;
 use crate::output;
 use crate::output::{note, print};
 use file::{File, Kept};
+use hivtac_host::down::{direction, text as text_of_down};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::down::Down;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use hivtac_wire::settings::{Found, NAME_BYTES, Name, RestPosition, Selection, SettingsReport};
 use serde_json::{Value, json};
@@ -46,6 +48,8 @@ pub enum Action {
     SetTemporal(Change),
     /// Set the camera, and keep that.
     SetCamera(camera::Change),
+    /// Say what is known of gravity, and keep that.
+    SetDown(Down),
     /// Save them in a file.
     Export(String),
     /// Set and keep those of a file.
@@ -76,6 +80,7 @@ pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
         Action::SetName(name) => device.set_name(name),
         Action::SetTemporal(change) => device.set_temporal(*change),
         Action::SetCamera(change) => device.set_camera(*change),
+        Action::SetDown(down) => device.set_down(*down),
         Action::Export(path) => device.export(path),
         Action::Import(path) => imported.map_or(Ok(()), |file| device.import(path, &file)),
         Action::Reset => device.reset(),
@@ -120,6 +125,25 @@ pub fn name(text: &str) -> Result<Name, String> {
             text.len()
         )
     })
+}
+
+/// What is known of gravity: three numbers, `none` or `fixed`.
+///
+/// # Errors
+/// Why it is none of them.
+pub fn down(words: &[String]) -> Result<Down, Failure> {
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let parsed = match words.as_slice() {
+        ["none"] => Ok(Down::Unknown),
+        ["fixed"] => Ok(Down::Fixed),
+        numbers => {
+            let parts: Result<Vec<f64>, _> = numbers.iter().map(|part| part.parse()).collect();
+            let vector: Option<[f64; 3]> = parts.ok().and_then(|parts| parts.try_into().ok());
+            let usage = "down is X Y Z, none or fixed: such as 0 0 -1".to_owned();
+            vector.ok_or(usage).and_then(direction).map(Down::Told)
+        }
+    };
+    parsed.map_err(|why| Failure::new(Kind::Usage, why))
 }
 
 struct Device {
@@ -195,6 +219,24 @@ impl Device {
         self.tell_set(name, &text)
     }
 
+    fn set_down(&mut self, down: Down) -> Result<(), Failure> {
+        self.link.set_down(down)?;
+        let selection = Selection {
+            down: true,
+            ..Selection::NONE
+        };
+        keep(&mut self.link, selection)?;
+        let report = self.settings()?;
+        let taken = report.tare.map(|tare| tare.down);
+        if report.down.told().is_some() && taken == Some(None) {
+            note(
+                "hivtac: nobody knows which way the sensor was held when its tare was taken: take \
+                 it anew",
+            );
+        }
+        self.tell_set("down", &text_of_down(report.down))
+    }
+
     /// What was set and kept.
     fn tell_set(&self, name: &str, text: &str) -> Result<(), Failure> {
         let line = format!("{name} set and kept: {text}");
@@ -258,6 +300,7 @@ impl Device {
             self.send(Request::SetCamera(file.camera()))
                 .map_err(unkept)?;
         }
+        self.link.set_down(file.down()).map_err(unkept)?;
         self.send(Request::SetTare(tare)).map_err(unkept)?;
         let temporal = file.temporal();
         self.send(Request::SetTemporal(temporal)).map_err(unkept)?;
@@ -314,6 +357,8 @@ fn lines(report: &SettingsReport) -> Vec<String> {
     let camera = until(report.kept.camera);
     let texts = camera::texts(&report.camera).into_iter();
     lines.extend(texts.map(|(name, text)| format!("{name:<11}{text} ({camera})")));
+    let down = until(report.kept.down);
+    lines.push(format!("down       {} ({down})", text_of_down(report.down)));
     lines.extend([
         format!("flash      {found}"),
         format!(
@@ -332,6 +377,23 @@ fn unusable(path: &str, why: impl std::fmt::Display) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::down::Direction;
+
+    #[test]
+    fn down_is_a_vector_or_a_word() {
+        let of = |words: &str| {
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            down(&words).map_err(|failure| failure.to_string())
+        };
+        assert_eq!(of("0 0.6 -0.8"), Ok(Down::Told(Direction([0, 600, -800]))));
+        assert_eq!(
+            (of("none"), of("fixed")),
+            (Ok(Down::Unknown), Ok(Down::Fixed))
+        );
+        for (words, said) in [("0 0", "X Y Z"), ("up", "X Y Z"), ("0 0 0", "no direction")] {
+            assert!(of(words).unwrap_err().contains(said), "{words}");
+        }
+    }
 
     #[test]
     fn names_are_short_and_can_be_read() {

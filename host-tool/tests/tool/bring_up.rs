@@ -56,7 +56,7 @@ fn board(presses: [[i32; 2]; 2]) -> FakeDevice {
         while let Some(message) = device.next() {
             let request = match &message {
                 HostMessage::Command(Command { request, .. }) => Some(request.clone()),
-                HostMessage::Hello(_) => None,
+                HostMessage::Hello(_) | HostMessage::Down(_) => None,
             };
             if request == Some(Request::Inspect) {
                 device.send(inspection());

@@ -322,6 +322,7 @@ fn nothing_that_a_device_says_acts_on_the_terminal() {
         while let Some(message) = device.next() {
             match message {
                 HostMessage::Hello(_) => device.send(DeviceMessage::Hello(hello.clone())),
+                HostMessage::Down(_) => {}
                 HostMessage::Command(command) => {
                     device.send(DeviceMessage::Log(LogLine {
                         level: LogLevel::Info,

@@ -2,6 +2,7 @@
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
@@ -116,9 +117,16 @@ impl Conversation {
 
     /// Answers one message; true for start.
     fn answer(&mut self, message: HostMessage) -> bool {
-        let HostMessage::Command(Command { id, request }) = message else {
-            self.send(DeviceMessage::Hello(self.hello.clone()));
-            return false;
+        let (id, request) = match message {
+            HostMessage::Command(Command { id, request }) => (id, request),
+            HostMessage::Hello(_) => {
+                self.send(DeviceMessage::Hello(self.hello.clone()));
+                return false;
+            }
+            HostMessage::Down(down) => {
+                self.settings.down = down;
+                return false;
+            }
         };
         let _ = self.commands.send(request.clone());
         match &request {
@@ -242,6 +250,7 @@ pub fn settings() -> SettingsReport {
             ],
             rect_center: (Px(160 << 16), Px(120 << 16)),
             rect_area: Q::from_int(14_400),
+            down: None,
         }),
         kept: Selection {
             name: true,
@@ -249,6 +258,7 @@ pub fn settings() -> SettingsReport {
             tare: false,
             temporal: true,
             camera: true,
+            down: true,
         },
         found: Found::Settings,
         erases: 3,
@@ -258,6 +268,7 @@ pub fn settings() -> SettingsReport {
         seen: None,
         drift: Some(Px(20_316)),
         camera: camera(),
+        down: Down::Fixed,
     }
 }
 

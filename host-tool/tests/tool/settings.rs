@@ -16,8 +16,7 @@ fn only(name: bool, threshold: bool, tare: bool) -> Request {
         name,
         threshold,
         tare,
-        temporal: false,
-        camera: false,
+        ..Selection::NONE
     })
 }
 
@@ -46,6 +45,7 @@ fn settings_for_a_person() {
          exposure   5.922 ms, as the light needs (kept)\n\
          gain       1.5, as the light needs (kept)\n\
          rate       156 frames a second (kept)\n\
+         down       fixed, as when the tare was taken (kept)\n\
          flash      settings found at the start\n\
          \x20          3 sectors erased in its life, 0 failed attempts to write since the start\n"
     );
@@ -346,14 +346,15 @@ fn the_guide_shows_what_setting_prints() {
             .chain(rest.split(' '))
             .collect();
         let of_camera = ["exposure", "gain", "rate"].contains(&arguments[2]);
-        let printed = match of_camera {
-            true => camera_changed(&arguments).1,
-            false => changed(&arguments).1,
+        let printed = match arguments[2] {
+            "down" => down_changed(&arguments),
+            _ if of_camera => camera_changed(&arguments).1,
+            _ => changed(&arguments).1,
         };
         assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
         shown += 1;
     }
-    assert_eq!(shown, 10);
+    assert_eq!(shown, 13);
 }
 
 /// What a device's camera is set to, and what the tool says that it keeps.
@@ -443,4 +444,36 @@ fn a_file_with_an_exposure_that_the_camera_has_not_changes_nothing() {
         rate: Rate::Half,
     });
     assert_eq!(commands(&device)[1], set);
+}
+
+/// What is said of gravity that is told, and that a tare from before says nothing of it.
+fn down_changed(arguments: &[&str]) -> String {
+    let device = device();
+    let run = run(&[arguments, &["--port", &device.port]].concat());
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let only_down = Selection {
+        down: true,
+        ..Selection::NONE
+    };
+    let expected = [Request::Keep(only_down), Request::GetSettings];
+    assert_eq!(commands(&device), expected);
+    let is_told = arguments.len() == 6;
+    assert_eq!(
+        run.stderr.contains("take it anew"),
+        is_told,
+        "{}",
+        run.stderr
+    );
+    run.stdout
+}
+
+#[test]
+fn what_is_no_direction_is_refused() {
+    let refused = run(&["settings", "set", "down", "0", "0", "0"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(
+        refused.stderr.contains("no direction"),
+        "{}",
+        refused.stderr
+    );
 }
