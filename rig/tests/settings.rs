@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use crate::common::{Setup, command, firmware};
+use crate::common::{Setup, command, down, firmware};
 use crate::cuts::{self, Start};
 use hivtac_rig::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
+use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
-use hivtac_wire::message::{DeviceMessage, Outcome, Request};
+use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample};
 use hivtac_wire::settings::{Found, Name, RestPosition, Selection, SettingsReport};
 
 /// Numbers of commands.
@@ -146,6 +147,40 @@ fn name_tare_and_threshold_are_kept_while_forces_go_on() {
     assert_eq!(run.settings().name, "old");
     assert_eq!(run.settings().tare, device.kept.tare);
     assert_eq!(run.settings().erases, 1, "there is room for hundreds");
+}
+
+/// What is told of gravity is not answered, goes with a tare, and is kept; what is no direction
+/// counts as unknown, and says so.
+#[test]
+fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("flash");
+    let told = Direction([0, 600, -800]);
+    let run = setup(&flash, ERASED_MS)
+        .at(SET_MS - 10, down(Down::Told(told)))
+        .at(SET_MS, send(SET, Request::Tare { frames: 2 }))
+        .at(KEEP_MS + 20, send(KEEP, Request::Keep(Selection::ALL)))
+        .run();
+    assert_eq!(run.outcome(SET), Outcome::Done);
+    assert_eq!(run.outcome(KEEP), Outcome::Done);
+    let report = run.settings();
+    assert_eq!((report.down, report.kept.down), (Down::Told(told), true));
+    assert_eq!(report.tare.unwrap().down, Some(told));
+    // A restart leaves it; turned over, the sensor measures on, and a jumble is said to be one.
+    let run = setup(&flash, 260)
+        .at(SET_MS, down(Down::Told(Direction([0, 600, 800]))))
+        .at(SET_MS + 30, down(Down::Told(Direction([1, 2, 3]))))
+        .run();
+    let samples = run.samples();
+    let is_unknown = |sample: &&Sample| sample.status.contains(Status::WEIGHT_UNKNOWN);
+    assert!(!is_unknown(&samples[0]) && is_unknown(samples.last().unwrap()));
+    assert_eq!(run.settings().tare.unwrap().down, Some(told));
+    assert_eq!(
+        (run.settings().down, run.settings().kept.down),
+        (Down::Unknown, false)
+    );
+    run.assert_only_setup_drops();
+    assert_eq!(run.missing_frames(), [0; 0], "forces go on");
 }
 
 /// Power is cut at each operation of a change of the name, in each way: the device has the old one

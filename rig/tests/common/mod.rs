@@ -24,6 +24,7 @@ use hivtac_rig::report::Report;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::{Action, Script};
 use hivtac_rig::truth::TruthLog;
+use hivtac_terms::down::Down;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
@@ -244,6 +245,11 @@ pub fn hello() -> Vec<u8> {
 /// A command.
 pub fn command(id: u16, request: Request) -> Vec<u8> {
     frame(&HostMessage::Command(Command { id, request }))
+}
+
+/// What is known of gravity.
+pub fn down(down: Down) -> Action {
+    Action::Send(frame(&HostMessage::Down(down)))
 }
 
 /// A command that sets the threshold.
