@@ -81,7 +81,7 @@ impl Film {
     pub fn with_down(self, down: Option<[f64; 3]>) -> Result<Film, FilmError> {
         let length = |[x, y, z]: [f64; 3]| libm::sqrt(x * x + y * y + z * z);
         let length = down.map_or(1.0, length);
-        if !((length - 1.0).abs() <= UNIT_LENGTH) {
+        if !(1.0 - UNIT_LENGTH..=1.0 + UNIT_LENGTH).contains(&length) {
             return Err(FilmError::Load(format!(
                 "down is {length} long: use a vector of length 1, such as [0, 0, -1]"
             )));

@@ -13,7 +13,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     pub fn set_down(&mut self, down: Down) {
         if self.down != down {
             self.down = down;
-            let noise = self.noise.clone();
+            let noise = self.noise;
             self.prepare();
             self.noise = noise;
         }
