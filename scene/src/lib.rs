@@ -31,11 +31,13 @@
 //! | `noise` | seeded sensor noise |
 //! | `format`, `jpeg`, `frame` | RGB565, YUV422, mono and JPEG; the frame and the truth |
 //! | `mechanics`, `surface` | the film as it is, or simplified |
+//! | `creep` | what the film remembers of its loads |
 //! | `motion`, `scene` | loads in time; the scene itself |
 //! | `file` | scenes from TOML files |
 
 mod camera;
 mod coverage;
+mod creep;
 mod disc;
 mod error;
 mod exposure;
@@ -56,6 +58,7 @@ mod scene;
 mod surface;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, PresetCamera};
+pub use creep::{Creep, Memory};
 pub use disc::{Disc, MARKERS};
 pub use error::SceneError;
 pub use format::Format;

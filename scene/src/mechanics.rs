@@ -1,6 +1,6 @@
 //! The film as it is, or simplified: to see what each part of its answer is worth.
 
-use crate::{Contact, Load, SceneError};
+use crate::{Contact, Creep, Load, SceneError};
 use hivtac_film::DiscMotion;
 use hivtac_film::reduced::{NOMINAL_RADIUS_MM, Unit};
 use hivtac_film::{Film, FilmError, Pressed};
@@ -29,6 +29,8 @@ pub struct Mechanics {
     /// Radius of the disc over which the tip of loads spreads their force that do not say so
     /// themselves, mm, 0.25 to 2.
     pub tip_radius_mm: f64,
+    /// What it remembers of a scene's motion.
+    pub creep: Creep,
 }
 
 /// How far the film gives for how much force.
@@ -58,6 +60,7 @@ impl Default for Mechanics {
             contact: Contact::Force,
             offset_mm: [0.0; 2],
             tip_radius_mm: NOMINAL_RADIUS_MM,
+            creep: Creep::default(),
         }
     }
 }
@@ -81,12 +84,14 @@ impl Mechanics {
         Ok(film)
     }
 
-    /// Whether a film can take a load.
+    /// Whether a film can take a load, held for ever.
     ///
     /// # Errors
     /// When the load is outside what the film's tables hold for.
     pub(crate) fn check(&self, film: &Film, load: &Load) -> Result<(), SceneError> {
-        Ok(film.check(&self.completed(load))?)
+        let load = self.completed(load);
+        film.check(&load)?;
+        Ok(film.check(&self.creep.at_last(&load))?)
     }
 
     /// A load with what it leaves open.

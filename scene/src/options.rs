@@ -129,6 +129,7 @@ impl Options {
         for place in self.glued_mm {
             all_within("glued_mm", place, [-1.0, 1.0])?;
         }
+        self.film.creep.check()?;
         self.patches.iter().try_for_each(Patch::check)?;
         self.specks.check()?;
         self.lens.check()?;
@@ -190,6 +191,8 @@ mod tests {
             (said_of(|o| o.salt.fraction = 1.1), "salt"),
             (said_of(|o| o.checkerboard_px = 401), "checkerboard_px"),
             (said_of(|o| o.glued_mm[3][1] = -1.1), "glued_mm"),
+            (said_of(|o| o.film.creep.parts[0] = 0.2), "parts"),
+            (said_of(|o| o.film.creep.times_s[1] = 0.0), "times_s"),
             (said_of(|o| o.specks.count = 100_001), "specks"),
             (said_of(|o| o.specks.radius_mm = 0.0), "speck_radius_mm"),
             (said_of(|o| o.lens.blur_px = 21.0), "blur_px"),

@@ -7,7 +7,8 @@ use crate::light::{Channel, Light, STEPS};
 use crate::motion::Motion;
 use crate::noise::{LOTS, Noise};
 use crate::{
-    Camera, Disc, Format, Frame, Load, MARKERS, Options, Paint, Preset, SceneError, Shutter, Truth,
+    Camera, Disc, Format, Frame, Load, MARKERS, Mechanics, Options, Paint, Preset, SceneError,
+    Shutter, Truth,
 };
 use hivtac_film::{Film, Pressed};
 
@@ -126,8 +127,26 @@ impl Scene {
 
     /// The same by a camera with another shutter, whose times are in their ranges.
     pub fn frame_by(&self, shutter: &Shutter, number: u64, time_s: f64) -> Frame {
-        let load = |after_s| self.motion.load(time_s + after_s);
-        self.expose(&self.exposure(shutter, load), number)
+        let force = self.motion.load(time_s);
+        self.expose(
+            &self.exposure(shutter, self.course(shutter, time_s)),
+            &force,
+            number,
+        )
+    }
+
+    /// The load that the elastic film answers to as this one does to the motion, so many seconds
+    /// after a time, while a shutter is open.
+    fn course(&self, shutter: &Shutter, time_s: f64) -> impl Fn(f64) -> Load {
+        let mechanics = &self.options.film;
+        let load = move |time_s| mechanics.completed(&self.motion.load(time_s));
+        // The first row is exposed so much earlier than the middle one.
+        let begin_s = time_s - shutter.exposure_s - shutter.readout_s;
+        let memory = mechanics.creep.memory(begin_s, load);
+        move |after_s| {
+            let now_s = time_s + after_s;
+            memory.after(begin_s, now_s, load).effective(&load(now_s))
+        }
     }
 
     /// What is true at a time in seconds, without rendering.
@@ -137,8 +156,12 @@ impl Scene {
 
     /// The same of a camera with another shutter, whose times are in their ranges.
     pub fn truth_by(&self, shutter: &Shutter, time_s: f64) -> Truth {
-        let exposure = self.exposure(shutter, |after_s| self.motion.load(time_s + after_s));
-        self.truth_of(&exposure, &self.marker_images(&exposure))
+        let exposure = self.exposure(shutter, self.course(shutter, time_s));
+        self.truth_of(
+            &exposure,
+            &self.motion.load(time_s),
+            &self.marker_images(&exposure),
+        )
     }
 
     /// What is true under any constant load, whatever the scene's motion, without rendering.
@@ -148,7 +171,7 @@ impl Scene {
     pub fn truth_under(&self, load: &Load) -> Result<Truth, SceneError> {
         self.options.film.check(&self.film, load)?;
         let exposure = self.exposure(&self.options.shutter, |_| *load);
-        Ok(self.truth_of(&exposure, &self.marker_images(&exposure)))
+        Ok(self.truth_of(&exposure, load, &self.marker_images(&exposure)))
     }
 
     /// A frame under any constant load, whatever the scene's motion; the number selects its noise.
@@ -158,7 +181,7 @@ impl Scene {
     pub fn render_load(&self, load: &Load, number: u64) -> Result<Frame, SceneError> {
         self.options.film.check(&self.film, load)?;
         let exposure = self.exposure(&self.options.shutter, |_| *load);
-        Ok(self.expose(&exposure, number))
+        Ok(self.expose(&exposure, load, number))
     }
 
     /// A frame of a film that somebody else pressed, such as finite elements; the number selects
@@ -170,7 +193,7 @@ impl Scene {
             now: pressed,
             ..self.exposure(&shutter, |_| *load)
         };
-        self.expose(&exposure, number)
+        self.expose(&exposure, load, number)
     }
 
     /// What is true of such a film, without rendering.
@@ -180,7 +203,7 @@ impl Scene {
             now: pressed,
             ..self.exposure(&shutter, |_| *load)
         };
-        self.truth_of(&exposure, &self.marker_images(&exposure))
+        self.truth_of(&exposure, load, &self.marker_images(&exposure))
     }
 
     /// The frame of a camera with a shutter under a load in time that is no [`Motion`]: what
@@ -195,8 +218,9 @@ impl Scene {
         number: u64,
         load: impl Fn(f64) -> Load,
     ) -> Result<Frame, SceneError> {
-        self.options.film.check(&self.film, &load(0.0))?;
-        Ok(self.expose(&self.exposure(shutter, load), number))
+        let force = load(0.0);
+        self.options.film.check(&self.film, &force)?;
+        Ok(self.expose(&self.exposure(shutter, load), &force, number))
     }
 
     fn exposure<'a, L: Fn(f64) -> Load>(
@@ -215,7 +239,12 @@ impl Scene {
         }
     }
 
-    fn expose<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>, number: u64) -> Frame {
+    fn expose<L: Fn(f64) -> Load>(
+        &self,
+        exposure: &Exposure<'_, L>,
+        force: &Load,
+        number: u64,
+    ) -> Frame {
         let markers = self.marker_images(exposure);
         let picture = self.picture(exposure, &markers);
         let Raster { words, bytes } = self.digitize(&picture, number);
@@ -225,7 +254,7 @@ impl Scene {
             format: self.options.format,
             pixels: words,
             mono: bytes,
-            truth: self.truth_of(exposure, &markers),
+            truth: self.truth_of(exposure, force, &markers),
         }
     }
 
@@ -291,15 +320,22 @@ impl Scene {
     fn truth_of<L: Fn(f64) -> Load>(
         &self,
         exposure: &Exposure<'_, L>,
+        force: &Load,
         markers: &[Option<Image>; 4],
     ) -> Truth {
-        let force = self.options.film.completed(&(exposure.load)(0.0));
+        let Mechanics { creep, .. } = self.options.film;
+        let force = self.options.film.completed(force);
         let presses = force.magnitude_n() > 0.0;
+        // Force and place are the tip's, whatever else the film remembers.
+        let touched = match creep.is_elastic() {
+            true => exposure.now,
+            false => self.options.film.press(&self.film, &force),
+        };
         Truth {
             force,
-            on_film_n: exposure.now.force_n,
+            on_film_n: touched.force_n,
             tip_mm: exposure.now.tip_mm,
-            touches_mm: presses.then_some(exposure.now.touches_mm),
+            touches_mm: presses.then_some(touched.touches_mm),
             markers: std::array::from_fn(|id| markers[id].as_ref()?.truth(&self.camera)),
         }
     }

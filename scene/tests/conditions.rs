@@ -1,8 +1,8 @@
 //! What each option does to a picture.
 
 use hivtac_scene::{
-    Contact, Discs, Frame, Lens, Load, Mounting, Options, Paint, Patch, Preset, Projection, Salt,
-    Scene, Shutter, Specks,
+    Contact, Creep, Discs, Frame, Lens, Load, Mechanics, Motion, Mounting, Options, Paint, Patch,
+    Preset, Press, Projection, Salt, Scene, Shutter, Specks,
 };
 
 fn scene(options: Options) -> Scene {
@@ -319,4 +319,56 @@ fn the_truth_tells_which_point_of_the_film_the_tip_is_on() {
     let slips = tilted.with_contact(Contact::Slip { mu: 0.05 }).unwrap();
     let [x, y] = touches(slips).unwrap();
     assert!(x > 0.05 && y.abs() < 1e-9, "it slid to ({x}, {y})");
+}
+
+/// How far the first marker is from its place on another scene, px.
+fn apart(one: &Scene, other: &Scene, time_s: f64) -> f64 {
+    let [a, b] = [one, other].map(|scene| scene.truth(time_s).markers[0].unwrap().centroid_px);
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+#[test]
+fn creep_moves_markers_and_not_the_truth() {
+    let film = |creep| Mechanics {
+        creep,
+        offset_mm: [1.0, -1.0],
+        ..Mechanics::default()
+    };
+    let with = |creep, shutter| {
+        let options = Options {
+            film: film(creep),
+            shutter,
+            ..clear()
+        };
+        let press = Motion::Press(Press {
+            force_n: 0.1,
+            hold_s: 10.0,
+            ..Press::default()
+        });
+        scene(options).with_motion(press).unwrap()
+    };
+    let still = Shutter::default();
+    let [elastic, creeping] = [Creep::default(), Creep::of(0.1)].map(|creep| with(creep, still));
+    assert_eq!(elastic.truth(0.05), creeping.truth(0.05), "nothing pressed");
+    let [soon, late] = [0.5, 10.0].map(|time_s| apart(&elastic, &creeping, time_s));
+    assert!(0.1 < soon && soon < late, "{soon} px, {late} px");
+    let (truth, known) = (creeping.truth(5.0), elastic.truth(5.0));
+    assert_eq!(
+        (truth.force, truth.on_film_n),
+        (known.force, known.on_film_n)
+    );
+    assert_eq!(truth.touches_mm, Some([1.0, -1.0]));
+    assert!(truth.tip_mm[2] < known.tip_mm[2]);
+    // Let go: what remains dies away.
+    let [left, less] = [11.0, 60.0].map(|time_s| apart(&elastic, &creeping, time_s));
+    assert!(less > 0.02 && left > 2.0 * less, "{left} px, {less} px");
+    assert_eq!(creeping.truth(11.0).force.magnitude_n(), 0.0);
+    assert_eq!(creeping.truth(11.0).touches_mm, None);
+    // Through a shutter it is the same film.
+    let rolling = Shutter {
+        exposure_s: 0.0,
+        readout_s: 0.02,
+    };
+    let rolled = with(Creep::of(0.1), rolling);
+    assert!(apart(&rolled, &creeping, 8.0) < 0.001);
 }

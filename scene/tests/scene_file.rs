@@ -84,7 +84,7 @@ fn known(section: &str) -> BTreeSet<String> {
 #[test]
 fn every_key_is_documented_and_every_documented_key_is_one() {
     let sections = documented();
-    assert_eq!(sections.len(), 18);
+    assert_eq!(sections.len(), 19);
     let names: BTreeSet<&str> = sections.iter().map(|(name, _)| name.as_str()).collect();
     for (name, rows) in &sections {
         let mut rows: BTreeSet<String> = rows.iter().map(|(key, _)| key.clone()).collect();
@@ -128,7 +128,7 @@ fn documented_defaults_change_nothing() {
 
 #[test]
 fn errors_name_line_key_value_and_what_is_possible() {
-    let cases: [(&str, &[&str]); 18] = [
+    let cases: [(&str, &[&str]); 20] = [
         ("[light]\ngian = 1", &["line 2", "gian", "`gain`"]),
         ("[ligth]\ngain = 1", &["line 1", "ligth", "`light`"]),
         (
@@ -182,6 +182,14 @@ fn errors_name_line_key_value_and_what_is_possible() {
         (
             "[film]\nunit.thickness = 3",
             &["line 1, film", "0.7 to 1.3"],
+        ),
+        (
+            "[film]\ncreep.parts = [0.05, 0.16]",
+            &["line 2, film.creep.parts", "0 to 0.15"],
+        ),
+        (
+            "[film]\ncreep.parts = [0.1, 0.1]\n[load]\nmotion = \"press\"\npress.force_n = 0.24",
+            &["line 3, load", "0.251", "press less"],
         ),
         ("[film]\ncontact = \"glue\"", &["line 2", "glue", "stick"]),
     ];

@@ -1,7 +1,7 @@
 //! The list of effects: what each is worth can be measured by switching it.
 
 use hivtac_scene::{
-    Contact, Discs, Format, Lens, Mounting, Options, Paint, Patch, Projection, Salt, Scene,
+    Contact, Creep, Discs, Format, Lens, Mounting, Options, Paint, Patch, Projection, Salt, Scene,
     SceneError, Shutter, Stiffness, Surface,
 };
 
@@ -85,6 +85,11 @@ fn film() -> Vec<Effect> {
             "camera-side surface",
             "markers on the film's middle surface",
             |_, options| options.film.surface = Surface::Middle,
+        ),
+        on(
+            "creep",
+            "a film that gives a tenth more within half a minute, and as slowly back",
+            |_, options| options.film.creep = Creep::of(0.1),
         ),
         on(
             "contact offset",
