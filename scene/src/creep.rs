@@ -59,8 +59,7 @@ pub struct Memory {
 }
 
 impl Creep {
-    /// Half of a part within half a second, half of it within twenty: what the parts of real
-    /// silicones are, a gauge must say.
+    /// Half of a part within half a second, half of it within twenty seconds.
     pub fn of(part: f64) -> Creep {
         Creep {
             parts: [part / 2.0; 2],
@@ -87,12 +86,19 @@ impl Creep {
         self.parts == [0.0; 2]
     }
 
+    /// How many times a load has grown that was put on at once and is held for so long, s.
+    pub fn grown(&self, held_s: f64) -> f64 {
+        let terms = self.parts.iter().zip(self.times_s);
+        let grown = terms.map(|(part, time_s)| part * (1.0 - libm::exp(-held_s / time_s)));
+        1.0 + grown.sum::<f64>()
+    }
+
     /// What a held load grows to.
     pub(crate) fn at_last(&self, load: &Load) -> Load {
         if self.is_elastic() {
             return *load;
         }
-        let grown = 1.0 + self.parts.iter().sum::<f64>();
+        let grown = self.grown(f64::INFINITY);
         let force = Load::from_vector(load.vector_n().map(|part| grown * part));
         force.map_or(*load, |force| {
             force.or(load.contact(), load.offset_mm(), load.tip_radius_mm())
@@ -194,10 +200,11 @@ mod tests {
                 Load::REST
             }
         };
-        let grown = |s: f64| 0.04 * (1.0 - (-s / 0.5).exp()) + 0.1 * (1.0 - (-s / 20.0).exp());
+        let grown = |s: f64| 1.04 - 0.04 * (-s / 0.5).exp() + 0.1 * (1.0 - (-s / 20.0).exp());
         for time_s in [0.0, 0.1, 1.0, 9.9] {
             let effective = creep.memory(time_s, load).effective(&load(time_s));
-            near(effective.magnitude_n(), 0.1 * (1.0 + grown(time_s)));
+            near(creep.grown(time_s), grown(time_s));
+            near(effective.magnitude_n(), 0.1 * grown(time_s));
             near(effective.alpha_deg(), 4.0);
             near(effective.offset_mm()[0], 2.0);
         }

@@ -5,6 +5,7 @@ mod anywhere;
 mod calculix;
 mod convergence;
 mod coverage;
+mod creep;
 mod document;
 mod large;
 mod maps;
@@ -46,6 +47,8 @@ enum Command {
     /// Ask in every tenth of |F| and of the distance from the middle whether stated uncertainties
     /// hold.
     Coverage(coverage::Coverage),
+    /// Press films that creep and unload late: hold, let go, and press by sines of time.
+    Creep(creep::CreepStudy),
     /// Make a model for frames of 800×600, and hold its errors against the Cramér–Rao bound.
     Large(large::Large),
     /// Render black, red and blue markers under a camera that sees no colours, in white and in cyan
@@ -91,6 +94,7 @@ fn main() -> Result<()> {
         Command::Calculix(study) => study.run(),
         Command::Convergence(study) => study.run(),
         Command::Coverage(study) => study.run(),
+        Command::Creep(study) => study.run(),
         Command::Large(study) => study.run(),
         Command::Mono(study) => study.run(),
         Command::MountedFilms(study) => study.run(),

@@ -10,7 +10,8 @@ use hivtac_sensing::model::{Conditions, Model};
 use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::rest::Rest;
-use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensing::tare::{Refusal, TareBuilder};
+use hivtac_sensing::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 
@@ -192,21 +193,11 @@ impl TestedUnit {
         let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
-        let rest = self.rest(&mut sensor)?;
-        sensor.set_tare(Some(rest), Drift::NONE);
-        Ok(Tared { sensor })
-    }
-
-    fn rest(&self, sensor: &mut Sensor<'_>) -> Result<Rest> {
-        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
-        for number in 0..TARE_FRAMES {
-            let frame = self.frame(&Load::REST, 1_000_000 + u64::from(number))?;
-            let seen = measure(sensor, &frame);
-            if let Some(outcome) = sensor.tare_with(&mut tare, &seen) {
-                return outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"));
-            }
-        }
-        Err(anyhow!("no rest position: too few frames show the markers"))
+        let mut tared = Tared { sensor };
+        let outcome = tared.judge_tare(self, &Load::REST, false)?;
+        let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
+        tared.set_rest(rest);
+        Ok(tared)
     }
 }
 
@@ -230,6 +221,44 @@ impl Tared<'_> {
     /// What the sensor says of a frame.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
         measure(&mut self.sensor, frame)
+    }
+
+    /// The rest position that a tare of a unit finds under a load, or why it is refused; it is not
+    /// set.
+    ///
+    /// # Errors
+    /// When the film cannot take the load, or too few frames show the markers.
+    pub fn judge_tare(
+        &mut self,
+        unit: &TestedUnit,
+        load: &Load,
+        insists: bool,
+    ) -> Result<Result<Rest, Refusal>> {
+        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
+        if insists {
+            tare = tare.insisting();
+        }
+        // Every second frame may be bad.
+        for number in 0..2 * TARE_FRAMES {
+            let seen = self.measure(&unit.frame(load, 1_000_000 + u64::from(number))?);
+            if let Some(outcome) = self.sensor.tare_with(&mut tare, &seen) {
+                return Ok(outcome);
+            }
+        }
+        if tare.saw_implausible() {
+            return Ok(Err(Refusal::MarkersImplausible));
+        }
+        Err(anyhow!("no rest position: too few frames show the markers"))
+    }
+
+    /// What follows from a frame, measured last, and those before it.
+    pub fn follow(&mut self, at: Moment, measurement: &Measurement) -> Followed {
+        self.sensor.follow(at, measurement)
+    }
+
+    /// Measures from now on against another rest position.
+    pub fn set_rest(&mut self, rest: Rest) {
+        self.sensor.set_tare(Some(rest), Drift::NONE);
     }
 
     /// Where it rests.
