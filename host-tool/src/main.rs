@@ -47,12 +47,15 @@ use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
 use hivtac_terms::units::{
-    Micrometres, Microseconds, MilliPx, Milliseconds, Permille, Sixteenths, UnsignedMicroNewtons,
+    Micrometres, Microseconds, MilliPx, Milliseconds, Permille, Sixteenths, SmallPermille,
+    UnsignedMicroNewtons,
 };
 use hivtac_wire::settings::Name;
 use lines::Format;
 use settings::camera::{self, Wanted};
-use settings::temporal::{Change, RezeroChange, small_thousandths, thousandths};
+use settings::temporal::{
+    Change, RezeroChange, small_thousandths, thousandths, tiny_thousandths, two_thousandths,
+};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -540,6 +543,24 @@ enum SetCommand {
               allow_negative_numbers = true)]
         down: Vec<String>,
     },
+    /// How much the film remembers of its loads
+    ///
+    /// A held load is seen as if it grew by two parts of itself, within half a second and within
+    /// 20 s, and what is taken off stays behind likewise: `hivtac-calibrate creep` finds both. The device takes that
+    /// off; what is uncertain of it is in each force's uncertainty.
+    ///
+    /// Example: hivtac settings set creep --parts 0.031,0.042 --uncertain 0.005
+    #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
+    Creep {
+        #[command(flatten)]
+        device: Told,
+        /// Parts of a force, 0 to 0.15 each; 0,0 by default
+        #[arg(long, value_name = "A,B", value_parser = two_thousandths, group = "limit")]
+        parts: Option<[u8; 2]>,
+        /// Standard uncertainty of each part, 0 to 0.15; 0.05 by default
+        #[arg(long, value_name = "PART", value_parser = tiny_thousandths, group = "limit")]
+        uncertain: Option<u8>,
+    },
     /// How long the camera exposes each row
     ///
     /// Automatic, it finds what the light needs when it starts and with `hivtac expose`, and then
@@ -714,6 +735,17 @@ impl SetCommand {
             }
             SetCommand::Filter(filter) => filter.change(),
             SetCommand::Rezero(rezero) => rezero.change(),
+            SetCommand::Creep {
+                device,
+                parts,
+                uncertain,
+            } => {
+                let change = Change::Creep {
+                    parts: parts.map(|parts| parts.map(SmallPermille)),
+                    uncertain: uncertain.map(SmallPermille),
+                };
+                (device, change)
+            }
         };
         Ok((device, settings::Action::SetTemporal(change)))
     }

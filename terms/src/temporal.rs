@@ -1,7 +1,9 @@
-//! What is made of one force after another: contact, slip, a filter, and re-zeroing. Their limits
-//! are settings that a device keeps.
+//! What is made of one force after another: contact, slip, a filter, re-zeroing, and what the film
+//! remembers. Their limits are settings that a device keeps.
 
-use crate::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
+use crate::units::{
+    Micrometres, MilliPx, Milliseconds, Permille, SmallPermille, UnsignedMicroNewtons,
+};
 use core::fmt;
 
 /// How forces are followed from frame to frame.
@@ -19,6 +21,8 @@ pub struct TemporalSettings {
     pub filter: Filter,
     /// Whether the rest position follows what drifts; `None` for never.
     pub rezero: Option<Rezero>,
+    /// What the film remembers of its loads.
+    pub creep: Creep,
 }
 
 /// When something touches the film: from `begins` on, until |F| is below `ends`.
@@ -84,9 +88,24 @@ pub struct Rezero {
     pub total: MilliPx,
 }
 
+/// What the film remembers of its loads: a held load is seen as if it grew by two parts of itself,
+/// within half a second and within 20 s, and what is taken off is left behind likewise. Forces are right a
+/// second after a load was put on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Creep {
+    /// The parts, 0 to 150 each: taken off.
+    pub parts: [SmallPermille; 2],
+    /// Standard uncertainty of each part, 0 to 150.
+    pub uncertain: SmallPermille,
+}
+
 impl TemporalSettings {
     /// A contact from 2 mN on until 1 mN; a slip of 60 µm within 50 ms, from a tenth of the normal
-    /// force on; no filter; re-zeroing as [`Rezero::USUAL`].
+    /// force on; no filter; re-zeroing as [`Rezero::USUAL`]; a film as [`Creep::USUAL`].
     pub const USUAL: TemporalSettings = TemporalSettings {
         contact: ContactLimits {
             begins: UnsignedMicroNewtons(2_000),
@@ -99,6 +118,7 @@ impl TemporalSettings {
         },
         filter: Filter::None,
         rezero: Some(Rezero::USUAL),
+        creep: Creep::USUAL,
     };
 }
 
@@ -139,6 +159,24 @@ impl Default for Rezero {
     }
 }
 
+impl Creep {
+    /// Of a film whose creep nobody measured: none, as uncertain as silicones differ, of which a
+    /// held load grows by 2 to 15 % in all.
+    pub const USUAL: Creep = Creep {
+        parts: [SmallPermille(0); 2],
+        uncertain: SmallPermille(50),
+    };
+    /// The times. A series of others is nearly one of these with other parts.
+    pub const TIMES: [Milliseconds; 2] = [Milliseconds(500), Milliseconds(20_000)];
+}
+
+impl Default for Creep {
+    /// [`Creep::USUAL`].
+    fn default() -> Self {
+        Creep::USUAL
+    }
+}
+
 /// A setting that is outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TemporalError {
@@ -160,6 +198,10 @@ pub enum TemporalError {
     RezeroRate,
     /// [`Rezero::total`].
     RezeroTotal,
+    /// [`Creep::parts`].
+    CreepParts,
+    /// [`Creep::uncertain`].
+    CreepUncertain,
 }
 
 impl fmt::Display for TemporalError {
@@ -174,6 +216,8 @@ impl fmt::Display for TemporalError {
             TemporalError::RezeroAfter => "re-zeroing begins after 1 to 3600 s",
             TemporalError::RezeroRate => "the rate of re-zeroing is 0.001 to 0.1 px a second",
             TemporalError::RezeroTotal => "re-zeroing moves by 0.001 to 0.25 px in all",
+            TemporalError::CreepParts => "a part of creep is 0 to 15 %",
+            TemporalError::CreepUncertain => "creep is uncertain by 0 to 15 %",
         })
     }
 }
@@ -189,6 +233,7 @@ impl TemporalSettings {
             slip,
             filter,
             rezero,
+            creep,
         } = self;
         let within = |is_within: bool, error| is_within.then_some(()).ok_or(error);
         let begins_within = (1..=1_000_000).contains(&begins.0);
@@ -204,6 +249,9 @@ impl TemporalSettings {
             let constant_within = (1..=10_000).contains(&time_constant.0);
             within(constant_within, TemporalError::TimeConstant)?;
         }
+        let parts_within = creep.parts.iter().all(|part| part.0 <= 150);
+        within(parts_within, TemporalError::CreepParts)?;
+        within(creep.uncertain.0 <= 150, TemporalError::CreepUncertain)?;
         let Some(Rezero { after, rate, total }) = rezero else {
             return Ok(());
         };
@@ -251,7 +299,12 @@ mod tests {
             };
             assert_eq!(settings.check().is_ok(), is_good, "{constant}");
         }
-        let bad: [(Edit, TemporalError); 8] = [
+        let bad: [(Edit, TemporalError); 10] = [
+            (
+                |s| s.creep.parts[1] = SmallPermille(151),
+                TemporalError::CreepParts,
+            ),
+            (|s| s.creep.uncertain.0 = 151, TemporalError::CreepUncertain),
             (
                 |s| s.contact.begins.0 = 1_000_001,
                 TemporalError::ContactBegins,

@@ -129,6 +129,14 @@ pub struct Milliseconds(pub u32);
 )]
 pub struct Permille(pub u16);
 
+/// Thousandths, to 255 of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct SmallPermille(pub u8);
+
 /// A distance in a picture, in thousandths of a pixel: of settings, which people write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(

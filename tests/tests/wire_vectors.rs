@@ -9,11 +9,11 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::{Filter, Rezero, TemporalSettings};
+use hivtac_terms::temporal::{Creep, Filter, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Px,
-    SignedMicrometres, Sixteenths, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
@@ -66,6 +66,10 @@ const OWN: TemporalSettings = TemporalSettings {
         rate: MilliPx(5),
         total: MilliPx(100),
     }),
+    creep: Creep {
+        parts: [SmallPermille(31), SmallPermille(42)],
+        uncertain: SmallPermille(5),
+    },
     ..TemporalSettings::USUAL
 };
 const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });

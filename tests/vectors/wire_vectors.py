@@ -154,8 +154,18 @@ def rezero(total_mpx):
 
 
 NO_REZERO = [raw("rezero: None", [0])]
-USUAL = LIMITS + NO_FILTER + rezero(200)
-OWN = LIMITS + LOW_PASS + rezero(100)
+
+
+def creep(parts, uncertain):
+    return [
+        *(unsigned("creep: part_permille", part) for part in parts),
+        unsigned("uncertain_permille", uncertain),
+    ]
+
+
+ANY_FILM = creep([0, 0], 50)
+USUAL = LIMITS + NO_FILTER + rezero(200) + ANY_FILM
+OWN = LIMITS + LOW_PASS + rezero(100) + creep([31, 42], 5)
 
 
 MODEL = [
@@ -383,7 +393,7 @@ HOST = {
     "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
-    + [raw("filter: MedianOfThree", [2])] + NO_REZERO,
+    + [raw("filter: MedianOfThree", [2])] + NO_REZERO + ANY_FILM,
     "begin-model": COMMAND
     + [unsigned("id", 16), raw("BeginModel", [14]), unsigned("bytes", 57_976)],
     "model-part": COMMAND

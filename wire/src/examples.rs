@@ -12,11 +12,11 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::{ContactLimits, Filter, Rezero, SlipLimits, TemporalSettings};
+use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
-    SignedMicrometres, Sixteenths, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
@@ -198,6 +198,10 @@ pub fn longest_temporal() -> TemporalSettings {
             rate: MilliPx(u16::MAX),
             total: MilliPx(u16::MAX),
         }),
+        creep: Creep {
+            parts: [SmallPermille(u8::MAX); 2],
+            uncertain: SmallPermille(u8::MAX),
+        },
     }
 }
 
@@ -696,8 +700,9 @@ pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
         }),
     ];
     let rezero = proptest::option::of(any::<(u32, u16, u16)>());
-    (any::<[u32; 4]>(), any::<u16>(), filter, rezero).prop_map(
-        |([begins, ends, distance, within], ratio, filter, rezero)| TemporalSettings {
+    let creep = any::<([u8; 2], u8)>();
+    (any::<[u32; 4]>(), any::<u16>(), filter, rezero, creep).prop_map(
+        |([begins, ends, distance, within], ratio, filter, rezero, creep)| TemporalSettings {
             contact: ContactLimits {
                 begins: UnsignedMicroNewtons(begins),
                 ends: UnsignedMicroNewtons(ends),
@@ -713,6 +718,10 @@ pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
                 rate: MilliPx(rate),
                 total: MilliPx(total),
             }),
+            creep: Creep {
+                parts: creep.0.map(SmallPermille),
+                uncertain: SmallPermille(creep.1),
+            },
         },
     )
 }

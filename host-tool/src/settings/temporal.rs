@@ -1,9 +1,11 @@
-//! How forces are followed from frame to frame: contact, slip, filter and re-zeroing, as JSON, as
+//! How forces are followed from frame to frame: contact, slip, filter, re-zeroing and creep, as JSON, as
 //! lines, and as what `settings set` changes of them.
 
 use crate::decimal::Thousandths;
-use hivtac_terms::temporal::{ContactLimits, Filter, Rezero, SlipLimits, TemporalSettings};
-use hivtac_terms::units::{Micrometres, MilliPx, Milliseconds, Permille, UnsignedMicroNewtons};
+use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
+use hivtac_terms::units::{
+    Micrometres, MilliPx, Milliseconds, Permille, SmallPermille, UnsignedMicroNewtons,
+};
 use serde::{Deserialize, Serialize};
 
 /// In whole numbers of the units that the device keeps.
@@ -14,6 +16,7 @@ pub struct TemporalJson {
     slip: SlipJson,
     filter: FilterJson,
     rezero: Option<RezeroJson>,
+    creep: CreepJson,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,6 +57,13 @@ struct RezeroJson {
     total_mpx: u16,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CreepJson {
+    parts_permille: [u8; 2],
+    uncertain_permille: u8,
+}
+
 impl TemporalJson {
     /// Of a device's settings.
     pub fn new(settings: &TemporalSettings) -> TemporalJson {
@@ -62,6 +72,7 @@ impl TemporalJson {
             slip,
             filter,
             rezero,
+            creep,
         } = *settings;
         TemporalJson {
             contact: ContactJson {
@@ -79,6 +90,10 @@ impl TemporalJson {
                 rate_mpx_per_s: rate.0,
                 total_mpx: total.0,
             }),
+            creep: CreepJson {
+                parts_permille: creep.parts.map(|part| part.0),
+                uncertain_permille: creep.uncertain.0,
+            },
         }
     }
 
@@ -106,6 +121,10 @@ impl TemporalJson {
                 rate: MilliPx(rezero.rate_mpx_per_s),
                 total: MilliPx(rezero.total_mpx),
             }),
+            creep: Creep {
+                parts: self.creep.parts_permille.map(SmallPermille),
+                uncertain: SmallPermille(self.creep.uncertain_permille),
+            },
         }
     }
 }
@@ -137,12 +156,13 @@ impl FilterJson {
 }
 
 /// What they are, for a person: name and text of each.
-pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 4] {
+pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
     let TemporalSettings {
         contact,
         slip,
         filter,
         rezero,
+        creep,
     } = settings;
     let rezero = match rezero {
         None => "off".to_owned(),
@@ -173,7 +193,16 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 4] {
         ),
         ("filter", FilterJson::new(*filter).text()),
         ("rezero", rezero),
+        ("creep", creep_text(creep)),
     ]
+}
+
+fn creep_text(creep: &Creep) -> String {
+    let thousandths = |number: u32| Thousandths::from_u64(number.into());
+    let [first, second] = creep.parts.map(|part| thousandths(part.0.into()));
+    let [short, long] = Creep::TIMES.map(|time| thousandths(time.0));
+    let uncertain = thousandths(creep.uncertain.0.into());
+    format!("{first} within {short} s, {second} within {long} s, each uncertain by {uncertain}")
 }
 
 /// What to change; what is not given stays.
@@ -199,6 +228,13 @@ pub enum Change {
     Filter(Filter),
     /// No re-zeroing, or this, with what is not given as it is, or as it is by default.
     Rezero(Option<RezeroChange>),
+    /// Of [`Creep`].
+    Creep {
+        /// Parts of a force.
+        parts: Option<[SmallPermille; 2]>,
+        /// How uncertain each part is.
+        uncertain: Option<SmallPermille>,
+    },
 }
 
 /// What to change of [`Rezero`].
@@ -215,7 +251,12 @@ pub struct RezeroChange {
 impl Change {
     /// The settings with it.
     pub fn of(self, mut settings: TemporalSettings) -> TemporalSettings {
-        let TemporalSettings { contact, slip, .. } = &mut settings;
+        let TemporalSettings {
+            contact,
+            slip,
+            creep,
+            ..
+        } = &mut settings;
         match self {
             Change::Contact { begins, ends } => {
                 contact.begins = begins.unwrap_or(contact.begins);
@@ -229,6 +270,10 @@ impl Change {
                 slip.distance = distance.unwrap_or(slip.distance);
                 slip.within = within.unwrap_or(slip.within);
                 slip.ratio = ratio.unwrap_or(slip.ratio);
+            }
+            Change::Creep { parts, uncertain } => {
+                creep.parts = parts.unwrap_or(creep.parts);
+                creep.uncertain = uncertain.unwrap_or(creep.uncertain);
             }
             Change::Filter(filter) => settings.filter = filter,
             Change::Rezero(change) => {
@@ -250,6 +295,7 @@ impl Change {
             Change::Slip { .. } => "slip",
             Change::Filter(_) => "filter",
             Change::Rezero(_) => "rezero",
+            Change::Creep { .. } => "creep",
         }
     }
 }
@@ -279,6 +325,25 @@ pub fn small_thousandths(text: &str) -> Result<u16, String> {
     u16::try_from(thousandths(text)?).map_err(|_| "it is out of range".to_owned())
 }
 
+/// The same of smaller ones.
+///
+/// # Errors
+/// As [`thousandths`].
+pub fn tiny_thousandths(text: &str) -> Result<u8, String> {
+    u8::try_from(thousandths(text)?).map_err(|_| "it is out of range".to_owned())
+}
+
+/// Two numbers with a comma between them, each in thousandths.
+///
+/// # Errors
+/// As [`thousandths`], or when they are not two.
+pub fn two_thousandths(text: &str) -> Result<[u8; 2], String> {
+    let (one, other) = text
+        .split_once(',')
+        .ok_or("use two numbers, such as 0.03,0.04")?;
+    Ok([tiny_thousandths(one)?, tiny_thousandths(other)?])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -303,6 +368,10 @@ mod tests {
                 time_constant: Milliseconds(20),
             }),
             Change::Rezero(Some(change)),
+            Change::Creep {
+                parts: Some([SmallPermille(31), SmallPermille(42)]),
+                uncertain: Some(SmallPermille(5)),
+            },
         ];
         let usual = TemporalSettings::default();
         changes
@@ -340,7 +409,7 @@ mod tests {
 
     #[test]
     fn a_person_reads_units() {
-        let [contact, slip, filter, rezero] = texts(&unusual()).map(|(_, text)| text);
+        let [contact, slip, filter, rezero, creep] = texts(&unusual()).map(|(_, text)| text);
         assert_eq!(contact, "from 3.500 mN on, until below 1.000 mN");
         assert_eq!(
             slip,
@@ -352,6 +421,8 @@ mod tests {
         );
         let expected = "after 10.000 s without a contact, by 0.007 px a second, 0.200 px in all";
         assert_eq!(rezero, expected);
+        let expected = "0.031 within 0.500 s, 0.042 within 20.000 s, each uncertain by 0.005";
+        assert_eq!(creep, expected);
     }
 
     #[test]
@@ -363,5 +434,9 @@ mod tests {
             assert!(thousandths(text).is_err(), "{text}");
         }
         assert!(small_thousandths("66").is_err());
+        assert_eq!(two_thousandths("0.03,0.2"), Ok([30, 200]));
+        for text in ["0.03", "0.03,", "0.03,0.3", "0.1,0.2,0.3"] {
+            assert!(two_thousandths(text).is_err(), "{text}");
+        }
     }
 }

@@ -172,7 +172,7 @@ fn late_place(own: &Place, [x, y]: [SignedMicrometres; 2]) -> Place {
 }
 
 /// √(a² + b²), at most 2³¹ − 1.
-fn both(a: u32, b: u32) -> u32 {
+pub(super) fn both(a: u32, b: u32) -> u32 {
     const MOST: u32 = i32::MAX as u32;
     let sum = u64::from(a.min(MOST)).pow(2) + u64::from(b.min(MOST)).pow(2);
     rounded_root(sum).min(u64::from(MOST)) as u32

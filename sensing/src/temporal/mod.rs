@@ -1,10 +1,12 @@
-//! From one frame's force to the next: contact, slip, and the filter of what is sent.
+//! From one frame's force to the next: what the film remembers, contact, slip, and the filter of
+//! what is sent.
 //!
 //! Every decision is by the frames' own times, so that it is the same at any frame rate and across
 //! frames that were lost; state and work are bounded. Contact and slip are told from each frame's
 //! own force, whatever the filter does to what is sent.
 
 mod contact;
+mod creep;
 mod filter;
 mod slip;
 #[cfg(test)]
@@ -12,6 +14,7 @@ pub(crate) mod tests;
 
 use crate::pipeline::Measurement;
 use contact::Contact;
+use creep::Memory;
 use filter::ForceFilter;
 use hivtac_force::force::Force;
 use hivtac_terms::status::Status;
@@ -48,6 +51,7 @@ pub struct Temporal {
     contact: Contact,
     slip: Slip,
     filter: ForceFilter,
+    memory: Memory,
 }
 
 impl Temporal {
@@ -58,6 +62,7 @@ impl Temporal {
             contact: Contact::NONE,
             slip: Slip::NONE,
             filter: ForceFilter::EMPTY,
+            memory: Memory::NONE,
         }
     }
 
@@ -83,6 +88,7 @@ impl Temporal {
         self.contact = Contact::NONE;
         self.slip = Slip::NONE;
         self.filter = ForceFilter::EMPTY;
+        self.memory = Memory::NONE;
     }
 
     /// Takes the next frame.
@@ -91,10 +97,20 @@ impl Temporal {
             contact,
             slip,
             filter,
+            creep,
             ..
         } = self.settings;
-        let own = measurement.force.as_ref();
-        let touched = self.contact.follow(&contact, at.time_us, measurement);
+        let undone = (self.memory).follow(&creep, at.time_us, measurement.force.as_ref());
+        let mut seen = Measurement {
+            force: undone.map(|undone| undone.force),
+            ..*measurement
+        };
+        // What the film may only remember does not touch it.
+        if undone.is_some_and(|undone| undone.is_remembered()) {
+            seen.status = Status(seen.status.0 & !Status::CONTACT.0);
+        }
+        let own = seen.force.as_ref();
+        let touched = self.contact.follow(&contact, at.time_us, &seen);
         let slipping = self.slip.follow(&slip, at.time_us, own, touched);
         let mut status = Status(measurement.status.0 & !(Status::CONTACT.0 | Status::SLIP.0));
         for (set, bit) in [

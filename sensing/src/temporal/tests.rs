@@ -42,8 +42,14 @@ use hivtac_force::features::Features;
 use hivtac_force::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::{Filter, TemporalError, TemporalSettings};
-use hivtac_terms::units::{Milliseconds, Px};
+use hivtac_terms::temporal::{Creep, Filter, TemporalError, TemporalSettings};
+use hivtac_terms::units::{Milliseconds, Px, SmallPermille};
+
+/// A film that is known to remember nothing.
+const ELASTIC: Creep = Creep {
+    uncertain: SmallPermille(0),
+    ..Creep::USUAL
+};
 
 /// A frame with a force, of markers that stand so far to the right.
 pub fn frame(force: Option<Force>, right: Px) -> Measurement {
@@ -80,9 +86,15 @@ fn contact_and_slip_do_not_know_of_the_filter() {
         filter: Filter::LowPass {
             time_constant: Milliseconds(500),
         },
+        creep: ELASTIC,
         ..TemporalSettings::default()
     };
+    let none = TemporalSettings {
+        filter: Filter::None,
+        ..low_pass
+    };
     let (mut unfiltered, mut filtered) = (Temporal::new(), Temporal::new());
+    unfiltered.set(none).unwrap();
     filtered.set(low_pass).unwrap();
     for number in 0..60 {
         let moved = 30 * (number as i32 - 30).max(0);
@@ -126,4 +138,20 @@ fn settings_that_are_none_change_nothing_and_others_begin_anew() {
     temporal.set(TemporalSettings::default()).unwrap();
     let followed = temporal.follow(moment(3), &between);
     assert!(!followed.status.contains(Status::CONTACT), "by its own |F|");
+}
+
+/// After a minute at 100 mN a film whose memory is not known may show millinewtons that are not
+/// there: no contact, until they are more than it may remember.
+#[test]
+fn what_a_film_may_remember_is_no_contact() {
+    let mut temporal = Temporal::new();
+    let mut told = |number: u32, force: i32| {
+        let mut seen = frame(Some(pressed(force, 100)), Px(0));
+        seen.status |= Status::CONTACT;
+        let followed = temporal.follow(moment(number), &seen);
+        followed.status.contains(Status::CONTACT)
+    };
+    assert!((0..9_400).all(|number| told(number, 100_000)));
+    assert!(!told(9_400, 4_000));
+    assert!(told(9_401, 30_000));
 }
