@@ -546,8 +546,8 @@ enum SetCommand {
     /// How much the film remembers of its loads
     ///
     /// A held load is seen as if it grew by two parts of itself, within half a second and within
-    /// 20 s, and what is taken off stays behind likewise: `hivtac-calibrate creep` finds both. The device takes that
-    /// off; what is uncertain of it is in each force's uncertainty.
+    /// 20 s, and what is taken off stays behind likewise; the guide to calibration says how they are measured. The device
+    /// takes that off; what is uncertain of it is in each force's uncertainty.
     ///
     /// Example: hivtac settings set creep --parts 0.031,0.042 --uncertain 0.005
     #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]

@@ -7,11 +7,14 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
+use hivtac_evaluation::bounds::MAGNITUDE_BOUND;
 use hivtac_film::reduced::Unit;
 use hivtac_scene::{Creep, Load, Mechanics, Memory, Options};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::model::Model;
 use hivtac_sensing::temporal::Moment;
+use hivtac_terms::temporal::{Creep as Undone, TemporalSettings};
+use hivtac_terms::units::SmallPermille;
 use rayon::prelude::*;
 
 use crate::anywhere::WEIGHTS;
@@ -35,6 +38,9 @@ const STEP_S: f64 = 0.02;
 /// For so long frames follow by that, s, and then by a longer one.
 const CLOSELY_S: f64 = 1.2 - 1e-6;
 const PAUSE_S: f64 = 0.1;
+
+/// What a device knows of its film: nothing, or the parts to so many thousandths.
+const KNOWN: [Option<u8>; 2] = [None, Some(3)];
 
 /// Press films that creep and unload late: hold, let go, and press by sines of time.
 #[derive(Args)]
@@ -65,6 +71,8 @@ struct Told {
     /// Sum of squares of |F| of an untouched film, mN², and of markers beside their rest, px².
     left_mn2: f64,
     left_px2: f64,
+    /// How many of the former are within their stated 95 % bounds.
+    within: u32,
     refused: u32,
     /// Of |F|, mN², by a tare that was insisted on.
     tare_mn2: f64,
@@ -81,19 +89,26 @@ impl CreepStudy {
         let bytes = export(&Weights::load(WEIGHTS.as_ref())?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let mut tables = [
-            "| film | held for | direction, rms | \\|F\\| | place | within the stated 95 %: \
-             direction, \\|F\\|, place |\n|--:|--:|--:|--:|--:|---|\n"
+            "| film | creep is | held for | direction, rms | \\|F\\| | place | within the stated \
+             95 %: direction, \\|F\\|, place |\n|--:|---|--:|--:|--:|--:|---|\n"
                 .to_owned(),
-            "| film | let go for | \\|F\\| that is told, rms | markers | tares refused | \\|F\\| \
-             of a press after a tare that was insisted on |\n|--:|--:|--:|--:|--:|--:|\n"
+            "| film | creep is | let go for | \\|F\\| that is told, rms | within the stated 95 % \
+             | markers | tares refused | \\|F\\| of a press after a tare that was insisted on \
+             |\n|--:|---|--:|--:|--:|--:|--:|--:|\n"
                 .to_owned(),
-            "| film | sine | falling forces above rising ones | direction, rms | \\|F\\| | place \
-             | within the stated 95 %: direction, \\|F\\|, place |\n|--:|--:|--:|--:|--:|--:|---|\n"
+            "| film | creep is | sine | falling forces above rising ones | direction, rms | \\|F\\| \
+             | place | within the stated 95 %: direction, \\|F\\|, place \
+             |\n|--:|---|--:|--:|--:|--:|--:|---|\n"
                 .to_owned(),
         ];
-        for part in PARTS {
-            let film = format!("| {:.0} %", 100.0 * part);
-            let told = self.all(|number| pressed(&model, Creep::of(part), number))?;
+        for (part, known) in PARTS
+            .into_iter()
+            .flat_map(|part| KNOWN.map(|known| (part, known)))
+        {
+            let name = known.map_or("unknown", |_| "known");
+            let film = format!("| {:.0} % | {name}", 100.0 * part);
+            let finger = || Finger::new(&model, Creep::of(part), known);
+            let told = self.all(|number| pressed(finger()?, number))?;
             let (held, left) = told.split_at(HELD_S.len());
             for (told, held_s) in held.iter().zip(HELD_S) {
                 writeln!(tables[0], "{film} | {held_s} s | {}", told.cells())?;
@@ -106,7 +121,7 @@ impl CreepStudy {
                 )?;
             }
             for rate_hz in SINES_HZ {
-                let told = self.all(|number| swung(&model, Creep::of(part), number, rate_hz))?;
+                let told = self.all(|number| swung(finger()?, number, rate_hz))?;
                 let late = 100.0 * told[0].late / f64::from(self.presses);
                 let cells = told[0].cells();
                 writeln!(tables[2], "{film} | {rate_hz} Hz | {late:.1} % | {cells}")?;
@@ -135,9 +150,8 @@ impl CreepStudy {
 }
 
 /// A load that is put on, held, and taken off.
-fn pressed(model: &Model<'_>, creep: Creep, number: u32) -> Result<[Told; 7]> {
+fn pressed(mut finger: Finger<'_>, number: u32) -> Result<[Told; 7]> {
     let load = press(number, FORCE_N, REACH_MM)?;
-    let mut finger = Finger::new(model, creep)?;
     let mut told = [Told::default(); 7];
     for (told, held_s) in told.iter_mut().zip(HELD_S) {
         let force = finger.hold(&load, held_s)?;
@@ -151,8 +165,7 @@ fn pressed(model: &Model<'_>, creep: Creep, number: u32) -> Result<[Told; 7]> {
 }
 
 /// A force that goes up and down.
-fn swung(model: &Model<'_>, creep: Creep, number: u32, rate_hz: f64) -> Result<[Told; 1]> {
-    let mut finger = Finger::new(model, creep)?;
+fn swung(mut finger: Finger<'_>, number: u32, rate_hz: f64) -> Result<[Told; 1]> {
     let mut told = Told::default();
     let (step_s, steps) = (0.05 / rate_hz.max(0.5), 200);
     let mut sum = 0.0;
@@ -175,7 +188,7 @@ fn swung(model: &Model<'_>, creep: Creep, number: u32, rate_hz: f64) -> Result<[
 impl<'m> Finger<'m> {
     /// A unit that was calibrated by loads that were held for a second, as by a model of a film
     /// that gives as far at once.
-    fn new(model: &Model<'m>, creep: Creep) -> Result<Self> {
+    fn new(model: &Model<'m>, creep: Creep, known: Option<u8>) -> Result<Self> {
         let grown = creep.grown(CALIBRATED_S);
         let film = Unit {
             stiffness: grown,
@@ -190,8 +203,21 @@ impl<'m> Finger<'m> {
             ..Options::default()
         };
         let unit = TestedUnit::new(&model.conditions, options, 0.5, 1)?;
+        let mut tared = unit.tare(model)?;
+        if let Some(uncertain) = known {
+            let parts = creep
+                .parts
+                .map(|part| SmallPermille((1e3 * part).round() as u8));
+            tared.set_temporal(TemporalSettings {
+                creep: Undone {
+                    parts,
+                    uncertain: SmallPermille(uncertain),
+                },
+                ..TemporalSettings::USUAL
+            })?;
+        }
         Ok(Self {
-            tared: unit.tare(model)?,
+            tared,
             judge: unit.tare(model)?,
             unit,
             memory: creep.unpressed(),
@@ -264,10 +290,13 @@ impl<'m> Finger<'m> {
         };
         let [good, bad] = [before, insisted.unwrap_or(before)].map(&mut told_mn);
         judge.set_rest(before);
+        let told_un = force.map_or([0.0; 2], |f| {
+            [f.magnitude.0.into(), f.magnitude_sigma.0.into()]
+        });
+        let [left_mn, sigma_mn] = told_un.map(|un: f64| un * 1e-3);
         Ok(Told {
-            left_mn2: force
-                .map_or(0.0, |force| f64::from(force.magnitude.0) * 1e-3)
-                .powi(2),
+            left_mn2: left_mn.powi(2),
+            within: u32::from(left_mn <= MAGNITUDE_BOUND * sigma_mn),
             left_px2,
             refused: u32::from(is_refused),
             tare_mn2: (bad? - good?).powi(2),
@@ -281,6 +310,7 @@ impl Told {
         self.errors.merge(&other.errors);
         self.left_mn2 += other.left_mn2;
         self.left_px2 += other.left_px2;
+        self.within += other.within;
         self.refused += other.refused;
         self.tare_mn2 += other.tare_mn2;
         self.late += other.late;
@@ -298,8 +328,9 @@ impl Told {
     fn left(&self, presses: u32) -> String {
         let rms = |sum: f64| (sum / f64::from(presses)).sqrt();
         format!(
-            "{:.2} mN | {:.2} px | {} of {presses} | {:.2} mN off |",
+            "{:.2} mN | {} of {presses} | {:.2} px | {} of {presses} | {:.2} mN off |",
             rms(self.left_mn2),
+            self.within,
             rms(self.left_px2),
             self.refused,
             rms(self.tare_mn2)

@@ -364,7 +364,7 @@ fn the_guide_shows_what_setting_prints() {
         assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
         shown += 1;
     }
-    assert_eq!(shown, 13);
+    assert_eq!(shown, 14);
 }
 
 /// What a device's camera is set to, and what the tool says that it keeps.

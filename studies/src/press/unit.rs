@@ -13,6 +13,7 @@ use hivtac_sensing::rest::Rest;
 use hivtac_sensing::tare::{Refusal, TareBuilder};
 use hivtac_sensing::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
+use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::ByteOrder;
 
 use super::{Drawn, RealFilm};
@@ -249,6 +250,15 @@ impl Tared<'_> {
             return Ok(Err(Refusal::MarkersImplausible));
         }
         Err(anyhow!("no rest position: too few frames show the markers"))
+    }
+
+    /// How forces are followed from now on.
+    ///
+    /// # Errors
+    /// A setting out of its range.
+    pub fn set_temporal(&mut self, settings: TemporalSettings) -> Result<()> {
+        let set = self.sensor.set_temporal(settings);
+        set.map_err(|error| anyhow!("{error}"))
     }
 
     /// What follows from a frame, measured last, and those before it.
