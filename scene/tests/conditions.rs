@@ -324,7 +324,7 @@ fn the_truth_tells_which_point_of_the_film_the_tip_is_on() {
 /// How far the first marker is from its place on another scene, px.
 fn apart(one: &Scene, other: &Scene, time_s: f64) -> f64 {
     let [a, b] = [one, other].map(|scene| scene.truth(time_s).markers[0].unwrap().centroid_px);
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 #[test]
