@@ -43,7 +43,7 @@ use hivtac_host::named;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
 use hivtac_terms::geometry::Preset;
-use hivtac_terms::temporal::Filter;
+use hivtac_terms::temporal::{Creep, Filter};
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_terms::threshold::{Mono, Yuv422};
 use hivtac_terms::units::{
@@ -53,9 +53,7 @@ use hivtac_terms::units::{
 use hivtac_wire::settings::Name;
 use lines::Format;
 use settings::camera::{self, Wanted};
-use settings::temporal::{
-    Change, RezeroChange, small_thousandths, thousandths, tiny_thousandths, two_thousandths,
-};
+use settings::temporal::{Change, RezeroChange, small_thousandths, thousandths, two_thousandths};
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -546,20 +544,17 @@ enum SetCommand {
     /// How much the film remembers of its loads
     ///
     /// A held load is seen as if it grew by two parts of itself, within half a second and within
-    /// 20 s, and what is taken off stays behind likewise; the guide to calibration says how they are measured. The device
-    /// takes that off; what is uncertain of it is in each force's uncertainty.
+    /// 20 s, and what is taken off stays behind likewise; the guide to calibration says how they
+    /// are measured. The device takes that off. Without it, or with 0,0, it states how silicones
+    /// differ.
     ///
-    /// Example: hivtac settings set creep --parts 0.031,0.042 --uncertain 0.005
-    #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
+    /// Example: hivtac settings set creep 0.031,0.042
     Creep {
         #[command(flatten)]
         device: Told,
-        /// Parts of a force, 0 to 0.15 each; 0,0 by default
-        #[arg(long, value_name = "A,B", value_parser = two_thousandths, group = "limit")]
-        parts: Option<[u8; 2]>,
-        /// Standard uncertainty of each part, 0 to 0.15; 0.05 by default
-        #[arg(long, value_name = "PART", value_parser = tiny_thousandths, group = "limit")]
-        uncertain: Option<u8>,
+        /// Parts of a force, 0 to 0.15 each
+        #[arg(value_name = "A,B", value_parser = two_thousandths)]
+        parts: [u8; 2],
     },
     /// How long the camera exposes each row
     ///
@@ -735,16 +730,9 @@ impl SetCommand {
             }
             SetCommand::Filter(filter) => filter.change(),
             SetCommand::Rezero(rezero) => rezero.change(),
-            SetCommand::Creep {
-                device,
-                parts,
-                uncertain,
-            } => {
-                let change = Change::Creep {
-                    parts: parts.map(|parts| parts.map(SmallPermille)),
-                    uncertain: uncertain.map(SmallPermille),
-                };
-                (device, change)
+            SetCommand::Creep { device, parts } => {
+                let parts = parts.map(SmallPermille);
+                (device, Change::Creep(Creep { parts }))
             }
         };
         Ok((device, settings::Action::SetTemporal(change)))

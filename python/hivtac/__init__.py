@@ -250,8 +250,8 @@ class Sensor:
             self._tell_log()
 
     def set_down(self, x: float, y: float, z: float) -> None:
-        """Says where gravity pulls on the film, from its next frame on: a vector of any length, x to
-        the right and y down in the image, z away from the camera. The film hangs by its own weight;
+        """Says where gravity pulls on the film, from its next frame on: a vector of any length, x
+        right and y down in the image, z away from the camera. The film hangs by its own weight;
         told how it is held, a sensor that turns measures on. As often as the robot moves, up to 100
         times a second: nothing answers. The tare must have been taken when this was told, too.
 

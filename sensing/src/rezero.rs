@@ -104,8 +104,8 @@ impl Mean {
 }
 
 impl Tare {
-    /// A rest position that was taken under a gravity, if that is known, and from which the film may
-    /// have drifted since.
+    /// A rest position that was taken under a gravity, if that is known, and from which the film
+    /// may have drifted since.
     pub fn new(taken: Rest, drift: Drift, down: Option<Gravity>) -> Tare {
         Tare {
             taken,

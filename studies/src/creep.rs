@@ -39,8 +39,8 @@ const STEP_S: f64 = 0.02;
 const CLOSELY_S: f64 = 1.2 - 1e-6;
 const PAUSE_S: f64 = 0.1;
 
-/// What a device knows of its film: nothing, or the parts to so many thousandths.
-const KNOWN: [Option<u8>; 2] = [None, Some(3)];
+/// Whether a device knows the parts of its film.
+const KNOWN: [bool; 2] = [false, true];
 
 /// Press films that creep and unload late: hold, let go, and press by sines of time.
 #[derive(Args)]
@@ -96,8 +96,8 @@ impl CreepStudy {
              | markers | tares refused | \\|F\\| of a press after a tare that was insisted on \
              |\n|--:|---|--:|--:|--:|--:|--:|--:|\n"
                 .to_owned(),
-            "| film | creep is | sine | falling forces above rising ones | direction, rms | \\|F\\| \
-             | place | within the stated 95 %: direction, \\|F\\|, place \
+            "| film | creep is | sine | falling forces above rising ones | direction, rms \
+             | \\|F\\| | place | within the stated 95 %: direction, \\|F\\|, place \
              |\n|--:|---|--:|--:|--:|--:|--:|---|\n"
                 .to_owned(),
         ];
@@ -105,7 +105,7 @@ impl CreepStudy {
             .into_iter()
             .flat_map(|part| KNOWN.map(|known| (part, known)))
         {
-            let name = known.map_or("unknown", |_| "known");
+            let name = if known { "known" } else { "unknown" };
             let film = format!("| {:.0} % | {name}", 100.0 * part);
             let finger = || Finger::new(&model, Creep::of(part), known);
             let told = self.all(|number| pressed(finger()?, number))?;
@@ -188,7 +188,7 @@ fn swung(mut finger: Finger<'_>, number: u32, rate_hz: f64) -> Result<[Told; 1]>
 impl<'m> Finger<'m> {
     /// A unit that was calibrated by loads that were held for a second, as by a model of a film
     /// that gives as far at once.
-    fn new(model: &Model<'m>, creep: Creep, known: Option<u8>) -> Result<Self> {
+    fn new(model: &Model<'m>, creep: Creep, known: bool) -> Result<Self> {
         let grown = creep.grown(CALIBRATED_S);
         let film = Unit {
             stiffness: grown,
@@ -204,15 +204,12 @@ impl<'m> Finger<'m> {
         };
         let unit = TestedUnit::new(&model.conditions, options, 0.5, 1)?;
         let mut tared = unit.tare(model)?;
-        if let Some(uncertain) = known {
+        if known {
             let parts = creep
                 .parts
                 .map(|part| SmallPermille((1e3 * part).round() as u8));
             tared.set_temporal(TemporalSettings {
-                creep: Undone {
-                    parts,
-                    uncertain: SmallPermille(uncertain),
-                },
+                creep: Undone { parts },
                 ..TemporalSettings::USUAL
             })?;
         }

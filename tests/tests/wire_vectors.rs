@@ -68,7 +68,6 @@ const OWN: TemporalSettings = TemporalSettings {
     }),
     creep: Creep {
         parts: [SmallPermille(31), SmallPermille(42)],
-        uncertain: SmallPermille(5),
     },
     ..TemporalSettings::USUAL
 };

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xC42DE6FAA280E1C2
+SCHEMA = 0x16857A083232EB66
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -156,16 +156,15 @@ def rezero(total_mpx):
 NO_REZERO = [raw("rezero: None", [0])]
 
 
-def creep(parts, uncertain):
+def creep(parts):
     return [
         *(unsigned("creep: part_permille", part) for part in parts),
-        unsigned("uncertain_permille", uncertain),
     ]
 
 
-ANY_FILM = creep([0, 0], 50)
+ANY_FILM = creep([0, 0])
 USUAL = LIMITS + NO_FILTER + rezero(200) + ANY_FILM
-OWN = LIMITS + LOW_PASS + rezero(100) + creep([31, 42], 5)
+OWN = LIMITS + LOW_PASS + rezero(100) + creep([31, 42])
 
 
 MODEL = [

@@ -200,7 +200,6 @@ pub fn longest_temporal() -> TemporalSettings {
         }),
         creep: Creep {
             parts: [SmallPermille(u8::MAX); 2],
-            uncertain: SmallPermille(u8::MAX),
         },
     }
 }
@@ -700,7 +699,7 @@ pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
         }),
     ];
     let rezero = proptest::option::of(any::<(u32, u16, u16)>());
-    let creep = any::<([u8; 2], u8)>();
+    let creep = any::<[u8; 2]>();
     (any::<[u32; 4]>(), any::<u16>(), filter, rezero, creep).prop_map(
         |([begins, ends, distance, within], ratio, filter, rezero, creep)| TemporalSettings {
             contact: ContactLimits {
@@ -719,8 +718,7 @@ pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
                 total: MilliPx(total),
             }),
             creep: Creep {
-                parts: creep.0.map(SmallPermille),
-                uncertain: SmallPermille(creep.1),
+                parts: creep.map(SmallPermille),
             },
         },
     )

@@ -14,7 +14,7 @@ pub(crate) const CRC_BYTES: usize = 4;
 
 /// Longest body a device sends in this protocol version: all its settings, each number as long as
 /// it can be.
-pub const MAX_DEVICE_BODY: usize = 271;
+pub const MAX_DEVICE_BODY: usize = 270;
 
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 144;

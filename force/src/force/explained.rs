@@ -46,8 +46,8 @@ const BUILT: Drift = Drift {
 const AREAS: [f32; 2] = [0.5, 6.0];
 
 impl Resting {
-    /// For a model that takes steps, and markers that rest there; the film's weight is no matter: it
-    /// hangs as it did when the rest position was taken.
+    /// For a model that takes steps, and markers that rest there; the film's weight is no matter:
+    /// it hangs as it did when the rest position was taken.
     pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
         Resting::of_turned(model, rest, None)
     }
@@ -67,9 +67,9 @@ impl Resting {
         self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
     }
 
-    /// For markers that rest there, and at `flat` where gravity pulls as it did on the model's film:
-    /// by what the model knows of the unit that it was made on; of another one by what its rest
-    /// picture tells. The camera of a unit that was calibrated may have been mounted anew.
+    /// For markers that rest there, and at `flat` where gravity pulls as it did on the model's
+    /// film: by what the model knows of the unit that it was made on; of another one by what its
+    /// rest picture tells. The camera of a unit that was calibrated may have been mounted anew.
     fn new(
         forward: &Forward<'_>,
         rest: &Rest,

@@ -1,5 +1,5 @@
-//! How forces are followed from frame to frame: contact, slip, filter, re-zeroing and creep, as JSON, as
-//! lines, and as what `settings set` changes of them.
+//! How forces are followed from frame to frame: contact, slip, filter, re-zeroing and creep, as
+//! JSON, as lines, and as what `settings set` changes of them.
 
 use crate::decimal::Thousandths;
 use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
@@ -61,7 +61,6 @@ struct RezeroJson {
 #[serde(deny_unknown_fields)]
 struct CreepJson {
     parts_permille: [u8; 2],
-    uncertain_permille: u8,
 }
 
 impl TemporalJson {
@@ -92,7 +91,6 @@ impl TemporalJson {
             }),
             creep: CreepJson {
                 parts_permille: creep.parts.map(|part| part.0),
-                uncertain_permille: creep.uncertain.0,
             },
         }
     }
@@ -123,7 +121,6 @@ impl TemporalJson {
             }),
             creep: Creep {
                 parts: self.creep.parts_permille.map(SmallPermille),
-                uncertain: SmallPermille(self.creep.uncertain_permille),
             },
         }
     }
@@ -198,11 +195,12 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
 }
 
 fn creep_text(creep: &Creep) -> String {
-    let thousandths = |number: u32| Thousandths::from_u64(number.into());
-    let [first, second] = creep.parts.map(|part| thousandths(part.0.into()));
-    let [short, long] = Creep::TIMES.map(|time| thousandths(time.0));
-    let uncertain = thousandths(creep.uncertain.0.into());
-    format!("{first} within {short} s, {second} within {long} s, each uncertain by {uncertain}")
+    if !creep.is_measured() {
+        return "not measured: uncertain as silicones differ".to_owned();
+    }
+    let [first, second] = creep.parts.map(|part| Thousandths::from_u64(part.0.into()));
+    let [short, long] = Creep::TIMES.map(|time| Thousandths::from_u64(time.0.into()));
+    format!("{first} of a force within {short} s, {second} within {long} s")
 }
 
 /// What to change; what is not given stays.
@@ -229,12 +227,7 @@ pub enum Change {
     /// No re-zeroing, or this, with what is not given as it is, or as it is by default.
     Rezero(Option<RezeroChange>),
     /// Of [`Creep`].
-    Creep {
-        /// Parts of a force.
-        parts: Option<[SmallPermille; 2]>,
-        /// How uncertain each part is.
-        uncertain: Option<SmallPermille>,
-    },
+    Creep(Creep),
 }
 
 /// What to change of [`Rezero`].
@@ -251,12 +244,7 @@ pub struct RezeroChange {
 impl Change {
     /// The settings with it.
     pub fn of(self, mut settings: TemporalSettings) -> TemporalSettings {
-        let TemporalSettings {
-            contact,
-            slip,
-            creep,
-            ..
-        } = &mut settings;
+        let TemporalSettings { contact, slip, .. } = &mut settings;
         match self {
             Change::Contact { begins, ends } => {
                 contact.begins = begins.unwrap_or(contact.begins);
@@ -271,10 +259,7 @@ impl Change {
                 slip.within = within.unwrap_or(slip.within);
                 slip.ratio = ratio.unwrap_or(slip.ratio);
             }
-            Change::Creep { parts, uncertain } => {
-                creep.parts = parts.unwrap_or(creep.parts);
-                creep.uncertain = uncertain.unwrap_or(creep.uncertain);
-            }
+            Change::Creep(creep) => settings.creep = creep,
             Change::Filter(filter) => settings.filter = filter,
             Change::Rezero(change) => {
                 let before = settings.rezero.unwrap_or_default();
@@ -295,7 +280,7 @@ impl Change {
             Change::Slip { .. } => "slip",
             Change::Filter(_) => "filter",
             Change::Rezero(_) => "rezero",
-            Change::Creep { .. } => "creep",
+            Change::Creep(_) => "creep",
         }
     }
 }
@@ -325,14 +310,6 @@ pub fn small_thousandths(text: &str) -> Result<u16, String> {
     u16::try_from(thousandths(text)?).map_err(|_| "it is out of range".to_owned())
 }
 
-/// The same of smaller ones.
-///
-/// # Errors
-/// As [`thousandths`].
-pub fn tiny_thousandths(text: &str) -> Result<u8, String> {
-    u8::try_from(thousandths(text)?).map_err(|_| "it is out of range".to_owned())
-}
-
 /// Two numbers with a comma between them, each in thousandths.
 ///
 /// # Errors
@@ -341,7 +318,11 @@ pub fn two_thousandths(text: &str) -> Result<[u8; 2], String> {
     let (one, other) = text
         .split_once(',')
         .ok_or("use two numbers, such as 0.03,0.04")?;
-    Ok([tiny_thousandths(one)?, tiny_thousandths(other)?])
+    let number = |text| {
+        let number = thousandths(text)?;
+        u8::try_from(number).map_err(|_| "it is out of range".to_owned())
+    };
+    Ok([number(one)?, number(other)?])
 }
 
 #[cfg(test)]
@@ -368,10 +349,9 @@ mod tests {
                 time_constant: Milliseconds(20),
             }),
             Change::Rezero(Some(change)),
-            Change::Creep {
-                parts: Some([SmallPermille(31), SmallPermille(42)]),
-                uncertain: Some(SmallPermille(5)),
-            },
+            Change::Creep(Creep {
+                parts: [SmallPermille(31), SmallPermille(42)],
+            }),
         ];
         let usual = TemporalSettings::default();
         changes
@@ -421,7 +401,7 @@ mod tests {
         );
         let expected = "after 10.000 s without a contact, by 0.007 px a second, 0.200 px in all";
         assert_eq!(rezero, expected);
-        let expected = "0.031 within 0.500 s, 0.042 within 20.000 s, each uncertain by 0.005";
+        let expected = "0.031 of a force within 0.500 s, 0.042 within 20.000 s";
         assert_eq!(creep, expected);
     }
 

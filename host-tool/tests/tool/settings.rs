@@ -42,7 +42,7 @@ fn settings_for_a_person() {
          filter     none: each frame's own force (kept)\n\
          rezero     after 10.000 s without a contact, by 0.005 px a second, 0.200 px in all \
          (kept)\n\
-         creep      0.000 within 0.500 s, 0.000 within 20.000 s, each uncertain by 0.050 (kept)\n\
+         creep      not measured: uncertain as silicones differ (kept)\n\
          exposure   5.922 ms, as the light needs (kept)\n\
          gain       1.5, as the light needs (kept)\n\
          rate       156 frames a second (kept)\n\
@@ -280,11 +280,10 @@ fn limits_are_changed_one_by_one_and_kept() {
         changed(&["settings", "set", "rezero", "off"]).0.rezero,
         None
     );
-    let parts = ["settings", "set", "creep", "--parts", "0.031,0.042"];
-    let (creep, _) = changed(&[&parts[..], &["--uncertain=0.005"]].concat());
+    let parts = ["settings", "set", "creep", "0.031,0.042"];
+    let (creep, _) = changed(&parts);
     let expected = Creep {
         parts: [SmallPermille(31), SmallPermille(42)],
-        uncertain: SmallPermille(5),
     };
     assert_eq!(creep.creep, expected);
 }
@@ -295,7 +294,7 @@ fn a_limit_out_of_its_range_changes_nothing() {
         (["contact", "--ends", "3"], "0.001 mN to where it begins"),
         (["slip", "--within", "5"], "10 to 100 ms"),
         (["filter", "low-pass", "--ms=0"], "1 to 10000 ms"),
-        (["creep", "--parts", "0.1,0.2"], "0 to 15 %"),
+        (["creep", "0.1,0.2", "--json"], "0 to 15 %"),
     ] {
         let device = device();
         let arguments = [&["settings", "set"], &arguments[..]].concat();
@@ -309,7 +308,7 @@ fn a_limit_out_of_its_range_changes_nothing() {
         ["filter", "low-pass", "--ms=x"],
         ["filter", "median-of-three", "--ms=3"],
         ["rezero", "off", "--rate=0.01"],
-        ["creep", "--parts", "0.1"],
+        ["creep", "0.1", "--json"],
     ] {
         let run = run(&[&["settings", "set"], &arguments[..]].concat());
         assert_eq!(run.code, Some(2), "{arguments:?}: {}", run.stderr);
