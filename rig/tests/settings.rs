@@ -261,7 +261,7 @@ pub fn of_another_version(flash: &Path) {
         record.extend(&word[1..]);
     }
     record.truncate(length);
-    assert_eq!(record[0], 3, "the version");
+    assert_eq!(record[0], 4, "the version");
     sector[10] = 200;
     record[0] = 200;
     let mut checked = sector[2..6].to_vec();

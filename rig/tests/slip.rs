@@ -5,10 +5,9 @@ use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
 use hivtac_sensing::pipeline::Measurement;
 use hivtac_sensing::temporal::{Moment, Temporal};
-use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, TemporalSettings};
-use hivtac_terms::units::{Milliseconds, UnsignedMicroNewtons};
+use hivtac_terms::units::{MicroNewtons, Milliseconds, UnsignedMicroNewtons};
 use hivtac_wire::message::{Outcome, Request, Sample};
 use std::collections::BTreeMap;
 
@@ -26,6 +25,10 @@ fn setup() -> Setup {
     }
 }
 
+/// A status, and a force's components, µN: uncertainties hold what the film may remember, which a
+/// sample that is followed again holds twice.
+type Told = (Status, Option<[MicroNewtons; 3]>);
+
 /// A sample of another run: what its frame itself tells.
 fn measured(sample: &Sample) -> Measurement {
     Measurement {
@@ -37,11 +40,7 @@ fn measured(sample: &Sample) -> Measurement {
 }
 
 /// What the sensing here makes of samples, with other settings from the one with this index on.
-fn followed(
-    samples: &[&Sample],
-    other: TemporalSettings,
-    from: usize,
-) -> Vec<(Status, Option<Force>)> {
+fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<Told> {
     let mut temporal = Temporal::new();
     let followed = samples.iter().enumerate().map(|(nth, sample)| {
         if nth == from {
@@ -52,14 +51,15 @@ fn followed(
             time_us: sample.time_us,
         };
         let followed = temporal.follow(at, &measured(sample));
-        (followed.status, followed.force)
+        (followed.status, followed.force.map(|force| force.cartesian))
     });
     followed.collect()
 }
 
-fn told(run: &Run) -> Vec<(Status, Option<Force>)> {
+fn told(run: &Run) -> Vec<Told> {
     let samples = run.samples();
-    samples.iter().map(|s| (s.status, s.force)).collect()
+    let told = |s: &&Sample| (s.status, s.force.map(|force| force.cartesian));
+    samples.iter().map(told).collect()
 }
 
 /// The truth of each frame: whether the tip presses, and how far its contact has moved, mm.

@@ -30,6 +30,8 @@ const READ_MS: f32 = 1_000.0;
 const HALVINGS: i32 = 6;
 /// Frames without a force: for so long the last one counts as held, µs, and then nothing presses.
 const HELD_US: u64 = 100_000;
+/// The film ends there, µm from its middle.
+const FARTHEST_UM: f32 = 20_000.0;
 /// m° of a radian.
 const MDEG: f32 = 57_295.78;
 
@@ -140,6 +142,7 @@ impl Memory {
         let turned = uncertain * MDEG * root(across) / size.max(1.0);
         // µm of mm; half of the square of a distance is each coordinate's.
         let far_um = 1e3 * uncertain * root(far / 2.0) / -vector[2].min(-1.0);
+        let far_um = far_um.min(FARTHEST_UM);
         force.magnitude_sigma = UnsignedMicroNewtons(both(own.magnitude_sigma.0, sigma));
         let direction = both(own.direction_sigma.0, turned as u32).min(180_000);
         force.direction_sigma = UnsignedMilliDegrees(direction);
