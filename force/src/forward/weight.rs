@@ -329,9 +329,12 @@ impl Hanging {
             add(&mut prediction.slopes[0], 1.0, &by_size);
         }
         let of_turn = LEFT_OF_TURN * soft(stiffness, pose.size);
-        for (i, row) in covariance.iter_mut().enumerate() {
-            let (left, of_turn) = (LEFT * (more[i] + self.at_rest[i]), of_turn * self.moved[i]);
-            row[i] += left * left + of_turn * of_turn;
+        let effects = more.iter().zip(&self.at_rest).zip(&self.moved);
+        for (i, (row, ((more, at_rest), moved))) in covariance.iter_mut().zip(effects).enumerate() {
+            let (left, turned) = (LEFT * (more + at_rest), of_turn * moved);
+            if let Some(variance) = row.get_mut(i) {
+                *variance += left * left + turned * turned;
+            }
         }
         let mut mode = self.moved;
         add(&mut mode, 1.0, &more);
