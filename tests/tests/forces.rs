@@ -148,8 +148,8 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
     }
 }
 
-/// Whether a sample is that of a frame by itself, its uncertainties no smaller: the device adds what
-/// the film may remember of the frames before.
+/// Whether a sample is that of a frame by itself, its uncertainties no smaller: the device adds
+/// what the film may remember of the frames before.
 fn follows(said: &Value, measured: &Value) -> Result<(), String> {
     const SIGMAS: [usize; 3] = [6, 7, 10];
     let told = |value: &Value| {

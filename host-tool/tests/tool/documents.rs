@@ -70,17 +70,22 @@ fn every_exit_code_has_its_meaning() {
 fn every_refusal_has_its_words_and_what_to_do() {
     let source = root_file("wire/src/message.rs");
     let (_, rest) = source.split_once("pub enum Outcome {").unwrap();
-    let (body, _) = rest.split_once('}').unwrap();
-    let names = body
-        .lines()
-        .map(str::trim)
-        .filter(|line| !line.starts_with("//"));
-    let names: Vec<_> = names.filter_map(|line| line.strip_suffix(',')).collect();
+    let (body, _) = rest.split_once("\n}").unwrap();
+    // What a variant carries stands further to the right.
+    let lines = body.lines().filter_map(|line| line.strip_prefix("    "));
+    let variants = lines.filter(|line| line.starts_with(char::is_uppercase));
+    let names: Vec<_> = variants
+        .map(|line| line.trim_end_matches([',', '{', ' ']))
+        .collect();
     assert!(names.len() > 10, "{names:?}");
     let text = root_file("docs/troubleshooting.md");
     let text = section(&text, "What a device refuses");
     for name in &names {
-        let outcome: Outcome = serde_json::from_str(&format!("\"{name}\"")).unwrap();
+        let outcome = match *name {
+            "Touched" => r#"{"Touched": {"looks_like": 1200}}"#.to_owned(),
+            _ => format!("\"{name}\""),
+        };
+        let outcome: Outcome = serde_json::from_str(&outcome).unwrap();
         let Err(refusal) = judge("x", outcome) else {
             assert_eq!(*name, "Done");
             continue;
