@@ -91,7 +91,12 @@ fn the_way_back_leads_to_the_same_forces() {
     for sample in back.iter().filter(|sample| sample.force.is_some()) {
         let others = undisturbed.samples();
         let same = others.iter().find(|it| it.frame == sample.frame);
-        assert_eq!(same.unwrap().force, sample.force, "{sample:?}");
+        // Uncertainties have what the film may remember of each run's own forces.
+        let told = |sample: &Sample| {
+            let force = sample.force.unwrap();
+            (force.cartesian, force.place.map(|place| (place.x, place.y)))
+        };
+        assert_eq!(told(same.unwrap()), told(sample), "{sample:?}");
     }
 }
 

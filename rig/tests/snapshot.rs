@@ -132,7 +132,7 @@ fn check_latency(run: &Run, kept: u64) {
 /// long, its bands are copied all the same.
 #[test]
 fn an_overrun_costs_a_frame_and_a_busy_bus_nothing() {
-    let run = setup(450).fault("dcmi-overrun@246").fault("bus-busy").run();
+    let run = setup(450).fault("dcmi-overrun@233").fault("bus-busy").run();
     assert_eq!(run.report.dcmi.overruns, 1);
     let taken = snapshots(&run);
     assert_eq!(taken.len(), 1);

@@ -356,18 +356,16 @@ impl Hanging {
         let steeper = SIZES as f32 * softness / (2.0 * root * limits.size);
         let (mut more, mut by_size) = (Column::default(), Column::default());
         let sizes = self.sizes.get(first).zip(self.sizes.get(second));
-        for (i, (from, to)) in sizes
-            .into_iter()
-            .flat_map(|(a, b)| a.iter().zip(b))
-            .enumerate()
-        {
+        let terms_of = sizes.into_iter().flat_map(|(a, b)| a.iter().zip(b));
+        let sums = more.iter_mut().zip(&mut by_size).zip(&self.at_rest);
+        for (((more, by_size), at_rest), (from, to)) in sums.zip(terms_of) {
             let [from, to] = [from, to].map(|parts| {
                 let products = parts.iter().zip(&terms);
                 products.fold(0.0, |sum, (part, term)| sum + part * term)
             });
             let value = one * from + other * to;
-            more[i] = softness * value - self.at_rest[i];
-            by_size[i] = softer * value + steeper * (to - from);
+            *more = softness * value - at_rest;
+            *by_size = softer * value + steeper * (to - from);
         }
         (more, by_size)
     }
