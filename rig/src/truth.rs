@@ -128,7 +128,8 @@ mod tests {
             written.store(true, Ordering::Relaxed);
             reader.join().unwrap()
         });
-        assert!(broken * 20 <= reads, "{broken} of {reads}");
+        // On a busy computer there are few reads, and one may fall between two pages of a write.
+        assert!(broken <= 1 + reads / 20, "{broken} of {reads}");
         let text = std::fs::read_to_string(file.path()).unwrap();
         assert_eq!(text.lines().count() as u64, LINES);
     }
