@@ -8,7 +8,7 @@ use hivtac_sensing::model::WeightSpec;
 use rayon::prelude::*;
 
 use super::covariances::Moved;
-use crate::unit_fit::inverse;
+use super::nearest::Nearest;
 
 /// Directions of gravity around the film, in the planes of x and z and of y and z, at which it is
 /// known how it rests.
@@ -116,15 +116,15 @@ fn nearest<const N: usize>(
     rows: &[[f64; N]],
     known: impl Fn(usize, usize) -> f64,
 ) -> Result<[Moved; N]> {
-    let product = |a: usize, b: usize| rows.iter().map(|row| row[a] * row[b]).sum();
-    let products = (0..N).map(|a| (0..N).map(|b| product(a, b)).collect());
-    let inverse = inverse(products.collect())?;
-    let side = |a: usize, c: usize| -> f64 {
-        let parts = rows.iter().enumerate();
-        parts.map(|(i, row)| row[a] * known(i, c)).sum()
+    let through = Nearest::new(&rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())?;
+    let of_coordinate = |c: usize| {
+        let samples: Vec<f64> = (0..rows.len()).map(|i| known(i, c)).collect();
+        through.coefficients(&samples)
     };
-    let of = |f: usize, c: usize| (0..N).map(|a| inverse[f][a] * side(a, c)).sum();
-    Ok(std::array::from_fn(|f| std::array::from_fn(|c| of(f, c))))
+    let found: [Vec<f64>; EQUATIONS] = std::array::from_fn(of_coordinate);
+    Ok(std::array::from_fn(|f| {
+        std::array::from_fn(|c| found[c][f])
+    }))
 }
 
 /// What a load adds to what gravity does at rest by each function of it. Gravity along z and −z

@@ -33,7 +33,6 @@ use anyhow::{Result, ensure};
 use crate::loads::SeenLoad;
 use explained::Explained;
 pub use left_out::LeftOut;
-pub(crate) use linear::inverse;
 use numbers::Family;
 pub use own::{FoundNumber, OwnFilm};
 pub use problem::Bench;
@@ -80,9 +79,13 @@ pub fn fit(
         priors: numbers::priors(family, bench.dots_mm.len(), stage_mm, from),
         trust: Trust::WHOLE,
     };
-    let (problem, found) = match problem(Family::Nominal).explained()? {
-        Some(found) => (problem(Family::Nominal), found),
-        None => (problem(Family::Real), problem(Family::Real).found()?),
+    let [nominal, real] = [Family::Nominal, Family::Real].map(problem);
+    let (problem, found) = match nominal.explained()? {
+        Some(found) => (nominal, found),
+        None => {
+            let found = real.found()?;
+            (real, found)
+        }
     };
     ensure!(
         found.chi_square() <= CONTRADICTED,
