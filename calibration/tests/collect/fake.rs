@@ -1,6 +1,9 @@
 //! A sensor whose film is a formula, and a hand that presses it.
 
-use hivtac_terms::units::Px;
+use hivtac_terms::force::{Force, Place};
+use hivtac_terms::units::{
+    MicroNewtons, MilliDegrees, Px, UnsignedMicroNewtons, UnsignedMilliDegrees,
+};
 use std::f64::consts::TAU;
 use std::fs::File;
 use std::io::{Read, Write};
@@ -196,6 +199,32 @@ fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
         },
         force: None,
         markers: found.then_some(seen),
+    }
+}
+
+/// A sample of a film that a straight force presses, N, as a model that knows nothing of the unit
+/// feels it: µN, and where.
+pub fn pressed(
+    frame: u32,
+    time_s: f64,
+    size_n: f64,
+    (felt, place): (i32, Option<Place>),
+) -> Sample {
+    Sample {
+        sequence: frame,
+        frame,
+        time_us: (time_s * 1e6) as u64,
+        status: Status::NOT_CALIBRATED,
+        force: Some(Force {
+            alpha: MilliDegrees(0),
+            beta: MilliDegrees(0),
+            magnitude: MicroNewtons(felt),
+            cartesian: [0, 0, -felt].map(MicroNewtons),
+            direction_sigma: UnsignedMilliDegrees(10_000),
+            magnitude_sigma: UnsignedMicroNewtons(20_000),
+            place,
+        }),
+        markers: Some(markers(force_n(size_n, [0.0; 2]))),
     }
 }
 

@@ -6,13 +6,8 @@ use std::process::{Command, Stdio};
 
 use hivtac_data::collect::simulated::SimulatedGauge;
 use hivtac_data::dataset::{Dataset, Row};
-use hivtac_terms::force::{Force, Place};
-use hivtac_terms::status::Status;
-use hivtac_terms::units::{
-    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
-};
-use hivtac_wire::message::Sample;
+use hivtac_terms::force::Place;
+use hivtac_terms::units::{Micrometres, SignedMicrometres};
 
 use crate::fake::*;
 use crate::over_serial::pseudo_terminal;
@@ -57,22 +52,8 @@ pub fn sensor(after: usize) -> FakeSensor {
         let [x, y] = place_mm.map(|mm| SignedMicrometres((1e3 * mm) as i32));
         let sigma = Micrometres(200);
         let felt = (8e5 * size_n) as i32;
-        Sample {
-            sequence: frame,
-            frame,
-            time_us: (time_s * 1e6) as u64,
-            status: Status::NOT_CALIBRATED,
-            force: Some(Force {
-                alpha: MilliDegrees(0),
-                beta: MilliDegrees(0),
-                magnitude: MicroNewtons(felt),
-                cartesian: [0, 0, -felt].map(MicroNewtons),
-                direction_sigma: UnsignedMilliDegrees(10_000),
-                magnitude_sigma: UnsignedMicroNewtons(20_000),
-                place: (size_n > 0.0).then_some(Place { x, y, sigma }),
-            }),
-            markers: Some(markers(force_n(size_n, [0.0; 2]))),
-        }
+        let place = (size_n > 0.0).then_some(Place { x, y, sigma });
+        pressed(frame, time_s, size_n, (felt, place))
     };
     FakeSensor::of_film(Box::new(film), after)
 }

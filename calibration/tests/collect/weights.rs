@@ -3,10 +3,6 @@
 use std::sync::{Arc, Mutex};
 
 use hivtac_data::dataset::Dataset;
-use hivtac_terms::force::Force;
-use hivtac_terms::status::Status;
-use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
-use hivtac_wire::message::Sample;
 
 use crate::fake::*;
 
@@ -36,22 +32,7 @@ fn sensor(begun: Arc<Mutex<Vec<f64>>>) -> FakeSensor {
         let load = (start as usize).checked_sub(2);
         let size_n = load.map_or(0.0, |load| GRAM_N * grams(load, time_s - begun_s));
         let felt = (1e6 * size_n) as i32;
-        Sample {
-            sequence: frame,
-            frame,
-            time_us: (time_s * 1e6) as u64,
-            status: Status::NOT_CALIBRATED,
-            force: Some(Force {
-                alpha: MilliDegrees(0),
-                beta: MilliDegrees(0),
-                magnitude: MicroNewtons(felt),
-                cartesian: [0, 0, -felt].map(MicroNewtons),
-                direction_sigma: UnsignedMilliDegrees(10_000),
-                magnitude_sigma: UnsignedMicroNewtons(20_000),
-                place: None,
-            }),
-            markers: Some(markers(force_n(size_n, [0.0; 2]))),
-        }
+        pressed(frame, time_s, size_n, (felt, None))
     };
     FakeSensor::of_film(Box::new(film), usize::MAX)
 }
