@@ -31,18 +31,20 @@ pub fn dataset(input: &[u8]) -> bool {
     true
 }
 
-/// The files of a recording's folder and one of a gauge, with zeros between them: refused, or made
-/// into a data set that can be read, or refused with the reason then.
+/// The files of a recording's folder, one of a gauge and how the sensor was held, with zeros
+/// between them: refused, or made into a data set that can be read, or refused with the reason
+/// then.
 pub fn recording(input: &[u8]) -> bool {
     let Some(recorded) = text(input) else {
         return false;
     };
-    let mut files = recorded.splitn(4, END);
+    let mut files = recorded.splitn(5, END);
     let mut file = || files.next().unwrap_or_default();
-    let Ok(recording) = Recording::parse(file(), file(), file()) else {
+    let [unit, samples, lines, gauge, down] = std::array::from_fn(|_| file());
+    let Ok(recording) = Recording::parse(unit, samples, lines, down) else {
         return false;
     };
-    let gauge = match gauge_file::parse(file(), None) {
+    let gauge = match gauge_file::parse(gauge, None) {
         Ok(series) => Gauge::Files(series),
         Err(error) => {
             assert!(!error.to_string().is_empty());

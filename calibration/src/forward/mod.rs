@@ -33,7 +33,7 @@ pub use noise::Noise;
 pub use others::OtherUnits;
 pub use tables::{Dot, UnitSetup, tables};
 pub use unit::Known;
-pub use weight::{Weighed, weight};
+pub use weight::{Pressed, Weighed, everywhere, weight};
 
 /// What is known of a unit's film and camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -182,15 +182,42 @@ struct Nominal {
 }
 
 impl Weighed for UnitSetup<'_> {
-    fn moved(&self, pose: &Pose, down: [f64; 3]) -> Result<Moved> {
+    fn pressed(&self) -> Vec<Pressed> {
+        everywhere()
+    }
+
+    fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>> {
+        let film = self.under(down)?;
+        let (place_mm, tilt) = *pressed;
+        let of_size = |size: &f64| {
+            let pose = Pose {
+                size: *size,
+                tilt,
+                place_mm,
+            };
+            self.images(|marker| Ok(UnitSetup::moved(self, &film, &pose, marker)?))
+        };
+        sizes.iter().map(of_size).collect()
+    }
+
+    fn hangs(&self, down: [f64; 3]) -> Result<Moved> {
+        let film = self.under(down)?;
+        self.images(|marker| Ok(self.moved_by(&film, &Load::REST, marker)?))
+    }
+}
+
+impl UnitSetup<'_> {
+    /// Its film when gravity pulls so.
+    fn under(&self, down: [f64; 3]) -> Result<Film> {
         let down = Some(down).filter(|down| *down != [0.0; 3]);
-        let film = Film::of(self.unit)?.with_down(down)?;
+        Ok(Film::of(self.unit)?.with_down(down)?)
+    }
+
+    /// All markers' images, each from its number.
+    fn images(&self, of_marker: impl Fn(usize) -> Result<[f64; 2]>) -> Result<Moved> {
         let mut moved = Moved::default();
         for (marker, place) in moved.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-            *place = match pose.size > 0.0 {
-                true => UnitSetup::moved(self, &film, pose, marker)?,
-                false => self.moved_by(&film, &Load::REST, marker)?,
-            };
+            *place = of_marker(marker)?;
         }
         Ok(moved)
     }
@@ -371,8 +398,11 @@ mod tests {
             let (z, angle) = (libm::cos(turn(3)), turn(5));
             let along = (1.0 - z * z).sqrt();
             let down = [along * libm::cos(angle), along * libm::sin(angle), z];
-            let at = |pose: &Pose, down| Weighed::moved(&setup, pose, down).unwrap();
-            let rest = Pose::default();
+            let pressed = |down| {
+                let at = (pose.place_mm, pose.tilt);
+                Weighed::moved(&setup, &at, &[pose.size], down).unwrap()[0]
+            };
+            let hangs = |down| setup.hangs(down).unwrap();
             let turned = forward::Turned::From {
                 before: [0.0; 3],
                 now: down.map(|part| part as f32),
@@ -393,8 +423,8 @@ mod tests {
                 &mut covariance,
             );
             for c in 0..8 {
-                let with = at(&pose, down)[c] - at(&rest, down)[c];
-                let without = at(&pose, [0.0; 3])[c] - at(&rest, [0.0; 3])[c];
+                let with = pressed(down)[c] - hangs(down)[c];
+                let without = pressed([0.0; 3])[c] - hangs([0.0; 3])[c];
                 let off = camera.focal_px() * (f64::from(told.moved[c]) - (with - without));
                 sum += off * off;
                 worst = worst.max(off.abs());

@@ -63,7 +63,7 @@ impl Weights {
             (other.origin.clone(), other.threshold, other.dilations);
         let rest = dataset.rest()?;
         let loads = self.loads(dataset, known)?;
-        let (mut weights, found) = self.fitted(rest, &loads, known)?;
+        let (mut weights, found) = self.fitted(rest, &loads, dataset.about.down, known)?;
         weights.conditions = Conditions {
             origin,
             threshold,
@@ -91,7 +91,8 @@ impl Weights {
         Ok(loads)
     }
 
-    /// These weights for the unit that rests so and answers loads so.
+    /// These weights for the unit that rests so and answers loads so, gravity being `down` in the
+    /// film frame, parts of g, if known.
     ///
     /// # Errors
     /// When the weights have no film, or no unit explains the loads.
@@ -99,6 +100,7 @@ impl Weights {
         mut self,
         rest: Rest,
         loads: &[SeenLoad],
+        down: Option<[f64; 3]>,
         known: Known<'_>,
     ) -> Result<(Weights, Fit)> {
         let film = self.film.take();
@@ -113,6 +115,7 @@ impl Weights {
             dots_mm: MARKER_CENTRES_MM.to_vec(),
             // Tables are in focal lengths: all cameras have this lens.
             camera: Camera::new(Preset::Ov7725, 320, 240)?,
+            down,
         };
         let from = known.from.map(Weights::own_film).transpose()?;
         let found = fit(&bench, loads, known.stage_mm, from)?;
@@ -194,7 +197,7 @@ mod tests {
         let mut loads = default_weights().loads(&dataset, KNOWN).unwrap();
         let fitted = |loads: &[SeenLoad]| {
             let (_, fit) = default_weights()
-                .fitted(dataset.rest().unwrap(), loads, KNOWN)
+                .fitted(dataset.rest().unwrap(), loads, None, KNOWN)
                 .unwrap();
             let sigmas = fit.own.numbers.iter().map(|number| number.sigma);
             (fit.chi_square, sigmas.sum::<f64>())

@@ -1,7 +1,7 @@
 //! What a film's own weight does, as a model file has it.
 
 use anyhow::Result;
-use hivtac_film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT, Pose};
+use hivtac_film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
 use hivtac_sensing::forward::weight::{AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms};
 use hivtac_sensing::forward::{EQUATIONS, Gravity, Stiffness};
 use hivtac_sensing::model::WeightSpec;
@@ -20,14 +20,42 @@ const TILTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.6], [
 /// loads, and of any other.
 const UNSURE: [f32; 2] = [0.05, 0.5];
 
-/// A film of which it can be told how its images move.
+/// Where a film is pressed to tell what weight does under a load: place of the tip, mm, and tilt.
+pub type Pressed = ([f64; 2], [f64; 2]);
+
+/// A film whose images can be computed under loads and gravity.
 pub trait Weighed: Sync {
-    /// How the images of all markers are moved under a load when gravity pulls so, from where they
-    /// are when the film weighs nothing and nothing presses it, focal lengths.
+    /// Weight of the film, as the press that sinks it as much, N.
+    fn press_n(&self) -> f64 {
+        AS_A_PRESS_N
+    }
+
+    /// Where it is pressed: at least as many as there are terms.
+    fn pressed(&self) -> Vec<Pressed>;
+
+    /// How the images of all markers are moved at one place and tilt under growing sizes when
+    /// gravity pulls so, from where they are when the film weighs nothing and nothing presses it,
+    /// focal lengths.
     ///
     /// # Errors
     /// When no equilibrium is found.
-    fn moved(&self, pose: &Pose, down: [f64; 3]) -> Result<Moved>;
+    fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>>;
+
+    /// The same of the untouched film.
+    ///
+    /// # Errors
+    /// When no equilibrium is found.
+    fn hangs(&self, down: [f64; 3]) -> Result<Moved>;
+}
+
+/// Places all over the film, each with five tilts.
+pub fn everywhere() -> Vec<Pressed> {
+    let places = PLACES_MM
+        .into_iter()
+        .flat_map(|y| PLACES_MM.map(|x| [x, y]));
+    places
+        .flat_map(|place_mm| TILTS.map(|tilt| (place_mm, tilt.map(|part| LARGEST_TILT * part))))
+        .collect()
 }
 
 /// What weight does on a film, of whose tables and own rest position gravity is `down`.
@@ -37,26 +65,20 @@ pub trait Weighed: Sync {
 pub fn weight(film: &impl Weighed, stiffness: Stiffness, down: [f64; 3]) -> Result<WeightSpec> {
     let functions = Functions {
         stiffness,
-        press_n: AS_A_PRESS_N as f32,
+        press_n: film.press_n() as f32,
     };
     let at_rest = at_rest(film, &functions)?;
-    let mut under_load = [[[[0.0; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES];
-    for (number, of_size) in under_load.iter_mut().enumerate() {
-        let root = (number + 1) as f64 / SIZES as f64;
-        *of_size = added(film, &functions, &at_rest, LARGEST_SIZE * root * root)?;
-    }
     Ok(WeightSpec {
         down: single(down),
         press_n: functions.press_n,
         unsure: UNSURE,
+        under_load: under_load(film, &functions, &at_rest)?,
         at_rest,
-        under_load,
     })
 }
 
 fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST]> {
-    let pose = Pose::default();
-    let weightless = film.moved(&pose, [0.0; 3])?;
+    let weightless = film.hangs([0.0; 3])?;
     let around = (0..AROUND).flat_map(|k| {
         let (sin, cos) = libm::sincos(k as f64 * std::f64::consts::TAU / AROUND as f64);
         [[sin, 0.0, cos], [0.0, sin, cos]]
@@ -64,7 +86,7 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
     let around: Vec<[f64; 3]> = around.collect();
     let sides: Vec<Moved> = around
         .par_iter()
-        .map(|down| Ok(less(&film.moved(&pose, *down)?, &weightless)))
+        .map(|down| Ok(less(&film.hangs(*down)?, &weightless)))
         .collect::<Result<_>>()?;
     let rows = around
         .iter()
@@ -72,42 +94,38 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
     nearest(&rows.collect::<Vec<_>>(), |i, c| sides[i][c])
 }
 
-/// What is added under loads of a size, by function of gravity, coordinate and term.
-fn added(
+/// What is added under loads, by size, function of gravity, coordinate and term.
+fn under_load(
     film: &impl Weighed,
     functions: &Functions,
     at_rest: &[Moved; AT_REST],
-    size: f64,
-) -> Result<[[[f64; TERMS]; EQUATIONS]; UNDER_LOAD]> {
-    let places = PLACES_MM
-        .into_iter()
-        .flat_map(|y| PLACES_MM.map(|x| [x, y]));
-    let poses = places.flat_map(|place_mm| {
-        TILTS.map(|tilt| Pose {
-            size,
-            tilt: tilt.map(|part| LARGEST_TILT * part),
-            place_mm,
-        })
+) -> Result<[[[[f64; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES]> {
+    let sizes: [f64; SIZES] = std::array::from_fn(|number| {
+        let root = (number + 1) as f64 / SIZES as f64;
+        LARGEST_SIZE * root * root
     });
-    let poses: Vec<Pose> = poses.collect();
-    let sides: Vec<[Moved; UNDER_LOAD]> = poses
+    let pressed = film.pressed();
+    // By place and tilt, and by size.
+    let sides: Vec<Vec<[Moved; UNDER_LOAD]>> = pressed
         .par_iter()
-        .map(|pose| of_pose(film, functions, at_rest, pose))
+        .map(|pressed| added(film, functions, at_rest, pressed, &sizes))
         .collect::<Result<_>>()?;
-    let softness = f64::from(soft(&functions.stiffness, size as f32));
-    let rows = poses.iter().map(|pose| {
-        let [place, tilt] = [pose.place_mm, pose.tilt].map(|pair| pair.map(|part| part as f32));
+    let rows = pressed.iter().map(|(place_mm, tilt)| {
+        let [place, tilt] = [place_mm, tilt].map(|pair| pair.map(|part| part as f32));
         terms(place, tilt).map(f64::from)
     });
     let rows: Vec<[f64; TERMS]> = rows.collect();
-    let mut added = [[[0.0; TERMS]; EQUATIONS]; UNDER_LOAD];
-    for (f, of_function) in added.iter_mut().enumerate() {
-        let found = nearest(&rows, |i, c| sides[i][f][c] / softness)?;
-        for (c, of_coordinate) in of_function.iter_mut().enumerate() {
-            *of_coordinate = found.map(|of_term| of_term[c]);
+    let mut under_load = [[[[0.0; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES];
+    for (number, (of_size, size)) in under_load.iter_mut().zip(sizes).enumerate() {
+        let softness = f64::from(soft(&functions.stiffness, size as f32));
+        for (f, of_function) in of_size.iter_mut().enumerate() {
+            let found = nearest(&rows, |i, c| sides[i][number][f][c] / softness)?;
+            for (c, of_coordinate) in of_function.iter_mut().enumerate() {
+                *of_coordinate = found.map(|of_term| of_term[c]);
+            }
         }
     }
-    Ok(added)
+    Ok(under_load)
 }
 
 /// The parts of each of `N` functions, whose values are rows, that sum up nearest to what is known
@@ -127,32 +145,46 @@ fn nearest<const N: usize>(
     }))
 }
 
-/// What a load adds to what gravity does at rest by each function of it. Gravity along z and −z
-/// tells what goes with Δ and with its square, gravity along the film is in proportion.
-fn of_pose(
+/// What loads of these sizes add to what gravity does at rest by each function of it. Gravity along
+/// z and −z tells what goes with Δ and with its square, gravity along the film is in proportion.
+fn added(
     film: &impl Weighed,
     functions: &Functions,
     at_rest: &[Moved; AT_REST],
-    pose: &Pose,
-) -> Result<[Moved; UNDER_LOAD]> {
-    let weightless = film.moved(pose, [0.0; 3])?;
-    let more = |down: [f64; 3]| -> Result<(f64, Moved)> {
-        let parts = functions.at(pose.size as f32, single(down)).map(f64::from);
-        let mut more = less(&film.moved(pose, down)?, &weightless);
-        for (part, column) in parts.iter().zip(at_rest) {
-            for (sum, value) in more.iter_mut().zip(column) {
-                *sum -= part * value;
+    pressed: &Pressed,
+    sizes: &[f64],
+) -> Result<Vec<[Moved; UNDER_LOAD]>> {
+    let weightless = film.moved(pressed, sizes, [0.0; 3])?;
+    let more = |down: [f64; 3]| -> Result<Vec<(f64, Moved)>> {
+        let moved = film.moved(pressed, sizes, down)?;
+        let of_size = |((moved, weightless), size): ((&Moved, &Moved), &f64)| {
+            let parts = functions.at(*size as f32, single(down)).map(f64::from);
+            let mut more = less(moved, weightless);
+            for (part, column) in parts.iter().zip(at_rest) {
+                for (sum, value) in more.iter_mut().zip(column) {
+                    *sum -= part * value;
+                }
             }
-        }
-        Ok((parts[0], more))
+            (parts[0], more)
+        };
+        Ok(moved
+            .iter()
+            .zip(&weightless)
+            .zip(sizes)
+            .map(of_size)
+            .collect())
     };
-    let (d, toward) = more([0.0, 0.0, -1.0])?;
-    let (e, away) = more([0.0, 0.0, 1.0])?;
-    let (_, along_x) = more([1.0, 0.0, 0.0])?;
-    let (_, along_y) = more([0.0, 1.0, 0.0])?;
-    let square: Moved = std::array::from_fn(|c| (toward[c] / d - away[c] / e) / (d - e));
-    let first = std::array::from_fn(|c| toward[c] / d - square[c] * d);
-    Ok([first, square, along_x, along_y])
+    let toward = more([0.0, 0.0, -1.0])?;
+    let away = more([0.0, 0.0, 1.0])?;
+    let along_x = more([1.0, 0.0, 0.0])?;
+    let along_y = more([0.0, 1.0, 0.0])?;
+    let of_size = |k: usize| {
+        let ((d, toward), (e, away)) = (&toward[k], &away[k]);
+        let square: Moved = std::array::from_fn(|c| (toward[c] / d - away[c] / e) / (d - e));
+        let first = std::array::from_fn(|c| toward[c] / d - square[c] * d);
+        [first, square, along_x[k].1, along_y[k].1]
+    };
+    Ok((0..sizes.len()).map(of_size).collect())
 }
 
 fn less(a: &Moved, b: &Moved) -> Moved {

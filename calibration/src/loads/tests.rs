@@ -66,6 +66,7 @@ fn dataset(rows: Vec<Row>, free: Option<Free>, sessions: usize) -> Dataset {
         seed: 0,
         range: Range::default(),
         free,
+        down: None,
     };
     Dataset { about, rows }
 }

@@ -104,9 +104,7 @@ impl<'a> Field<'a> {
 
     /// The force of a pose, N.
     pub fn force_n(&self, pose: &Pose) -> [f64; 3] {
-        let [a, b] = self.stiffness_n;
-        let size_n = a * pose.size + b * pose.size * pose.size * pose.size;
-        pose.direction().map(|part| size_n * part)
+        force_n(self.stiffness_n, pose)
     }
 
     fn solve_place(&self, place_mm: [f64; 2]) -> Result<Vec<Solved>> {
@@ -235,6 +233,12 @@ impl<'a> Field<'a> {
         let edge = self.at.made.design.half_edge_mm();
         point_mm.map(|part| part.clamp(-edge, edge))
     }
+}
+
+/// The force of a pose, N, on a film of this stiffness, |F| = a·s + b·s³: a and b, N.
+pub fn force_n([a, b]: [f64; 2], pose: &Pose) -> [f64; 3] {
+    let size_n = a * pose.size + b * pose.size * pose.size * pose.size;
+    pose.direction().map(|part| size_n * part)
 }
 
 /// The state under a pose that another one's slopes foretell.

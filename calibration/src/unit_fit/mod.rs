@@ -13,6 +13,7 @@
 //! | `left_out` | how good the fit is on loads left out of it |
 //! | `field` | from few solved places of the tip to every place |
 //! | `own` | the unit's tables and what is not known of them, for its model file |
+//! | `weight` | what gravity does to the unit's film when it is turned |
 
 mod descent;
 mod equations;
@@ -25,6 +26,7 @@ mod numbers;
 mod own;
 mod problem;
 mod seen;
+mod weight;
 
 use std::fmt;
 
@@ -76,7 +78,7 @@ pub fn fit(
         bench,
         loads,
         family,
-        priors: numbers::priors(family, bench.dots_mm.len(), stage_mm, from),
+        priors: numbers::priors(family, bench, stage_mm, from),
         trust: Trust::WHOLE,
     };
     let [nominal, real] = [Family::Nominal, Family::Real].map(problem);

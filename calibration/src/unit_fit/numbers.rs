@@ -3,12 +3,18 @@
 use hivtac_shell::{Change, Design};
 
 use super::own::{FoundNumber, OwnFilm};
+use super::problem::Bench;
 use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
 /// Standard deviations of what the pixel grid does to a marker at rest, px, and of how far the
 /// camera is from the film beyond its nominal distance, mm.
 const REST_PX: f64 = 0.006;
 const DISTANCE_MM: f64 = 0.1;
+
+/// Standard deviation of gravity along the film, g, of a unit that may be held any way.
+const SIDEWAYS: f64 = 0.6;
+/// Standard deviation of each part of a known direction of gravity, g: a degree.
+const DOWN: f64 = 0.02;
 
 /// The overhang by which what it does to the film falls to a part of e, mm.
 const OVERHANG_MM: f64 = 2.0;
@@ -88,14 +94,19 @@ impl Number {
 }
 
 impl Prior {
-    /// With a mean of 0 and a range of four standard deviations.
-    pub fn about_zero(number: Number, sigma: f64) -> Prior {
+    /// With a range of four standard deviations.
+    fn about(number: Number, mean: f64, sigma: f64) -> Prior {
         Prior {
             number,
-            mean: 0.0,
+            mean,
             sigma,
-            range: [-4.0 * sigma, 4.0 * sigma],
+            range: [mean - 4.0 * sigma, mean + 4.0 * sigma],
         }
+    }
+
+    /// The same about 0.
+    pub fn about_zero(number: Number, sigma: f64) -> Prior {
+        Prior::about(number, 0.0, sigma)
     }
 
     /// Takes what was found of the number for what is known.
@@ -163,9 +174,9 @@ impl Family {
     }
 }
 
-/// The numbers of units with this many dots whose stage's zero is known to so many mm; the camera
-/// and the posts of a unit whose old film was fitted are known.
-pub fn priors(family: Family, dots: usize, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
+/// The numbers of units before a bench whose stage's zero is known to so many mm; the camera and
+/// the posts of a unit whose old film was fitted are known.
+pub fn priors(family: Family, bench: &Bench, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
     let film = FILM.iter();
     let film = film.filter(|(change, _)| family.differs_in(*change));
     let film = film.map(|(change, [mean, sigma, least, largest])| Prior {
@@ -178,14 +189,14 @@ pub fn priors(family: Family, dots: usize, stage_mm: f64, from: Option<&OwnFilm>
     let mut add = |number, sigma| all.push(Prior::about_zero(number, sigma));
     for axis in [0, 1] {
         if family == Family::Real {
-            add(Number::Film(Change::Down(axis)), 0.6);
+            add(Number::Film(Change::Down(axis)), SIDEWAYS);
         }
         add(Number::Middle(axis), MIDDLE_PX);
         add(Number::Stage(axis), stage_mm);
         for post in 0..4 {
             add(Number::Film(Change::Post(post, axis)), POST_MM);
         }
-        for dot in 0..dots {
+        for dot in 0..bench.dots_mm.len() {
             add(Number::Marker(dot, axis), MARKER_MM);
             add(Number::Rest(dot, axis), REST_PX);
         }
@@ -193,6 +204,12 @@ pub fn priors(family: Family, dots: usize, stage_mm: f64, from: Option<&OwnFilm>
     add(Number::Roll, ROLL_DEG);
     add(Number::Focal, FOCAL);
     add(Number::Distance, DISTANCE_MM);
+    if let Some(down) = bench.down {
+        all.retain(|prior| !matches!(prior.number, Number::Film(Change::Down(_))));
+        all.extend(
+            (0..3).map(|axis| Prior::about(Number::Film(Change::Down(axis)), down[axis], DOWN)),
+        );
+    }
     for prior in &mut all {
         if let Some(known) = from.filter(|_| prior.number.stays()) {
             prior.narrow(known);

@@ -17,6 +17,7 @@ use super::field::{Coefficients, Field};
 use super::linear::{cholesky, dot};
 use super::numbers::{Family, Number};
 use super::problem::{At, Problem, Rates, mesh_part, near_tip};
+use super::weight::OwnWeight;
 use crate::forward::{
     Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
@@ -42,6 +43,9 @@ pub struct OwnFilm {
     functions: Vec<Vec<f32>>,
     dots: Vec<OwnTable>,
     covariance: OwnCovariance,
+    /// What gravity does, if it was known under the loads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    weight: Option<Box<OwnWeight>>,
 }
 
 /// A number of a unit that was found.
@@ -115,6 +119,14 @@ impl OwnFilm {
                     .map(|f| f.as_flattened().to_vec())
                     .collect(),
             },
+            weight: match problem.bench.down {
+                Some(_) => Some(Box::new(OwnWeight::new(
+                    problem,
+                    found,
+                    field.stiffness_n(),
+                )?)),
+                None => None,
+            },
         })
     }
 
@@ -133,6 +145,9 @@ impl OwnFilm {
             "film.own: {} markers: this program knows {DOTS}",
             self.dots.len()
         );
+        if let Some(weight) = &self.weight {
+            weight.check()?;
+        }
         self.covariance().map(|_| ())
     }
 
@@ -156,7 +171,7 @@ impl OwnFilm {
             tables: self.tables(),
             own: Some(self.covariance()?),
             other: None,
-            weight: None,
+            weight: self.weight.as_deref().map(OwnWeight::spec).transpose()?,
         })
     }
 

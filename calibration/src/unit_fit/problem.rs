@@ -37,6 +37,8 @@ pub struct Bench {
     pub dots_mm: Vec<[f64; 2]>,
     /// The camera whose lens sees the film; images count in its focal lengths.
     pub camera: Camera,
+    /// Where gravity pulls in the film frame at rest and under all loads, parts of g, if known.
+    pub down: Option<[f64; 3]>,
 }
 
 /// A unit's numbers, what is known of them, and loads to hold them against.
@@ -245,7 +247,8 @@ impl Problem<'_> {
         }
     }
 
-    fn view<'a>(&'a self, made: &Made, film: &'a Film) -> View<'a> {
+    /// A film of the unit before its camera.
+    pub fn view<'a>(&'a self, made: &Made, film: &'a Film) -> View<'a> {
         View {
             film,
             camera: &self.bench.camera,

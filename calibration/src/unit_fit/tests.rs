@@ -1,5 +1,5 @@
 use hivtac_scene::{Camera, MARKERS, Preset};
-use hivtac_sensing::forward::Forward;
+use hivtac_sensing::forward::{self as chip, Forward};
 use hivtac_shell::{Design, Equilibrium, Film, Law};
 
 use super::problem::Made;
@@ -112,6 +112,25 @@ impl Truth {
         }
     }
 
+    /// The same film when gravity pulls another way.
+    fn turned(&self, down: [f64; 3]) -> Truth {
+        let mut design = mounted();
+        design.down = down;
+        let mut truth = Truth::of(&design);
+        truth.film = self.film.changed(&design).unwrap();
+        truth.rest = truth.film.rest();
+        truth
+    }
+
+    /// How far dots are moved from where they rest, x and y of each, px.
+    fn moved_px(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> [f64; 8] {
+        let [there, here] = [&self.press(force_n, place_mm), &self.rest].map(|state| {
+            let seen = self.seen_px(state, 0);
+            seen.as_flattened().to_vec()
+        });
+        std::array::from_fn(|k| there[k] - here[k])
+    }
+
     fn bench(&self) -> Bench {
         Bench {
             focal_px: self.camera.focal_px(),
@@ -120,8 +139,43 @@ impl Truth {
             noise_px: 0.008,
             dots_mm: MARKERS.iter().map(|disc| disc.centre_mm).collect(),
             camera: self.camera,
+            down: None,
         }
     }
+}
+
+impl OwnFilm {
+    /// Of motions in focal lengths. The numbers found are the unit's camera's, too.
+    fn to_px(&self, moved: &[f64; 8]) -> [f64; 8] {
+        let [re, im] = self.per_px;
+        let square = re * re + im * im;
+        std::array::from_fn(|k| {
+            let [x, y] = [moved[k - k % 2], moved[k - k % 2 + 1]];
+            [re * x + im * y, re * y - im * x][k % 2] / square
+        })
+    }
+}
+
+/// A model file's film of a fit.
+fn model_of(fit: &Fit) -> FilmModel {
+    let noise = Noise {
+        rest_px: [[0.0; 2]; 4],
+        at_rest_px: [0.01; 2],
+        at_four_areas: [1.0; 2],
+    };
+    FilmModel {
+        own: Some(Box::new(fit.own.clone())),
+        ..FilmModel::nominal(1, &noise)
+    }
+}
+
+fn chip_pose(chip: &Forward<'_>, force_n: [f64; 3], place_mm: [f64; 2]) -> chip::Pose {
+    chip::Pose::of_force(
+        force_n.map(|part| part as f32),
+        place_mm.map(|part| part as f32),
+        &chip.stiffness,
+        &chip.limits,
+    )
 }
 
 /// A film that no table holds is found from ten loads, and the chip predicts what it does under
@@ -150,16 +204,7 @@ fn a_mounted_film_is_found_from_ten_loads() {
     let worst = fit.left_out.iter().map(|load| load.direction_deg);
     assert!(worst.fold(0.0, f64::max) < 3.0, "{:?}", fit.left_out);
 
-    let noise = Noise {
-        rest_px: [[0.0; 2]; 4],
-        at_rest_px: [0.01; 2],
-        at_four_areas: [1.0; 2],
-    };
-    let model = FilmModel {
-        own: Some(Box::new(fit.own.clone())),
-        ..FilmModel::nominal(1, &noise)
-    };
-    let bytes = model.spec().unwrap().to_bytes();
+    let bytes = model_of(&fit).spec().unwrap().to_bytes();
     let chip = Forward::parse(&bytes).unwrap();
     let rest_px = truth.seen_px(&truth.rest, 0);
     for (force_n, place_mm) in [
@@ -168,28 +213,77 @@ fn a_mounted_film_is_found_from_ten_loads() {
         ([-0.01, 0.01, -0.18], [0.5, 1.0]),
     ] {
         let seen = truth.seen_px(&truth.press(force_n, place_mm), 0);
-        let pose = hivtac_sensing::forward::Pose::of_force(
-            force_n.map(|part| part as f32),
-            place_mm.map(|part| part as f32),
-            &chip.stiffness,
-            &chip.limits,
-        );
+        let pose = chip_pose(&chip, force_n, place_mm);
         let told = chip.tables.predict(&pose, &chip.limits, &[[0.0; 2]; 4]);
+        let px = fit.own.to_px(&told.moved.map(f64::from));
         for k in 0..4 {
-            let moved = [told.moved[2 * k], told.moved[2 * k + 1]].map(f64::from);
-            // The numbers found are the unit's camera's, too.
-            let [re, im] = fit.own.per_px;
-            let square = re * re + im * im;
-            let px = [
-                (re * moved[0] + im * moved[1]) / square,
-                (re * moved[1] - im * moved[0]) / square,
-            ];
             for i in [0, 1] {
-                let off = px[i] - (seen[k][i] - rest_px[k][i]);
+                let off = px[2 * k + i] - (seen[k][i] - rest_px[k][i]);
                 assert!(
                     off.abs() < 0.25,
                     "{force_n:?} {place_mm:?} marker {k}: {off} px"
                 );
+            }
+        }
+    }
+}
+
+/// Where gravity is known under the loads, the chip knows how the film moves when it is turned: as
+/// full solutions of the true film do, to a part of what turning it does.
+#[test]
+fn a_mounted_film_is_known_turned() {
+    let truth = Truth::new();
+    let loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
+    let bench = Bench {
+        down: Some(truth.made.design.down),
+        ..truth.bench()
+    };
+    let fit = fit(&bench, &loads, 0.1, None).unwrap();
+    assert!(fit.chi_square < 1.5, "{}", fit.chi_square);
+    let model = model_of(&fit);
+    let bytes = model.spec().unwrap().to_bytes();
+    let chip = Forward::parse(&bytes).unwrap();
+    for down in [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [1.0, 0.0, 0.0],
+        [0.6, -0.8, 0.0],
+    ] {
+        let film = truth.turned(down);
+        let turned = chip::Turned::From {
+            before: truth.made.design.down.map(|part| part as f32),
+            now: down.map(|part| part as f32),
+        };
+        for (force_n, place_mm) in [
+            ([0.002, 0.0, -0.02], [0.5, 0.0]),
+            ([0.0, -0.005, -0.06], [-2.5, 0.5]),
+            ([0.01, 0.0, -0.12], [2.0, -1.5]),
+        ] {
+            let moved_px = |film: &Truth| film.moved_px(force_n, place_mm);
+            let [with, without] = [&film, &truth].map(moved_px);
+            let pose = chip_pose(&chip, force_n, place_mm);
+            let mut told = chip::Prediction::default();
+            let mut covariance = chip::Covariance::default();
+            let hanging = chip.hanging(turned, true).unwrap();
+            hanging.add_to(
+                &pose,
+                &chip.stiffness,
+                &chip.limits,
+                &mut told,
+                &mut covariance,
+            );
+            let told_px = fit.own.to_px(&told.moved.map(f64::from));
+            let does = |k: usize| with[k] - without[k];
+            let most = (0..8)
+                .map(does)
+                .fold(0.0, |most: f64, does| most.max(does.abs()));
+            assert!(most > 0.04, "{most}");
+            for k in 0..8 {
+                let off = told_px[k] - does(k);
+                let sigma = truth.made.focal_px * f64::from(covariance[k][k]).sqrt();
+                let about = format!("{down:?} {force_n:?} {k}: {off} of {} px", does(k));
+                assert!(off.abs() < 0.015 + 0.05 * most, "{about}");
+                assert!(off.abs() < 3.0 * sigma, "{about}: {sigma}");
             }
         }
     }

@@ -442,6 +442,7 @@ fn about(recording: &Recording, rows: &[Row], report: &Report) -> About {
             place_mm: reach_mm(recording),
         },
         free: None,
+        down: recording.down,
     }
 }
 

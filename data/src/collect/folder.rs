@@ -6,6 +6,7 @@
 //! | `samples.csv` | every sample of the sensor, with the pose it was taken in |
 //! | `gauge.csv` | every line of a gauge at a serial port, as it came |
 //! | `takes.csv` | the takes that were finished |
+//! | `down.csv` | which way the sensor was held in each run, where that was known |
 //! | `covered.csv` | where and how hard the film was pressed enough, by the sensor's own account, in takes of presses anywhere |
 //!
 //! Every line is written at once, so that an interruption costs at most the line under way, which
@@ -17,6 +18,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_scene::Contact;
+use hivtac_terms::down::Direction;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
@@ -26,12 +28,13 @@ use serde::{Deserialize, Serialize};
 use super::poses::{self, Pose};
 use super::series::LARGEST_S;
 use crate::conditions::{Conditions, OriginName};
-use crate::dataset::LARGEST_AREA;
+use crate::dataset::{LARGEST_AREA, check_down};
 
 const SAMPLES: &str = "samples.csv";
 const GAUGE: &str = "gauge.csv";
 const TAKES: &str = "takes.csv";
 const COVERED: &str = "covered.csv";
+const DOWN: &str = "down.csv";
 const UNIT: &str = "unit.json";
 
 const SAMPLE_COLUMNS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status,\
@@ -40,6 +43,10 @@ x3_q16,y3_q16,area3_px,x_mm,y_mm";
 const GAUGE_COLUMNS: &str = "run,host_s,line";
 const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
 const COVERED_COLUMNS: &str = "run,x_mm,y_mm,force_n";
+const DOWN_COLUMNS: &str = "run,x,y,z";
+
+/// Directions of gravity in two runs that differ by more, each part in g, are not the same.
+const SAME_DOWN: f64 = 0.05;
 
 /// No marker lies beyond it along either side of a frame: 2¹⁰ px in 1/65,536 px. Then a pattern is
 /// no larger than a data set can hold.
@@ -53,6 +60,7 @@ pub struct Folder {
     samples: File,
     takes: File,
     covered: File,
+    down: File,
     /// For whoever listens to the gauge.
     pub gauge: File,
     /// Number of this run, from 0.
@@ -95,12 +103,14 @@ impl Folder {
         let gauge = append(&path.join(GAUGE), GAUGE_COLUMNS)?;
         let takes = append(&path.join(TAKES), TAKE_COLUMNS)?;
         let covered = append(&path.join(COVERED), COVERED_COLUMNS)?;
+        let down = append(&path.join(DOWN), DOWN_COLUMNS)?;
         let before = Recording::read(path)?;
         let done = done(path)?;
         Ok(Self {
             samples,
             takes,
             covered,
+            down,
             gauge,
             run: before.runs(),
             done,
@@ -118,6 +128,15 @@ impl Folder {
     pub fn covered(&mut self, [x_mm, y_mm]: [f64; 2], force_n: f64) -> Result<()> {
         let line = format!("{},{x_mm:.3},{y_mm:.3},{force_n:.6}", self.run);
         write_line(&mut self.covered, &line, COVERED)
+    }
+
+    /// Notes where gravity pulls in this run, in the film frame.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn held(&mut self, down: Direction) -> Result<()> {
+        let [x, y, z] = down.to_unit();
+        write_line(&mut self.down, &format!("{},{x},{y},{z}", self.run), DOWN)
     }
 
     /// Keeps a sample.
@@ -280,6 +299,8 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
 pub struct Recording {
     /// The unit, and how it looks at its frames.
     pub conditions: Conditions,
+    /// Where gravity pulled in the film frame, parts of g, if known of all runs.
+    pub down: Option<[f64; 3]>,
     /// In the order they came.
     pub samples: Vec<Kept>,
     /// Lines of the gauge at a serial port: run, time of the computer in s, text.
@@ -327,15 +348,16 @@ impl Recording {
             let path = path.join(name);
             fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
         };
-        Self::parse(&text, &table(SAMPLES)?, &table(GAUGE)?)
+        Self::parse(&text, &table(SAMPLES)?, &table(GAUGE)?, &table(DOWN)?)
             .with_context(|| path.display().to_string())
     }
 
-    /// The recording in the texts of its files: `unit.json`, `samples.csv` and `gauge.csv`.
+    /// The recording in the texts of its files: `unit.json`, `samples.csv`, `gauge.csv` and
+    /// `down.csv`.
     ///
     /// # Errors
-    /// When one is damaged; names the file and the line.
-    pub fn parse(unit: &str, samples: &str, gauge: &str) -> Result<Self> {
+    /// When one is damaged, names the file and the line; when the sensor was turned between runs.
+    pub fn parse(unit: &str, samples: &str, gauge: &str, down: &str) -> Result<Self> {
         let conditions =
             serde_json::from_str(unit).with_context(|| format!("{UNIT} is damaged"))?;
         let samples = rows([SAMPLES, samples], sample, SAMPLE_COLUMNS)?;
@@ -345,11 +367,13 @@ impl Recording {
             Ok((line.run, line.host_s, line.line))
         };
         let gauge_lines = rows([GAUGE, gauge], gauge_line, GAUGE_COLUMNS)?;
-        let recording = Self {
+        let mut recording = Self {
             conditions,
+            down: None,
             samples,
             gauge_lines,
         };
+        recording.down = recording.held(&rows([DOWN, down], direction, DOWN_COLUMNS)?)?;
         let lines = recording.samples.len() + recording.gauge_lines.len();
         let runs = recording.runs();
         // Each run that left a line follows another one that did.
@@ -376,6 +400,23 @@ impl Recording {
             }
         }
         lasted
+    }
+
+    /// Where gravity pulled in all runs with samples, if known: from the lines of its file.
+    fn held(&self, lines: &[(usize, [f64; 3])]) -> Result<Option<[f64; 3]>> {
+        let Some((first, down)) = lines.first() else {
+            return Ok(None);
+        };
+        for (run, other) in lines {
+            let apart = down.iter().zip(other).map(|(a, b)| (a - b).abs());
+            ensure!(
+                apart.fold(0.0, f64::max) <= SAME_DOWN,
+                "{DOWN}: the sensor was held another way in run {run} ({other:?}) than in run \
+                 {first} ({down:?}): record each way into a folder of its own"
+            );
+        }
+        let is_known = |kept: &Kept| lines.iter().any(|(run, _)| *run == kept.run);
+        Ok(self.samples.iter().all(is_known).then_some(*down))
     }
 
     /// How many runs there are.
@@ -406,6 +447,15 @@ fn rows<T>(
     });
     rows.collect::<Result<_>>()
         .with_context(|| format!("{name} is damaged"))
+}
+
+fn direction(record: &csv::StringRecord) -> Result<(usize, [f64; 3])> {
+    let mut down = [0.0; 3];
+    for (part, text) in down.iter_mut().zip(record.iter().skip(1)) {
+        *part = text.parse()?;
+    }
+    check_down(&down)?;
+    Ok((record[0].parse()?, down))
 }
 
 fn sample(record: &csv::StringRecord) -> Result<Kept> {
@@ -619,6 +669,34 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_says_which_way_the_sensor_was_held() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path();
+        let down = Direction([0, 600, -800]);
+        for run in 0..2 {
+            let mut folder = Folder::open(path, &conditions()).unwrap();
+            assert_eq!(folder.run, run);
+            folder.held(down).unwrap();
+            folder.sample(0.5, None, &sample(1, true)).unwrap();
+        }
+        let recording = Recording::read(path).unwrap();
+        let near = recording.down.unwrap().into_iter().zip([0.0, 0.6, -0.8]);
+        assert!(near.into_iter().all(|(a, b)| (a - b).abs() < 1e-6));
+        // In a third run nobody says.
+        let mut folder = Folder::open(path, &conditions()).unwrap();
+        folder.sample(0.5, None, &sample(1, true)).unwrap();
+        assert_eq!(Recording::read(path).unwrap().down, None);
+        // Turned over in a fourth.
+        let mut folder = Folder::open(path, &conditions()).unwrap();
+        folder.held(Direction([0, 0, 1000])).unwrap();
+        let error = format!("{:#}", Recording::read(path).unwrap_err());
+        assert!(error.contains("another way in run 3"), "{error}");
+        fs::write(path.join(DOWN), format!("{DOWN_COLUMNS}\n0,0,0,9.81\n")).unwrap();
+        let error = format!("{:#}", Recording::read(path).unwrap_err());
+        assert!(error.contains("down.csv is damaged: line 2"), "{error}");
+    }
+
+    #[test]
     fn conditions_have_the_pixel_format_that_the_sensor_is_set_to() {
         let mut hello = DeviceHello {
             protocol: 1,
@@ -690,11 +768,11 @@ mod tests {
             .unwrap();
         let read = |name: &str| fs::read_to_string(path.join(name)).unwrap();
         let [unit, samples, gauge] = [UNIT, SAMPLES, GAUGE].map(read);
-        assert!(Recording::parse(&unit, &samples, &gauge).is_ok());
+        assert!(Recording::parse(&unit, &samples, &gauge, "").is_ok());
         let refused = |before: &str, after: &str, words: &str| {
             assert!(samples.contains(before), "{before} in {samples}");
             let samples = samples.replacen(before, after, 1);
-            let error = Recording::parse(&unit, &samples, &gauge).unwrap_err();
+            let error = Recording::parse(&unit, &samples, &gauge, "").unwrap_err();
             assert!(format!("{error:#}").contains(words), "{after}: {error:#}");
         };
         refused("\n0,0.500000,", "\n18446744073709551615,0.5,", "runs");
@@ -711,7 +789,7 @@ mod tests {
         refused(",0.5,-2\n", ",1e9,-2\n", "places within");
         refused(",0.5,-2\n", ",,-2\n", "half a pose");
         let gauge = format!("{gauge}0,inf,0.1N\n");
-        let error = Recording::parse(&unit, &samples, &gauge).unwrap_err();
+        let error = Recording::parse(&unit, &samples, &gauge, "").unwrap_err();
         assert!(format!("{error:#}").contains("gauge.csv is damaged: line 2"));
     }
 }

@@ -226,14 +226,23 @@ impl Recorder {
     }
 
     /// Has the sensor take its rest position: it refuses bad markers, and what it then says of
-    /// markers under a force is against their own places.
+    /// markers under a force is against their own places. Notes which way the sensor is held, where
+    /// it knows.
     fn tare(&mut self) -> Result<()> {
         let request = Request::Tare {
             frames: TARE_FRAMES,
         };
-        self.link
-            .request(request, self.patience + TARE_PATIENCE, |_| ())?;
-        Ok(())
+        let mut down = None;
+        let patience = self.patience + TARE_PATIENCE;
+        self.link.request(request, patience, |message| {
+            if let DeviceMessage::Tared(report) = message {
+                down = report.rest.down;
+            }
+        })?;
+        match down {
+            Some(down) => self.folder.held(down),
+            None => Ok(()),
+        }
     }
 
     /// The next task, once its pose is set; nothing at the end.

@@ -14,7 +14,7 @@ use csv::StringRecord;
 use hivtac_sensing::features::FEATURES;
 use hivtac_terms::fixed::Q;
 
-use super::{About, Dataset, Observation, Place, Row};
+use super::{About, Dataset, Observation, Place, Row, check_down};
 use crate::rest::q16;
 
 const FORMAT: &str =
@@ -134,6 +134,9 @@ impl Dataset {
             .and_then(|line| line.strip_prefix("# "))
             .context("line 2 says nothing about it")?;
         let about: About = serde_json::from_str(about).context("line 2")?;
+        if let Some(down) = &about.down {
+            check_down(down).context("line 2")?;
+        }
         if let Some(free) = &about.free {
             ensure!(
                 free.direction_deg > 0.0 && free.direction_deg <= LARGEST_DEG,

@@ -10,7 +10,7 @@ mod split;
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use hivtac_sensing::features::FEATURES;
 use hivtac_terms::fixed::Q;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,23 @@ pub struct About {
     /// What is known of rows whose place is not: without it, that the tip was on the film's middle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free: Option<Free>,
+    /// Where gravity pulled in the film frame, parts of g (length 1): x right and y down in the
+    /// image, z away from the camera. Absent if nobody knows, or it differs between rows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub down: Option<[f64; 3]>,
+}
+
+/// Checks that gravity can pull there: a vector of length 1, to 1 %.
+///
+/// # Errors
+/// Says what is wrong with it.
+pub fn check_down(down: &[f64; 3]) -> Result<()> {
+    let length = down.iter().map(|part| part * part).sum::<f64>().sqrt();
+    ensure!(
+        (length - 1.0).abs() <= 0.01,
+        "down is {down:?}, of length {length}: a vector of length 1 is needed, such as [0,0,1]"
+    );
+    Ok(())
 }
 
 /// Presses of which nobody knows the place: the tip was anywhere on the film.
@@ -259,6 +276,7 @@ mod tests {
             seed: 3,
             range: Range::default(),
             free: None,
+            down: None,
         };
         let rows = vec![
             Row {

@@ -263,6 +263,7 @@ impl Recipe {
             seed: self.seed,
             range: self.range,
             free: None,
+            down: None,
         })
     }
 }

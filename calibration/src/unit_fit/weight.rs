@@ -1,0 +1,169 @@
+//! What gravity does to a unit's film when it is turned, by finite elements.
+
+use anyhow::{Context, Result, ensure};
+use hivtac_film::reduced::{AS_A_PRESS_N, LARGEST_TILT, Pose};
+use hivtac_sensing::forward::weight::{AT_REST, SIZES, TERMS, UNDER_LOAD};
+use hivtac_sensing::forward::{EQUATIONS, Stiffness};
+use hivtac_sensing::model::WeightSpec;
+use hivtac_shell::{Design, Equilibrium, Film};
+use serde::{Deserialize, Serialize};
+
+use super::descent::Found;
+use super::field::force_n;
+use super::problem::{At, Problem};
+use crate::forward::{Moved, Pressed, Weighed, weight};
+
+/// Places of the tip along each axis, mm, and tilts in its middle, in parts of the largest.
+const PLACES_MM: [f64; 3] = [-3.8, 0.0, 3.8];
+const TILTS: [[f64; 2]; 4] = [[0.6, 0.0], [-0.6, 0.0], [0.0, 0.6], [0.0, -0.6]];
+
+/// As [`WeightSpec`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OwnWeight {
+    /// Gravity when the unit's loads were put on, parts of g.
+    down: [f64; 3],
+    press_n: f32,
+    unsure: [f32; 2],
+    /// By function of gravity.
+    at_rest: Vec<Moved>,
+    /// Terms by size, function of gravity and coordinate, one after the other.
+    under_load: Vec<f32>,
+}
+
+impl OwnWeight {
+    /// Of a unit whose loads were put on while gravity was known.
+    ///
+    /// # Errors
+    /// When its film finds no equilibrium when it is turned.
+    pub fn new(problem: &Problem<'_>, found: &Found, stiffness_n: [f64; 2]) -> Result<Self> {
+        let at = problem.coarse(&found.at)?;
+        let weightless = turned(&at, [0.0; 3])?;
+        let film = Turned {
+            images: images(problem, &at, &weightless, &weightless.rest()),
+            problem,
+            at: &at,
+            stiffness_n,
+        };
+        let [linear_n, cubic_n] = stiffness_n.map(|part| part as f32);
+        let stiffness = Stiffness { linear_n, cubic_n };
+        let down = at.made.design.down;
+        let spec = weight(&film, stiffness, down).context("the film, turned any way")?;
+        let under_load = spec.under_load.as_flattened().as_flattened().as_flattened();
+        Ok(Self {
+            down,
+            press_n: spec.press_n,
+            unsure: spec.unsure,
+            at_rest: spec.at_rest.to_vec(),
+            under_load: under_load.iter().map(|part| *part as f32).collect(),
+        })
+    }
+
+    /// Checks that it can be a unit's.
+    ///
+    /// # Errors
+    /// Says what cannot.
+    pub fn check(&self) -> Result<()> {
+        self.spec().map(|_| ())
+    }
+
+    /// As a model file has it.
+    ///
+    /// # Errors
+    /// When numbers are missing, too many or not finite.
+    pub fn spec(&self) -> Result<WeightSpec> {
+        let all = self.at_rest.as_flattened().iter();
+        ensure!(
+            all.chain(&self.down).all(|part| part.is_finite())
+                && self.under_load.iter().all(|part| part.is_finite()),
+            "film.own.weight has numbers that are not finite"
+        );
+        let at_rest = <[Moved; AT_REST]>::try_from(self.at_rest.as_slice());
+        let counts = "film.own.weight: numbers are missing, or too many";
+        ensure!(
+            self.under_load.len() == SIZES * UNDER_LOAD * EQUATIONS * TERMS,
+            counts
+        );
+        let mut under_load = [[[[0.0; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES];
+        let all = under_load.as_flattened_mut().as_flattened_mut();
+        for (part, own) in all.as_flattened_mut().iter_mut().zip(&self.under_load) {
+            *part = f64::from(*own);
+        }
+        Ok(WeightSpec {
+            down: self.down.map(|part| part as f32),
+            press_n: self.press_n,
+            unsure: self.unsure,
+            at_rest: at_rest.ok().context(counts)?,
+            under_load,
+        })
+    }
+}
+
+/// A unit's film that is turned.
+struct Turned<'a> {
+    problem: &'a Problem<'a>,
+    /// As its loads were put on.
+    at: &'a At,
+    stiffness_n: [f64; 2],
+    /// Of its dots when it weighs nothing, focal lengths.
+    images: Moved,
+}
+
+impl Weighed for Turned<'_> {
+    fn press_n(&self) -> f64 {
+        let thickness = |design: &Design| design.material.thickness_mm;
+        AS_A_PRESS_N * thickness(&self.at.made.design) / thickness(&Design::default())
+    }
+
+    fn pressed(&self) -> Vec<Pressed> {
+        let places = PLACES_MM
+            .into_iter()
+            .flat_map(|y| PLACES_MM.map(|x| ([x, y], [0.0; 2])));
+        let tilted = TILTS.map(|tilt| ([0.0; 2], tilt.map(|part| LARGEST_TILT * part)));
+        places.chain(tilted).collect()
+    }
+
+    fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>> {
+        let (place_mm, tilt) = *pressed;
+        let film = turned(self.at, down)?;
+        let at_mm = self.at.film.material_point(&self.at.rest, place_mm);
+        let mut state = film.rest();
+        let of_size = |size: &f64| -> Result<Moved> {
+            let pose = Pose {
+                size: *size,
+                tilt,
+                place_mm,
+            };
+            state = film.press_force(at_mm, force_n(self.stiffness_n, &pose), &state)?;
+            Ok(self.beside_weightless(&film, &state))
+        };
+        sizes.iter().map(of_size).collect()
+    }
+
+    fn hangs(&self, down: [f64; 3]) -> Result<Moved> {
+        let film = turned(self.at, down)?;
+        Ok(self.beside_weightless(&film, &film.rest()))
+    }
+}
+
+impl Turned<'_> {
+    fn beside_weightless(&self, film: &Film, state: &Equilibrium) -> Moved {
+        let there = images(self.problem, self.at, film, state);
+        std::array::from_fn(|k| there[k] - self.images[k])
+    }
+}
+
+/// The unit's film with gravity along another direction.
+fn turned(at: &At, down: [f64; 3]) -> Result<Film> {
+    let mut design = at.made.design.clone();
+    design.down = down;
+    Ok(at.film.changed(&design)?)
+}
+
+/// Where the unit's dots are seen, focal lengths.
+fn images(problem: &Problem<'_>, at: &At, film: &Film, state: &Equilibrium) -> Moved {
+    let view = problem.view(&at.made, film);
+    let images = view.images(state, &at.made.dots_mm);
+    let all = images.as_flattened();
+    std::array::from_fn(|k| all[k])
+}
