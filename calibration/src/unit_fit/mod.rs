@@ -58,6 +58,8 @@ pub struct Fit {
     pub own: OwnFilm,
     /// χ² of what is seen and of what was known before, over the coordinates that are seen.
     pub chi_square: f64,
+    /// Whether gravity was known under the loads.
+    is_held: bool,
     /// The load that is explained worst.
     worst: SeenLoad,
     /// Each load, left out of the fit.
@@ -100,6 +102,7 @@ pub fn fit(
     Ok(Fit {
         chi_square: found.chi_square(),
         worst: loads[found.worst()],
+        is_held: bench.down.is_some(),
         left_out: found.left_out(&problem)?,
         own: OwnFilm::new(&problem, &found)?,
     })
@@ -115,7 +118,18 @@ impl fmt::Display for Fit {
         for FoundNumber { name, value, sigma } in &self.own.numbers {
             writeln!(f, "{name:<46} {value:>9.4} ± {sigma:.4}")?;
         }
-        Ok(())
+        let turned = match (self.own.knows_weight(), self.is_held) {
+            (true, _) => "The model holds when the sensor is turned.",
+            (false, true) => {
+                "The film finds no equilibrium when it is turned: then the sensor says \
+                 `weight_unknown`."
+            }
+            (false, false) => {
+                "Nobody said which way the sensor was held (`hivtac settings set down`): when it \
+                 is turned, it says `weight_unknown`."
+            }
+        };
+        writeln!(f, "{turned}")
     }
 }
 

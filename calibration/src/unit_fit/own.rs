@@ -43,7 +43,8 @@ pub struct OwnFilm {
     functions: Vec<Vec<f32>>,
     dots: Vec<OwnTable>,
     covariance: OwnCovariance,
-    /// What gravity does, if it was known under the loads.
+    /// What gravity does, if it was known under the loads, and the film finds an equilibrium any
+    /// way it is turned.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weight: Option<Box<OwnWeight>>,
 }
@@ -119,15 +120,15 @@ impl OwnFilm {
                     .map(|f| f.as_flattened().to_vec())
                     .collect(),
             },
-            weight: match problem.bench.down {
-                Some(_) => Some(Box::new(OwnWeight::new(
-                    problem,
-                    found,
-                    field.stiffness_n(),
-                )?)),
-                None => None,
-            },
+            weight: (problem.bench.down)
+                .and_then(|_| OwnWeight::new(problem, found, field.stiffness_n()).ok())
+                .map(Box::new),
         })
+    }
+
+    /// Whether it holds when the sensor is turned.
+    pub fn knows_weight(&self) -> bool {
+        self.weight.is_some()
     }
 
     /// Checks that it can be a unit's.

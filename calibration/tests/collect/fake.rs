@@ -14,14 +14,17 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::down::Direction;
+use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::{HsvBox, Threshold};
+use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{
     DeviceHello, DeviceMessage, HostMessage, Outcome, PROTOCOL_VERSION, Reply, Request, Sample,
 };
+use hivtac_wire::settings::{RestPosition, TareReport};
 use hivtac_wire::version::SCHEMA_HASH;
 
 /// How hard the hand presses at a time of the sensor, N; it begins after a second.
@@ -171,13 +174,33 @@ fn answer(stream: &mut TcpStream, message: HostMessage, tare: Outcome, streaming
         HostMessage::Command(hivtac_wire::message::Command { id, request }) => {
             let mut outcome = Outcome::Done;
             match request {
-                Request::Tare { .. } => outcome = tare,
+                Request::Tare { .. } => {
+                    send(stream, &DeviceMessage::Tared(tared()));
+                    outcome = tare;
+                }
                 Request::StartWithMarkers => *streaming = true,
                 Request::Stop => *streaming = false,
                 other => panic!("{other:?} was not expected"),
             }
             send(stream, &DeviceMessage::Reply(Reply { id, outcome }));
         }
+    }
+}
+
+/// A tare while the film lies above its camera.
+fn tared() -> TareReport {
+    TareReport {
+        rest: RestPosition {
+            format: PixelFormat::Rgb565,
+            dilations: 1,
+            centroid: CentroidEstimator::BinaryMask,
+            markers: markers([0.0; 3]),
+            rect_center: (Px(160 << 16), Px(120 << 16)),
+            rect_area: Q::from_bits(88 * 88 << 16),
+            down: Some(Direction([0, 0, -1000])),
+        },
+        spread: Px(0),
+        moved: None,
     }
 }
 

@@ -104,6 +104,7 @@ fn from_a_recording_to_a_model_for_the_unit() {
         (data.about.loads, data.about.sessions),
         (Loads::Measured(3), 3)
     );
+    assert_eq!(data.about.down, Some([0.0, 0.0, -1.0]));
     // Where the gauge's force is known, the film's formula gives the very features.
     let rest = data.rest().unwrap();
     let mut pressed = 0;

@@ -87,7 +87,7 @@ impl Bench {
         };
         let mut random = seeded(7_000 + number);
         let loads = self.loads(weights, &rest, unit, tared, &mut random)?;
-        let (own, _) = weights.clone().fitted(rest, &loads, known)?;
+        let (own, _) = weights.clone().fitted(rest, &loads, None, known)?;
         Ok(own)
     }
 

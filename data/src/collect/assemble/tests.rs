@@ -57,6 +57,7 @@ fn recording() -> Recording {
     };
     Recording {
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
+        down: None,
         samples: (0..60 * 39).map(frame).collect(),
         gauge_lines: Vec::new(),
     }
@@ -207,6 +208,7 @@ fn free_recording(seconds: u32) -> (Recording, Series) {
     }
     let recording = Recording {
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
+        down: None,
         samples: (0..seconds * 39).map(frame).collect(),
         gauge_lines: Vec::new(),
     };
