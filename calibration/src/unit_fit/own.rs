@@ -214,7 +214,7 @@ impl OwnFilm {
 /// coordinate, px at 320×240: where many numbers are open, they stand for it.
 fn mesh_px(family: Family) -> f64 {
     match family {
-        Family::Nominal => 0.016,
+        Family::Nominal => 0.02,
         Family::Real => 0.0,
     }
 }
