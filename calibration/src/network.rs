@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 /// Features that enter the network (`force::features`).
 pub const INPUTS: usize = 11;
 /// Numbers that leave it and say a force ([`Meaning`]).
-pub const OUTPUTS: usize = hivtac_sensing::model::OUTPUTS;
+pub const OUTPUTS: usize = hivtac_sensor::force::model::OUTPUTS;
 /// Numbers that leave it after those and say where the tip is, if it tells that.
-pub const PLACE_OUTPUTS: usize = hivtac_sensing::model::PLACE_OUTPUTS;
+pub const PLACE_OUTPUTS: usize = hivtac_sensor::force::model::PLACE_OUTPUTS;
 
 /// What the outputs are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

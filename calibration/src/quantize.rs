@@ -6,11 +6,11 @@
 //! a fixed order: the same weights give the same bytes on every machine.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_sensing::features::FEATURES;
-use hivtac_sensing::model::{self, InputScaling, OutputKind, UncertaintyKnot};
-use hivtac_sensing::model::{encode::LayerSpec, encode::ModelSpec};
-use hivtac_sensing::packing::{MAX_ACTIVATION8, WeightWidth};
-use hivtac_sensing::rest;
+use hivtac_sensor::force::features::FEATURES;
+use hivtac_sensor::force::model::{self, InputScaling, OutputKind, UncertaintyKnot};
+use hivtac_sensor::force::model::{encode::LayerSpec, encode::ModelSpec};
+use hivtac_sensor::force::packing::{MAX_ACTIVATION8, WeightWidth};
+use hivtac_sensor::force::rest;
 use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::forward::FilmModel;

@@ -7,7 +7,7 @@
 //! standard uncertainty of a normal distribution that has its 95 % bound there.
 
 use anyhow::{Result, ensure};
-use hivtac_sensing::model::Uncertainty as ChipUncertainty;
+use hivtac_sensor::force::model::Uncertainty as ChipUncertainty;
 use serde::{Deserialize, Serialize};
 
 use hivtac_data::loads::norm;
@@ -22,7 +22,7 @@ const FEWEST: f64 = 60.0;
 
 const KNOTS: usize = ChipUncertainty::KNOTS;
 
-/// Standard uncertainties over |F|, as [`hivtac_sensing::model::Uncertainty`] has them.
+/// Standard uncertainties over |F|, as [`hivtac_sensor::force::model::Uncertainty`] has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Uncertainty {

@@ -10,7 +10,7 @@ use hivtac_data::dataset::{Loads, Recipe, generate, measure};
 use hivtac_data::range::Range;
 use hivtac_evaluation::check::{check, recipe, sensor};
 use hivtac_evaluation::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
-use hivtac_sensing::model::{Model, Origin, OutputKind};
+use hivtac_sensor::force::model::{Model, Origin, OutputKind};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, ensure};
 use hivtac_host::shown::unit_number;
 use hivtac_scene::{Camera, Contact};
-use hivtac_sensing::model::{self, Origin};
+use hivtac_sensor::force::model::{self, Origin};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{PixelFormat, Threshold};

@@ -1,7 +1,7 @@
 //! What an untouched film looks like.
 
 use anyhow::{Context, Result};
-use hivtac_sensing::features::{COORDINATES, FEATURES, Features};
+use hivtac_sensor::force::features::{COORDINATES, FEATURES, Features};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::units::Px;
 use serde::{Deserialize, Serialize};

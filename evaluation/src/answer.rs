@@ -1,11 +1,11 @@
 //! What the chip says of a row of a data set.
 
 use anyhow::Result;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::force::{self, Force, FrameNoise, Resting};
-use hivtac_sensing::model::Model;
-use hivtac_sensing::network::Network;
-use hivtac_sensing::rest::Rest;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::{self, Force, FrameNoise, Resting};
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network;
+use hivtac_sensor::force::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 

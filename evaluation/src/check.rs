@@ -6,9 +6,9 @@ use std::fmt;
 
 use anyhow::{Result, anyhow, bail, ensure};
 use hivtac_scene::Contact;
-use hivtac_sensing::force::Force;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensor::force::Force;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::conditions::ContactReading;
 use hivtac_terms::threshold::ByteOrder;
 use rayon::prelude::*;

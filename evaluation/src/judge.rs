@@ -5,8 +5,8 @@ use std::collections::btree_map::Entry;
 
 use anyhow::{Result, anyhow, ensure};
 use hivtac_scene::Contact;
-use hivtac_sensing::force::{Force, Place};
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::{Force, Place};
+use hivtac_sensor::force::model::Model;
 use hivtac_terms::status::Status;
 
 use crate::answer::Chip;

@@ -4,7 +4,7 @@ use crate::settings::{name, of_pipeline};
 use crate::{board, camera};
 use core::fmt::Write;
 use heapless::String;
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_wire::message::DeviceHello;

@@ -61,7 +61,7 @@ use defmt_rtt as _;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
-use hivtac_sensing::forward::Drift;
+use hivtac_sensor::force::forward::Drift;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;

@@ -1,6 +1,6 @@
 //! The threshold's table of 64 KiB, in DTCM whatever else the pipeline holds lies in.
 
-use hivtac_sensing::tables::{ByteTable, Pixels, Run, Table, Weights};
+use hivtac_sensor::markers::tables::{ByteTable, Pixels, Run, Table, Weights};
 use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 use static_cell::ConstStaticCell;
 

@@ -4,10 +4,10 @@
 use crate::pipeline_task::Sensor;
 use crate::shared::{DOWN, NAME, PIPELINE};
 use core::cell::Cell;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::forward::CameraMotion;
-use hivtac_sensing::rest::Rest;
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::forward::CameraMotion;
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::angle::atan2;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;

@@ -4,9 +4,9 @@ use crate::camera;
 use crate::pipeline_task::Sensor;
 use crate::session;
 use embassy_time::{Duration, Instant};
-use hivtac_sensing::pipeline::Measurement;
-use hivtac_sensing::rest::Rest;
-use hivtac_sensing::tare::{Refusal, TareBuilder};
+use hivtac_sensor::pipeline::Measurement;
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::units::Px;
 use hivtac_wire::message::Outcome;
 

@@ -7,7 +7,7 @@ use hivtac_data::collect::assemble::{Gauge, How, assemble};
 use hivtac_data::collect::folder::Recording;
 use hivtac_data::collect::gauge_file;
 use hivtac_data::dataset::Dataset;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 
 /// Ends one of several files in an input.
 const END: char = '\0';

@@ -2,12 +2,12 @@
 //! no force says why.
 
 use arbitrary::{Result, Unstructured};
-use hivtac_sensing::forward::Drift;
-use hivtac_sensing::model::{AlignedFile, Model};
-use hivtac_sensing::motion::Motion;
-use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensor::force::forward::Drift;
+use hivtac_sensor::force::model::{AlignedFile, Model};
+use hivtac_sensor::motion::Motion;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::status::Status;

@@ -1,7 +1,7 @@
 //! Markers and their rest position, as frames may show them.
 
 use arbitrary::{Result, Unstructured};
-use hivtac_force::rest::Rest;
+use hivtac_sensor::force::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 

@@ -1,7 +1,7 @@
 //! Pictures in files: an error names the file, or there are all pixels of a frame.
 
 use hivtac_host::picture::Picture;
-use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
+use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
 
 /// Reads the input as a PNG, JPEG or PPM file, or as a raw frame.
 pub fn attack(input: &[u8]) -> bool {

@@ -3,9 +3,9 @@
 use crate::decimal::Millionths;
 use crate::force_json::ForceJson;
 use crate::lines::{contact_text, status_text, to_json};
-use hivtac_sensing::blob::Blob;
-use hivtac_sensing::pipeline::Measurement;
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::markers::blob::Blob;
+use hivtac_sensor::pipeline::Measurement;
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use serde::Serialize;

@@ -2,8 +2,8 @@
 //! takes for markers.
 
 use crate::frame::Frame;
-use hivtac_sensing::formats::Formats;
-use hivtac_sensing::tables::{ByteTable, Pixels};
+use hivtac_sensor::markers::formats::Formats;
+use hivtac_sensor::markers::tables::{ByteTable, Pixels};
 use hivtac_terms::hsv::rgb888;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat};
 

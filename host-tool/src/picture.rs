@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::files::read_at_most;
 use crate::frame::pixels;
 use crate::raw;
-use hivtac_sensing::scanner::{MAX_HEIGHT, MAX_WIDTH};
+use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use hivtac_terms::threshold::PixelFormat;
 
 /// A picture as the sensing takes it: RGB565 with red in the high bits, or a frame of the device.

@@ -10,7 +10,7 @@ use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use hivtac_wire::message::{
     DeviceHello, MODEL_BYTES, MODEL_PART_BYTES, ModelIdentity, ModelPart, ModelSource, Request,
 };

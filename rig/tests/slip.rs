@@ -3,8 +3,8 @@
 
 use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
-use hivtac_sensing::pipeline::Measurement;
-use hivtac_sensing::temporal::{Moment, Temporal};
+use hivtac_sensor::pipeline::Measurement;
+use hivtac_sensor::temporal::{Moment, Temporal};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, TemporalSettings};
 use hivtac_terms::units::{MicroNewtons, Milliseconds, UnsignedMicroNewtons};

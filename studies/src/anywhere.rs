@@ -8,7 +8,7 @@ use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_scene::Options;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 
 use crate::page;
 use crate::press::{FORCES_MN, Held, REACH_MM, TestedUnit, press};
@@ -46,7 +46,7 @@ impl Anywhere {
              direction, \\|F\\|, place | within the stated 95 %: direction, \\|F\\|, place | \
              refused |\n|--:|--:|--:|--:|--:|---|---|--:|\n",
         );
-        for steps in 0..=hivtac_sensing::forward::MOST_STEPS {
+        for steps in 0..=hivtac_sensor::force::forward::MOST_STEPS {
             for held in self.held(&weights, Some(steps))? {
                 writeln!(
                     text,

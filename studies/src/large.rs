@@ -13,7 +13,7 @@ use hivtac_data::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_data::range::Range;
 use hivtac_film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_scene::Options;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 use rayon::prelude::*;
 

@@ -11,7 +11,7 @@ use hivtac_data::dataset::{Dataset, Observation};
 use hivtac_data::loads::norm;
 use hivtac_evaluation::answer::Chip;
 use hivtac_evaluation::errors::angle_deg;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use serde::Serialize;

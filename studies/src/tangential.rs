@@ -7,7 +7,7 @@ use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_scene::Options;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 

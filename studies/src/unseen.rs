@@ -6,8 +6,8 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensing::forward::{Estimate, Forward, Pose};
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::forward::{Estimate, Forward, Pose};
+use hivtac_sensor::force::model::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 

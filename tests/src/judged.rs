@@ -5,8 +5,8 @@ use std::format;
 use std::string::String;
 
 use hivtac_scene::{Load, SceneError, Truth};
-use hivtac_sensing::force::Force;
-use hivtac_sensing::pipeline::Measurement;
+use hivtac_sensor::force::Force;
+use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;
 
 use crate::pictures::Random;

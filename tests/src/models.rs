@@ -2,14 +2,14 @@
 
 use std::vec::Vec;
 
-use hivtac_sensing::features::{FEATURES, Features};
-use hivtac_sensing::model::{
+use hivtac_sensor::force::features::{FEATURES, Features};
+use hivtac_sensor::force::model::{
     CalibratedRange, Conditions, InputScaling, Origin, OutputKind, Uncertainty, UncertaintyKnot,
 };
-use hivtac_sensing::model::{encode::LayerSpec, encode::ModelSpec, encode::with_steps};
-use hivtac_sensing::packing::WeightWidth;
-use hivtac_sensing::rest::Rest;
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::force::model::{encode::LayerSpec, encode::ModelSpec, encode::with_steps};
+use hivtac_sensor::force::packing::WeightWidth;
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;

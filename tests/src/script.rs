@@ -2,8 +2,8 @@
 
 use std::vec::Vec;
 
-use hivtac_sensing::features::Features;
-use hivtac_sensing::rest::Rest;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::rest::Rest;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 

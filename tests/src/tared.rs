@@ -6,12 +6,12 @@ use std::vec::Vec;
 
 use anyhow::{Context, Result, anyhow};
 use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
-use hivtac_sensing::forward::Drift;
-use hivtac_sensing::model::{Model, OutputKind};
-use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::rest::Rest;
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tare::{Refusal, TareBuilder};
+use hivtac_sensor::force::forward::Drift;
+use hivtac_sensor::force::model::{Model, OutputKind};
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::down::Down;
 use hivtac_terms::geometry::Geometry;

@@ -1,11 +1,11 @@
 //! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
 
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
-use hivtac_sensing::features::Features;
-use hivtac_sensing::forward::MOST_STEPS;
-use hivtac_sensing::layer::MAX_WIDTH;
-use hivtac_sensing::model::{Model, OutputKind};
-use hivtac_sensing::rest::Rest;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::forward::MOST_STEPS;
+use hivtac_sensor::force::layer::MAX_WIDTH;
+use hivtac_sensor::force::model::{Model, OutputKind};
+use hivtac_sensor::force::rest::Rest;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, HsvBox, PixelFormat, Threshold};

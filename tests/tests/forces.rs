@@ -7,9 +7,9 @@ use std::path::Path;
 
 use crate::rig::{Rig, ToolOutput, json_lines, tool};
 use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
-use hivtac_sensing::model::Model;
-use hivtac_sensing::motion::Motion;
-use hivtac_sensing::pipeline::{Measurement, Sensor};
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::motion::Motion;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::artifact;

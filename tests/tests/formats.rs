@@ -1,8 +1,8 @@
 //! Markers in frames of the scene's other pixel formats.
 
 use hivtac_scene::{Format, Frame, Load, Options, Preset, Scene};
-use hivtac_sensing::scanner::{ScanSettings, Scanner};
-use hivtac_sensing::tables::Pixels;
+use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
+use hivtac_sensor::markers::tables::Pixels;
 use hivtac_terms::threshold::{Mono, Yuv422};
 
 fn frame(format: Format, load: &Load) -> Frame {

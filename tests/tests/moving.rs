@@ -7,9 +7,9 @@ use std::fs;
 use std::path::Path;
 
 use hivtac_scene::{Motion, Preset, Scene, Shutter, Vibration};
-use hivtac_sensing::model::Model;
-use hivtac_sensing::motion;
-use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::motion;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
 
 /// Lines of an OV7725's frame, of which 240 are rows.

@@ -65,7 +65,7 @@ fn the_sensing_runs_from_itcm() {
             "hivtac_terms",
             "hivtac_markers",
             "hivtac_force",
-            "hivtac_sensing",
+            "hivtac_sensor",
         ];
         packages.iter().any(|package| symbol.name.contains(package))
             || symbol.name.starts_with("hivtac_")
@@ -76,9 +76,9 @@ fn the_sensing_runs_from_itcm() {
     let seldom = [
         "hivtac_force5model",
         "hivtac_force..model",
-        "hivtac_sensing4tare",
-        "hivtac_sensing8temporal",
-        "hivtac_sensing6rezero",
+        "hivtac_sensor4tare",
+        "hivtac_sensor8temporal",
+        "hivtac_sensor6rezero",
         "8pipeline9following",
         "serde_core",
         "$GT$7prepare17h",

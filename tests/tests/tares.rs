@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use hivtac_scene::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, Preset, Scene};
-use hivtac_sensing::tare::Refusal;
+use hivtac_sensor::tare::Refusal;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;

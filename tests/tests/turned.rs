@@ -1,8 +1,8 @@
 //! A sensor that is turned over: its film hangs the other way.
 
 use hivtac_scene::{Frame, Load, Mechanics, Options, Preset, Scene};
-use hivtac_sensing::pipeline::Measurement;
-use hivtac_sensing::tare::Refusal;
+use hivtac_sensor::pipeline::Measurement;
+use hivtac_sensor::tare::Refusal;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged, errors};

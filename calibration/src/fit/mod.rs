@@ -2,9 +2,9 @@
 //! held out.
 
 use anyhow::{Context, Result, anyhow, ensure};
-use hivtac_sensing::features::Features;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::network::Network as ChipNetwork;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network as ChipNetwork;
 
 use crate::network::Network;
 use crate::quantize::export;

@@ -1,8 +1,8 @@
 //! What a film's tables leave of how a unit's images move: covariances at even places and sizes.
 
 use hivtac_film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_sensing::forward::EQUATIONS;
-use hivtac_sensing::model::CovarianceSpec;
+use hivtac_sensor::force::forward::EQUATIONS;
+use hivtac_sensor::force::model::CovarianceSpec;
 
 use super::matrix::cholesky;
 
@@ -81,7 +81,7 @@ fn factor(covariance: &Covariance) -> Covariance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_sensing::forward::{CovarianceGrid, Limits, Pose as ChipPose};
+    use hivtac_sensor::force::forward::{CovarianceGrid, Limits, Pose as ChipPose};
 
     /// What a chip reads of a grid is what went in, at knots and between them.
     #[test]

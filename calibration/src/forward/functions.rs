@@ -3,8 +3,8 @@
 
 use anyhow::Result;
 use hivtac_film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
-use hivtac_sensing::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
-use hivtac_sensing::model::{TableSpec, TablesSpec};
+use hivtac_sensor::force::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
+use hivtac_sensor::force::model::{TableSpec, TablesSpec};
 
 use super::matrix::{Matrix, cholesky, principal};
 use super::nearest::{self, splines};

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_film::reduced::NOMINAL_RADIUS_MM;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 
 use super::{FilmModel, Noise};
 use crate::quantize::export;

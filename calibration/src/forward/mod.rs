@@ -19,8 +19,8 @@ use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_film::Film;
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_scene::{Camera, Disc, FILM_DISTANCE_MM, Load, Preset};
-use hivtac_sensing::forward::{self, DOTS, Limits, RestImage, Stiffness};
-use hivtac_sensing::model::{ForwardSpec, TablesSpec, WeightSpec};
+use hivtac_sensor::force::forward::{self, DOTS, Limits, RestImage, Stiffness};
+use hivtac_sensor::force::model::{ForwardSpec, TablesSpec, WeightSpec};
 use serde::{Deserialize, Serialize};
 
 use crate::unit_fit::OwnFilm;

@@ -4,8 +4,8 @@ use anyhow::Result;
 use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
 use hivtac_film::{Film, MAX_PLACE_MM};
 use hivtac_scene::{Camera, Disc, Load};
-use hivtac_sensing::forward::MOST_TILTS;
-use hivtac_sensing::model::TablesSpec;
+use hivtac_sensor::force::forward::MOST_TILTS;
+use hivtac_sensor::force::model::TablesSpec;
 use rayon::prelude::*;
 
 use super::functions::{Sampled, compressed};

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use hivtac_film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
-use hivtac_sensing::forward::weight::{AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms};
-use hivtac_sensing::forward::{EQUATIONS, Gravity, Stiffness};
-use hivtac_sensing::model::WeightSpec;
+use hivtac_sensor::force::forward::weight::{AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms};
+use hivtac_sensor::force::forward::{EQUATIONS, Gravity, Stiffness};
+use hivtac_sensor::force::model::WeightSpec;
 use rayon::prelude::*;
 
 use super::covariances::Moved;

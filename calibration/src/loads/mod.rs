@@ -17,8 +17,8 @@ use hivtac_data::dataset::{Dataset, Observation, Sample};
 use hivtac_data::loads::norm;
 use hivtac_data::rest::Rest;
 use hivtac_evaluation::answer::Chip;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::model::Model;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 

@@ -5,7 +5,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 
-use hivtac_sensing::features::FEATURES;
+use hivtac_sensor::force::features::FEATURES;
 
 use super::*;
 use crate::quantize::export;

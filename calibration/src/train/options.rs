@@ -10,9 +10,9 @@ use crate::network::{Arithmetic, Layer, Meaning, Network};
 use crate::weights::Weights;
 
 /// The widest layer that a model file can hold.
-const WIDEST: usize = hivtac_sensing::layer::MAX_WIDTH;
+const WIDEST: usize = hivtac_sensor::force::layer::MAX_WIDTH;
 /// The most layers between inputs and outputs.
-const MOST_HIDDEN: usize = hivtac_sensing::model::MAX_LAYERS - 1;
+const MOST_HIDDEN: usize = hivtac_sensor::force::model::MAX_LAYERS - 1;
 
 /// How to train. Those without an argument are for studies of other networks: what they are by
 /// default is what helps.

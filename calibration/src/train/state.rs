@@ -1,8 +1,8 @@
 //! A training as it goes on: weights, optimizer, data and the best weights so far.
 
 use anyhow::Result;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::network::scale_inputs;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::network::scale_inputs;
 use hivtac_terms::fixed::Q;
 use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;

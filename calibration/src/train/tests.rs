@@ -1,5 +1,5 @@
-use hivtac_sensing::model::Model;
-use hivtac_sensing::network::Network as ChipNetwork;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network as ChipNetwork;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -1,5 +1,5 @@
 use hivtac_scene::{Camera, MARKERS, Preset};
-use hivtac_sensing::forward::{self as chip, Forward};
+use hivtac_sensor::force::forward::{self as chip, Forward};
 use hivtac_shell::{Design, Equilibrium, Film, Law};
 
 use super::problem::Made;

@@ -2,9 +2,9 @@
 
 use anyhow::{Context, Result, ensure};
 use hivtac_film::reduced::{AS_A_PRESS_N, LARGEST_TILT, Pose};
-use hivtac_sensing::forward::weight::{AT_REST, SIZES, TERMS, UNDER_LOAD};
-use hivtac_sensing::forward::{EQUATIONS, Stiffness};
-use hivtac_sensing::model::WeightSpec;
+use hivtac_sensor::force::forward::weight::{AT_REST, SIZES, TERMS, UNDER_LOAD};
+use hivtac_sensor::force::forward::{EQUATIONS, Stiffness};
+use hivtac_sensor::force::model::WeightSpec;
 use hivtac_shell::{Design, Equilibrium, Film};
 use serde::{Deserialize, Serialize};
 

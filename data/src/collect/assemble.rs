@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_sensing::features::Features;
+use hivtac_sensor::force::features::Features;
 use hivtac_terms::marker::Marker;
 
 use super::align::{Alignment, RadiusSample, Search, align};

@@ -4,11 +4,11 @@ use std::sync::Mutex;
 
 use anyhow::{Result, anyhow};
 use hivtac_scene::Frame;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::forward::Drift;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::forward::Drift;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, Threshold};

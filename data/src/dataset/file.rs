@@ -11,7 +11,7 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use csv::StringRecord;
-use hivtac_sensing::features::FEATURES;
+use hivtac_sensor::force::features::FEATURES;
 use hivtac_terms::fixed::Q;
 
 use super::{About, Dataset, Observation, Place, Row, check_down};

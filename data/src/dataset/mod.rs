@@ -11,7 +11,7 @@ mod split;
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_sensing::features::FEATURES;
+use hivtac_sensor::force::features::FEATURES;
 use hivtac_terms::fixed::Q;
 use serde::{Deserialize, Serialize};
 

@@ -10,7 +10,7 @@ use super::registers::Registers;
 use super::{Bus, Error, Pace, Search, Setting, frame_time, store};
 use crate::board::{CameraLines, XCLK_HZ};
 use embassy_time::{Duration, Timer};
-use hivtac_sensing::motion::Motion;
+use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::units::{Microseconds, Sixteenths};

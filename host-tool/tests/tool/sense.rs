@@ -2,8 +2,8 @@
 
 use crate::run::*;
 use hivtac_scene::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
-use hivtac_sensing::model::Model;
-use hivtac_sensing::pipeline::Sensor;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};

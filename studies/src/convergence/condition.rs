@@ -1,6 +1,6 @@
 //! How well the markers tell the parts of a load.
 
-use hivtac_sensing::forward::{Estimate, Forward, UNKNOWNS};
+use hivtac_sensor::force::forward::{Estimate, Forward, UNKNOWNS};
 
 /// Jacobi's rotations sweep so often at most: four or five bring five rows to rounding.
 const SWEEPS: usize = 12;

@@ -1,13 +1,13 @@
 //! Ways from first guesses to a contact, as the sensor goes them.
 
 use anyhow::Result;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::force;
-use hivtac_sensing::forward::{
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force;
+use hivtac_sensor::force::forward::{
     Descent, Estimate, Forward, Mounting, Observed, Pose, STEPS_AT_MOST, UNEXPLAINED,
 };
-use hivtac_sensing::model::Model;
-use hivtac_sensing::network::Network;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 

@@ -11,7 +11,7 @@ use hivtac_data::dataset::{
 };
 use hivtac_data::range::Range;
 use hivtac_scene::Contact;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 
 use super::PeersArgs;

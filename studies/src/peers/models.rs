@@ -10,9 +10,9 @@ use hivtac_data::dataset::Dataset;
 use hivtac_data::rest::features_from_q16;
 use hivtac_evaluation::check::vector_n;
 use hivtac_scene::Contact;
-use hivtac_sensing::force;
-use hivtac_sensing::model::Model as Chip;
-use hivtac_sensing::network::Network;
+use hivtac_sensor::force;
+use hivtac_sensor::force::model::Model as Chip;
+use hivtac_sensor::force::network::Network;
 
 use super::frames::{Frames, Sets};
 use super::{PeersArgs, there};

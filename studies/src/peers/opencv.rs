@@ -9,7 +9,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use anyhow::{Context, Result, ensure};
 use hivtac_data::dataset::{Detection, MarkerDetector, Observation};
 use hivtac_scene::Frame;
-use hivtac_sensing::features::Features;
+use hivtac_sensor::force::features::Features;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 

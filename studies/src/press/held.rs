@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use hivtac_scene::Load;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use serde::Serialize;
 
 use super::{Answer, Bound, Errors, Noise, Row, TestedUnit};

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use hivtac_evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_evaluation::errors::angle_deg;
 use hivtac_scene::Load;
-use hivtac_sensing::force::Force;
+use hivtac_sensor::force::Force;
 use serde::Serialize;
 
 /// How far an answer is off, and its stated 95 % bounds: of the direction, degrees, of |F|, mN, and

@@ -3,11 +3,11 @@
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_data::dataset::reasons;
 use hivtac_scene::{Camera, Frame, Load, Scene, Truth};
-use hivtac_sensing::forward::Drift;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::settings::Settings;
-use hivtac_sensing::tare::TareBuilder;
+use hivtac_sensor::force::forward::Drift;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;

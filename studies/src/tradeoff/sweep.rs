@@ -13,8 +13,8 @@ use hivtac_data::dataset::{Dataset, Row};
 use hivtac_data::loads::norm;
 use hivtac_evaluation::answer::Chip;
 use hivtac_evaluation::errors::{WEAK_N, angle_deg};
-use hivtac_sensing::model::Model;
-use hivtac_sensing::model::encode::with_steps;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::model::encode::with_steps;
 use hivtac_terms::status::Status;
 use rayon::prelude::*;
 

@@ -85,7 +85,7 @@ fn the_committed_results_pick_the_default_model() {
     let picked = best(&all, &Limits::default()).unwrap();
     assert_eq!(picked.reach(), Reach::Firmware);
     let bytes = fs::read(folder.join("../calibration/models/default.hvtm")).unwrap();
-    let model = hivtac_sensing::model::Model::parse(&bytes).unwrap();
+    let model = hivtac_sensor::force::model::Model::parse(&bytes).unwrap();
     assert_eq!(model.conditions.centroid, picked.centroid);
     let name = format!("11-{}-5 ov7725", picked.estimator);
     assert_eq!(model.name().as_str(), name);

@@ -8,7 +8,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_data::rest::Rest;
 use hivtac_scene::Load;
-use hivtac_sensing::features::Features;
+use hivtac_sensor::force::features::Features;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 

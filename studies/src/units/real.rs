@@ -5,7 +5,7 @@ use std::fmt::Write;
 use anyhow::{Context, Result, anyhow};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -7,7 +7,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_film::DiscMotion;
 use hivtac_scene::Load;
-use hivtac_sensing::model::Model;
+use hivtac_sensor::force::model::Model;
 use serde_json::{Value, json};
 
 use super::own_weights;

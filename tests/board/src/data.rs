@@ -1,6 +1,6 @@
 //! The frames and models that are measured, as `benchmark-cases` (in `tests`) wrote them.
 
-use hivtac_sensing::model::AlignedFile;
+use hivtac_sensor::force::model::AlignedFile;
 
 /// A frame and the model that is for it.
 pub struct Frame {

@@ -1,11 +1,11 @@
 //! What is timed.
 
-use hivtac_sensing::features::Features;
-use hivtac_sensing::model::Model;
-use hivtac_sensing::network::Network as Inference;
-use hivtac_sensing::pipeline;
-use hivtac_sensing::scanner::{MAX_WIDTH, ScanSettings, Scanner};
-use hivtac_sensing::tables::Pixels;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network as Inference;
+use hivtac_sensor::pipeline;
+use hivtac_sensor::markers::scanner::{MAX_WIDTH, ScanSettings, Scanner};
+use hivtac_sensor::markers::tables::Pixels;
 use hivtac_terms::threshold::ByteOrder;
 
 use crate::data::{Frame, Network};

@@ -11,9 +11,9 @@ use std::{env, fs};
 
 use anyhow::{Context, Result};
 use hivtac_scene::{Preset, Scene};
-use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::screen::ScreenedTable;
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::markers::screen::ScreenedTable;
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::pictures;

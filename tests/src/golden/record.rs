@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use hivtac_sensing::model::ModelError;
-use hivtac_sensing::scanner::ScanError;
-use hivtac_sensing::settings::SettingsError;
+use hivtac_sensor::force::model::ModelError;
+use hivtac_sensor::markers::scanner::ScanError;
+use hivtac_sensor::markers::settings::SettingsError;
 use hivtac_terms::threshold::ThresholdError;
 
 /// What a record holds.

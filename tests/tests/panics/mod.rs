@@ -26,7 +26,7 @@ const NEVER: [&str; 9] = [
     "hivtac_terms",
     "hivtac_markers",
     "hivtac_force",
-    "hivtac_sensing",
+    "hivtac_sensor",
     "hivtac_capture",
     "hivtac_wire",
     "9band_copy",

@@ -8,10 +8,15 @@ use addr2line::Loader;
 use anyhow::{Context, Result, anyhow};
 
 /// The modules of each stage, a line each.
-const LISTED: &str = include_str!("../../../sensing/stages.txt");
+const LISTED: &str = include_str!("../../../sensor/stages.txt");
 
-/// The folders of the packages that are the sensing.
-const PACKAGES: [&str; 4] = ["terms", "markers", "force", "sensing"];
+/// The folders whose modules are the sensing, and what their names begin with: the innermost first.
+const FOLDERS: [(&str, &str); 4] = [
+    ("sensor/terms/src", "terms/"),
+    ("sensor/src/markers", "markers/"),
+    ("sensor/src/force", "force/"),
+    ("sensor/src", ""),
+];
 
 /// The stages, in the order in which a frame goes through them.
 pub const ORDER: [&str; 10] = [
@@ -102,17 +107,17 @@ fn stage(files: &[String]) -> Option<&'static str> {
 }
 
 fn stage_of_file(file: &str) -> Option<&'static str> {
-    let module = PACKAGES.iter().find_map(|package| {
-        let (_, within) = file.rsplit_once(&format!("/{package}/src/"))?;
+    let module = FOLDERS.iter().find_map(|(folder, begin)| {
+        let (_, within) = file.rsplit_once(&format!("/{folder}/"))?;
         let name = within.split(['/', '.']).next()?;
-        Some(format!("{package}/{name}"))
+        Some(format!("{begin}{name}"))
     })?;
     ORDER
         .into_iter()
         .find(|stage| modules_of(stage).any(|name| name == module))
 }
 
-/// The modules of a stage: package and name.
+/// The modules of a stage.
 fn modules_of(stage: &str) -> impl Iterator<Item = &'static str> {
     let lines = LISTED.lines().filter_map(|line| line.rsplit_once(':'));
     let of_it = lines.filter(move |(name, _)| *name == stage);
@@ -151,18 +156,18 @@ mod tests {
     #[test]
     fn the_innermost_function_of_the_sensing_decides() {
         let core = "/rustc/1/library/core/src/slice.rs";
-        let (label, scanner) = ("/p/markers/src/label.rs", "/p/markers/src/scanner.rs");
+        let (label, scanner) = ("/p/sensor/src/markers/label.rs", "/p/sensor/src/markers/scanner.rs");
         assert_eq!(
             stage_of(&[core, label, scanner]),
             Some("runs, labels, moments")
         );
         assert_eq!(stage_of(&[core, scanner]), Some("pipeline"));
         assert_eq!(
-            stage_of(&["/p/terms/src/units.rs", label]),
+            stage_of(&["/p/sensor/terms/src/units.rs", label]),
             Some("runs, labels, moments")
         );
         assert_eq!(
-            stage_of(&["/p/markers/src/rules/shape.rs"]),
+            stage_of(&["/p/sensor/src/markers/rules/shape.rs"]),
             Some("markers")
         );
     }
@@ -172,16 +177,17 @@ mod tests {
         let stages = ORDER.into_iter().chain(["caller"]);
         let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
         listed.sort();
-        let modules = |package: &&str| {
-            let folder = crate::workspace::folder(package).join("src");
-            let entries = std::fs::read_dir(folder).unwrap();
+        let modules = |(folder, begin): &(&str, &str)| {
+            let entries = std::fs::read_dir(crate::workspace::folder(folder)).unwrap();
             let name = |entry: std::io::Result<std::fs::DirEntry>| {
                 let path = entry.unwrap().path();
-                format!("{package}/{}", path.file_stem().unwrap().to_str().unwrap())
+                format!("{begin}{}", path.file_stem().unwrap().to_str().unwrap())
             };
             entries.map(name).collect::<Vec<_>>()
         };
-        let mut found: Vec<String> = PACKAGES.iter().flat_map(modules).collect();
+        let mut found: Vec<String> = FOLDERS.iter().flat_map(modules).collect();
+        // Folders of their own.
+        found.retain(|module| !["markers", "force"].contains(&module.as_str()));
         found.sort();
         assert_eq!(listed, found);
     }

@@ -14,12 +14,12 @@ use std::{env, fs};
 
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_scene::{Format, Load, Options, Preset, Scene};
-use hivtac_sensing::features::Features;
-use hivtac_sensing::forward::MOST_STEPS;
-use hivtac_sensing::model::{Model, OutputKind};
-use hivtac_sensing::pipeline::Sensor;
-use hivtac_sensing::rest::Rest;
-use hivtac_sensing::settings::Settings;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::forward::MOST_STEPS;
+use hivtac_sensor::force::model::{Model, OutputKind};
+use hivtac_sensor::pipeline::Sensor;
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::conditions::CentroidEstimator::{self, BinaryMask, RednessWeighted};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;

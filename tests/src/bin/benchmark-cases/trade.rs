@@ -8,9 +8,9 @@ use std::path::Path;
 
 use anyhow::Result;
 use hivtac_scene::Scene;
-use hivtac_sensing::features::Features;
-use hivtac_sensing::forward::MOST_STEPS;
-use hivtac_sensing::rest::Rest;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::forward::MOST_STEPS;
+use hivtac_sensor::force::rest::Rest;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};

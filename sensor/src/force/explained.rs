@@ -1,0 +1,321 @@
+//! The force that explains the markers best, by the film run forwards.
+
+use super::{Force, FrameNoise, Place, Polar, trust};
+use crate::force::forward::{
+    Column, Covariance, DOTS, Drift, Estimate, Forward, Hanging, Markers, Mounting, Noise,
+    Observed, Pose, Sigma, Strength, Turned,
+};
+use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
+use crate::force::network::Output;
+use crate::force::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::units::{
+    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+};
+
+/// Where a unit's markers rest, and what follows from that before there is a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resting {
+    mounting: Mounting,
+    /// Whether it is the unit that the model was made on.
+    is_own: bool,
+    px: Markers,
+    areas: [f32; DOTS],
+    /// How far that may be from where the film rests; `None` where it is known.
+    drift: Option<Covariance>,
+    /// What the film's own weight does; `None` where the tables and the rest position have it.
+    hanging: Option<Hanging>,
+}
+
+/// What is left over of markers that are known less well, in parts of its variance, is seldom more
+/// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
+/// the light: in 1 of 1,000 frames).
+const UNEXPLAINED_BLURRED: f32 = 5.0;
+/// Where the search for a light touch begins, in parts of the largest size.
+const FIRST_SIZE: f32 = 0.1;
+/// How exactly units are built, as standard deviations: a marker's place along each axis, mm; and
+/// whatever shift and turn its camera has, in parts of the pattern's radius, its focal length and
+/// its distance from the film.
+const GLUED_MM: f32 = 0.15;
+const BUILT: Drift = Drift {
+    unseen: [0.1, 0.1, 0.025],
+    ..Drift::NONE
+};
+/// Areas at which a marker's noise is known, in parts of the one at rest.
+const AREAS: [f32; 2] = [0.5, 6.0];
+
+impl Resting {
+    /// For a model that takes steps, and markers that rest there; the film's weight is no matter:
+    /// it hangs as it did when the rest position was taken.
+    pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
+        Resting::of_turned(model, rest, None)
+    }
+
+    /// The same of a sensor that was turned since, and markers that rest there as gravity is now.
+    pub fn of_turned(model: &Model<'_>, rest: &Rest, turned: Option<Turned>) -> Option<Resting> {
+        let forward = model.forward.as_ref().filter(|forward| forward.steps > 0)?;
+        let flat = turned.map_or(*rest, |turned| forward.as_made(rest, turned));
+        let mut resting = Resting::new(forward, rest, &flat, &model.rest, !model.is_simulated());
+        resting.hanging = turned.and_then(|turned| forward.hanging(turned, resting.is_own));
+        Some(resting)
+    }
+
+    /// Says how far the film may rest from there.
+    pub fn set_drift(&mut self, drift: &Drift) {
+        let is_known = *drift == Drift::NONE;
+        self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
+    }
+
+    /// For markers that rest there, and at `flat` where gravity pulls as it did on the model's
+    /// film: by what the model knows of the unit that it was made on; of another one by what its
+    /// rest picture tells. The camera of a unit that was calibrated may have been mounted anew.
+    fn new(
+        forward: &Forward<'_>,
+        rest: &Rest,
+        flat: &Rest,
+        own: &Rest,
+        is_calibrated: bool,
+    ) -> Resting {
+        let told = forward.rest_image.mounting(flat);
+        let near = own.is_near(&flat.features);
+        // The tables are of this unit's own markers.
+        let known = Mounting {
+            per_px: forward.per_px.unwrap_or(told.per_px),
+            beside_mm: Markers::default(),
+        };
+        let own = match near {
+            true => Some(known),
+            false => known.remounted(flat, own).filter(|_| is_calibrated),
+        };
+        let is_own = own.is_some();
+        let mounting = own.unwrap_or(told);
+        let centroids = rest.features.centroids;
+        let off = match near {
+            true => forward.noise.rest_px,
+            false => Markers::default(),
+        };
+        let at = |k: usize| {
+            [
+                centroids[k].0.to_f32() - off[k][0],
+                centroids[k].1.to_f32() - off[k][1],
+            ]
+        };
+        Resting {
+            mounting,
+            is_own,
+            px: core::array::from_fn(at),
+            areas: rest.areas.map(|area| area as f32),
+            drift: None,
+            hanging: None,
+        }
+    }
+
+    /// The force that another rest position of a unit looks like, µN, and its standard uncertainty
+    /// by noise, whatever the camera did.
+    pub fn touch(
+        model: &Model<'_>,
+        rest: &Rest,
+        turned: Option<Turned>,
+        other: &Rest,
+    ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
+        let noise = FrameNoise::AS_MODELLED;
+        Self::touch_by(model, rest, turned, other, (&Drift::MOUNTED_ANEW, noise))
+    }
+
+    /// The same of a unit of which no rest position is known, built like the model's, which rests
+    /// there as gravity is now.
+    pub fn touch_of_unit(
+        model: &Model<'_>,
+        rest: &Rest,
+        turned: Option<Turned>,
+        other: &Rest,
+    ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
+        let forward = model.forward.as_ref()?;
+        let scale = forward.rest_image.mounting(&model.rest).scale();
+        let [away, _] = forward.rest_image.film_mm[0];
+        let noise = FrameNoise {
+            blur: Px((GLUED_MM / away / scale * 65_536.0) as i32),
+            ..FrameNoise::AS_MODELLED
+        };
+        Self::touch_by(model, rest, turned, other, (&BUILT, noise))
+    }
+
+    fn touch_by(
+        model: &Model<'_>,
+        rest: &Rest,
+        turned: Option<Turned>,
+        other: &Rest,
+        (drift, noise): (&Drift, FrameNoise),
+    ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
+        let forward = model.forward.as_ref()?;
+        let mut resting = Resting::of_turned(model, rest, turned)?;
+        resting.set_drift(drift);
+        let observed = resting.observed(forward, &other.markers(), noise);
+        let guess = Pose {
+            size: FIRST_SIZE * forward.limits.size,
+            place_mm: forward.rest_image.where_most(&observed.moved),
+            ..Pose::default()
+        };
+        let unknown = forward.unknown(resting.is_own);
+        let estimate = forward.estimate(&observed, &resting.mounting, unknown, guess);
+        let (force, by_noise) = force(&forward.strength(resting.is_own), &estimate);
+        Some((force.magnitude, by_noise))
+    }
+
+    /// How markers moved from there. Once in the near memory, which is scarce.
+    #[inline(never)]
+    fn observed(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker; 4],
+        frame: FrameNoise,
+    ) -> Observed<'_> {
+        let (mut moved, mut noise) = (Column::default(), [[0.0; 3]; DOTS]);
+        let scale = self.mounting.scale();
+        let blur = scale * frame.blur.to_f32();
+        for (k, marker) in markers.iter().enumerate() {
+            let [x, y] = self.px[k];
+            let [x, y] = [marker.x.to_f32() - x, marker.y.to_f32() - y];
+            [moved[2 * k], moved[2 * k + 1]] = self.mounting.moved([x, y]);
+            let larger = (marker.area as f32 / self.areas[k]).clamp(AREAS[0], AREAS[1]);
+            let Noise {
+                at_rest_px,
+                at_four_areas,
+                ..
+            } = &forward.noise;
+            let [away, across] = *at_rest_px;
+            let [more_away, more_across] = *at_four_areas;
+            let variances = [(away, more_away), (across, more_across)].map(|(at_rest, more)| {
+                let growth = 1.0 + (more - 1.0) * (larger - 1.0) / 3.0;
+                // A law that falls to nothing within the areas would weigh a marker as certain.
+                let seen = frame.times * scale * at_rest * growth.max(0.1);
+                seen * seen + blur * blur
+            });
+            noise[k] = forward.rest_image.noise(k, variances);
+        }
+        let drift = self.drift.as_ref();
+        let hanging = self.hanging.as_ref();
+        Observed {
+            moved,
+            noise,
+            drift,
+            hanging,
+        }
+    }
+
+    /// The load that explains the markers best, from the network's answer on.
+    pub fn estimate(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker; 4],
+        noise: FrameNoise,
+        output: &Output,
+    ) -> Estimate {
+        let newtons = output.values.map(|part| part as f32 * 1e-6);
+        let place_mm = output.place.map(|part| part as f32 * 1e-3);
+        let guess = Pose::of_force(newtons, place_mm, &forward.stiffness, &forward.limits);
+        let observed = self.observed(forward, markers, noise);
+        forward.estimate(
+            &observed,
+            &self.mounting,
+            forward.unknown(self.is_own),
+            guess,
+        )
+    }
+
+    /// What a sample says of a load that was found in a frame of that noise;
+    /// [`Status::UNEXPLAINED`] when it explains the markers badly, or is the largest that the
+    /// tables hold.
+    pub fn told(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        noise: FrameNoise,
+        estimate: &Estimate,
+    ) -> (Force, Status) {
+        let (force, by_noise) = force(&forward.strength(self.is_own), estimate);
+        let mut status = trust(&force, by_noise, range);
+        let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
+        if is_blurred || !estimate.is_explained() {
+            status |= Status::UNEXPLAINED;
+        }
+        // Where the tables end, a larger force may explain the markers better.
+        if estimate.pose.size >= forward.limits.size {
+            status |= Status::MAGNITUDE_OUT_OF_RANGE | Status::UNEXPLAINED;
+        }
+        // A load that explains nothing tells of no contact.
+        if status.contains(Status::UNEXPLAINED) {
+            status.0 &= !Status::CONTACT.0;
+        }
+        (force, status)
+    }
+
+    /// The force of [`Self::estimate`] as [`Self::told`], of a frame whose noise is as modelled.
+    pub fn force(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        markers: &[Marker; 4],
+        output: &Output,
+    ) -> (Force, Status) {
+        let noise = FrameNoise::AS_MODELLED;
+        let estimate = self.estimate(forward, markers, noise, output);
+        self.told(forward, range, noise, &estimate)
+    }
+}
+
+/// The force of a load, and how uncertain |F| is by noise.
+fn force(strength: &Strength, estimate: &Estimate) -> (Force, UnsignedMicroNewtons) {
+    let pose = &estimate.pose;
+    let micronewtons = 1e6 * strength.stiffness.magnitude_n(pose.size);
+    let cartesian = pose
+        .direction()
+        .map(|part| MicroNewtons(rounded(micronewtons * part)));
+    let Polar {
+        alpha,
+        beta,
+        magnitude,
+    } = Polar::of_vector(cartesian);
+    let sigma = estimate.sigma(strength);
+    let [direction, magnitude_sigma, place, by_noise] = stated(sigma);
+    let [x, y] = pose
+        .place_mm
+        .map(|part| SignedMicrometres(rounded(1e3 * part)));
+    let force = Force {
+        alpha,
+        beta,
+        magnitude,
+        cartesian,
+        direction_sigma: UnsignedMilliDegrees(direction),
+        magnitude_sigma: UnsignedMicroNewtons(magnitude_sigma),
+        place: Some(Place {
+            x,
+            y,
+            sigma: Micrometres(place),
+        }),
+    };
+    (force, UnsignedMicroNewtons(by_noise))
+}
+
+/// Of direction, |F|, place and |F| by noise: in m°, µN and µm, at least one of each.
+fn stated(sigma: Option<Sigma>) -> [u32; 4] {
+    let Some(sigma) = sigma else {
+        let nothing = i32::MAX as u32;
+        return [
+            NO_DIRECTION.0,
+            nothing,
+            LARGEST_PLACE_UNCERTAINTY.0,
+            nothing,
+        ];
+    };
+    let direction = (sigma.direction.to_degrees() * 1e3).min(NO_DIRECTION.0 as f32);
+    let place = (sigma.place_mm * 1e3).min(LARGEST_PLACE_UNCERTAINTY.0 as f32);
+    let [magnitude, by_noise] = [sigma.magnitude_n, sigma.by_noise_n].map(|part| 1e6 * part);
+    [direction, magnitude, place, by_noise].map(|part| rounded(part).max(1).unsigned_abs())
+}
+
+/// To nearest; at the limits of 32 bits beyond them.
+fn rounded(value: f32) -> i32 {
+    (value + 0.5f32.copysign(value)) as i32
+}

@@ -1,0 +1,353 @@
+//! What a model does not know of how the images move, as a covariance of their coordinates:
+//! interpolated between sizes and places of the load; and coordinates in which a covariance is the
+//! unit matrix.
+
+use super::pose::{Pose, limited};
+use super::solve::{Column, EQUATIONS};
+use super::terms::Limits;
+use crate::force::kernels::sqrt;
+
+/// Knots along sizes and along each axis of places.
+pub const KNOTS: core::ops::RangeInclusive<u8> = 2..=16;
+/// The largest step of a factor's entries, focal lengths.
+pub const LARGEST_STEP: f32 = 1e-3;
+/// Entries of a triangle.
+const TRIANGLE: usize = EQUATIONS * (EQUATIONS + 1) / 2;
+/// Bytes of a knot: a step and the factor's entries.
+const KNOT: usize = 4 + 2 * TRIANGLE;
+/// Of a unit of which nothing but a rest picture is known, where no file says more: standard
+/// uncertainties of each coordinate of a marker's motion, and of all of them together, in parts of
+/// the motion.
+const OF_ITSELF: f32 = 0.03;
+const OF_ALL: f32 = 0.1;
+
+/// A covariance of x and y of all images, in focal lengths squared; what is above the diagonal
+/// means nothing.
+pub type Covariance = [Column; EQUATIONS];
+
+/// Covariances by the load's size and place, borrowed from a model file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CovarianceGrid<'a> {
+    /// Knots along the size, along y and along x.
+    counts: [u8; 3],
+    /// Places go to so many mm either way.
+    end_mm: f32,
+    /// By size, place along y and place along x: an f32 step, and a lower triangle of i16 of such
+    /// steps, row by row, whose square is the covariance.
+    knots: &'a [[u8; KNOT]],
+}
+
+/// What a model does not know of a unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unknown<'a> {
+    /// Nothing that would matter beside noise.
+    Nothing,
+    /// What its file says.
+    Grid(CovarianceGrid<'a>),
+    /// As much as may differ between units, in parts of what moves.
+    Unit,
+}
+
+impl<'a> CovarianceGrid<'a> {
+    /// Of so many knots ([`KNOTS`]) along the size, y and x, of places to `end_mm` either way (0.1
+    /// to 100), and of as many bytes as [`CovarianceGrid::length`] says; `None` of others, or where
+    /// a step is not between 0 and [`LARGEST_STEP`].
+    pub fn new(counts: [u8; 3], end_mm: f32, bytes: &'a [u8]) -> Option<CovarianceGrid<'a>> {
+        let (knots, _) = bytes.as_chunks();
+        let grid = CovarianceGrid {
+            counts,
+            end_mm,
+            knots,
+        };
+        let sound = counts.iter().all(|count| KNOTS.contains(count))
+            && (0.1..=100.0).contains(&end_mm)
+            && bytes.len() == CovarianceGrid::length(counts)
+            && knots
+                .iter()
+                .all(|knot| (0.0..=LARGEST_STEP).contains(&step(knot)));
+        sound.then_some(grid)
+    }
+
+    /// Bytes of all knots.
+    pub fn length(counts: [u8; 3]) -> usize {
+        counts.into_iter().map(usize::from).product::<usize>() * KNOT
+    }
+
+    /// At a load; beyond the last size or place as there. Sizes of knots are the squares of even
+    /// parts. Between knots it is their factors that are interpolated: any sum of those is one of a
+    /// covariance.
+    pub fn at(&self, pose: &Pose, limits: &Limits) -> Covariance {
+        let [sizes, lines, places] = self.counts.map(usize::from);
+        let along = |at_mm: f32| 0.5 + 0.5 * at_mm / self.end_mm;
+        let [x, y] = pose.place_mm.map(along);
+        let size = sqrt(limited(pose.size / limits.size, 0.0, 1.0));
+        let mut factor = Covariance::default();
+        for (i, of_size) in between(size, sizes) {
+            for (j, of_y) in between(y, lines) {
+                for (k, of_x) in between(x, places) {
+                    let knot = self.knots.get((i * lines + j) * places + k);
+                    add(&mut factor, knot, of_size * of_y * of_x);
+                }
+            }
+        }
+        squared(&factor)
+    }
+}
+
+impl Unknown<'_> {
+    /// Under a load that moves the images so. Not inlined: what it needs of the stack is free again
+    /// behind it.
+    #[inline(never)]
+    pub fn covariance(&self, pose: &Pose, limits: &Limits, moved: &Column) -> Covariance {
+        match self {
+            Unknown::Nothing => Covariance::default(),
+            Unknown::Grid(grid) => grid.at(pose, limits),
+            Unknown::Unit => of_motion(moved),
+        }
+    }
+}
+
+/// What may differ between units where images move so.
+fn of_motion(moved: &Column) -> Covariance {
+    let mut covariance: Covariance = moved.map(|a| moved.map(|b| OF_ALL * OF_ALL * a * b));
+    for (dot, [x, y]) in moved.as_chunks::<2>().0.iter().enumerate() {
+        let square = OF_ITSELF * OF_ITSELF * (x * x + y * y);
+        for k in [2 * dot, 2 * dot + 1] {
+            covariance[k][k] += square;
+        }
+    }
+    covariance
+}
+
+fn step(knot: &[u8; KNOT]) -> f32 {
+    let [a, b, c, d, ..] = *knot;
+    f32::from_le_bytes([a, b, c, d])
+}
+
+/// A part of a knot's factor more.
+fn add(factor: &mut Covariance, knot: Option<&[u8; KNOT]>, part: f32) {
+    let Some(knot) = knot else { return };
+    let part = part * step(knot);
+    let mut entries = knot.as_chunks::<2>().0[2..].iter();
+    for (i, row) in factor.iter_mut().enumerate() {
+        for (entry, bytes) in row[..=i].iter_mut().zip(&mut entries) {
+            *entry += part * f32::from(i16::from_le_bytes(*bytes));
+        }
+    }
+}
+
+/// The covariance of a lower factor.
+fn squared(factor: &Covariance) -> Covariance {
+    let mut covariance = Covariance::default();
+    for (i, (row, of_row)) in factor.iter().zip(&mut covariance).enumerate() {
+        for (j, (other, sum)) in factor.iter().zip(&mut of_row[..=i]).enumerate() {
+            for (a, b) in row[..=j].iter().zip(other) {
+                *sum += a * b;
+            }
+        }
+    }
+    covariance
+}
+
+/// The two of `count` even knots from 0 to 1 that a value lies between, and how much each counts.
+pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
+    let last = count - 1;
+    let at = limited(value, 0.0, 1.0) * last as f32;
+    let first = (at as usize).min(last - 1);
+    let second = at - first as f32;
+    [(first, 1.0 - second), (first + 1, second)]
+}
+
+/// Coordinates in which a covariance is the unit matrix.
+#[derive(Clone, Copy, Debug)]
+pub struct Whitening {
+    /// The covariance's lower factor, with one over its diagonal in that one's place.
+    factor: Covariance,
+}
+
+impl Whitening {
+    /// `None` when the covariance has a direction without any, or a number is none.
+    pub fn new(covariance: &Covariance) -> Option<Whitening> {
+        let mut factor = Covariance::default();
+        for i in 0..EQUATIONS {
+            for j in 0..=i {
+                let left = less(covariance[i][j], &factor[i][..j], &factor[j]);
+                factor[i][j] = match i == j {
+                    true if (f32::MIN_POSITIVE..f32::MAX).contains(&left) => 1.0 / sqrt(left),
+                    true => return None,
+                    false => left * factor[j][j],
+                };
+            }
+        }
+        Some(Whitening { factor })
+    }
+
+    /// What a column is in these coordinates.
+    pub fn of(&self, column: &Column) -> Column {
+        let mut white = *column;
+        for (i, row) in self.factor.iter().enumerate() {
+            white[i] = less(white[i], &row[..i], &white) * row[i];
+        }
+        white
+    }
+}
+
+/// A number less the products of parts with as many others.
+fn less(whole: f32, parts: &[f32], others: &[f32]) -> f32 {
+    let products = parts.iter().zip(others);
+    products.fold(whole, |left, (part, other)| left - part * other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const LIMITS: Limits = Limits {
+        size: 0.8,
+        tilt: 0.67,
+    };
+    const COUNTS: [u8; 3] = [3, 2, 4];
+
+    fn pose(size: f32, place_mm: [f32; 2]) -> Pose {
+        Pose {
+            size,
+            tilt: [0.1, -0.2],
+            place_mm,
+        }
+    }
+
+    /// Knots of entries by knot and entry, in steps of 10⁻⁵.
+    fn knots(entry: impl Fn(usize, usize) -> i16) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        for knot in 0..COUNTS.map(usize::from).iter().product() {
+            bytes.extend(1e-5f32.to_le_bytes());
+            bytes.extend((0..TRIANGLE).flat_map(|k| entry(knot, k).to_le_bytes()));
+        }
+        bytes
+    }
+
+    /// Standard deviations of one coordinate alone that are linear along each axis, the size's root
+    /// for the size, come out as they are, at knots, between them and beyond.
+    #[test]
+    fn planes_come_back() {
+        let sigma = |size: f32, y: f32, x: f32| 1e3 * (1.0 + size + 2.0 * y + x);
+        let entry = |knot: usize, k: usize| {
+            let (x, line) = (knot % 4, knot / 4);
+            let [size, y] = [line / 2, line % 2].map(|k| k as f32);
+            match k {
+                0 => sigma(size, y, x as f32) as i16,
+                _ => 0,
+            }
+        };
+        let bytes = knots(entry);
+        let grid = CovarianceGrid::new(COUNTS, 3.0, &bytes).unwrap();
+        for (size, [x, y]) in [
+            (0.0, [-3.0, -3.0]),
+            (0.2, [1.0, -2.0]),
+            (0.53, [0.3, 2.9]),
+            (0.8, [3.0, 3.0]),
+            (1.1, [9.0, -7.0]),
+        ] {
+            let found = grid.at(&pose(size, [x, y]), &LIMITS);
+            let part = |at: f32| (at.clamp(-3.0, 3.0) + 3.0) / 6.0;
+            let sizes = 2.0 * (size.min(0.8) / 0.8).sqrt();
+            let expected = 1e-10 * sigma(sizes, part(y), 3.0 * part(x)).powi(2);
+            let off = (found[0][0] - expected).abs();
+            assert!(
+                off < 2e-3 * expected,
+                "{size} {x} {y}: {found:?} {expected}"
+            );
+            assert_eq!(found[7][7], 0.0);
+        }
+    }
+
+    #[test]
+    fn white_coordinates_have_the_unit_matrix() {
+        let wave = |i: usize, j: usize| ((5 * i + 3 * j) as f32).sin();
+        let product = |i: usize, j: usize| (0..8).map(|k| wave(i, k) * wave(j, k)).sum::<f32>();
+        let mut covariance: Covariance =
+            core::array::from_fn(|i| core::array::from_fn(|j| product(i, j)));
+        for (i, row) in covariance.iter_mut().enumerate() {
+            row[i] += 0.5;
+        }
+        let whitening = Whitening::new(&covariance).unwrap();
+        // Columns of what whitens.
+        let inverse: [Column; 8] = core::array::from_fn(|k| {
+            let mut unit = Column::default();
+            unit[k] = 1.0;
+            whitening.of(&unit)
+        });
+        for a in 0..8 {
+            for b in 0..8 {
+                let row = |k: usize| -> Column { core::array::from_fn(|i| inverse[i][k]) };
+                let (row_a, row_b) = (row(a), row(b));
+                let mut sum = 0.0;
+                for i in 0..8 {
+                    for j in 0..8 {
+                        sum += row_a[i] * covariance[i][j] * row_b[j];
+                    }
+                }
+                let expected = f32::from(u8::from(a == b));
+                assert!((sum - expected).abs() < 1e-4, "{a} {b}: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_covariance_whitens_nothing() {
+        assert!(Whitening::new(&Covariance::default()).is_none());
+        for wrong in [f32::NAN, f32::INFINITY, -1.0] {
+            let mut covariance = Covariance::default();
+            for (k, row) in covariance.iter_mut().enumerate() {
+                row[k] = 1.0;
+            }
+            assert!(Whitening::new(&covariance).is_some());
+            covariance[5][5] = wrong;
+            assert!(Whitening::new(&covariance).is_none(), "{wrong}");
+        }
+    }
+
+    proptest! {
+        /// Whatever a file holds and wherever the load is: with noise it is a covariance.
+        #[test]
+        fn with_noise_it_is_always_a_covariance(
+            seed in any::<u64>(),
+            size in prop_oneof![-1.0f32..2.0, any::<f32>()],
+            x in prop_oneof![-6.0f32..6.0, any::<f32>()],
+            noise in 1e-5f32..1e-2,
+        ) {
+            let entry = |knot: usize, k: usize| {
+                let mixed = (knot * TRIANGLE + k) as u64 ^ seed;
+                (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) as i16
+            };
+            let bytes = knots(entry);
+            let grid = CovarianceGrid::new(COUNTS, 4.0, &bytes).unwrap();
+            let mut covariance = grid.at(&pose(size, [x, 0.5]), &LIMITS);
+            for (k, row) in covariance.iter_mut().enumerate() {
+                row[k] += noise * noise;
+            }
+            let no_number = size.is_nan() || x.is_nan();
+            prop_assert!(no_number || Whitening::new(&covariance).is_some(), "{covariance:?}");
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let bytes = knots(|_, _| 3);
+        let is_sound =
+            |counts, end_mm, bytes: &[u8]| CovarianceGrid::new(counts, end_mm, bytes).is_some();
+        assert!(is_sound(COUNTS, 4.0, &bytes[..]));
+        assert!(!is_sound(COUNTS, 4.0, &bytes[1..]) && !is_sound(COUNTS, 4.0, &bytes[KNOT..]));
+        assert!(!is_sound([1, 6, 4], 4.0, &bytes[..]) && !is_sound([0, 2, 4], 4.0, &[]));
+        for end_mm in [0.0, -4.0, 101.0, f32::NAN] {
+            assert!(!is_sound(COUNTS, end_mm, &bytes[..]), "{end_mm}");
+        }
+        for step in [-1e-4, 1.1e-3, f32::NAN, f32::INFINITY] {
+            let mut bytes = bytes.clone();
+            bytes[KNOT..KNOT + 4].copy_from_slice(&step.to_le_bytes());
+            assert!(!is_sound(COUNTS, 4.0, &bytes[..]), "{step}");
+        }
+    }
+}

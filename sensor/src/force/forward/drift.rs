@@ -1,0 +1,132 @@
+//! How far the film may rest from where its rest position was taken: camera and film wander with
+//! temperature, and whoever touches the sensor moves them.
+
+use super::covariance::Covariance;
+use super::mounting::{Mounting, about_middle, radius};
+use super::predict::{DOTS, Markers};
+use super::solve::Column;
+
+/// What may have happened to a rest position since it was taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drift {
+    /// Standard uncertainties of what nobody saw, in parts of the pattern's radius: of a shift
+    /// along x and along y each, of a turn, and of a change of scale.
+    pub unseen: [f32; 3],
+    /// How far from it the untouched film's markers were when they were seen last, px.
+    pub seen_px: Markers,
+}
+
+impl Drift {
+    /// Of a rest position that was taken just now.
+    pub const NONE: Drift = Drift {
+        unseen: [0.0; 3],
+        seen_px: [[0.0; 2]; DOTS],
+    };
+
+    /// Of a rest position that no frame of the untouched film has confirmed: 0.08 px at 320×240,
+    /// and half as much again by a change of scale, which looks like a press.
+    pub const UNSEEN: Drift = Drift {
+        unseen: [1e-3, 1e-3, 1.5e-3],
+        ..Drift::NONE
+    };
+
+    /// Of a camera that may have been mounted anew: any shift and turn. A change of scale is
+    /// small: a press looks like a larger one.
+    pub const MOUNTED_ANEW: Drift = Drift {
+        unseen: [0.1, 0.1, 1e-3],
+        ..Drift::NONE
+    };
+
+    /// The farthest that a marker's coordinate was seen from there, px.
+    pub fn farthest_px(&self) -> f32 {
+        let far = self.seen_px.as_flattened().iter();
+        far.fold(0.0, |farthest, part| part.abs().max(farthest))
+    }
+
+    /// As a covariance of images of markers that rest at these px; what is above the diagonal means
+    /// nothing.
+    pub fn covariance(&self, mounting: &Mounting, rest_px: &Markers) -> Covariance {
+        let about = about_middle(rest_px);
+        let [shift, turn, scale] = self.unseen;
+        let shift_px = shift * radius(&about);
+        let mut covariance = Covariance::default();
+        let mut add = |px: Markers| {
+            let moved = px.map(|px| mounting.moved(px));
+            let mut mode = Column::default();
+            mode.copy_from_slice(moved.as_flattened());
+            for (i, row) in covariance.iter_mut().enumerate() {
+                for (sum, part) in row[..=i].iter_mut().zip(&mode) {
+                    *sum += mode[i] * part;
+                }
+            }
+        };
+        add([[shift_px, 0.0]; DOTS]);
+        add([[0.0, shift_px]; DOTS]);
+        add(about.map(|[x, y]| [-turn * y, turn * x]));
+        add(about.map(|place| place.map(|part| scale * part)));
+        add(self.seen_px);
+        covariance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::forward::EQUATIONS;
+
+    const MOUNTING: Mounting = Mounting {
+        per_px: [0.01, 0.0],
+        beside_mm: [[0.0; 2]; DOTS],
+    };
+    const REST_PX: Markers = [[60.0, 20.0], [160.0, 20.0], [160.0, 120.0], [60.0, 120.0]];
+
+    fn variance(covariance: &Covariance, along: &Markers) -> f32 {
+        let along = along.as_flattened();
+        let entry = |i: usize, j: usize| covariance[i.max(j)][i.min(j)];
+        let mut sum = 0.0;
+        for i in 0..EQUATIONS {
+            for j in 0..EQUATIONS {
+                sum += along[i] * along[j] * entry(i, j);
+            }
+        }
+        sum
+    }
+
+    /// Radius 70.7 px, 0.01 focal lengths a pixel.
+    #[test]
+    fn shift_turn_and_scale_are_as_uncertain_as_told() {
+        let drift = Drift {
+            unseen: [1e-3, 2e-3, 3e-3],
+            ..Drift::NONE
+        };
+        let covariance = drift.covariance(&MOUNTING, &REST_PX);
+        let about = about_middle(&REST_PX);
+        let modes = [
+            ([[0.5, 0.0]; DOTS], 1e-3 * 50.0 * 2f32.sqrt() * 2.0),
+            (about.map(|[x, y]| [-y / 141.42, x / 141.42]), 2e-3 * 141.42),
+            (about.map(|[x, y]| [x / 141.42, y / 141.42]), 3e-3 * 141.42),
+            ([[0.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [-0.5, 0.0]], 0.0),
+        ];
+        for (mode, sigma_px) in modes {
+            let found = variance(&covariance, &mode).sqrt();
+            assert!((found - 0.01 * sigma_px).abs() < 1e-5, "{found} {sigma_px}");
+        }
+    }
+
+    #[test]
+    fn what_was_seen_is_as_uncertain_as_it_is_far() {
+        let seen_px = [[0.1, 0.0], [0.1, -0.3], [0.1, 0.0], [0.1, 0.0]];
+        let drift = Drift {
+            seen_px,
+            ..Drift::NONE
+        };
+        assert_eq!(drift.farthest_px(), 0.3);
+        let covariance = drift.covariance(&MOUNTING, &REST_PX);
+        assert!((covariance[3][3] - 9e-6).abs() < 1e-9);
+        assert!((covariance[3][0] + 3e-6).abs() < 1e-9);
+        assert_eq!(
+            Drift::NONE.covariance(&MOUNTING, &REST_PX),
+            Covariance::default()
+        );
+    }
+}

@@ -1,0 +1,296 @@
+//! Gauss–Newton steps from a first guess to the load that explains the markers best.
+
+use super::covariance::{Covariance, Unknown};
+use super::descent::Descent;
+use super::mounting::Mounting;
+use super::pose::{Pose, sine_over_angle_and_cosine};
+use super::predict::DOTS;
+use super::solve::{Column, Solved};
+use super::weight::Hanging;
+use super::{Forward, Strength};
+
+/// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
+/// of three degrees of freedom is more than 17.7 then.
+pub const UNEXPLAINED: f32 = 17.7;
+/// χ² of three degrees of freedom is more than this in 1 of 6: what is left over beyond it is taken
+/// for noise that is larger than the model says.
+const USUAL: f32 = 5.0;
+/// Steps that a frame takes at most: more than the model asks for while what they led to does not
+/// explain the markers. Units of which little is known begin far from where they end.
+pub const STEPS_AT_MOST: u8 = 8;
+
+/// How the markers' images moved since the rest position, and how well that is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observed<'a> {
+    /// x and y of markers 0–3, focal lengths along the film's axes.
+    pub moved: Column,
+    /// The noise of each marker: covariances of x and x, x and y, y and y, focal lengths squared;
+    /// the first and the last > 0.
+    pub noise: [[f32; 3]; DOTS],
+    /// How far the rest position may be from where the film rests ([`Drift`](super::Drift)); `None`
+    /// where it is known.
+    pub drift: Option<&'a Covariance>,
+    /// What the film's own weight does; `None` where the tables and the rest position have it.
+    pub hanging: Option<&'a Hanging>,
+}
+
+impl Observed<'_> {
+    /// The noise of all markers: no two share any.
+    pub(super) fn by_noise(&self) -> Covariance {
+        let mut covariance = Covariance::default();
+        self.add_noise(&mut covariance);
+        covariance
+    }
+
+    /// Noise, and what the rest position may be off.
+    pub(super) fn add_to(&self, covariance: &mut Covariance) {
+        self.add_noise(covariance);
+        let drift = self.drift.into_iter().flatten();
+        for (i, (row, of_drift)) in covariance.iter_mut().zip(drift).enumerate() {
+            for (sum, part) in row[..=i].iter_mut().zip(of_drift) {
+                *sum += part;
+            }
+        }
+    }
+
+    fn add_noise(&self, covariance: &mut Covariance) {
+        for (dot, [xx, xy, yy]) in self.noise.into_iter().enumerate() {
+            let (x, y) = (2 * dot, 2 * dot + 1);
+            covariance[x][x] += xx;
+            covariance[y][x] += xy;
+            covariance[y][y] += yy;
+        }
+    }
+}
+
+/// A load and how well it is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The load.
+    pub pose: Pose,
+    /// What it does not explain: the square of that in parts of its covariance, by noise and by
+    /// what is not known of the unit.
+    pub unexplained: f32,
+    /// What no load near it explains, in parts of noise alone: what changes of it from frame to
+    /// frame is noise, whatever is not known of the unit.
+    pub left: Column,
+    /// What the markers say at this load; `None` where they do not tell its parts.
+    pub solved: Option<Solved>,
+    /// How often the film was run forwards: once where the steps begin, and once for each step.
+    pub looks: u8,
+}
+
+impl Forward<'_> {
+    /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
+    /// which they find no way on, from where the markers moved most, too: from there they find
+    /// theirs where a guess was bad. Once in the near memory, which is scarce.
+    #[inline(never)]
+    pub fn estimate(
+        &self,
+        observed: &Observed<'_>,
+        mounting: &Mounting,
+        unknown: Unknown<'_>,
+        guess: Pose,
+    ) -> Estimate {
+        let descend = |guess| self.descend(Descent::new(self, observed, mounting, unknown, guess));
+        let (found, is_done) = descend(guess);
+        if is_done {
+            return found;
+        }
+        let (other, _) = descend(Pose {
+            size: guess.size,
+            place_mm: self.rest_image.where_most(&observed.moved),
+            ..Pose::default()
+        });
+        let looks = found.looks + other.looks;
+        let nearer = if other.unexplained < found.unexplained {
+            other
+        } else {
+            found
+        };
+        Estimate { looks, ..nearer }
+    }
+
+    /// Takes as many steps as the model asks for, and more where these do not explain the markers.
+    /// Also whether that came to an end.
+    fn descend(&self, mut descent: Descent<'_>) -> (Estimate, bool) {
+        for step in 0..STEPS_AT_MOST {
+            if step >= self.steps && descent.is_over() {
+                break;
+            }
+            if !descent.step() {
+                break;
+            }
+        }
+        let is_done = descent.is_done();
+        (descent.estimate(), is_done)
+    }
+}
+
+/// Standard uncertainties of a load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sigma {
+    /// Of the direction, both ways across it together, rad.
+    pub direction: f32,
+    /// Of |F|, N.
+    pub magnitude_n: f32,
+    /// That by what the markers leave open of the size alone, N.
+    pub by_noise_n: f32,
+    /// Of each coordinate of the place, mm: the root of half their covariance's trace.
+    pub place_mm: f32,
+}
+
+impl Estimate {
+    /// Whether a load explains the markers; what is no number explains nothing.
+    pub fn is_explained(&self) -> bool {
+        (0.0..=UNEXPLAINED).contains(&self.unexplained)
+    }
+
+    /// How many times the markers' stated noise what is left over speaks for, at least 1.
+    fn noisier(&self) -> f32 {
+        libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
+    }
+
+    /// How well the load is known; `None` where the markers do not tell its parts. The covariance
+    /// counts as larger where more is left over than it explains as a rule.
+    pub fn sigma(&self, strength: &Strength) -> Option<Sigma> {
+        let solved = self.solved.as_ref()?;
+        let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);
+        let tilt = [(1, 1), (1, 2), (2, 2)].map(covariance);
+        let place = [(3, 3), (3, 4), (4, 4)].map(covariance);
+        let noisier = self.noisier();
+        let place_mm = noisier * stated(place) * core::f32::consts::FRAC_1_SQRT_2;
+        let size = noisier * libm::sqrtf(covariance((0, 0)));
+        Some(Sigma {
+            direction: noisier * stated(across(&self.pose, tilt)),
+            magnitude_n: strength.sigma_n(self.pose.size, size),
+            by_noise_n: strength.stiffness.per_size_n(self.pose.size) * size,
+            place_mm,
+        })
+    }
+}
+
+/// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across
+/// that so much less as the circle is shorter than its angle.
+fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
+    let [x, y] = pose.tilt;
+    let square = x * x + y * y;
+    if square <= f32::MIN_POSITIVE {
+        return [xx, xy, yy];
+    }
+    let (sine, _) = sine_over_angle_and_cosine(square);
+    let away = (x * x * xx + 2.0 * x * y * xy + y * y * yy) / square;
+    let along = (y * y * xx - 2.0 * x * y * xy + x * x * yy) / square;
+    let both = (x * y * (yy - xx) + (x * x - y * y) * xy) / square;
+    [away, sine * both, sine * sine * along]
+}
+
+/// What a covariance (xx, xy, yy) states as its σ: 95 of 100 errors are within 1.731 times it
+/// (√(−ln 0.05)), however long and narrow their ellipse is. A round one's is the root of its trace;
+/// of a narrow one's 95 of 100 are within 1.960 times that.
+pub fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
+    let trace = xx + yy;
+    let apart = (xx - yy) * (xx - yy) + 4.0 * xy * xy;
+    // Fits the quantiles of all ellipses to 0.7 %.
+    let narrow = if trace > 0.0 {
+        apart / (trace * trace)
+    } else {
+        0.0
+    };
+    libm::sqrtf(trace) * (1.0 + 0.132 * narrow)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::forward::{RELATIVE, Stiffness};
+    use proptest::prelude::*;
+
+    const STRENGTH: Strength = Strength {
+        stiffness: Stiffness {
+            linear_n: 0.2,
+            cubic_n: 0.1,
+        },
+        relative: [0.0; RELATIVE],
+        largest_size: 0.63,
+    };
+
+    /// Of a load of which what is left over is as given.
+    fn estimate(unexplained: f32) -> Estimate {
+        let mut spread = [[0.0; 5]; 5];
+        for (k, row) in spread.iter_mut().enumerate() {
+            row[k] = 0.001 * (k + 1) as f32;
+        }
+        Estimate {
+            pose: Pose {
+                size: 0.5,
+                tilt: [0.1, 0.05],
+                place_mm: [1.0, -2.0],
+            },
+            unexplained,
+            left: Column::default(),
+            solved: Some(Solved {
+                unknowns: [0.0; 5],
+                left_over: unexplained,
+                explained: 0.0,
+                spread,
+            }),
+            looks: 1,
+        }
+    }
+
+    fn parts(unexplained: f32) -> [f32; 3] {
+        let sigma = estimate(unexplained).sigma(&STRENGTH).unwrap();
+        [sigma.direction, sigma.magnitude_n, sigma.place_mm]
+    }
+
+    /// Noise of n times what is stated leaves n² times as much over, and is stated n times as
+    /// large.
+    #[test]
+    fn what_is_left_over_beyond_the_usual_widens_all_three() {
+        let stated = parts(1.0);
+        assert_eq!(parts(USUAL), stated);
+        for times in [1.5f32, 1.8] {
+            let wider = parts(USUAL * times * times);
+            for (wider, stated) in wider.into_iter().zip(stated) {
+                assert!((wider / stated - times).abs() < 1e-5, "{wider} {stated}");
+            }
+        }
+    }
+
+    /// Uncertain strength of a unit is beside what the markers leave open, by squares; between two
+    /// sizes it is between theirs.
+    #[test]
+    fn a_units_strength_is_uncertain_beside_its_size() {
+        let unsure = Strength {
+            relative: [0.5, 0.4, 0.3, 0.2, 0.1],
+            ..STRENGTH
+        };
+        let force_n = STRENGTH.stiffness.magnitude_n(0.5);
+        let sure = STRENGTH.sigma_n(0.5, 0.01);
+        let both = unsure.sigma_n(0.5, 0.01);
+        let relative = libm::sqrtf(both * both - sure * sure) / force_n;
+        let at = 4.0 * libm::sqrtf(0.5 / 0.63);
+        assert!((relative - (0.5 - 0.1 * at)).abs() < 1e-4, "{relative}");
+        assert_eq!(
+            unsure.sigma_n(2.0, 0.0),
+            0.1 * STRENGTH.stiffness.magnitude_n(2.0)
+        );
+    }
+
+    proptest! {
+        /// No uncertainty becomes smaller by more that is left over, whatever the numbers.
+        #[test]
+        fn more_that_is_left_over_never_makes_a_force_surer(
+            less in prop_oneof![0.0f32..100.0, any::<f32>()],
+            more in prop_oneof![0.0f32..100.0, any::<f32>()],
+        ) {
+            let explained = [less, more].map(|part| estimate(part).is_explained());
+            prop_assert!(!(explained[1] && less < more && less >= 0.0) || explained[0]);
+            let [sure, unsure] = [less.min(more), less.max(more)].map(parts);
+            for (less, more) in sure.into_iter().zip(unsure) {
+                prop_assert!(more >= less, "{more} {less}");
+            }
+        }
+    }
+}

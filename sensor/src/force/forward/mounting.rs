@@ -1,0 +1,336 @@
+//! Where this unit's markers are on its film, and how its camera sees them.
+
+use super::predict::{DOTS, Markers};
+use super::solve::{Column, square};
+use crate::force::kernels::sqrt;
+use crate::force::rest::{NEAR, Rest};
+
+/// How a unit's camera sees its film, and where its markers are glued.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mounting {
+    /// Focal lengths per px: (x + iy) in px times this complex number is in focal lengths along the
+    /// film's axes.
+    pub per_px: [f32; 2],
+    /// How far each marker is glued beside its place, mm.
+    pub beside_mm: Markers,
+}
+
+/// What a rest picture says of a mounting when the camera is as the tables have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RestImage {
+    /// Where the tables' markers are seen at rest, focal lengths from the axis.
+    pub at: Markers,
+    /// What a focal length is on the film at each of them: away from the axis, and across that, mm.
+    pub film_mm: Markers,
+}
+
+/// How far a unit's camera may be from where it was, in parts of the pattern's radius, as the sine
+/// of its turn and in parts of its scale.
+const LARGEST_SHIFT: f32 = 0.125;
+const LARGEST_TURN: f32 = 0.052;
+const LARGEST_SCALE: f32 = 0.01;
+
+impl RestImage {
+    /// The direction in which a marker's image lies from the axis, of length one; along x where it
+    /// lies there.
+    #[inline]
+    pub fn away(&self, dot: usize) -> [f32; 2] {
+        let [x, y] = self.at.get(dot).copied().unwrap_or_default();
+        let far = sqrt(x * x + y * y);
+        match far > 0.0 {
+            true => [x / far, y / far],
+            false => [1.0, 0.0],
+        }
+    }
+
+    /// Where on the film the markers moved most, mm: the mean of their places, each counting as the
+    /// square of its motion, focal lengths; the middle where none moved.
+    pub fn where_most(&self, moved: &Column) -> [f32; 2] {
+        let (mut sum, mut all) = ([0.0; 2], f32::MIN_POSITIVE);
+        for ((at, film_mm), [x, y]) in self.at.iter().zip(&self.film_mm).zip(moved.as_chunks().0) {
+            let counts = x * x + y * y;
+            sum = [0, 1].map(|i| sum[i] + counts * film_mm[1] * at[i]);
+            all += counts;
+        }
+        sum.map(|part| part / all)
+    }
+
+    /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the
+    /// axis and across that.
+    #[inline]
+    pub fn noise(&self, dot: usize, [away, across]: [f32; 2]) -> [f32; 3] {
+        let [x, y] = self.away(dot);
+        [
+            away * x * x + across * y * y,
+            (away - across) * x * y,
+            away * y * y + across * x * x,
+        ]
+    }
+
+    /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the
+    /// whole pattern count as the camera's, which a rest picture cannot tell from gluing; what is
+    /// left is gluing.
+    pub fn mounting(&self, rest: &Rest) -> Mounting {
+        let seen = about_middle(&places_px(rest));
+        let own = about_middle(&self.at);
+        let per_px = similarity(&seen, &own);
+        let beside = |dot: usize| {
+            let [x, y] = turned(per_px, seen[dot]);
+            self.on_film(dot, [x - own[dot][0], y - own[dot][1]])
+        };
+        Mounting {
+            per_px,
+            beside_mm: core::array::from_fn(beside),
+        }
+    }
+
+    /// What a shift of a marker's image, focal lengths, is on the film, mm.
+    fn on_film(&self, dot: usize, [x, y]: [f32; 2]) -> [f32; 2] {
+        let ([ux, uy], [away, across]) = (self.away(dot), self.film_mm[dot]);
+        let away = away * (x * ux + y * uy);
+        let across = across * (y * ux - x * uy);
+        [away * ux - across * uy, away * uy + across * ux]
+    }
+}
+
+fn places_px(rest: &Rest) -> Markers {
+    let centroids = rest.features.centroids;
+    centroids.map(|(x, y)| [x.to_f32(), y.to_f32()])
+}
+
+fn middle(places: &Markers) -> [f32; 2] {
+    let mut middle = [0.0; 2];
+    for place in places {
+        middle = [0, 1].map(|i| middle[i] + place[i] / DOTS as f32);
+    }
+    middle
+}
+
+/// Places as seen from their mean.
+pub(super) fn about_middle(places: &Markers) -> Markers {
+    let middle = middle(places);
+    places.map(|[x, y]| [x - middle[0], y - middle[1]])
+}
+
+/// How far places are from their mean, which they are seen from: root mean square.
+pub(super) fn radius(about: &Markers) -> f32 {
+    sqrt(square(about.as_flattened()) / DOTS as f32)
+}
+
+/// The complex number that brings what is seen nearest to where it would be seen.
+fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
+    let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
+    for ([x, y], [cx, cy]) in seen.iter().zip(own) {
+        along += x * cx + y * cy;
+        across += x * cy - y * cx;
+        square += x * x + y * y;
+    }
+    // The markers in a sound rest position are not all in one place; if they were, nothing would be
+    // seen to move.
+    let square = if square > 0.0 { square } else { f32::MAX };
+    [along / square, across / square]
+}
+
+/// How a camera moved over a film since it was seen with its markers elsewhere, as far as a shift,
+/// a turn and a change of scale explain that.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraMotion {
+    /// How far the markers' middle moved, px.
+    pub shift_px: [f32; 2],
+    /// What brings the markers back, as seen from their middle, as a complex number: its argument
+    /// is the turn, x towards y, its absolute value the scale, either the other way round.
+    pub back: [f32; 2],
+    /// How far beside where they were the markers are then: the coordinate that is farthest, px.
+    pub beside_px: f32,
+    /// The pattern's radius before, px.
+    radius_px: f32,
+}
+
+impl CameraMotion {
+    /// From `before` to `now`.
+    pub fn between(before: &Rest, now: &Rest) -> CameraMotion {
+        let places = [now, before].map(places_px);
+        let [at, at_before] = places.each_ref().map(middle);
+        let [seen, own] = places.each_ref().map(about_middle);
+        let back = similarity(&seen, &own);
+        let beside = |k: usize| {
+            let [x, y] = turned(back, seen[k]);
+            (x - own[k][0]).abs().max((y - own[k][1]).abs())
+        };
+        CameraMotion {
+            shift_px: [at[0] - at_before[0], at[1] - at_before[1]],
+            back,
+            beside_px: (0..DOTS).map(beside).fold(0.0, f32::max),
+            radius_px: radius(&own),
+        }
+    }
+
+    /// How many times as large the pattern is seen as before.
+    pub fn times(&self) -> f32 {
+        let [along, across] = self.back;
+        1.0 / sqrt(along * along + across * across)
+    }
+
+    /// Whether it is as small as of a unit's own camera that was mounted anew.
+    fn is_remounting(&self) -> bool {
+        let [along, across] = self.back;
+        let [x, y] = self.shift_px.map(f32::abs);
+        let scale = sqrt(along * along + across * across);
+        x.max(y) <= LARGEST_SHIFT * self.radius_px
+            && across.abs() <= LARGEST_TURN
+            && (scale - 1.0).abs() <= LARGEST_SCALE
+            && self.beside_px <= NEAR.to_f32()
+    }
+}
+
+impl Mounting {
+    /// The same film, seen as at `rest` by a camera that moved since it was seen as at `own`.
+    /// `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of scale of
+    /// 1 % bring all markers within [`NEAR`] of that: another unit's film.
+    pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
+        let motion = CameraMotion::between(own, rest);
+        motion.is_remounting().then(|| Mounting {
+            per_px: turned(self.per_px, motion.back),
+            ..*self
+        })
+    }
+
+    /// How a marker's image moved, px, in focal lengths along the film's axes.
+    pub fn moved(&self, px: [f32; 2]) -> [f32; 2] {
+        turned(self.per_px, px)
+    }
+
+    /// The same the other way round.
+    pub fn px(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        let [a, b] = self.per_px;
+        let square = (a * a + b * b).max(f32::MIN_POSITIVE);
+        turned([a / square, -b / square], [x, y])
+    }
+
+    /// Focal lengths per px.
+    pub fn scale(&self) -> f32 {
+        let [a, b] = self.per_px;
+        sqrt(a * a + b * b)
+    }
+}
+
+/// (a + ib)·(x + iy).
+fn turned([a, b]: [f32; 2], [x, y]: [f32; 2]) -> [f32; 2] {
+    [a * x - b * y, b * x + a * y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::features::Features;
+    use hivtac_terms::units::Px;
+
+    const CORNERS: Markers = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    const CORNER: f32 = 0.342;
+    const REST: RestImage = RestImage {
+        at: [
+            [-CORNER, -CORNER],
+            [CORNER, -CORNER],
+            [CORNER, CORNER],
+            [-CORNER, CORNER],
+        ],
+        film_mm: [[12.76, 10.85]; DOTS],
+    };
+
+    /// Markers seen at the places of a nominal camera, moved by so many focal lengths each.
+    fn rest(moved: Markers, per_focal: [f32; 2], middle: [f32; 2]) -> Rest {
+        let seen = |k: usize| {
+            let [x, y] = [0, 1].map(|i| REST.at[k][i] + moved[k][i]);
+            let [x, y] = turned(per_focal, [x, y]);
+            let px = |part: f32| Px((65_536.0 * part) as i32);
+            (px(x + middle[0]), px(y + middle[1]))
+        };
+        Rest {
+            features: Features {
+                centroids: core::array::from_fn(seen),
+                ..Features::default()
+            },
+            areas: [200; 4],
+        }
+    }
+
+    #[test]
+    fn a_camera_that_is_off_moves_no_marker() {
+        // Rolled by 3°, 2 % longer, 5 px beside the middle.
+        let per_focal = [
+            178.5 * 3f32.to_radians().cos(),
+            178.5 * 3f32.to_radians().sin(),
+        ];
+        let mounting = REST.mounting(&rest([[0.0; 2]; 4], per_focal, [164.5, 115.0]));
+        assert!(
+            mounting
+                .beside_mm
+                .as_flattened()
+                .iter()
+                .all(|part| part.abs() < 1e-4)
+        );
+        assert!((mounting.scale() * 178.5 - 1.0).abs() < 1e-5);
+        let [x, y] = mounting.moved(turned(per_focal, [0.01, 0.02]));
+        assert!((x - 0.01).abs() < 1e-6 && (y - 0.02).abs() < 1e-6);
+    }
+
+    /// A taper is nobody's but the markers'. It makes the pattern a little larger, too, by its
+    /// square.
+    #[test]
+    fn gluing_that_no_camera_makes_is_found() {
+        let taper = [[0.01, 0.0], [-0.01, 0.0], [0.01, 0.0], [-0.01, 0.0]];
+        let mounting = REST.mounting(&rest(taper, [175.0, 0.0], [159.5, 119.5]));
+        for (k, [x, y]) in mounting.beside_mm.into_iter().enumerate() {
+            let [sx, sy] = CORNERS[k];
+            // Along x by 0.01: half of it away from the axis and half across.
+            let (away, across) = (taper[k][0] * sx / 2.0, -taper[k][0] * sy / 2.0);
+            let expected = [
+                12.76 * away * sx - 10.85 * across * sy,
+                12.76 * away * sy + 10.85 * across * sx,
+            ];
+            assert!((x - expected[0]).abs() < 3e-3, "{x} {expected:?}");
+            assert!((y - expected[1]).abs() < 3e-3, "{y} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn noise_is_along_and_across_what_leads_away() {
+        let [xx, xy, yy] = REST.noise(1, [4.0, 1.0]);
+        assert!((xx - 2.5).abs() < 1e-5 && (xy + 1.5).abs() < 1e-5 && (yy - 2.5).abs() < 1e-5);
+        assert_eq!(REST.noise(4, [4.0, 1.0]), [4.0, 0.0, 1.0]);
+    }
+
+    /// Shifted by (2, −1) px, turned by 1°, 1 % larger, and one marker 0.2 px beside that.
+    #[test]
+    fn a_camera_that_moved_is_told_by_shift_turn_and_scale() {
+        let focal = [178.5, 0.0];
+        let before = rest([[0.0; 2]; 4], focal, [160.0, 120.0]);
+        let turn = 1f32.to_radians();
+        let moved = focal.map(|_| 178.5 * 1.01);
+        let moved = [moved[0] * turn.cos(), moved[1] * turn.sin()];
+        let now = rest([[0.0; 2]; 4], moved, [162.0, 119.0]);
+        let motion = CameraMotion::between(&before, &now);
+        let [along, across] = motion.back;
+        assert!((motion.shift_px[0] - 2.0).abs() < 1e-3 && (motion.shift_px[1] + 1.0).abs() < 1e-3);
+        assert!((motion.times() - 1.01).abs() < 1e-5, "{motion:?}");
+        assert!((-across.atan2(along) - turn).abs() < 1e-5, "{motion:?}");
+        assert!(motion.beside_px < 1e-3, "{motion:?}");
+        let mut pulled = now;
+        pulled.features.centroids[1].0.0 += 13_107;
+        let beside = CameraMotion::between(&before, &pulled).beside_px;
+        assert!((0.05..0.2).contains(&beside), "{beside}");
+    }
+
+    #[test]
+    fn markers_in_one_place_say_nothing() {
+        let mounting = REST.mounting(&rest([[0.0; 2]; 4], [0.0; 2], [100.0, 100.0]));
+        assert_eq!(mounting.per_px, [0.0; 2]);
+        assert!(
+            mounting
+                .beside_mm
+                .as_flattened()
+                .iter()
+                .all(|part| part.is_finite())
+        );
+    }
+}

@@ -1,0 +1,258 @@
+//! Linear equations for five unknowns, by least squares.
+//!
+//! Modified Gram–Schmidt, the right side as a sixth column: as stable as Householder's reflections
+//! for least squares (Björck 1967), and nothing is squared.
+
+use crate::force::kernels::sqrt;
+
+/// Unknowns: size, tilt along x and y, place along x and y.
+pub const UNKNOWNS: usize = 5;
+/// Equations of the markers: x and y of each.
+pub const EQUATIONS: usize = 8;
+/// A column of which less than this part is left beside those before it says nothing of its own:
+/// the tables' slopes are exact to some 10⁻³ of the largest.
+const LEAST_OWN: f32 = 1e-3;
+
+/// A column of the markers' equations.
+pub type Column = [f32; EQUATIONS];
+/// Size, tilt along x and y, place along x and y, or what they change.
+pub type Unknowns = [f32; UNKNOWNS];
+
+/// The square of what has these parts.
+pub(crate) fn square(parts: &[f32]) -> f32 {
+    parts.iter().fold(0.0, |sum, part| sum + part * part)
+}
+
+/// What equations say.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solved {
+    /// The unknowns.
+    pub unknowns: Unknowns,
+    /// The square of what no unknowns explain, of the right side.
+    pub left_over: f32,
+    /// The square of what they explain.
+    pub explained: f32,
+    /// By unknown: rows whose products are the unknowns' covariances when the equations' are the
+    /// unit matrix.
+    pub spread: [[f32; UNKNOWNS]; UNKNOWNS],
+}
+
+impl Solved {
+    /// The covariance of two unknowns. Once in the near memory, which is scarce.
+    #[inline(never)]
+    pub fn covariance(&self, a: usize, b: usize) -> f32 {
+        let [Some(a), Some(b)] = [a, b].map(|unknown| self.spread.get(unknown)) else {
+            return 0.0;
+        };
+        let pairs = a.iter().zip(b);
+        pairs.fold(0.0, |sum, (a, b)| sum + a * b)
+    }
+
+    /// The nearest unknowns to `unknowns`, by what the equations say, in which those at `first` and
+    /// after it are less by `less` along a direction of length one.
+    pub fn held_back(
+        &self,
+        unknowns: Unknowns,
+        first: usize,
+        along: [f32; 2],
+        less: f32,
+    ) -> Unknowns {
+        let with = |unknown: usize| {
+            let [a, b] = [first, first + 1].map(|k| self.covariance(unknown, k));
+            a * along[0] + b * along[1]
+        };
+        let variance = with(first) * along[0] + with(first + 1) * along[1];
+        let mut held = unknowns;
+        for (k, held) in held.iter_mut().enumerate() {
+            *held -= less * with(k) / variance;
+        }
+        held
+    }
+}
+
+/// The unknowns whose combination of `columns` is nearest to `side`, of which what they do not
+/// explain is left; `None` when the columns do not tell them apart, or a number is no number.
+pub fn solve<const N: usize>(
+    mut columns: [[f32; N]; UNKNOWNS],
+    side: &mut [f32; N],
+) -> Option<Solved> {
+    let whole = columns.each_ref().map(norm);
+    let mut upper = [[0.0; UNKNOWNS]; UNKNOWNS];
+    let mut along = [0.0; UNKNOWNS];
+    for k in 0..UNKNOWNS {
+        let own = norm(&columns[k]);
+        // Not more than the whole, up to rounding; what is no number is not among them.
+        if !(f32::MIN_POSITIVE.max(LEAST_OWN * whole[k])..2.0 * whole[k]).contains(&own) {
+            return None;
+        }
+        upper[k][k] = own;
+        let per_own = 1.0 / own;
+        let unit = columns[k].map(|part| part * per_own);
+        for j in k + 1..UNKNOWNS {
+            upper[k][j] = dot(&unit, &columns[j]);
+            take(&mut columns[j], &unit, upper[k][j]);
+        }
+        along[k] = dot(&unit, side);
+        take(side, &unit, along[k]);
+    }
+    let left_over = dot(side, side);
+    let inverse = inverse(&upper);
+    let mut solved = Solved {
+        unknowns: [0.0; UNKNOWNS],
+        left_over,
+        explained: square(&along),
+        spread: inverse,
+    };
+    for (row, unknown) in solved.unknowns.iter_mut().enumerate() {
+        for k in row..UNKNOWNS {
+            *unknown += inverse[row][k] * along[k];
+        }
+    }
+    let sound = left_over.is_finite() && solved.unknowns.iter().all(|part| part.is_finite());
+    sound.then_some(solved)
+}
+
+/// Of an upper triangular matrix with nothing near zero on its diagonal.
+fn inverse(upper: &[[f32; UNKNOWNS]; UNKNOWNS]) -> [[f32; UNKNOWNS]; UNKNOWNS] {
+    let mut inverse = [[0.0; UNKNOWNS]; UNKNOWNS];
+    for column in 0..UNKNOWNS {
+        inverse[column][column] = 1.0 / upper[column][column];
+        for row in (0..column).rev() {
+            let sum =
+                (row + 1..=column).fold(0.0, |sum, k| sum + upper[row][k] * inverse[k][column]);
+            inverse[row][column] = -sum * inverse[row][row];
+        }
+    }
+    inverse
+}
+
+fn norm<const N: usize>(column: &[f32; N]) -> f32 {
+    sqrt(dot(column, column))
+}
+
+/// In four sums, none of which waits for another.
+fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
+    let mut sums = [0.0; 4];
+    for (k, (a, b)) in a.iter().zip(b).enumerate() {
+        sums[k % 4] += a * b;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+fn take<const N: usize>(from: &mut [f32; N], unit: &[f32; N], part: f32) {
+    for (from, unit) in from.iter_mut().zip(unit) {
+        *from -= part * unit;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn columns(parts: [f32; 40]) -> [Column; UNKNOWNS] {
+        core::array::from_fn(|k| core::array::from_fn(|i| parts[8 * k + i]))
+    }
+
+    fn applied(columns: &[Column; UNKNOWNS], unknowns: [f32; UNKNOWNS]) -> Column {
+        let mut sum = [0.0; EQUATIONS];
+        for (column, unknown) in columns.iter().zip(unknowns) {
+            take(&mut sum, column, -unknown);
+        }
+        sum
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_combined_comes_back(
+            parts in prop::array::uniform(-1.0f32..1.0),
+            unknowns in prop::array::uniform5(-1.0f32..1.0),
+            scales in prop::array::uniform5(-20i32..20),
+        ) {
+            let mut columns = columns(parts);
+            for (column, scale) in columns.iter_mut().zip(scales) {
+                *column = column.map(|part| part * 2f32.powi(scale));
+            }
+            let side = applied(&columns, unknowns);
+            let Some(solved) = solve(columns, &mut side.clone()) else {
+                return Ok(());
+            };
+            // What a rounding of the equations may move an unknown by.
+            let side = norm(&side);
+            for (k, unknown) in unknowns.iter().enumerate() {
+                let spread = solved.covariance(k, k).sqrt();
+                let error = (solved.unknowns[k] - unknown).abs();
+                prop_assert!(error <= 1e-4 * spread * side + 1e-6, "{error} {spread} {side}");
+            }
+            prop_assert!(solved.left_over <= 1e-6 * side * side);
+        }
+
+        /// Against f64 normal equations: nearest, with what is left at right angles to every
+        /// column.
+        #[test]
+        fn what_is_left_is_across_all_columns(
+            parts in prop::array::uniform(-1.0f32..1.0),
+            side in prop::array::uniform8(-1.0f32..1.0),
+        ) {
+            let columns = columns(parts);
+            let mut over = side;
+            let Some(solved) = solve(columns, &mut over) else {
+                return Ok(());
+            };
+            let mut left = side;
+            for (column, unknown) in columns.iter().zip(solved.unknowns) {
+                take(&mut left, column, unknown);
+            }
+            let largest = solved.unknowns.iter().fold(1.0f32, |most, part| most.max(part.abs()));
+            for (left, over) in left.iter().zip(over) {
+                prop_assert!((left - over).abs() < 1e-4 * largest);
+            }
+            for column in &columns {
+                prop_assert!(dot(&left, column).abs() < 1e-4 * largest);
+            }
+            prop_assert!((dot(&left, &left) - solved.left_over).abs() < 1e-4 * largest);
+            let all = solved.left_over + solved.explained;
+            prop_assert!((all - dot(&side, &side)).abs() < 1e-4 * largest);
+        }
+
+        #[test]
+        fn any_number_is_survived(
+            parts in prop::array::uniform(any::<f32>()),
+            side in prop::array::uniform8(any::<f32>()),
+        ) {
+            if let Some(solved) = solve(columns(parts), &mut side.clone()) {
+                prop_assert!(solved.unknowns.iter().all(|part| part.is_finite()));
+            }
+        }
+    }
+
+    #[test]
+    fn columns_that_say_the_same_are_refused() {
+        let mut parts = [0.0; 40];
+        for (i, part) in parts.iter_mut().enumerate() {
+            *part = ((i * i) as f32 * 1.7).sin();
+        }
+        let mut all = columns(parts);
+        assert!(solve(all, &mut [1.0; 8]).is_some());
+        all[4] = all[1].map(|part| -3.0 * part);
+        assert!(solve(all, &mut [1.0; 8]).is_none());
+        all[4] = [0.0; 8];
+        assert!(solve(all, &mut [1.0; 8]).is_none());
+    }
+
+    #[test]
+    fn the_covariance_is_that_of_the_normal_equations() {
+        // Columns at right angles, of lengths 1, 2, 3, 4 and 5.
+        let mut all = [[0.0; 8]; 5];
+        for (k, column) in all.iter_mut().enumerate() {
+            column[k] = (k + 1) as f32;
+        }
+        let solved = solve(all, &mut [1.0; 8]).unwrap();
+        for k in 0..5 {
+            let expected = 1.0 / ((k + 1) as f32).powi(2);
+            assert!((solved.covariance(k, k) - expected).abs() < 1e-6);
+            assert_eq!(solved.covariance(k, (k + 1) % 5), 0.0);
+        }
+        assert_eq!((solved.left_over, solved.explained), (3.0, 5.0));
+    }
+}

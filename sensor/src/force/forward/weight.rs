@@ -1,0 +1,381 @@
+//! What a film's own weight does to the images: at rest, and less under a load.
+//!
+//! Weight along the film's normal acts as a load of its own. With it the film is as large a load's
+//! as the root a of |F|(a) = |F|(s) − p·g_z, s being the tip's, and what it moves is nearly in
+//! proportion to Δ = a − s: all of it hangs from that at rest, some hundredths under a deep press.
+//! Functions of Δ and of gravity along the film are made once, when gravity changes; a frame sums
+//! what is left of them over the load.
+
+use super::covariance::{Covariance, between};
+use super::mounting::Mounting;
+use super::pose::{Pose, Stiffness, limited};
+use super::predict::Prediction;
+use super::solve::{Column, EQUATIONS};
+use super::terms::Limits;
+use super::{Forward, Markers};
+use crate::force::kernels::sqrt;
+use crate::force::rest::Rest;
+
+/// Gravity along x, y and z of the film's frame, in parts of g.
+pub type Gravity = [f32; 3];
+
+/// Functions of gravity that sum up to what weight does at rest: Δ, Δ², Δ³, x, y, x·Δ and y·Δ.
+pub const AT_REST: usize = 7;
+/// Those of which more is added under a load: Δ, Δ², x and y.
+pub const UNDER_LOAD: usize = 4;
+/// Sizes at which it is known what is added, the squares of even parts of the largest; at none
+/// nothing is.
+pub const SIZES: usize = 10;
+/// Functions of place and tilt: 1, x, y, x², x·y, y², of the tilt a and b, a² + b².
+pub const TERMS: usize = 9;
+/// Bytes of what is added at a size by a function of gravity: a step, and parts of each coordinate
+/// and term.
+const BLOCK: usize = 4 + 2 * EQUATIONS * TERMS;
+/// Bytes of all of it.
+pub const BYTES: usize = SIZES * UNDER_LOAD * BLOCK;
+/// Steps of what is added.
+pub const LEGAL: core::ops::RangeInclusive<f32> = 0.0..=1e3;
+/// Beyond this place, mm, it is as there.
+const LAST_MM: f32 = 5.0;
+/// Newton's steps to a size.
+const STEPS: usize = 12;
+/// Standard uncertainty of gravity that nobody told, in parts of what g along an axis does: one
+/// that was turned over is within two of it. Any two directions are √(2/3) apart along each axis.
+const ANY_WAY: f32 = 1.0;
+/// What these functions leave of each coordinate, standard uncertainty: this part of what weight
+/// does under the load, and that part of what a turn did at rest times the softness. Under some mN
+/// the film turns inside out where gravity pulls away from the camera.
+const LEFT: f32 = 0.02;
+const LEFT_OF_TURN: f32 = 0.15;
+/// Gravity that differs by less than this, in parts of g, is the same.
+const SAME: f32 = 2e-3;
+/// How often a rest picture is read to tell how large weight's effect is in it: each reading leaves
+/// a twentieth of the error of the one before.
+const READINGS: usize = 3;
+
+/// What weight does, borrowed from a model file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weight<'a> {
+    /// Gravity on the film that the tables and the model's own rest position are of; zeros: it
+    /// weighed nothing.
+    pub down: Gravity,
+    /// The press that sinks the film as its weight does, N.
+    pub press_n: f32,
+    /// Standard uncertainty of what weight does, in parts of that: of the unit that the model was
+    /// made on, and of any other.
+    pub unsure: [f32; 2],
+    /// What it does at rest by each function, focal lengths.
+    pub at_rest: [Column; AT_REST],
+    /// What is added at each size by each function, divided by the film's [softness](soft).
+    pub under_load: &'a [[u8; BLOCK]],
+}
+
+/// How functions of gravity depend on a film and the load that is on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Functions {
+    /// How strong the force of a size is.
+    pub stiffness: Stiffness,
+    /// As [`Weight::press_n`].
+    pub press_n: f32,
+}
+
+/// What is known of gravity on a sensor, when its rest position was taken and now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Turned {
+    /// It may be any, both times.
+    AnyWay,
+    /// It is this.
+    From {
+        /// When the rest position was taken.
+        before: Gravity,
+        /// Now.
+        now: Gravity,
+    },
+}
+
+/// What weight does beside what the tables say, gravity being what it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hanging {
+    /// Whether the prediction has it; else only its uncertainty.
+    is_told: bool,
+    /// What it does by size and term of each coordinate, divided by the softness.
+    sizes: [[[f32; TERMS]; EQUATIONS]; SIZES + 1],
+    /// What of that the rest position has.
+    at_rest: Column,
+    /// What is uncertain of it at rest, and by how much in parts of it all.
+    moved: Column,
+    unsure: f32,
+    /// Gravity along the film, when it is not known: what it does along x and along y.
+    along: Option<[Column; 2]>,
+}
+
+impl<'a> Weight<'a> {
+    /// From the bytes of a file; `None` where there are fewer or more than [`BYTES`], or a step is
+    /// not within [`LEGAL`].
+    pub fn under_load_of(bytes: &'a [u8]) -> Option<&'a [[u8; BLOCK]]> {
+        let (blocks, rest) = bytes.as_chunks();
+        let sound = blocks.len() == SIZES * UNDER_LOAD
+            && rest.is_empty()
+            && blocks.iter().all(|block| LEGAL.contains(&step(block)));
+        sound.then_some(blocks)
+    }
+
+    /// How far the images of a film that gravity pulls on so are from a weightless film's, at rest,
+    /// focal lengths.
+    pub fn hangs(&self, stiffness: &Stiffness, gravity: Gravity) -> Column {
+        let mut sum = Column::default();
+        let parts = self.functions(stiffness).at(0.0, gravity);
+        for (part, column) in parts.iter().zip(&self.at_rest) {
+            add(&mut sum, *part, column);
+        }
+        sum
+    }
+
+    /// What a sensor shows that was turned so, beside what the tables say; of the unit that they
+    /// were made on, or of another.
+    pub fn hanging(
+        &self,
+        stiffness: &Stiffness,
+        limits: &Limits,
+        turned: Turned,
+        is_own: bool,
+    ) -> Hanging {
+        let unsure = self.unsure[usize::from(!is_own)];
+        let mut hanging = Hanging {
+            is_told: true,
+            sizes: [[[0.0; TERMS]; EQUATIONS]; SIZES + 1],
+            at_rest: Column::default(),
+            moved: Column::default(),
+            unsure,
+            along: None,
+        };
+        let parts = match turned {
+            Turned::AnyWay => [(0.5, [0.0, 0.0, 1.0]), (-0.5, [0.0, 0.0, -1.0])],
+            Turned::From { now, .. } => [(1.0, now), (-1.0, self.down)],
+        };
+        for (number, of_size) in hanging.sizes.iter_mut().enumerate() {
+            let root = number as f32 / SIZES as f32;
+            let size = limits.size * root * root;
+            for (part, gravity) in parts {
+                self.add_at(number, size, stiffness, gravity, part, of_size);
+            }
+        }
+        hanging.at_rest = hanging.sizes[0].map(|[first, ..]| first);
+        match turned {
+            Turned::AnyWay => {
+                let along = |k: usize| self.at_rest[k].map(|part| ANY_WAY * part);
+                hanging.is_told = false;
+                hanging.moved = hanging.at_rest;
+                hanging.unsure = ANY_WAY;
+                hanging.along = Some([along(3), along(4)]);
+            }
+            Turned::From { before, now } => {
+                add(&mut hanging.moved, 1.0, &self.hangs(stiffness, now));
+                add(&mut hanging.moved, -1.0, &self.hangs(stiffness, before));
+            }
+        }
+        hanging
+    }
+
+    fn functions(&self, stiffness: &Stiffness) -> Functions {
+        Functions {
+            stiffness: *stiffness,
+            press_n: self.press_n,
+        }
+    }
+
+    /// A part of what gravity does at the size of a number, more.
+    fn add_at(
+        &self,
+        number: usize,
+        size: f32,
+        stiffness: &Stiffness,
+        gravity: Gravity,
+        part: f32,
+        sum: &mut [[f32; TERMS]; EQUATIONS],
+    ) {
+        let functions = self.functions(stiffness).at(size, gravity);
+        let by_softness = part / soft(stiffness, size);
+        for (function, column) in functions.iter().zip(&self.at_rest) {
+            for (sum, value) in sum.iter_mut().zip(column) {
+                sum[0] += by_softness * function * value;
+            }
+        }
+        let [d, square, _, x, y, ..] = functions;
+        let first = number.wrapping_sub(1).saturating_mul(UNDER_LOAD);
+        let blocks = self.under_load.iter().skip(first).take(UNDER_LOAD);
+        for (function, block) in [d, square, x, y].into_iter().zip(blocks) {
+            add_block(block, part * function, sum);
+        }
+    }
+}
+
+impl Forward<'_> {
+    /// A rest position as it is where gravity pulls as it did on the model's own film.
+    pub fn as_made(&self, rest: &Rest, turned: Turned) -> Rest {
+        match (&self.weight, turned) {
+            (Some(weight), Turned::From { now, .. }) => self.turned(rest, now, weight.down),
+            _ => *rest,
+        }
+    }
+
+    /// A rest position that was taken under a gravity, as it is under another.
+    pub fn turned(&self, rest: &Rest, from: Gravity, to: Gravity) -> Rest {
+        let Some(weight) = &self.weight else {
+            return *rest;
+        };
+        let hangs = |gravity| weight.hangs(&self.stiffness, gravity);
+        let moved = |from: Gravity, to: Gravity, by: &Mounting| {
+            let mut moved = hangs(to);
+            add(&mut moved, -1.0, &hangs(from));
+            let mut px = Markers::default();
+            for (px, moved) in px.iter_mut().zip(moved.as_chunks::<2>().0) {
+                *px = by.px(*moved);
+            }
+            rest.displaced(&px)
+        };
+        let mut flat = *rest;
+        for _ in 0..READINGS {
+            flat = moved(from, weight.down, &self.rest_image.mounting(&flat));
+        }
+        match is_same(to, weight.down) {
+            true => flat,
+            false => moved(from, to, &self.rest_image.mounting(&flat)),
+        }
+    }
+
+    /// What a sensor that was turned so shows beside what the tables say; nothing where gravity is
+    /// always as it was on the model's own film, or the file does not say.
+    pub fn hanging(&self, turned: Turned, is_own: bool) -> Option<Hanging> {
+        let weight = self.weight.as_ref()?;
+        if let Turned::From { before, now } = turned
+            && is_same(before, weight.down)
+            && is_same(now, weight.down)
+        {
+            return None;
+        }
+        Some(weight.hanging(&self.stiffness, &self.limits, turned, is_own))
+    }
+}
+
+fn is_same(a: Gravity, b: Gravity) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME)
+}
+
+impl Functions {
+    /// The functions of gravity under a load of a size.
+    pub fn at(&self, size: f32, [x, y, z]: Gravity) -> [f32; AT_REST] {
+        let stiffness = &self.stiffness;
+        let with_n = stiffness.magnitude_n(size) - self.press_n * z;
+        // An odd function, whose root Newton's steps find from above.
+        let (sign, with_n) = if with_n < 0.0 {
+            (-1.0, -with_n)
+        } else {
+            (1.0, with_n)
+        };
+        let mut root = (with_n / stiffness.linear_n).min(libm::cbrtf(with_n / stiffness.cubic_n));
+        for _ in 0..STEPS {
+            root -= (stiffness.magnitude_n(root) - with_n) / stiffness.per_size_n(root);
+        }
+        let d = sign * root - size;
+        [d, d * d, d * d * d, x, y, x * d, y * d]
+    }
+}
+
+/// The functions of place, mm, and tilt, rad.
+pub fn terms(place_mm: [f32; 2], [a, b]: [f32; 2]) -> [f32; TERMS] {
+    let [x, y] = place_mm.map(|part| limited(part, -LAST_MM, LAST_MM));
+    [1.0, x, y, x * x, x * y, y * y, a, b, a * a + b * b]
+}
+
+/// How much softer the film is at rest than under a load of a size, inverted: 1 at rest.
+pub fn soft(stiffness: &Stiffness, size: f32) -> f32 {
+    stiffness.linear_n / stiffness.per_size_n(size)
+}
+
+fn add(sum: &mut Column, part: f32, column: &Column) {
+    for (sum, value) in sum.iter_mut().zip(column) {
+        *sum += part * value;
+    }
+}
+
+fn step([a, b, c, d, ..]: &[u8; BLOCK]) -> f32 {
+    f32::from_le_bytes([*a, *b, *c, *d])
+}
+
+fn add_block(block: &[u8; BLOCK], part: f32, sum: &mut [[f32; TERMS]; EQUATIONS]) {
+    let part = part * step(block);
+    let steps = block.as_chunks::<2>().0.iter().skip(2);
+    for (sum, step) in sum.as_flattened_mut().iter_mut().zip(steps) {
+        *sum += part * f32::from(i16::from_le_bytes(*step));
+    }
+}
+
+impl Hanging {
+    /// Adds what weight does under a load to what the tables say, and what of it is uncertain to a
+    /// covariance.
+    #[inline(never)]
+    pub fn add_to(
+        &self,
+        pose: &Pose,
+        stiffness: &Stiffness,
+        limits: &Limits,
+        prediction: &mut Prediction,
+        covariance: &mut Covariance,
+    ) {
+        let (more, by_size) = self.more(pose, stiffness, limits);
+        if self.is_told {
+            add(&mut prediction.moved, 1.0, &more);
+            add(&mut prediction.slopes[0], 1.0, &by_size);
+        }
+        let of_turn = LEFT_OF_TURN * soft(stiffness, pose.size);
+        let effects = more.iter().zip(&self.at_rest).zip(&self.moved);
+        for (i, (row, ((more, at_rest), moved))) in covariance.iter_mut().zip(effects).enumerate() {
+            let (left, turned) = (LEFT * (more + at_rest), of_turn * moved);
+            if let Some(variance) = row.get_mut(i) {
+                *variance += left * left + turned * turned;
+            }
+        }
+        let mut mode = self.moved;
+        add(&mut mode, 1.0, &more);
+        add_square(covariance, &mode, self.unsure);
+        for along in self.along.iter().flatten() {
+            add_square(covariance, along, 1.0);
+        }
+    }
+
+    /// What weight does under a load beside what it does at rest, and its slope by the size.
+    fn more(&self, pose: &Pose, stiffness: &Stiffness, limits: &Limits) -> (Column, Column) {
+        let terms = terms(pose.place_mm, pose.tilt);
+        let size = limited(pose.size / limits.size, 1e-6, 1.0);
+        let root = sqrt(size);
+        let [(first, one), (second, other)] = between(root, SIZES + 1);
+        let (at, per_size_n) = (pose.size, stiffness.per_size_n(pose.size));
+        let softness = stiffness.linear_n / per_size_n;
+        let softer = -6.0 * stiffness.cubic_n * at * softness / per_size_n;
+        let steeper = SIZES as f32 * softness / (2.0 * root * limits.size);
+        let (mut more, mut by_size) = (Column::default(), Column::default());
+        let sizes = self.sizes.get(first).zip(self.sizes.get(second));
+        let terms_of = sizes.into_iter().flat_map(|(a, b)| a.iter().zip(b));
+        let sums = more.iter_mut().zip(&mut by_size).zip(&self.at_rest);
+        for (((more, by_size), at_rest), (from, to)) in sums.zip(terms_of) {
+            let [from, to] = [from, to].map(|parts| {
+                let products = parts.iter().zip(&terms);
+                products.fold(0.0, |sum, (part, term)| sum + part * term)
+            });
+            let value = one * from + other * to;
+            *more = softness * value - at_rest;
+            *by_size = softer * value + steeper * (to - from);
+        }
+        (more, by_size)
+    }
+}
+
+/// The covariance of what moves along a column with a standard uncertainty, more.
+fn add_square(covariance: &mut Covariance, along: &Column, sigma: f32) {
+    for (i, row) in covariance.iter_mut().enumerate() {
+        for (sum, part) in row[..=i].iter_mut().zip(along) {
+            *sum += sigma * along[i] * (sigma * part);
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The hottest loops, by the fastest means that this processor has.
+//!
+//! Each function is the definition in portable Rust, of the same name in `portable`, or a kernel
+//! that gives the same bits: on a Cortex-M4 or M7 (targets `thumbv7em-*`) those of `cortex_m7`, the
+//! only file of this package that holds `unsafe`.
+
+#[cfg(armv7em)]
+#[allow(unsafe_code)]
+mod cortex_m7;
+mod portable;
+
+pub use crate::markers::sqrt;
+
+use crate::force::layer::{Layer, MAX_WIDTH};
+use hivtac_terms::fixed::Q;
+
+/// What a kernel may read beyond the inputs of the widest layer: it loads ahead.
+const LOADED_AHEAD: usize = 4;
+
+/// The inputs of a layer. Those beyond a layer's width meet weights of zero: what they hold means
+/// nothing.
+#[derive(Clone, Debug)]
+#[repr(C, align(4))]
+pub struct Inputs([i16; MAX_WIDTH + LOADED_AHEAD]);
+
+/// The sums of a layer's rows, before bias and rescaling. A layer of k rows fills up its last group
+/// of four.
+pub type Sums = [i32; MAX_WIDTH];
+
+impl Inputs {
+    /// All zero.
+    pub const fn new() -> Inputs {
+        Inputs([0; MAX_WIDTH + LOADED_AHEAD])
+    }
+
+    /// The inputs, to be written.
+    pub fn values_mut(&mut self) -> &mut [i16; MAX_WIDTH] {
+        let [values @ .., _, _, _, _] = &mut self.0;
+        values
+    }
+}
+
+/// Σ w_ji·x_i of every row j of a layer. Afterwards the inputs mean nothing.
+pub fn multiply(layer: &Layer<'_>, inputs: &mut Inputs, sums: &mut Sums) {
+    #[cfg(armv7em)]
+    if cortex_m7::multiply(layer, inputs, sums) {
+        return;
+    }
+    portable::multiply(layer, inputs.values_mut(), sums);
+}
+
+/// clamp(rescale(acc_j, m_j, s_j), 0, A) of every row j of a hidden layer, as inputs of the next
+/// one.
+pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
+    #[cfg(armv7em)]
+    let done = cortex_m7::activate(layer, sums, inputs);
+    #[cfg(not(armv7em))]
+    let done = 0;
+    portable::activate(layer, sums, inputs.values_mut(), done);
+}
+
+/// Parts of coefficients at four by four nodes: those of the value and of the slope along each
+/// axis, whose sizes each add up to at most one and four roundings.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(4))]
+pub struct Parts {
+    /// Along y, for each line: of the value and of the slope.
+    pub y: [[Q<15, i16>; 2]; 4],
+    /// Along x: of the value, of the slope.
+    pub x: [[Q<15, i16>; 4]; 2],
+}
+
+/// What a term's coefficient counts in an output, and in its slopes by size and by tilt along x and
+/// y.
+pub type Factors = [f32; 4];
+
+/// An output at a place, and its slopes by size, by tilt along x and y, and along x and y: see
+/// `portable::spline`.
+pub fn spline(
+    steps: &[u8],
+    line: usize,
+    node: usize,
+    parts: &Parts,
+    factors: &[Factors],
+) -> [f32; 6] {
+    #[cfg(all(armv7em, target_abi = "eabihf"))]
+    if let Some(sums) = cortex_m7::spline(steps, line, node, parts, factors) {
+        return sums;
+    }
+    portable::spline(steps, line, node, parts, factors)
+}

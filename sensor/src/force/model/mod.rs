@@ -1,0 +1,167 @@
+//! The model file: a quantized network with its input scaling, the film run forwards, and the
+//! conditions they were made under.
+//!
+//! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves
+//! it sound before it can be used. It may lie anywhere; kernels run one that lies at a multiple of
+//! four ([`AlignedFile`]). Feature `encode` adds the writer, `encode::ModelSpec`. Both follow
+//! `docs/model-file.md`.
+
+mod aligned;
+mod conditions;
+#[cfg(any(test, feature = "encode"))]
+pub mod encode;
+mod error;
+mod forward;
+#[cfg(test)]
+mod layer_tests;
+mod layers;
+mod layout;
+mod place;
+mod reader;
+#[cfg(any(test, feature = "samples"))]
+#[doc(hidden)]
+pub mod samples;
+#[cfg(test)]
+mod tests;
+mod uncertainty;
+
+pub use aligned::AlignedFile;
+pub use conditions::{Conditions, Origin};
+pub use error::ModelError;
+#[cfg(any(test, feature = "encode"))]
+pub use forward::{CovarianceSpec, ForwardSpec, OthersSpec, TableSpec, TablesSpec, WeightSpec};
+pub(crate) use uncertainty::{LARGEST_PLACE_UNCERTAINTY, NO_DIRECTION};
+pub use uncertainty::{LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
+
+use crate::force::features::{FEATURES, Features};
+use crate::force::forward::Forward;
+use crate::force::layer::Layer;
+use crate::force::rest::Rest;
+use core::fmt::Write;
+use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
+
+/// The most layers a model may have.
+pub const MAX_LAYERS: usize = 8;
+/// Outputs that say a force, the first ones of every model.
+pub const OUTPUTS: usize = 3;
+/// Outputs that say where the tip is, after those of the force.
+pub const PLACE_OUTPUTS: usize = 2;
+
+/// A model, borrowed from the bytes of its file and proven sound.
+#[derive(Clone, Copy, Debug)]
+pub struct Model<'a> {
+    /// What it was made for; a frame made under other conditions has no force.
+    pub conditions: Conditions,
+    /// The rest position of the sensor it was made on.
+    pub rest: Rest,
+    /// How features become the network's input.
+    pub input: InputScaling,
+    /// What the outputs are.
+    pub output: OutputKind,
+    /// The forces it was trained or calibrated on.
+    pub range: CalibratedRange,
+    /// How well it knows them.
+    pub uncertainty: Uncertainty,
+    /// The film run forwards, which betters the network's answer.
+    pub forward: Option<Forward<'a>>,
+    crc: u32,
+    layers: [Layer<'a>; MAX_LAYERS],
+    layer_count: usize,
+}
+
+/// x_i = sat16(rescale(f_i − tare_i + rest_i − mean_i, m_i, s_i)), in units of σ_i / 4096.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct InputScaling {
+    /// Means of the training data.
+    pub mean: Features,
+    /// m_i, 1 to 2²⁴ − 1.
+    pub multipliers: [u32; FEATURES],
+    /// s_i, 1–62.
+    pub shifts: [u8; FEATURES],
+}
+
+/// What the outputs of the last layer are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum OutputKind {
+    /// Fx, Fy, Fz in µN.
+    ForceVector,
+    /// α and β in thousandths of a degree, |F| in µN.
+    AnglesMagnitude,
+    /// Fx, Fy, Fz in µN, and p_x, p_y in µm: the point of the film that the tip is on, by where it
+    /// rests, film frame.
+    ForceAndPlace,
+}
+
+impl OutputKind {
+    /// How many outputs there are: 3, or 5 with a place.
+    pub const fn count(self) -> usize {
+        match self {
+            OutputKind::ForceVector | OutputKind::AnglesMagnitude => OUTPUTS,
+            OutputKind::ForceAndPlace => OUTPUTS + PLACE_OUTPUTS,
+        }
+    }
+
+    /// Whether the place of the tip is among them.
+    pub const fn tells_place(self) -> bool {
+        matches!(self, OutputKind::ForceAndPlace)
+    }
+}
+
+/// The forces a model was trained or calibrated on: 0 to `magnitude`, both angles and both
+/// coordinates of the place to ± their limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CalibratedRange {
+    /// Largest |F|, > 0.
+    pub magnitude: MicroNewtons,
+    /// Largest |α|, 0–90°.
+    pub alpha: MilliDegrees,
+    /// Largest |β|, 0–90°.
+    pub beta: MilliDegrees,
+    /// Largest |p_x| and |p_y|, 1 to 1,000,000 µm; 0 in a model that does not tell places.
+    pub place: Micrometres,
+}
+
+impl<'a> Model<'a> {
+    /// Reads and proves a model file.
+    ///
+    /// # Errors
+    /// [`ModelError`] says what is wrong and where: not a model file, another version, cut or
+    /// damaged, a value outside its range, or a row of weights whose sum could overflow.
+    pub fn parse(bytes: &'a [u8]) -> Result<Model<'a>, ModelError> {
+        layout::parse(bytes)
+    }
+
+    /// The model's identity: the CRC-32 of its file.
+    pub fn crc(&self) -> u32 {
+        self.crc
+    }
+
+    /// Its layers, first to last: at least one.
+    pub fn layers(&self) -> &[Layer<'a>] {
+        self.layers.get(..self.layer_count).unwrap_or_default()
+    }
+
+    /// True when its file lies at a multiple of four, so that kernels can run it. Every layer then
+    /// lies so, too.
+    pub fn is_aligned(&self) -> bool {
+        let lies_so = |layer: &Layer<'_>| layer.weights.as_ptr().cast::<u32>().is_aligned();
+        self.layers().iter().all(lies_so)
+    }
+
+    /// True when the training data was simulated.
+    pub fn is_simulated(&self) -> bool {
+        self.conditions.origin == Origin::Simulated
+    }
+
+    /// Layer widths and preset, such as `11-64-64-5 ov7725`; cut after 32 bytes.
+    pub fn name(&self) -> heapless::String<32> {
+        let mut name = heapless::String::new();
+        // A full string keeps what it has: the end of a very long name is cut.
+        let _ = write!(name, "{FEATURES}");
+        for layer in self.layers() {
+            let _ = write!(name, "-{}", layer.outputs());
+        }
+        let _ = write!(name, " {}", self.conditions.preset.name());
+        name
+    }
+}

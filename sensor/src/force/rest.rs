@@ -1,0 +1,100 @@
+//! The rest position: where the untouched film has its markers.
+
+use crate::force::features::Features;
+use crate::markers::rules::pattern::{Pattern, distance};
+use hivtac_terms::geometry::Geometry;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::units::Px;
+
+/// The longest side of a picture, px.
+const LARGEST_SIDE: i32 = 800;
+
+/// The untouched film of the same unit has its markers no farther from its rest position than this,
+/// beside what its camera did: half a pixel. What touches it, and another unit, moves one farther.
+pub const NEAR: Px = Px(Px::ONE.0 / 2);
+
+/// A rest position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Rest {
+    /// Features of the untouched film.
+    pub features: Features,
+    /// Areas of its markers 0–3 in the mask, px.
+    pub areas: [u32; 4],
+}
+
+impl Rest {
+    /// Of these markers.
+    pub fn of_markers(markers: &[Marker; 4]) -> Rest {
+        Rest {
+            features: Features::of_markers(markers),
+            areas: markers.map(|marker| marker.area),
+        }
+    }
+
+    /// Whether all coordinates of these markers are within [`NEAR`] of it.
+    pub fn is_near(&self, features: &Features) -> bool {
+        let near = |a: Px, b: Px| a.0.abs_diff(b.0) <= NEAR.0.unsigned_abs();
+        let pairs = self.features.centroids.iter().zip(&features.centroids);
+        pairs
+            .into_iter()
+            .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
+    }
+
+    /// Its markers 0–3.
+    pub fn markers(&self) -> [Marker; 4] {
+        core::array::from_fn(|identity| {
+            let (x, y) = self.features.centroids[identity];
+            let area = self.areas[identity];
+            Marker { x, y, area }
+        })
+    }
+
+    /// The same whose markers lie so many px farther. The bounding rectangle of a mean is not the
+    /// mean of rectangles: what it changes by is added.
+    pub fn displaced(&self, px: &[[f32; 2]; 4]) -> Rest {
+        let mut markers = self.markers();
+        let before = Features::of_markers(&markers);
+        for (marker, [x, y]) in markers.iter_mut().zip(px) {
+            marker.x.0 = marker.x.0.saturating_add(Px::of_f32(*x).0);
+            marker.y.0 = marker.y.0.saturating_add(Px::of_f32(*y).0);
+        }
+        let after = Features::of_markers(&markers);
+        let (center, area) = (self.features.rect_center, self.features.rect_area);
+        let shifted =
+            |of: Px, from: Px, to: Px| Px(of.0.saturating_add(to.0.saturating_sub(from.0)));
+        Rest {
+            features: Features {
+                centroids: after.centroids,
+                rect_center: (
+                    shifted(center.0, before.rect_center.0, after.rect_center.0),
+                    shifted(center.1, before.rect_center.1, after.rect_center.1),
+                ),
+                rect_area: area.saturating_add(after.rect_area - before.rect_area),
+            },
+            areas: self.areas,
+        }
+    }
+
+    /// Whether it can be a rest position: inside the largest picture, with markers of at least a
+    /// pixel.
+    pub fn is_sound(&self) -> bool {
+        let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
+        let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;
+        self.features
+            .centroids
+            .iter()
+            .all(|c| inside(c.0) && inside(c.1))
+            && self.areas.iter().all(|area| (1..=largest).contains(area))
+    }
+
+    /// Whether the markers are as far from their common centre as a film at rest shows them, to
+    /// 15 %. That leaves room for a film 1.5 mm nearer or farther and for markers 0.7 mm off their
+    /// places, and refuses a film that something presses: every force against such a rest would be
+    /// wrong.
+    pub fn fits(&self, geometry: &Geometry) -> bool {
+        let center = Pattern::of_centroids(self.features.centroids).center;
+        let [a, b, c, d] = self.features.centroids.map(|point| distance(point, center));
+        let expected = 4.0 * geometry.rest_distance().to_f32();
+        (a + b + c + d - expected).abs() <= 0.15 * expected
+    }
+}

@@ -1,0 +1,301 @@
+//! Whether four markers may make a force: how they compare with a rest position.
+//!
+//! The limits stand between what a load does to the markers and what a false, cut or half dark
+//! marker does. The first was measured on rendered frames of the film's curves at QVGA and 800×600,
+//! both presets: forces to 0.25 N tilted by up to 12°, tip offsets to 0.5 mm. Each limit's comment
+//! gives the largest value seen. Lengths do not grow with the frame where they come of the pixel
+//! grid. A model of presses in the middle would read presses far off it wrong: they are refused
+//! where they strain the pattern. One that tells places has wider limits ([`Reading`]).
+
+use super::{
+    Found, Image,
+    pattern::{Pattern, distance, is_within, larger, length},
+    reading::Reading,
+    shape::RadialShape,
+};
+use crate::markers::dilate::MAX_DILATIONS;
+use crate::markers::kernels::sqrt;
+use crate::markers::settings::Settings;
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::geometry::Geometry;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::PixelFormat;
+use hivtac_terms::units::Px;
+
+/// Strain of binary centroids against this unit's own rest, as the displacement of one marker that
+/// makes it, px (seen: 0.7 at QVGA, 0.26 at 800×600). Of weighted ones: [`Reading::displacement`].
+/// It is what a thing that stands in for a marker may be off.
+const STRAIN_BINARY: f32 = 0.7;
+/// Strain against a model's rest: another unit's markers are not quite where this one's are.
+const STRAIN_FOREIGN: f32 = 0.015;
+/// Turn against the rest's: the tangent of 5° (seen: 0.1°).
+const TURN: f32 = 0.087_489;
+/// Shift of the centre against the rest's, in parts of the rest's half side (seen: 0.11).
+const SHIFT: f32 = 0.352;
+/// Size against the rest's (seen: 1 to 1.71).
+const SCALE: (f32, f32) = (0.852, 2.0);
+/// Width across the radius: off by [`Reading::width`] of it and so many px (seen: 0.3). Eaten or
+/// swollen edges.
+const WIDTH_PIXELS: f32 = 0.35;
+/// The narrowest marker's aspect over the widest's: 1 less 0.05 less 0.5 px of its width less 6
+/// times the taper less the shift over the rest's half side: the film is steeper on the side that
+/// comes nearer, and where an off-centre tip is. One marker eaten or cut along the radius.
+const ASPECT: f32 = 0.05;
+const ASPECT_PIXELS: f32 = 0.5;
+const ASPECT_TAPER: f32 = 6.0;
+/// Skew: 1 px of its width (seen: 0.91 px) and the taper. Eaten or cut on one side.
+const SKEW_PIXELS: f32 = 1.0;
+/// Hollowness, px², with none to three dilations, which make a disc a little square (seen: 0.20,
+/// 0.20, 0.28 and 0.44). Dented, notched, grown.
+const HOLLOW: [f32; 1 + MAX_DILATIONS as usize] = [0.22, 0.22, 0.31, 0.49];
+/// Pixels that passed the threshold themselves, before dilation: at least as many as an ellipse has
+/// whose diameters are smaller than the mask's by what dilation adds to them, 8/π px each time (it
+/// adds 2 px to the width and to the height of what it dilates, 8·r + 4 px to a disc's area), and
+/// by 0.328 px (seen: 0.27). What is less are holes, which dilation closes: white pixels, stripes,
+/// spots of light.
+const DILATED: f32 = 8.0 / core::f32::consts::PI;
+const HOLES: f32 = 0.328;
+/// Lean: at most 0.3 px² for a marker as wide as at rest, and more as it is wider: the lens bends
+/// what comes near (seen: 0.16 near rest, 0.26 at 1.5 times its width). Cut or grown on one side.
+const LEAN: f32 = 0.3;
+/// Mean weight of a marker's pixels against that of all four: 0.015 and 12 px² over its width's
+/// square (seen at QVGA: more in 6 of 20,000 frames, 13.1 px² at most; at 800×600 less than 0.012
+/// in all). Striped, stained or glaring inside, where the dilated mask closes.
+const DENSITY: f32 = 0.015;
+const DENSITY_AREA: f32 = 12.0;
+/// What the mask adds to one marker's diameter at rest less what it adds to another's: 1 px (seen:
+/// 0.8 on units as people build them). One marker cut or grown.
+const EDGES_APART: f32 = 1.0;
+/// Centroid against bounding box: 0.6 px and 0.0313 of its width. Cut or grown on one side.
+const LOPSIDED_PIXELS: f32 = 0.6;
+const LOPSIDED: f32 = 0.0313;
+
+/// What four markers are compared with: a rest position, and all that follows from it before there
+/// is a frame.
+#[derive(Clone, Debug)]
+pub struct Trust {
+    at_rest: Pattern,
+    /// What the mask added to each marker's diameters at rest, px.
+    edges: [f32; 4],
+    /// One over a marker's width at rest, px.
+    by_rest_width: f32,
+    /// One over half the pattern's side at rest, px.
+    by_half_side: f32,
+    /// Limits of a marker's second moments that come of the pixel grid are so many times those of
+    /// other formats: YUV422 has one Cr for two columns.
+    grid: f32,
+    /// The same of limits of means, which it hardly changes: nine eighths.
+    grid_of_means: f32,
+    /// Largest hollowness.
+    hollow: f32,
+    /// By how much the diameters of the pixels that passed may be smaller than the mask's, px.
+    rim: f32,
+    /// Strain as the displacement of one marker that makes it, px; `None` against a model's rest.
+    displacement: Option<f32>,
+    reading: Reading,
+}
+
+impl Trust {
+    /// For markers found with these settings that rest there; `own_rest` says whether that was
+    /// taken on this unit, and `reading` what presses.
+    pub fn new(settings: &Settings, rest: &[Marker; 4], own_rest: bool, reading: Reading) -> Trust {
+        let geometry = &settings.geometry;
+        let centroids = rest.map(|marker| (marker.x, marker.y));
+        let at_rest = Pattern::of_centroids(centroids);
+        let (grid, grid_of_means) = match settings.threshold.format() {
+            PixelFormat::Yuv422 => (2.0, 1.125),
+            PixelFormat::Rgb565 | PixelFormat::Mono => (1.0, 1.0),
+        };
+        let displacement = match settings.centroid {
+            CentroidEstimator::RednessWeighted => grid_of_means * reading.displacement,
+            CentroidEstimator::BinaryMask => grid * STRAIN_BINARY,
+        };
+        let hollow = HOLLOW[usize::from(settings.dilations.min(MAX_DILATIONS))];
+        let rest_width = geometry.across(geometry.rest_distance());
+        Trust {
+            edges: core::array::from_fn(|identity| {
+                let distance = distance(centroids[identity], at_rest.center);
+                let distance = Px((distance * Px::ONE.0 as f32) as i32);
+                edge_at_rest(geometry, distance, rest[identity].area)
+            }),
+            by_rest_width: 1.0 / rest_width.to_f32().max(LEAST_LENGTH),
+            by_half_side: 1.0 / at_rest.half_side.max(LEAST_LENGTH),
+            at_rest,
+            grid,
+            grid_of_means,
+            hollow: grid * (hollow + reading.hollow),
+            rim: match settings.dilations {
+                0 => 0.0,
+                times => f32::from(times) * DILATED + HOLES,
+            },
+            displacement: own_rest.then_some(displacement),
+            reading,
+        }
+    }
+
+    /// Says whether these markers may make a force: [`Status::OK`] or
+    /// [`Status::MARKERS_IMPLAUSIBLE`].
+    pub fn judge(&self, found: &Found) -> Status {
+        let shift = distance(found.pattern.center, self.at_rest.center) * self.by_half_side;
+        if self.moved_plausibly(&found.pattern, shift) && self.images_fit(found, shift) {
+            Status::OK
+        } else {
+            Status::MARKERS_IMPLAUSIBLE
+        }
+    }
+
+    /// `shift` is that of the centre over the half side at rest, here and below.
+    fn moved_plausibly(&self, now: &Pattern, shift: f32) -> bool {
+        let rest = &self.at_rest;
+        let change = |now: [f32; 2], rest: [f32; 2]| [now[0] - rest[0], now[1] - rest[1]];
+        let taper = length(change(now.taper, rest.taper));
+        let scale = now.half_side * self.by_half_side;
+        let ([cos, sin], [rest_cos, rest_sin]) = (now.turn, rest.turn);
+        let turned = [
+            cos * rest_cos + sin * rest_sin,
+            sin * rest_cos - cos * rest_sin,
+        ];
+        is_within(
+            change(now.strain, rest.strain),
+            self.strain_limit(now, shift, taper),
+        ) && taper <= self.reading.taper
+            && turned[1].abs() <= turned[0] * TURN
+            && shift <= SHIFT
+            && (SCALE.0..=SCALE.1).contains(&scale)
+    }
+
+    fn strain_limit(&self, now: &Pattern, shift: f32, taper: f32) -> f32 {
+        let always = self.reading.strain_always;
+        let Some(displacement) = self.displacement else {
+            return larger(STRAIN_FOREIGN, always);
+        };
+        // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over
+        // four of those, and tapers by √2 times as much: that part of a taper is no tip's.
+        let displaced = displacement / (FOUR_DISTANCES * now.half_side);
+        let tapered = larger(taper - displaced * core::f32::consts::SQRT_2, 0.0);
+        let limit = displaced
+            + shift * shift * self.reading.strain_by_shift
+            + tapered * self.reading.strain_by_taper;
+        larger(limit, always)
+    }
+
+    fn images_fit(&self, found: &Found, shift: f32) -> bool {
+        let taper = length(found.pattern.taper);
+        let (mut narrowest, mut widest, mut by_width) = (f32::INFINITY, 0.0_f32, 0.0_f32);
+        for (image, edge) in found.images.iter().zip(&self.edges) {
+            if !self.image_fits(image, *edge, taper) {
+                return false;
+            }
+            let aspect = image.radial.along * image.radial.by_across;
+            narrowest = if aspect < narrowest {
+                aspect
+            } else {
+                narrowest
+            };
+            widest = larger(widest, aspect);
+            by_width = larger(by_width, image.radial.by_across);
+        }
+        let aspect = ASPECT
+            + by_width * (self.grid * ASPECT_PIXELS)
+            + taper * ASPECT_TAPER
+            + shift * self.reading.aspect_by_shift
+            + self.reading.aspect_always;
+        widest - narrowest <= aspect * widest && self.evenly_coloured(found, shift, by_width)
+    }
+
+    fn image_fits(&self, image: &Image, edge: f32, taper: f32) -> bool {
+        let Image {
+            radial, expected, ..
+        } = image;
+        let width = radial.across;
+        let lopsided = self.grid_of_means * LOPSIDED_PIXELS + width * LOPSIDED;
+        let skew = self.grid * SKEW_PIXELS * radial.by_across
+            + taper * self.reading.skew_by_taper
+            + self.reading.skew_always;
+        // For a marker that the optics makes so wide now.
+        let wider = larger(expected * self.by_rest_width, 1.0);
+        let bent = width * width * taper * self.reading.lean_by_taper;
+        let lean = (LEAN * wider + bent) * (0.5 * (self.grid + 1.0));
+        self.width_fits(*expected, radial, edge)
+            && radial.skew.abs() <= skew
+            && image.hollow <= self.hollow
+            && radial.squared_lean <= lean * lean
+            && image.lopsided <= lopsided
+            && is_filled(image, self.rim, self.reading.holes)
+    }
+
+    /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
+    fn width_fits(&self, expected: f32, radial: &RadialShape, edge: f32) -> bool {
+        let excess = radial.across - edge - expected;
+        excess.abs() <= expected * self.reading.width + self.grid_of_means * WIDTH_PIXELS
+    }
+
+    /// Whether the mean weights are as alike as such a shift leaves them, and with the mask's edge
+    /// left out, too, where that is looked at. `by_width` is one over the narrowest's width.
+    fn evenly_coloured(&self, found: &Found, shift: f32, by_width: f32) -> bool {
+        let over_square = |area: f32| self.grid * area * (by_width * by_width);
+        let densities = found.images.each_ref().map(|image| image.density);
+        let more = shift * self.reading.density_by_shift + over_square(DENSITY_AREA);
+        let inner = |area: f32| {
+            let [a, b, c, d] = &found.images;
+            let [e, f, g, h] = self.edges;
+            let pairs = [(a, e), (b, f), (c, g), (d, h)];
+            let densities = pairs.map(|(image, edge)| inner_density(image, edge));
+            are_alike(densities, over_square(area))
+        };
+        are_alike(densities, more) && self.reading.inner_density_area.is_none_or(inner)
+    }
+}
+
+/// Four times a marker's distance from the centre, in half sides.
+const FOUR_DISTANCES: f32 = 4.0 * core::f32::consts::SQRT_2;
+/// No length that is divided by is less, px.
+const LEAST_LENGTH: f32 = 1.0 / 65_536.0;
+
+/// Whether markers of these areas at rest are equal: discs of one size on a flat film, to whose
+/// diameters the mask adds the same.
+pub fn are_equal(geometry: &Geometry, areas: [u32; 4]) -> bool {
+    let edges = areas.map(|area| edge_at_rest(geometry, geometry.rest_distance(), area));
+    let least = edges.iter().copied().fold(f32::INFINITY, f32::min);
+    edges.iter().all(|edge| edge - least <= EDGES_APART)
+}
+
+/// Whether four mean weights are alike, to 0.015 of them and `more`. Always without weights.
+fn are_alike(densities: [f32; 4], more: f32) -> bool {
+    let [a, b, c, d] = densities;
+    let sum = a + b + c + d;
+    let allowed = sum * (DENSITY + more);
+    densities
+        .iter()
+        .all(|density| (4.0 * density - sum).abs() <= allowed)
+}
+
+/// The mean weight of a marker without what the mask adds around it, which weighs little and is a
+/// larger part of a narrow image: of an ellipse a by b, e/a + e/b when it adds e to both. Images of
+/// other aspects are comparable only so.
+fn inner_density(image: &Image, edge: f32) -> f32 {
+    let outer = edge * image.radial.by_across + edge / image.radial.along;
+    image.density / larger(1.0 - outer, 0.125)
+}
+
+/// Whether enough pixels passed, for diameters that may be smaller by `rim` px, but for this part
+/// of them.
+fn is_filled(image: &Image, rim: f32, holes: f32) -> bool {
+    let (across, along) = (image.radial.across, image.radial.along);
+    let least = image.area as f32 * larger(across - rim, 0.0) * larger(along - rim, 0.0);
+    image.passed as f32 * across * along >= least * (1.0 - holes)
+}
+
+/// What the mask added to a marker's diameters at rest, px.
+///
+/// At rest the film is flat, and the optics gives the marker's image: t across the radius, q =
+/// t·sin θ·cos θ/θ along it. So (t + e)(q + e)·π/4 is the area: e = (√((t − q)² + 16·area/π) − t −
+/// q)/2.
+fn edge_at_rest(geometry: &Geometry, distance: Px, area: u32) -> f32 {
+    const SIXTEEN_OVER_PI: f32 = 16.0 / core::f32::consts::PI;
+    let across = geometry.across(distance).to_f32();
+    let along = geometry.along_flat(distance).to_f32();
+    let squared = (across - along) * (across - along) + area as f32 * SIXTEEN_OVER_PI;
+    0.5 * (sqrt(squared) - across - along)
+}

@@ -1,0 +1,142 @@
+//! Looking ahead: the force is worked out while the camera still sends the rows below the markers.
+//!
+//! When as many blobs are whole as there are markers, and none is open, what they make is worked
+//! out at once. If no other blob has come until the frame ends, that is its measurement, and
+//! nothing but the check is left to do after the last row. Otherwise it is worked out anew, as it
+//! depends on the blobs alone.
+
+use super::{Measurement, Sensor};
+use crate::markers::tables::Table;
+
+/// The fewest blobs that can be markers.
+const FEWEST_BLOBS: usize = 4;
+/// Of more blobs nothing is worked out ahead: it bounds how often it is done in vain.
+const MOST_BLOBS: usize = 8;
+
+/// What was worked out before the frame ended.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Ahead {
+    /// Nothing shall be.
+    Off,
+    /// Nothing yet.
+    Nothing,
+    /// What the frame's first `blobs` blobs make.
+    Worked {
+        blobs: usize,
+        measurement: Measurement,
+    },
+}
+
+impl Ahead {
+    /// Of a frame with so many blobs.
+    pub fn measurement(&self, count: usize) -> Option<Measurement> {
+        match self {
+            Ahead::Worked { blobs, measurement } if *blobs == count => Some(*measurement),
+            _ => None,
+        }
+    }
+
+    /// Whether so many whole blobs are worth a look.
+    #[inline(always)]
+    fn wants(&self, count: usize) -> bool {
+        let in_vain = match self {
+            Ahead::Off => true,
+            Ahead::Nothing => false,
+            Ahead::Worked { blobs, .. } => *blobs == count,
+        };
+        (FEWEST_BLOBS..=MOST_BLOBS).contains(&count) && !in_vain
+    }
+}
+
+impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
+    /// After each row or band.
+    #[inline(always)]
+    pub(super) fn look_ahead(&mut self) {
+        if self.scanner.is_settled() && self.ahead.wants(self.scanner.blobs().len()) {
+            self.work_ahead();
+        }
+    }
+
+    #[inline(never)]
+    fn work_ahead(&mut self) {
+        let blobs = self.scanner.blobs().len();
+        let found = self.find_markers();
+        let measurement = self.measurement(found);
+        self.ahead = Ahead::Worked { blobs, measurement };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::{Pattern, Picture, RED, tared};
+    use crate::force::forward::Drift;
+    use hivtac_terms::geometry::{Geometry, Preset};
+    use proptest::prelude::*;
+
+    const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 160, 120);
+
+    /// All rows at once: what was worked out ahead can only be of the whole frame.
+    fn fed_at_once(sensor: &mut Sensor<'_>, picture: &Picture) -> Measurement {
+        sensor.begin_frame();
+        sensor.push_rows(&picture.pixels);
+        sensor.ahead = Ahead::Off;
+        sensor.finish_frame()
+    }
+
+    #[test]
+    fn nothing_is_left_to_work_out_after_the_last_band() {
+        let mut sensor = tared(GEOMETRY);
+        let picture = Pattern::at_rest(GEOMETRY).draw();
+        let expected = fed_at_once(&mut sensor, &picture);
+        let width = usize::from(GEOMETRY.width);
+        let (bands, last) = picture.pixels.split_at(116 * width);
+        sensor.begin_frame();
+        sensor.push_rows(bands);
+        let ahead = sensor.ahead.measurement(4);
+        assert_eq!(ahead, Some(expected), "the markers lie above");
+        sensor.push_rows(last);
+        assert_eq!(sensor.finish_frame(), expected);
+    }
+
+    #[test]
+    fn a_frame_that_is_cut_short_or_set_otherwise_has_no_force_from_before() {
+        let mut sensor = tared(GEOMETRY);
+        let picture = Pattern::at_rest(GEOMETRY).draw();
+        let expected = fed_at_once(&mut sensor, &picture);
+        let width = usize::from(GEOMETRY.width);
+        sensor.begin_frame();
+        sensor.push_rows(&picture.pixels[..116 * width]);
+        let cut = sensor.finish_frame();
+        assert_eq!(cut.markers, None, "{:?}", cut.status);
+        sensor.begin_frame();
+        sensor.push_rows(&picture.pixels);
+        sensor.set_tare(None, Drift::NONE);
+        let untared = sensor.finish_frame();
+        assert_ne!(untared.status, expected.status);
+        assert_eq!(untared.markers, expected.markers);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+
+        /// Discs anywhere, among them such as end in the last rows or come after the markers.
+        #[test]
+        fn every_frame_is_measured_as_if_it_had_come_at_once(
+            discs in prop::collection::vec((0.0..160.0f64, 0.0..120.0f64, 1.0..14.0f64), 0..5),
+            band in 1..9usize,
+        ) {
+            let mut sensor = tared(GEOMETRY);
+            let mut picture = Pattern::at_rest(GEOMETRY).draw();
+            for (x, y, diameter) in discs {
+                picture.disc(RED, (x, y), diameter);
+            }
+            let expected = fed_at_once(&mut sensor, &picture);
+            sensor.begin_frame();
+            for rows in picture.pixels.chunks(band * usize::from(GEOMETRY.width)) {
+                sensor.push_rows(rows);
+            }
+            prop_assert_eq!(sensor.finish_frame(), expected);
+        }
+    }
+}

@@ -1,0 +1,494 @@
+//! Rows in, measurement out.
+
+mod again;
+mod ahead;
+mod following;
+mod hanging;
+#[cfg(test)]
+mod marker_tests;
+mod taring;
+#[cfg(test)]
+mod tests;
+
+use crate::known_answer::{self, Answer};
+use crate::motion::Motion;
+use crate::rezero::Tare;
+use crate::temporal::Temporal;
+use again::{BLUR, Look};
+use ahead::Ahead;
+use crate::force::features::Features;
+use crate::force::{self, Force, NoiseLevel, Resting};
+use crate::force::forward::Drift;
+use crate::force::model::Model;
+use crate::force::network::Network;
+use crate::force::rest::Rest;
+use crate::markers::blob::Blob;
+use crate::markers::formats::Formats;
+use crate::markers::rules::{Finder, Found, Reading, Trust};
+use crate::markers::scanner::Scanner;
+use crate::markers::settings::{Settings, SettingsError};
+use crate::markers::tables::{ByteTable, Table};
+use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::down::{Direction, Down};
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
+use hivtac_terms::units::Px;
+
+/// What one frame gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Measurement {
+    /// Why there is no force, or how far to trust it.
+    pub status: Status,
+    /// The four markers where the frame shows them, when they were found.
+    pub markers: Option<[Marker; 4]>,
+    /// Their features, at one time ([`Sensor::set_motion`]), exactly when there are markers.
+    pub features: Option<Features>,
+    /// The force; `None` exactly when `status` has a bit of [`Status::NO_FORCE`].
+    pub force: Option<Force>,
+}
+
+/// A frame has more set pixels than one in this many: no four dots look like that.
+const SATURATED_PART: u32 = 2;
+
+/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
+/// up in a `T`.
+///
+/// It holds all its storage, about 76 KiB and the table (64 KiB), so build it where it shall stay:
+/// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
+/// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
+/// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
+/// and [`finish_frame`](Self::finish_frame).
+#[derive(Clone, Debug)]
+pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
+    settings: Settings,
+    model: Option<Model<'m>>,
+    tare: Option<Tare>,
+    down: Down,
+    pixels: Formats<T>,
+    scanner: Scanner<BLOBS>,
+    network: Network,
+    /// `None` until it is configured.
+    prepared: Option<Prepared>,
+    ahead: Ahead,
+    motion: Motion,
+    noise: NoiseLevel,
+    look: Look,
+    temporal: Temporal,
+}
+
+/// What follows from settings, model and tare before there is a frame.
+#[derive(Clone, Debug)]
+struct Prepared {
+    finder: Finder,
+    /// `None` without a rest position to compare with.
+    trust: Option<Trust>,
+    /// `None` without a film run forwards.
+    resting: Option<Resting>,
+    /// The bits that every frame has, whatever it shows.
+    standing: Status,
+    /// What is measured against.
+    rest: Option<Rest>,
+}
+
+impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
+    /// A sensor that sees nothing until it is configured: its threshold accepts no colour.
+    pub const fn new() -> Self {
+        Sensor {
+            settings: Settings {
+                geometry: Geometry::preset(Preset::Ov7725, 320, 240),
+                threshold: Threshold::red(PixelFormat::Rgb565),
+                byte_order: ByteOrder::Swapped,
+                dilations: 1,
+                min_area: 1,
+                centroid: CentroidEstimator::BinaryMask,
+            },
+            model: None,
+            tare: None,
+            down: Down::Fixed,
+            pixels: Formats::CLOSED,
+            scanner: Scanner::new(),
+            network: Network::new(),
+            prepared: None,
+            ahead: Ahead::Off,
+            motion: Motion::GLOBAL,
+            noise: NoiseLevel::AS_MODELLED,
+            look: Look::First,
+            temporal: Temporal::new(),
+        }
+    }
+
+    /// Sets everything and forgets the tare. Without a model there are markers and features but no
+    /// force.
+    ///
+    /// # Errors
+    /// A setting out of its range; nothing is then changed.
+    pub fn configure(
+        &mut self,
+        settings: Settings,
+        model: Option<Model<'m>>,
+    ) -> Result<(), SettingsError> {
+        settings.check()?;
+        let seen = (settings.threshold, settings.byte_order);
+        let is_set = seen == (self.settings.threshold, self.settings.byte_order);
+        // A table of RGB565 takes as long as some frames.
+        if self.prepared.is_none() || !is_set {
+            let set = self.pixels.set(&settings.threshold, settings.byte_order);
+            set.map_err(SettingsError::Threshold)?;
+        }
+        self.settings = settings;
+        self.model = model;
+        self.set_tare(None, Drift::NONE);
+        Ok(())
+    }
+
+    /// The same, and keeps the rest position with all that became of it, when markers are seen as
+    /// before.
+    ///
+    /// # Errors
+    /// A setting out of its range; nothing is then changed.
+    pub fn reconfigure(
+        &mut self,
+        settings: Settings,
+        model: Option<Model<'m>>,
+    ) -> Result<(), SettingsError> {
+        let seen = |by: &Settings| (by.threshold.format(), by.dilations, by.centroid);
+        let is_alike = seen(&settings) == seen(&self.settings);
+        let holds = |tare: &Tare| is_alike && tare.rest().fits(&settings.geometry);
+        let tare = self.tare.filter(holds);
+        self.configure(settings, model)?;
+        self.tare = tare;
+        self.begin_anew();
+        Ok(())
+    }
+
+    /// What it is set to.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The model in use.
+    pub fn model(&self) -> Option<&Model<'m>> {
+        self.model.as_ref()
+    }
+
+    /// The threshold in use.
+    pub fn threshold(&self) -> Threshold {
+        self.settings.threshold
+    }
+
+    /// Sets the threshold, effective from the next row; do it between frames. A model made with
+    /// another one gives no force then ([`Status::MODEL_MISMATCH`]).
+    ///
+    /// # Errors
+    /// A threshold that means nothing; it is then unchanged.
+    pub fn set_threshold(&mut self, threshold: Threshold) -> Result<(), ThresholdError> {
+        self.pixels.set(&threshold, self.settings.byte_order)?;
+        self.settings.threshold = threshold;
+        self.begin_anew();
+        Ok(())
+    }
+
+    /// Sets the rest position of this unit, from which the film may have drifted since it was
+    /// taken, or goes back to the model's. One that is not [sound](Rest::is_sound) is as none.
+    pub fn set_tare(&mut self, rest: Option<Rest>, drift: Drift) {
+        self.set_tare_under(rest, drift, self.down.told());
+    }
+
+    /// The same of one that was taken under this gravity, or where nobody said which.
+    pub fn set_tare_under(&mut self, rest: Option<Rest>, drift: Drift, down: Option<Direction>) {
+        let rest = rest.filter(Rest::is_sound);
+        let down = down.map(Direction::to_unit);
+        self.tare = rest.map(|rest| Tare::new(rest, drift, down));
+        self.begin_anew();
+    }
+
+    /// The next frames are seen in another way: what was before says nothing of them.
+    fn begin_anew(&mut self) {
+        self.temporal.begin_anew();
+        if let Some(tare) = &mut self.tare {
+            tare.begin_anew();
+        }
+        self.prepare();
+    }
+
+    fn apply_drift(&mut self) {
+        let drift = self.tare.as_ref().map_or(&Drift::NONE, Tare::drift);
+        let prepared = self.prepared.as_mut();
+        if let Some(resting) = prepared.and_then(|prepared| prepared.resting.as_mut()) {
+            resting.set_drift(drift);
+        }
+    }
+
+    /// The model in use, when it is for these frames.
+    fn fitting_model(&self) -> Option<&Model<'m>> {
+        let model = self.model.as_ref();
+        model.filter(|model| model.conditions.are_of(&self.settings))
+    }
+
+    /// The rest position of this unit that is measured against, when one was taken.
+    pub fn tare(&self) -> Option<&Rest> {
+        self.tare.as_ref().map(Tare::rest)
+    }
+
+    /// Says when which row of a frame is exposed, and forgets the frame before. At first all are at
+    /// once.
+    pub fn set_motion(&mut self, motion: Motion) {
+        self.motion = motion;
+    }
+
+    /// The next frame does not follow the one before at once: how the markers move is not known,
+    /// nor what of a change is noise.
+    pub fn forget_frame(&mut self) {
+        self.motion.forget();
+        self.noise.forget_frame();
+    }
+
+    /// Starts a frame and forgets the one before, but for where its markers were and what they left
+    /// unexplained.
+    pub fn begin_frame(&mut self) {
+        self.motion.begin_frame();
+        self.noise.begin_frame();
+        self.look = Look::First;
+        // An error cannot happen after `configure`, and makes every frame incomplete before it.
+        let _ = self.scanner.begin(self.settings.scan());
+        self.ahead = Ahead::Nothing;
+    }
+
+    /// Takes the next row of pixels, as they lie in memory: a `u16` for each, or for two of mono.
+    pub fn push_row(&mut self, row: &[u16]) {
+        self.scanner.push_row(&self.pixels, row);
+        self.look_ahead();
+    }
+
+    /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than
+    /// one by one.
+    pub fn push_rows(&mut self, rows: &[u16]) {
+        self.scanner.push_rows(&self.pixels, rows);
+        self.look_ahead();
+    }
+
+    /// The same when the rows that came last are still in memory, one after the other, as `above`:
+    /// all of the frame, or at least as many as there are [`Settings::dilations`]. Nothing is
+    /// copied then ([`Scanner::push_rows_below`]).
+    pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
+        self.scanner.push_rows_below(&self.pixels, above, rows);
+        self.look_ahead();
+    }
+
+    /// Measures a frame that lies in memory: all rows from the top, one after the other. A frame
+    /// that does not follow the one before wants [`forget_frame`](Self::forget_frame) first.
+    pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
+        self.begin_frame();
+        self.push_rows(frame);
+        self.finish_frame()
+    }
+
+    /// The same, and [looks again](Self::look_again) when that may help.
+    pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
+        let measurement = self.measure_frame(frame);
+        if !self.look_again() {
+            return measurement;
+        }
+        self.push_rows(frame);
+        self.finish_frame()
+    }
+
+    /// Ends the frame.
+    pub fn finish_frame(&mut self) -> Measurement {
+        match self.look {
+            Look::Again(first) => self.finish_look(&first),
+            Look::First | Look::Wanted(_) => self.finish_first_look(),
+        }
+    }
+
+    fn finish_first_look(&mut self) -> Measurement {
+        let measurement = self.measure_scanned();
+        self.motion.ended(measurement.markers.as_ref());
+        if self.wants_again(&measurement) {
+            self.look = Look::Wanted(measurement);
+        }
+        measurement
+    }
+
+    fn measure_scanned(&mut self) -> Measurement {
+        if let Err(reason) = self.end_scan() {
+            return self.measurement(Err(reason));
+        }
+        if let Some(measurement) = self.ahead.measurement(self.scanner.blobs().len()) {
+            return measurement;
+        }
+        let found = self.find_markers();
+        self.measurement(found)
+    }
+
+    /// What follows from the markers.
+    fn measurement(&mut self, found: Result<Found, Status>) -> Measurement {
+        let (seen, mut status) = match &found {
+            Ok(found) => (Some(found), Status::OK),
+            Err(reason) => (None, *reason),
+        };
+        let rows = self.settings.geometry.height;
+        let moved = seen.and_then(|seen| {
+            let markers = self.motion.at_the_middle(&seen.markers, rows)?;
+            Some(seen.moved_to(markers))
+        });
+        let still = moved.as_ref().or(seen);
+        match (&self.prepared, still) {
+            (None, _) => status |= self.standing_status(),
+            (Some(prepared), None) => status |= prepared.standing,
+            (Some(prepared), Some(found)) => {
+                let trust = prepared.trust.as_ref();
+                status |= prepared.standing | trust.map_or(Status::OK, |trust| trust.judge(found));
+            }
+        }
+        let markers = still.map(|still| &still.markers);
+        let features = markers.map(Features::of_markers);
+        let force = features
+            .as_ref()
+            .zip(markers)
+            .and_then(|(features, markers)| self.measure(features, markers, &mut status));
+        Measurement {
+            status,
+            markers: seen.map(|seen| seen.markers),
+            features,
+            force,
+        }
+    }
+
+    /// How it reads pixels.
+    pub fn pixels(&self) -> &Formats<T> {
+        &self.pixels
+    }
+
+    /// The blobs of the frame that was finished last, at least [`Settings::min_area`] each.
+    pub fn blobs(&self) -> &[Blob] {
+        self.scanner.blobs()
+    }
+
+    /// Works out anew what follows from settings, model and tare.
+    fn prepare(&mut self) {
+        self.hang();
+        self.ahead = Ahead::Off;
+        self.look = Look::First;
+        self.noise = NoiseLevel::AS_MODELLED;
+        let settings = &self.settings;
+        // What a model for other frames says of rest and contact does not hold here.
+        let fitting = self.fitting_model();
+        let rest = self.tare().copied().or_else(|| self.rest_of_model());
+        // The same tip presses, whether or not the model is for these frames.
+        let reading = self
+            .model
+            .as_ref()
+            .map_or(Reading::of(ContactReading::Force, false), |model| {
+                Reading::of(model.conditions.contact, model.output.tells_place())
+            });
+        let own_rest = self.tare.is_some();
+        self.prepared = Some(Prepared {
+            finder: Finder::new(settings),
+            resting: fitting
+                .zip(rest)
+                .and_then(|(model, rest)| Resting::of_turned(model, &rest, self.turned())),
+            trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
+            standing: self.standing_status(),
+            rest,
+        });
+        self.apply_drift();
+    }
+
+    fn standing_status(&self) -> Status {
+        let mut status = Status::OK;
+        if self.tare.is_none() {
+            status |= Status::TARE_MISSING;
+        }
+        if self.is_weight_unknown() {
+            status |= Status::WEIGHT_UNKNOWN;
+        }
+        match &self.model {
+            None => status |= Status::MODEL_MISSING,
+            Some(model) => {
+                if model.is_simulated() {
+                    status |= Status::NOT_CALIBRATED;
+                }
+                if !model.conditions.are_of(&self.settings) {
+                    status |= Status::MODEL_MISMATCH;
+                }
+            }
+        }
+        status
+    }
+
+    /// Brings out the last blobs; says why the frame as a whole has no markers.
+    fn end_scan(&mut self) -> Result<(), Status> {
+        let geometry = &self.settings.geometry;
+        let pixels = u32::from(geometry.width) * u32::from(geometry.height);
+        let scan = self.scanner.finish(&self.pixels);
+        if scan.status != Status::OK {
+            return Err(scan.status);
+        }
+        if scan.set_pixels == 0 {
+            return Err(Status::IMAGE_DARK);
+        }
+        if scan.set_pixels > pixels / SATURATED_PART {
+            return Err(Status::IMAGE_SATURATED);
+        }
+        Ok(())
+    }
+
+    /// What a model says of a question whose answer is known; frames go on as if it had not been
+    /// asked.
+    pub fn known_answer(&mut self, model: &Model<'_>) -> Answer {
+        known_answer::of(model, &mut self.network)
+    }
+
+    fn find_markers(&self) -> Result<Found, Status> {
+        // Before it is configured nothing passes the threshold.
+        let prepared = self.prepared.as_ref().ok_or(Status::IMAGE_DARK)?;
+        prepared.finder.find(self.scanner.blobs())
+    }
+
+    /// The force of a frame's features, unless `status` already forbids one.
+    fn measure(
+        &mut self,
+        features: &Features,
+        markers: &[Marker; 4],
+        status: &mut Status,
+    ) -> Option<Force> {
+        if status.intersects(Status::NO_FORCE) {
+            return None;
+        }
+        let model = self.model.as_ref()?;
+        let prepared = self.prepared.as_ref()?;
+        let rest = prepared.rest.as_ref().unwrap_or(&model.rest);
+        let output = self.network.run(model, features, &rest.features);
+        let resting = prepared.resting.as_ref();
+        let (force, trust) = match model.forward.as_ref().zip(resting) {
+            Some((forward, resting)) => {
+                let is_again = matches!(self.look, Look::Again(_));
+                let blur = if is_again { BLUR } else { Px(0) };
+                let noise = self.noise.of_frame(blur);
+                let estimate = resting.estimate(forward, markers, noise, &output);
+                if !is_again {
+                    self.noise.saw(noise, &estimate.left);
+                }
+                resting.told(forward, &model.range, noise, &estimate)
+            }
+            None => force::of_outputs(model, &output),
+        };
+        *status |= trust;
+        if status.contains(Status::UNEXPLAINED) {
+            return None;
+        }
+        if output.input_saturated {
+            *status |= Status::MAGNITUDE_OUT_OF_RANGE;
+        }
+        Some(force)
+    }
+}
+
+impl<const BLOBS: usize, T: Table> Default for Sensor<'_, BLOBS, T> {
+    fn default() -> Self {
+        Sensor::new()
+    }
+}

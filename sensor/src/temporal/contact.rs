@@ -1,0 +1,116 @@
+//! Whether something touches the film, with hysteresis.
+//!
+//! A contact begins with the limit's |F| when that is at least three times its standard
+//! uncertainty, or the frame's own status says that something touches the film: it leaves out how
+//! uncertain a film's strength is. It ends below the lower limit, or below half of that certainty.
+
+use super::ContactLimits;
+use crate::pipeline::Measurement;
+use crate::force::CONTACT_SIGMAS;
+use hivtac_terms::status::Status;
+
+/// What was known is forgotten when no frame had a force for so long, µs.
+const FORGOTTEN_US: u64 = 100_000;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contact {
+    is_touched: bool,
+    /// When the newest force was, µs.
+    newest_us: u64,
+}
+
+impl Contact {
+    /// Nothing touches it.
+    pub const NONE: Contact = Contact {
+        is_touched: false,
+        newest_us: 0,
+    };
+
+    /// Takes a frame; `None` when nobody knows, as it has no force.
+    pub fn follow(
+        &mut self,
+        limits: &ContactLimits,
+        time_us: u64,
+        measurement: &Measurement,
+    ) -> Option<bool> {
+        let force = measurement.force.as_ref()?;
+        // Where a unit's strength is uncertain, the frame's own status tells what is by noise.
+        let is_certain = measurement.status.contains(Status::CONTACT);
+        let was_touched = self.is_touched && time_us.saturating_sub(self.newest_us) <= FORGOTTEN_US;
+        let magnitude = force.magnitude.0.unsigned_abs();
+        let sigma = u64::from(force.magnitude_sigma.0) * u64::from(CONTACT_SIGMAS);
+        self.is_touched = match was_touched {
+            true => magnitude >= limits.ends.0 && (is_certain || 2 * u64::from(magnitude) >= sigma),
+            false => magnitude >= limits.begins.0 && (is_certain || u64::from(magnitude) >= sigma),
+        };
+        self.newest_us = time_us;
+        Some(self.is_touched)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::temporal::tests::{frame, pressed};
+    use hivtac_terms::units::Px;
+
+    /// Whether each of forces, µN with standard uncertainty, a frame apart, is a contact.
+    fn told(forces: &[(i32, u32)]) -> std::vec::Vec<bool> {
+        let mut contact = Contact::NONE;
+        let mut time_us = 0;
+        let frames = forces.iter().map(|&(magnitude, sigma)| {
+            time_us += 6_405;
+            let force = pressed(magnitude, sigma);
+            let seen = frame(Some(force), Px(0));
+            contact.follow(&ContactLimits::default(), time_us, &seen)
+        });
+        frames.map(|told| told.unwrap()).collect()
+    }
+
+    #[test]
+    fn it_begins_high_and_ends_low() {
+        let forces = [1_999, 2_000, 1_999, 1_000, 999, 1_999, 2_000].map(|f| (f, 300));
+        let expected = [false, true, true, true, false, false, true];
+        assert_eq!(told(&forces), expected);
+    }
+
+    #[test]
+    fn it_begins_with_three_uncertainties_and_ends_below_half_of_them() {
+        let forces = [
+            (8_999, 3_000),
+            (9_000, 3_000),
+            (4_500, 3_000),
+            (4_499, 3_000),
+        ];
+        assert_eq!(told(&forces), [false, true, true, false]);
+        let extremes = [(i32::MAX, u32::MAX), (i32::MIN, 1), (0, 0)];
+        assert_eq!(told(&extremes), [false, true, false]);
+    }
+
+    /// How strong a unit's film is, may be as uncertain as its force is large: the frame's status
+    /// knows what is by noise.
+    #[test]
+    fn a_film_of_unknown_strength_is_touched() {
+        let mut seen = frame(Some(pressed(20_000, 20_000)), Px(0));
+        for (bit, expected) in [(Status::OK, false), (Status::CONTACT, true)] {
+            seen.status |= bit;
+            let mut contact = Contact::NONE;
+            let told = contact.follow(&ContactLimits::default(), 0, &seen);
+            assert_eq!(told, Some(expected));
+        }
+    }
+
+    #[test]
+    fn without_a_force_nobody_knows_and_after_a_while_nothing_is_remembered() {
+        let limits = ContactLimits::default();
+        let [first, none, between] = [Some(pressed(5_000, 1)), None, Some(pressed(1_500, 1))]
+            .map(|force| frame(force, Px(0)));
+        for (later_us, expected) in [(100_000, true), (100_001, false)] {
+            let mut contact = Contact::NONE;
+            assert_eq!(contact.follow(&limits, 0, &first), Some(true));
+            assert_eq!(contact.follow(&limits, 50_000, &none), None);
+            let told = contact.follow(&limits, later_us, &between);
+            assert_eq!(told, Some(expected), "{later_us}");
+        }
+    }
+}

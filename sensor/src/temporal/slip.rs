@@ -1,0 +1,361 @@
+//! Whether what touches the film slips: its place on the film moves.
+//!
+//! The place is a point of the film itself: it stays while the contact sticks, however far that
+//! takes the film along, and moves when the contact slips. Friction then pulls the film with a
+//! force along it, which is a part of the one into it: a place that moves without is none of a
+//! slip.
+//!
+//! A place is not exact. Its noise grows as the force falls, and what the model does not know of a
+//! unit shifts it with every change of the force; the stated uncertainty holds that. So a place has
+//! moved since an earlier frame when it did by
+//!
+//! distance · (1 + 10 mN / |F|) + σ · (1/8 + |ΔF| / 2|F|)
+//!
+//! with the smaller |F| of the two frames, ΔF the vector between their forces and σ the place's
+//! stated uncertainty; and by three times the noise of the frames between, the mean length of the
+//! place's second differences, which a steady motion does not have. A slip begins with the second
+//! frame in a row that says so: when a force begins to change, a rolling shutter has one frame in
+//! which markers do not move as between the two before. While it slips, three fifths of the
+//! distance are enough.
+
+use super::SlipLimits;
+use crate::force::{Force, Place};
+use hivtac_terms::division::Divisor;
+use hivtac_terms::root::root;
+use hivtac_terms::units::MicroNewtons;
+
+/// Frames that are remembered: 100 ms, the longest time of the limits, at 310 frames a second. At a
+/// higher rate it is the time of so many frames.
+const FRAMES: usize = 32;
+/// |F| at which noise doubles the distance, µN.
+const DOUBLES_AT: u64 = 10_000;
+/// How many times the mean second difference a place must have moved.
+const NOISES: u64 = 3;
+/// What of the distance is enough while it slips.
+const GOES_ON: [u64; 2] = [3, 5];
+
+/// Force and place of a frame.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    /// Modulo 2³².
+    time_us: u32,
+    /// µm.
+    place: [i32; 2],
+    /// µN.
+    force: [i32; 3],
+    magnitude: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slip {
+    frames: [Seen; FRAMES],
+    /// How many of them there are, and where the next one goes.
+    count: usize,
+    next: usize,
+    /// Whether the place had moved in the newest frame.
+    moved: bool,
+    slips: bool,
+}
+
+impl Slip {
+    /// Nothing is known.
+    pub const NONE: Slip = Slip {
+        frames: [Seen {
+            time_us: 0,
+            place: [0; 2],
+            force: [0; 3],
+            magnitude: 0,
+        }; FRAMES],
+        count: 0,
+        next: 0,
+        moved: false,
+        slips: false,
+    };
+
+    /// Takes a frame and says whether its contact slips. A frame whose force or touch nobody knows
+    /// does not tell, and is passed over; where nothing touches, what was before is forgotten.
+    pub fn follow(
+        &mut self,
+        limits: &SlipLimits,
+        time_us: u64,
+        force: Option<&Force>,
+        touched: Option<bool>,
+    ) -> bool {
+        if touched == Some(false) {
+            (self.count, self.moved, self.slips) = (0, false, false);
+        }
+        let placed = force.and_then(|force| Some((force, force.place?)));
+        let Some((force, place)) = placed.filter(|_| touched == Some(true)) else {
+            return false;
+        };
+        let seen = Seen {
+            time_us: time_us as u32,
+            place: [place.x.0, place.y.0],
+            force: force.cartesian.map(|part| part.0),
+            magnitude: force.magnitude.0.unsigned_abs().max(1),
+        };
+        self.forget_older(time_us as u32, limits.within.0.saturating_mul(1_000));
+        let moved = is_pulled(force, limits) && self.has_moved(limits, &seen, &place);
+        self.slips = moved && self.moved;
+        self.moved = moved;
+        self.keep(seen);
+        self.slips
+    }
+
+    /// Frames, newest first.
+    fn newest(&self) -> impl Iterator<Item = &Seen> {
+        (1..=self.count).filter_map(|back| {
+            let at = self.next.wrapping_add(FRAMES).wrapping_sub(back) % FRAMES;
+            self.frames.get(at)
+        })
+    }
+
+    fn forget_older(&mut self, now_us: u32, within_us: u32) {
+        let recent = |seen: &&Seen| now_us.wrapping_sub(seen.time_us) <= within_us;
+        self.count = self.newest().take_while(recent).count();
+    }
+
+    fn keep(&mut self, seen: Seen) {
+        if let Some(frame) = self.frames.get_mut(self.next) {
+            *frame = seen;
+        }
+        self.next = (self.next + 1) % FRAMES;
+        self.count = (self.count + 1).min(FRAMES);
+    }
+
+    fn has_moved(&self, limits: &SlipLimits, now: &Seen, place: &Place) -> bool {
+        let distance = match self.slips {
+            true => u64::from(limits.distance.0) * GOES_ON[0] / GOES_ON[1],
+            false => limits.distance.0.into(),
+        };
+        let mut noise = None;
+        self.newest().any(|before| {
+            let moved = far(now.place, before.place);
+            moved >= distance
+                && moved >= least_moved(distance, now, before, place)
+                && moved >= *noise.get_or_insert_with(|| NOISES * self.noise(now))
+        })
+    }
+
+    /// Mean length of the second differences of all places, µm; of fewer than three the largest
+    /// number.
+    fn noise(&self, now: &Seen) -> u64 {
+        let places = || core::iter::once(now).chain(self.newest());
+        let triples = places().zip(places().skip(1)).zip(places().skip(2));
+        let (mut sum, mut count) = (0_u64, 0_u32);
+        for ((a, b), c) in triples {
+            let ([ax, ay], [bx, by], [cx, cy]) = (a.place, b.place, c.place);
+            sum += u64::from(length(second(ax, bx, cx), second(ay, by, cy)));
+            count += 1;
+        }
+        match count {
+            0 => u64::MAX / NOISES,
+            _ => Divisor::new(count).quotient(sum),
+        }
+    }
+}
+
+/// Coordinates farther apart than this count as so far apart, µm: squares then fit 64 bits.
+const FAR: i64 = 1 << 30;
+
+/// Distance of two places, µm.
+fn far([ax, ay]: [i32; 2], [bx, by]: [i32; 2]) -> u64 {
+    length(i64::from(ax) - i64::from(bx), i64::from(ay) - i64::from(by)).into()
+}
+
+fn second(a: i32, b: i32, c: i32) -> i64 {
+    i64::from(a) - 2 * i64::from(b) + i64::from(c)
+}
+
+fn length(x: i64, y: i64) -> u32 {
+    let [x, y] = [x, y].map(|part| part.clamp(-FAR, FAR));
+    root((x * x + y * y) as u64)
+}
+
+/// By how much a place must have moved from one frame to another, µm.
+fn least_moved(distance: u64, now: &Seen, before: &Seen, place: &Place) -> u64 {
+    let pairs = now.force.iter().zip(&before.force);
+    let squares = pairs.map(|(now, before)| u64::from(now.abs_diff(*before).min(1 << 30)).pow(2));
+    let change = u64::from(root(squares.sum()));
+    let smaller = Divisor::new(now.magnitude.min(before.magnitude));
+    let sigma = u64::from(place.sigma.0.min(1 << 30));
+    distance
+        + smaller.quotient(distance * DOUBLES_AT)
+        + sigma / 8
+        + smaller.quotient(sigma * change) / 2
+}
+
+/// Whether the force along the film is a large enough part of the one into it.
+fn is_pulled(force: &Force, limits: &SlipLimits) -> bool {
+    let [x, y, z] = force.cartesian;
+    let square = |part: MicroNewtons| u64::from(part.0.unsigned_abs()).pow(2);
+    let along = u64::from(root(square(x) + square(y)));
+    along * 1_000 >= u64::from(z.0.unsigned_abs()) * u64::from(limits.ratio.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::temporal::tests::force_of;
+    use hivtac_terms::units::{Micrometres, Permille, SignedMicrometres};
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const LIMITS: SlipLimits = SlipLimits {
+        distance: Micrometres(60),
+        within: hivtac_terms::units::Milliseconds(50),
+        ratio: Permille(100),
+    };
+
+    /// A contact at a place, µm, under a force, µN.
+    fn at(x: i32, vector: [i32; 3]) -> Force {
+        let force = force_of(vector);
+        let place = force.place.map(|place| Place {
+            x: SignedMicrometres(x),
+            ..place
+        });
+        Force { place, ..force }
+    }
+
+    const PULLED: [i32; 3] = [30_000, 0, -100_000];
+
+    /// When a contact slips, µs, that moves at a speed, mm/s, after 0.3 s; frames so far apart, of
+    /// which every so many comes.
+    fn slips(speed: f64, vector: [i32; 3], frame_us: u64, every: u64) -> Vec<u64> {
+        let mut slip = Slip::NONE;
+        let frames = (0..600_000 / frame_us).filter(|frame| frame % every == 0);
+        let times = frames.map(|frame| 7_000 + frame * frame_us);
+        let slipping = times.filter(|time_us| {
+            let moved_us = time_us.saturating_sub(300_000);
+            let x = 500 + (speed * 1e-3 * moved_us as f64) as i32;
+            slip.follow(&LIMITS, *time_us, Some(&at(x, vector)), Some(true))
+        });
+        slipping.collect()
+    }
+
+    #[test]
+    fn a_place_that_moves_slips_at_any_frame_rate_and_across_lost_frames() {
+        for (frame_us, every) in [(6_405, 1), (4_076, 1), (6_405, 3), (2_000, 1)] {
+            assert_eq!(slips(0.0, PULLED, frame_us, every), []);
+            // 65 µm within 50 ms is 1.3 mm/s.
+            assert_eq!(slips(1.2, PULLED, frame_us, every), []);
+            for speed in [2.0, 10.0, 100.0] {
+                let times = slips(speed, PULLED, frame_us, every);
+                let late_us = times[0] - 300_000;
+                let least_us = (65.0 / speed * 1e3) as u64;
+                let most_us = least_us + 3 * every * frame_us;
+                assert!(
+                    (least_us..=most_us).contains(&late_us),
+                    "{speed}: {late_us}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_force_along_the_film_nothing_slips() {
+        assert_eq!(slips(10.0, [9_900, 0, -100_000], 6_405, 1), []);
+        assert!(!slips(10.0, [10_000, 0, -100_000], 6_405, 1).is_empty());
+    }
+
+    #[test]
+    fn a_slip_ends_when_the_place_stays_and_begins_anew_with_a_contact() {
+        let mut slip = Slip::NONE;
+        let mut time_us = 0;
+        let mut next = |x: i32, touched: bool| {
+            time_us += 6_405;
+            slip.follow(&LIMITS, time_us, Some(&at(x, PULLED)), Some(touched))
+        };
+        (0..8).for_each(|_| assert!(!next(0, true)));
+        assert!((1..20).any(|k| next(20 * k, true)));
+        let ends = (0..20).take_while(|_| next(380, true)).count();
+        assert!((5..9).contains(&ends), "{ends} frames");
+        assert!(!next(380, false));
+        // Somewhere else.
+        (0..8).for_each(|_| assert!(!next(-900, true)));
+    }
+
+    /// A press whose place settles by 240 µm while |F| grows tenfold, by a model that knows little
+    /// of the unit.
+    #[test]
+    fn what_the_model_does_not_know_does_not_slip() {
+        let told = |sigma: u32| {
+            let mut slip = Slip::NONE;
+            (0..40).any(|k: i32| {
+                let force = at(
+                    2 * k.min(30),
+                    [1_000, 0, -5_000].map(|part| part * (1 + k.min(30))),
+                );
+                let place = force.place.map(|place| Place {
+                    sigma: Micrometres(sigma),
+                    x: SignedMicrometres(20 * k.min(12)),
+                    ..place
+                });
+                let force = Force { place, ..force };
+                slip.follow(&LIMITS, 6_405 * k as u64, Some(&force), Some(true))
+            })
+        };
+        assert!(!told(250));
+        assert!(told(3), "a model that knows the place");
+    }
+
+    #[test]
+    fn noise_does_not_slip() {
+        let mut slip = Slip::NONE;
+        // 100 µm from frame to frame.
+        let told = (0..60).any(|k: u64| {
+            let x = if k.is_multiple_of(2) { 100 } else { 0 };
+            slip.follow(&LIMITS, 6_405 * k, Some(&at(x, PULLED)), Some(true))
+        });
+        assert!(!told);
+    }
+
+    #[test]
+    fn frames_that_do_not_tell_are_passed_over() {
+        let mut slip = Slip::NONE;
+        let mut next = |k: u64, force: Option<&Force>, touched: Option<bool>| {
+            slip.follow(&LIMITS, 6_405 * k, force, touched)
+        };
+        (0..5).for_each(|k| assert!(!next(k, Some(&at(0, PULLED)), Some(true))));
+        assert!(!next(5, None, None));
+        let unplaced = Force {
+            place: None,
+            ..at(0, PULLED)
+        };
+        assert!(!next(6, Some(&unplaced), Some(true)));
+        assert!(!next(7, Some(&at(150, PULLED)), Some(true)), "one frame");
+        assert!(next(8, Some(&at(300, PULLED)), Some(true)));
+    }
+
+    proptest! {
+        #[test]
+        fn any_numbers_are_followed(
+            frames in proptest::collection::vec(
+                (any::<[i32; 3]>(), any::<[i32; 2]>(), any::<u32>(), any::<u64>(), 0u8..3),
+                1..80,
+            ),
+            distance in 1u32..=5_000,
+            within in 10u32..=100,
+        ) {
+            let limits = SlipLimits {
+                distance: Micrometres(distance),
+                within: hivtac_terms::units::Milliseconds(within),
+                ..LIMITS
+            };
+            let mut slip = Slip::NONE;
+            for (vector, [x, y], sigma, time_us, touched) in frames {
+                let force = force_of(vector);
+                let place = Place {
+                    x: SignedMicrometres(x),
+                    y: SignedMicrometres(y),
+                    sigma: Micrometres(sigma),
+                };
+                let force = Force { place: Some(place), ..force };
+                let touched = [None, Some(false), Some(true)][usize::from(touched)];
+                let told = slip.follow(&limits, time_us, Some(&force), touched);
+                prop_assert!(!told || touched == Some(true));
+                prop_assert!(slip.count <= FRAMES);
+            }
+        }
+    }
+}
