@@ -6,6 +6,8 @@
 //!
 //! | file | subject |
 //! |---|---|
+//! | `data` | forces with what the sensor saw: rendered, or of a unit and a force gauge |
+//! | `evaluation` | how far a model's forces are from the truth |
 //! | `train`, `fit` | networks; from a data set to weights |
 //! | `forward` | the film run forwards, from what is known of a unit |
 //! | `loads` | the loads that a data set shows, and how well each is known |
@@ -16,6 +18,8 @@
 //! | `unit` | a person led through a unit's loads, to its own model |
 //! | `progress` | bars on the terminal |
 
+pub mod data;
+pub mod evaluation;
 pub mod fit;
 pub mod forward;
 pub mod import;

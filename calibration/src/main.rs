@@ -8,7 +8,7 @@ use commands::data::DatasetArgs;
 use commands::default_model::DefaultModelArgs;
 use commands::model::{CheckArgs, EvaluateArgs, ExportArgs};
 use commands::network::{FilmArgs, TrainArgs, UnitArgs};
-use hivtac_data::collect::CollectCommand;
+use hivtac_calibration::data::collect::CollectCommand;
 
 /// From data to a model on the chip: a unit's own, or that of the simulated sensor.
 #[derive(Parser)]

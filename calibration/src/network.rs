@@ -4,7 +4,7 @@ mod reach;
 
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
-use hivtac_data::loads::{from_polar, polar};
+use crate::data::loads::{from_polar, polar};
 use serde::{Deserialize, Serialize};
 
 /// Features that enter the network (`force::features`).

@@ -16,8 +16,8 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 use crate::forward::FilmModel;
 use crate::network::{Layer, Meaning, Network, Standardization};
 use crate::weights::{Uncertainty, Weights};
-use hivtac_data::range::Range;
-use hivtac_data::rest::{Rest, features_from_q16, q16};
+use crate::data::range::Range;
+use crate::data::rest::{Rest, features_from_q16, q16};
 
 /// Steps of the network's input in one standard deviation of a feature.
 const INPUT_STEPS: f64 = 4096.0;

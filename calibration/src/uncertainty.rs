@@ -10,9 +10,9 @@ use anyhow::{Result, ensure};
 use hivtac_sensor::force::model::Uncertainty as ChipUncertainty;
 use serde::{Deserialize, Serialize};
 
-use hivtac_data::loads::norm;
-use hivtac_evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
-use hivtac_evaluation::errors::angle_deg;
+use crate::data::loads::norm;
+use crate::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
+use crate::evaluation::errors::angle_deg;
 
 /// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little
 /// more than they promise, for the sessions that come.

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
 pub use crate::uncertainty::Uncertainty;
-use hivtac_data::conditions::Conditions;
-use hivtac_data::range::Range;
-use hivtac_data::rest::{Rest, features_from_q16};
+use crate::data::conditions::Conditions;
+use crate::data::range::Range;
+use crate::data::rest::{Rest, features_from_q16};
 
 /// What the file calls itself.
 const FORMAT: &str = "hivtac-weights 2";

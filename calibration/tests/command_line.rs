@@ -4,9 +4,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use hivtac_calibration::weights::Weights;
-use hivtac_data::dataset::{Loads, Recipe, generate_file};
-use hivtac_data::range::Range;
-use hivtac_scene::Contact;
+use hivtac_calibration::data::dataset::{Loads, Recipe, generate_file};
+use hivtac_calibration::data::range::Range;
+use hivtac_twin::Contact;
 
 fn run(directory: &Path, arguments: &[&str]) -> Output {
     let program = env!("CARGO_BIN_EXE_hivtac-calibrate");

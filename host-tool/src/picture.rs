@@ -200,7 +200,7 @@ mod tests {
     /// 8 columns and 4,194,303,749 rows: 100 GB of pixels, of a file of 239 bytes.
     #[test]
     fn a_picture_that_claims_to_be_huge_takes_no_memory() {
-        let file = include_bytes!("../../fuzz/corpus/picture/claims_100_gb");
+        let file = include_bytes!("../../tests/fuzz/corpus/picture/claims_100_gb");
         let error = Picture::parse("it.png", file).err().unwrap().to_string();
         assert!(error.contains("it.png has 8 × 4194303749 px"), "{error}");
     }

@@ -106,7 +106,7 @@ fn ruler() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_scene::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM};
+    use hivtac_twin::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM};
 
     /// Numbers of all circles of a class.
     fn circles(svg: &str, class: &str) -> Vec<[f64; 3]> {

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_scene::Options;
+use hivtac_twin::Options;
 use hivtac_sensor::force::model::Model;
 use rayon::prelude::*;
 use serde::Serialize;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::Result;
-use hivtac_scene::MARKERS;
+use hivtac_twin::MARKERS;
 
 use crate::page;
 

@@ -5,10 +5,10 @@ use std::fmt::Write;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use hivtac_data::dataset::{Recipe, measure};
-use hivtac_data::loads::RandomLoads;
-use hivtac_data::range::Range;
-use hivtac_scene::{Lens, Load, MarkerTruth, Options, Paint, PresetCamera, Scene};
+use hivtac_calibration::data::dataset::{Recipe, measure};
+use hivtac_calibration::data::loads::RandomLoads;
+use hivtac_calibration::data::range::Range;
+use hivtac_twin::{Lens, Load, MarkerTruth, Options, Paint, PresetCamera, Scene};
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::conditions::CentroidEstimator;

@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use hivtac_scene::{Preset, Scene};
+use hivtac_twin::{Preset, Scene};
 use serde_json::Value;
 
 fn run(directory: &Path, arguments: &[&str]) -> Output {

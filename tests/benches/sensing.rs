@@ -4,7 +4,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use hivtac_scene::{Preset, Scene};
+use hivtac_twin::{Preset, Scene};
 use hivtac_sensor::force::model::{Model, OutputKind};
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::pipeline::Sensor;

@@ -4,7 +4,7 @@
 use std::format;
 use std::string::String;
 
-use hivtac_scene::{Load, SceneError, Truth};
+use hivtac_twin::{Load, SceneError, Truth};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;

@@ -5,7 +5,7 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_scene::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
+use hivtac_twin::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Model, OutputKind};
 use hivtac_sensor::pipeline::{Measurement, Sensor};

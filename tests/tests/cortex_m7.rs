@@ -1,6 +1,6 @@
 //! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
 
-use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::layer::MAX_WIDTH;

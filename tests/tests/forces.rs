@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::rig::{Rig, ToolOutput, json_lines, tool};
-use hivtac_scene::{Format, Options, Preset, Scene, Shutter};
+use hivtac_twin::{Format, Options, Preset, Scene, Shutter};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};

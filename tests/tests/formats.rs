@@ -1,6 +1,6 @@
 //! Markers in frames of the scene's other pixel formats.
 
-use hivtac_scene::{Format, Frame, Load, Options, Preset, Scene};
+use hivtac_twin::{Format, Frame, Load, Options, Preset, Scene};
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::Pixels;
 use hivtac_terms::threshold::{Mono, Yuv422};

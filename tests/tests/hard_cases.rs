@@ -3,8 +3,8 @@
 
 use std::fmt::Debug;
 
-use hivtac_film::{MAX_FORCE_N, MAX_LABEL_N};
-use hivtac_scene::{Contact, Load};
+use hivtac_twin::film::{MAX_FORCE_N, MAX_LABEL_N};
+use hivtac_twin::{Contact, Load};
 use hivtac_tests::hard::detect_in_all;
 use hivtac_tests::tared::{Detection, View, views};
 

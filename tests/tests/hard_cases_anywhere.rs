@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use hivtac_hard_cases::{Expected, HardCase, hard_cases};
-use hivtac_scene::Preset;
+use hivtac_twin::hard_cases::{Expected, HardCase, hard_cases};
+use hivtac_twin::Preset;
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
@@ -108,7 +108,7 @@ fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
 /// be refused, and none wrong.
 fn hardly_any_is_refused(frames: u64) {
     let mut sensor = sensor();
-    let scene = hivtac_scene::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
+    let scene = hivtac_twin::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
     let mut random = Random::new(23);
     let (mut refused, mut reasons) = (0, BTreeMap::new());
     for number in 0..frames {

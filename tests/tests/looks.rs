@@ -1,7 +1,7 @@
 //! Frames that are looked at again: disturbed ones keep their force, within what it states; what
 //! hides too much of a marker stays refused; good frames are looked at once.
 
-use hivtac_scene::{MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Specks};
+use hivtac_twin::{MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Specks};
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;

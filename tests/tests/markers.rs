@@ -1,7 +1,7 @@
 //! What the marker rules let through on rendered frames: every honest frame, and no false one
 //! beyond a bound.
 
-use hivtac_scene::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
+use hivtac_twin::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_tests::tared::{Detection, TaredSensor, View, views};

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use hivtac_scene::{Motion, Preset, Scene, Shutter, Vibration};
+use hivtac_twin::{Motion, Preset, Scene, Shutter, Vibration};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion;
 use hivtac_sensor::pipeline::Sensor;

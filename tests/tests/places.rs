@@ -1,7 +1,7 @@
 //! Honest contacts anywhere get a force from a model that tells places, and few of them from one
 //! that does not.
 
-use hivtac_scene::{Contact, Frame};
+use hivtac_twin::{Contact, Frame};
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::Contacts;
 use hivtac_tests::pictures::Random;
@@ -30,7 +30,7 @@ struct Counts {
 impl Counts {
     fn add(&mut self, detection: Detection, frame: &Frame) {
         let inside = |marker: &Option<_>| {
-            marker.is_some_and(|marker: hivtac_scene::MarkerTruth| marker.visible == 1.0)
+            marker.is_some_and(|marker: hivtac_twin::MarkerTruth| marker.visible == 1.0)
         };
         match detection {
             Detection::Trusted { .. } => self.trusted += 1,

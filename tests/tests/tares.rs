@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
-use hivtac_scene::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, Preset, Scene};
+use hivtac_twin::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensor::tare::Refusal;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
@@ -199,7 +199,7 @@ fn markers_that_are_all_covered_from_the_same_side_are_refused() {
     for depth_mm in [0.2, 0.25, 0.3, 0.4] {
         for direction in 0..8 {
             let (sin, cos) = (TAU * f64::from(direction) / 8.0).sin_cos();
-            let patch = |marker: &hivtac_scene::Disc| Patch {
+            let patch = |marker: &hivtac_twin::Disc| Patch {
                 centre_mm: [
                     marker.centre_mm[0] + (1.5 - depth_mm) * cos,
                     marker.centre_mm[1] + (1.5 - depth_mm) * sin,

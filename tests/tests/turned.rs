@@ -1,6 +1,6 @@
 //! A sensor that is turned over: its film hangs the other way.
 
-use hivtac_scene::{Frame, Load, Mechanics, Options, Preset, Scene};
+use hivtac_twin::{Frame, Load, Mechanics, Options, Preset, Scene};
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::Refusal;
 use hivtac_terms::down::{Direction, Down};

@@ -1,4 +1,4 @@
-//! The attacks of `fuzz/`, some seconds each.
+//! The attacks of `tests/fuzz/`, some seconds each.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -82,11 +82,11 @@ fn build() -> Result<PathBuf> {
 
 /// Names of the targets.
 fn targets() -> Result<Vec<String>> {
-    let folder = workspace::folder("fuzz/targets");
-    let entries = folder.read_dir().context("reading fuzz/targets")?;
+    let folder = workspace::folder("tests/fuzz/targets");
+    let entries = folder.read_dir().context("reading tests/fuzz/targets")?;
     let mut names = Vec::new();
     for entry in entries {
-        let path = entry.context("reading fuzz/targets")?.path();
+        let path = entry.context("reading tests/fuzz/targets")?.path();
         names.extend(path.file_stem().map(|stem| stem.display().to_string()));
     }
     names.sort();
@@ -114,7 +114,7 @@ fn attack(programs: &Path, target: &str) -> Result<String> {
 fn command(programs: &Path, target: &str, found: &Path) -> Command {
     let mut command = Command::new(programs.join(target));
     command.arg(found);
-    command.arg(workspace::folder("fuzz/corpus").join(target));
+    command.arg(workspace::folder("tests/fuzz/corpus").join(target));
     command.arg("-print_final_stats=1").args(LIMITS);
     command.arg(format!("-artifact_prefix={}/", found.display()));
     command.arg(format!("-max_total_time={SECONDS}"));

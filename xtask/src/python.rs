@@ -11,7 +11,7 @@ use crate::{artifacts, process, workspace};
 
 /// What building and testing need.
 const ENVIRONMENT: Environment = Environment {
-    folder: "python",
+    folder: "host-tool/python",
     modules: "maturin, mypy, numpy",
     packages: &["maturin>=1.9,<2", "mypy", "numpy"],
     oldest: (3, 9),
@@ -42,7 +42,7 @@ pub fn test(firmware: &Path, tally: &mut Tally) -> Result<()> {
         "--no-build-isolation",
         "--force-reinstall",
         "--no-deps",
-        "./python",
+        "./host-tool/python",
     ]);
     install.env("MATURIN_PEP517_ARGS", "--profile tools");
     process::run(install.current_dir(workspace::root()))?;
@@ -53,12 +53,12 @@ pub fn test(firmware: &Path, tally: &mut Tally) -> Result<()> {
         "--strict",
         "--cache-dir",
         "target/mypy",
-        "python/hivtac",
+        "host-tool/python/hivtac",
     ]);
     process::run(types.current_dir(workspace::root()))?;
     let mut command = Command::new(&python);
     command
-        .args(["-W", "error", "python/tests/test_hivtac.py"])
+        .args(["-W", "error", "host-tool/python/tests/test_hivtac.py"])
         .current_dir(workspace::root())
         .env("HIVTAC_ELF", firmware)
         .env("HIVTAC_TOOL", artifacts::host_tool()?)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use hivtac_calibration::progress::bar;
-use hivtac_data::dataset::{Dataset, Recipe, generate, generate_file};
+use hivtac_calibration::data::dataset::{Dataset, Recipe, generate, generate_file};
 
 /// Options of `dataset`.
 #[derive(Args)]

@@ -8,9 +8,9 @@ use clap::Args;
 use hivtac_calibration::progress::bar;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_data::dataset::Dataset;
-use hivtac_evaluation::Evaluation;
-use hivtac_evaluation::check::check;
+use hivtac_calibration::data::dataset::Dataset;
+use hivtac_calibration::evaluation::Evaluation;
+use hivtac_calibration::evaluation::check::check;
 
 /// Frames that are checked.
 const CHECKED: usize = 4000;

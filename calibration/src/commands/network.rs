@@ -11,8 +11,8 @@ use hivtac_calibration::progress::bar;
 use hivtac_calibration::train::Options;
 use hivtac_calibration::unit::GuideArgs;
 use hivtac_calibration::weights::Weights;
-use hivtac_data::dataset::Dataset;
-use hivtac_evaluation::errors::{Errors, WEAK_N};
+use hivtac_calibration::data::dataset::Dataset;
+use hivtac_calibration::evaluation::errors::{Errors, WEAK_N};
 
 /// Options of `train`.
 #[derive(Args)]

@@ -11,11 +11,11 @@ use crate::quantize::export;
 use crate::train::{Options, Progress, Samples, train};
 use crate::uncertainty::Miss;
 use crate::weights::{Training, Uncertainty, Weights};
-use hivtac_data::dataset::{About, Dataset, Observation, Sample};
-use hivtac_data::loads::norm;
-use hivtac_data::range::Range;
-use hivtac_data::rest::features_from_q16;
-use hivtac_evaluation::errors::Errors;
+use crate::data::dataset::{About, Dataset, Observation, Sample};
+use crate::data::loads::norm;
+use crate::data::range::Range;
+use crate::data::rest::features_from_q16;
+use crate::evaluation::errors::Errors;
 
 /// What was held out together, in files: single rows, whatever their pose.
 const WITHIN_POSE: &str = "within-pose";

@@ -16,9 +16,9 @@ mod weight;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
-use hivtac_film::Film;
-use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
-use hivtac_scene::{Camera, Disc, FILM_DISTANCE_MM, Load, Preset};
+use hivtac_twin::film::Film;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
+use hivtac_twin::{Camera, Disc, FILM_DISTANCE_MM, Load, Preset};
 use hivtac_sensor::force::forward::{self, DOTS, Limits, RestImage, Stiffness};
 use hivtac_sensor::force::model::{ForwardSpec, TablesSpec, WeightSpec};
 use serde::{Deserialize, Serialize};
@@ -290,8 +290,8 @@ pub(crate) fn rest_image(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> RestIm
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_film::Film;
-    use hivtac_film::reduced::Pose;
+    use hivtac_twin::film::Film;
+    use hivtac_twin::film::reduced::Pose;
 
     /// What a film's tables say of a pose, as the chip reads them, of markers that are glued so far
     /// beside theirs.

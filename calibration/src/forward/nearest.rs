@@ -2,7 +2,7 @@
 //! numbers on every machine.
 
 use anyhow::{Result, ensure};
-use hivtac_film::reduced::Axis;
+use hivtac_twin::film::reduced::Axis;
 
 /// What is told least of the terms is at least this part of what is told most.
 const LEAST_TOLD: f64 = 1e-9;

@@ -1,12 +1,12 @@
 //! How well markers are seen, from frames of presses whose force and place are known.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_film::Film;
-use hivtac_film::reduced::{Pose, Unit};
-use hivtac_scene::MARKERS;
+use hivtac_twin::film::Film;
+use hivtac_twin::film::reduced::{Pose, Unit};
+use hivtac_twin::MARKERS;
 
 use super::UnitSetup;
-use hivtac_data::dataset::{Dataset, Sample};
+use crate::data::dataset::{Dataset, Sample};
 
 /// The mean of what is normally distributed, without sign, over its standard deviation: √(2/π).
 const MEAN_SIZE: f64 = 0.797_884_560_802_865_4;

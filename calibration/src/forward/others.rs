@@ -3,9 +3,9 @@
 //! moves them as far.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_film::MARKER_CENTRES_MM;
-use hivtac_film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_scene::{Camera, Disc};
+use hivtac_twin::film::MARKER_CENTRES_MM;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_twin::{Camera, Disc};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::{DOTS, EQUATIONS, Forward, Markers, Mounting, Stiffness};
 use hivtac_sensor::force::forward::{Pose as ChipPose, RELATIVE};

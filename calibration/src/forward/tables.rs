@@ -1,9 +1,9 @@
 //! The tables of a film run forwards, from the simulated sensor.
 
 use anyhow::Result;
-use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
-use hivtac_film::{Film, MAX_PLACE_MM};
-use hivtac_scene::{Camera, Disc, Load};
+use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
+use hivtac_twin::film::{Film, MAX_PLACE_MM};
+use hivtac_twin::{Camera, Disc, Load};
 use hivtac_sensor::force::forward::MOST_TILTS;
 use hivtac_sensor::force::model::TablesSpec;
 use rayon::prelude::*;

@@ -7,11 +7,11 @@ use crate::loads::{Certainty, Rough, SeenLoad, loads_of};
 use crate::quantize::export;
 use crate::unit_fit::{Bench, Fit, OwnFilm, fit};
 use crate::weights::Weights;
-use hivtac_data::conditions::Conditions;
-use hivtac_data::dataset::Dataset;
-use hivtac_data::rest::Rest;
-use hivtac_film::MARKER_CENTRES_MM;
-use hivtac_scene::{Camera, Preset};
+use crate::data::conditions::Conditions;
+use crate::data::dataset::Dataset;
+use crate::data::rest::Rest;
+use hivtac_twin::film::MARKER_CENTRES_MM;
+use hivtac_twin::{Camera, Preset};
 
 /// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
 /// left of noise. With it χ² of simulated units is 1 over its degrees of freedom, on average.
@@ -142,12 +142,12 @@ fn places(features_px: &[f64]) -> [[f64; 2]; 4] {
 mod tests {
     use std::path::Path;
 
-    use hivtac_scene::Contact;
+    use hivtac_twin::Contact;
     use hivtac_terms::threshold::PixelFormat;
 
     use super::*;
-    use hivtac_data::dataset::{Loads, Recipe, generate};
-    use hivtac_data::range::Range;
+    use crate::data::dataset::{Loads, Recipe, generate};
+    use crate::data::range::Range;
 
     const KNOWN: Known<'static> = Known {
         gauge_n: 1e-3,

@@ -13,10 +13,10 @@ mod representative;
 use std::cell::RefCell;
 
 use anyhow::{Result, anyhow};
-use hivtac_data::dataset::{Dataset, Observation, Sample};
-use hivtac_data::loads::norm;
-use hivtac_data::rest::Rest;
-use hivtac_evaluation::answer::Chip;
+use crate::data::dataset::{Dataset, Observation, Sample};
+use crate::data::loads::norm;
+use crate::data::rest::Rest;
+use crate::evaluation::answer::Chip;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::marker::Marker;

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use hivtac_data::dataset::{Observation, Sample};
-use hivtac_data::loads::norm;
+use crate::data::dataset::{Observation, Sample};
+use crate::data::loads::norm;
 
 use super::markers_px;
 

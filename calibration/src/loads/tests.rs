@@ -1,6 +1,6 @@
-use hivtac_data::conditions::Conditions;
-use hivtac_data::dataset::{About, Free, Loads, Place, Recipe, Row, generate};
-use hivtac_data::range::Range;
+use crate::data::conditions::Conditions;
+use crate::data::dataset::{About, Free, Loads, Place, Recipe, Row, generate};
+use crate::data::range::Range;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;

@@ -3,7 +3,7 @@
 
 use super::{DirectionWeight, Samples};
 use crate::network::OUTPUTS;
-use hivtac_data::loads::norm;
+use crate::data::loads::norm;
 
 /// How much what is off across each row's force counts; along it, every row counts the same.
 pub(super) struct Across {

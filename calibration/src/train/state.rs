@@ -14,7 +14,7 @@ use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
 use crate::network::{Arithmetic, INPUTS, Layer, Network, Standardization};
 use crate::quantize::input_scaling;
-use hivtac_data::rest::{features_from_q16, q16};
+use crate::data::rest::{features_from_q16, q16};
 
 /// Rows that are measured at a time.
 const MEASURED_ROWS: usize = 256;

@@ -1,6 +1,6 @@
 //! The loads that a person puts on, in words.
 
-use hivtac_data::collect::poses::{Pose, Task};
+use crate::data::collect::poses::{Pose, Task};
 
 /// More loads tell hardly more of a unit (`docs/results/units.md`).
 pub const MOST_LOADS: usize = 10;
@@ -106,7 +106,7 @@ fn words(pose: &Pose) -> String {
 
 #[cfg(test)]
 mod tests {
-    use hivtac_data::collect::poses;
+    use crate::data::collect::poses;
 
     use super::*;
 

@@ -8,7 +8,7 @@
 //! there the motion of the dot itself is interpolated, with its slopes by the place.
 
 use anyhow::{Context, Result};
-use hivtac_film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
+use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use hivtac_shell::{Equilibrium, Film, Response};
 use rayon::prelude::*;
 

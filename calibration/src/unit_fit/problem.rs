@@ -1,7 +1,7 @@
 //! A unit's numbers, held against its rest position and its loads.
 
 use anyhow::Result;
-use hivtac_scene::Camera;
+use hivtac_twin::Camera;
 use hivtac_shell::{Change, Design, Equilibrium, Film};
 use rayon::prelude::*;
 

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use hivtac_scene::{Camera, Disc};
+use hivtac_twin::{Camera, Disc};
 use hivtac_shell::{Equilibrium, Film, Response};
 
 use crate::forward::in_focal_lengths;

@@ -1,4 +1,4 @@
-use hivtac_scene::{Camera, MARKERS, Preset};
+use hivtac_twin::{Camera, MARKERS, Preset};
 use hivtac_sensor::force::forward::{self as chip, Forward};
 use hivtac_shell::{Design, Equilibrium, Film, Law};
 

@@ -4,8 +4,8 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use hivtac_data::collect::simulated::SimulatedGauge;
-use hivtac_data::dataset::{Dataset, Row};
+use hivtac_calibration::data::collect::simulated::SimulatedGauge;
+use hivtac_calibration::data::dataset::{Dataset, Row};
 use hivtac_terms::force::Place;
 use hivtac_terms::units::{Micrometres, SignedMicrometres};
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use hivtac_data::collect::simulated::SimulatedGauge;
-use hivtac_data::dataset::{Dataset, Loads};
+use hivtac_calibration::data::collect::simulated::SimulatedGauge;
+use hivtac_calibration::data::dataset::{Dataset, Loads};
 
 use hivtac_wire::message::Outcome;
 

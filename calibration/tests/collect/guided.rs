@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use hivtac_data::collect::simulated::SimulatedGauge;
-use hivtac_data::dataset::{MarkerDetector, Recipe, Sensing};
-use hivtac_scene::Load;
+use hivtac_calibration::data::collect::simulated::SimulatedGauge;
+use hivtac_calibration::data::dataset::{MarkerDetector, Recipe, Sensing};
+use hivtac_twin::Load;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::force::Force;

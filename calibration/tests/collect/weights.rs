@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use hivtac_data::dataset::Dataset;
+use hivtac_calibration::data::dataset::Dataset;
 
 use crate::fake::*;
 

@@ -1,7 +1,7 @@
 //! Pictures of the simulated sensor, right and wrong, and what is said of them.
 
 use super::*;
-use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
 

@@ -4,7 +4,7 @@
 
 use crate::run::run;
 use crate::sense::{Folder, MODEL, json_of, photograph};
-use hivtac_scene::{DiscMotion, Frame, Load, Mounting, Options, Preset, Pressed, Scene};
+use hivtac_twin::{DiscMotion, Frame, Load, Mounting, Options, Preset, Pressed, Scene};
 use hivtac_wire::frame::CRC32;
 use serde_json::Value;
 

@@ -1,7 +1,7 @@
 //! `hivtac sense` on pictures that are drawn here.
 
 use crate::run::*;
-use hivtac_scene::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
+use hivtac_twin::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
@@ -64,7 +64,7 @@ fn frame(is_pressed: bool) -> Frame {
 
 /// The untouched film with film colour over a quarter of a millimetre of every marker.
 fn covered() -> Frame {
-    let patch = |marker: &hivtac_scene::Disc| Patch {
+    let patch = |marker: &hivtac_twin::Disc| Patch {
         centre_mm: [marker.centre_mm[0] + 1.25, marker.centre_mm[1]],
         radius_mm: 1.0,
         paint: Paint::Film,

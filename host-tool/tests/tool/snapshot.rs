@@ -2,7 +2,7 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};

@@ -1,7 +1,7 @@
 //! Two films under the same press, and what one makes of the other's markers.
 
 use anyhow::Result;
-use hivtac_scene::Camera;
+use hivtac_twin::Camera;
 use hivtac_shell::{Contact, Design, Equilibrium, Film, Marker, markers};
 
 /// Gauss–Newton steps at most, and how small they are (N, mm) at the end.

@@ -1,8 +1,8 @@
 //! A film that CalculiX solves, as a scene shows it.
 
 use anyhow::Result;
-use hivtac_film::Pressed;
-use hivtac_scene::{Disc, Load};
+use hivtac_twin::film::Pressed;
+use hivtac_twin::{Disc, Load};
 use hivtac_shell::{Design, Film, pressed_on};
 
 use super::Solver;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use hivtac_scene::MARKER_REST_MM;
+use hivtac_twin::MARKER_REST_MM;
 use hivtac_shell::Design;
 
 /// How fast elements grow away from tip and posts, mm per mm.

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_scene::{Camera, MARKER_REST_MM};
+use hivtac_twin::{Camera, MARKER_REST_MM};
 use hivtac_shell::{Design, Film, markers_on, paper_camera};
 
 use compare::{FilmObservation, Reading};

@@ -3,7 +3,7 @@
 use super::displacement::away_from_pinhole;
 use super::domain::{not_negative, positive, up_to};
 use super::{OutOfDomain, Real, disp_s_mm};
-use hivtac_scene::{FILM_DISTANCE_MM, FOCAL_LENGTH_MM, HALF_SIDE_MM};
+use hivtac_twin::{FILM_DISTANCE_MM, FOCAL_LENGTH_MM, HALF_SIDE_MM};
 
 /// What D_ph is: the paper has it both ways, and the mean of R* depends on it (0.2609 or 0.3546).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum PinholeDistance {
     /// the same. At PM = 5.257 mm that is 24.95° for a ray at 27.73°.
     Slant,
     /// The text below eq. 15: D_ph = h, along the optical axis. What a camera does;
-    /// [`Camera`](hivtac_scene::Camera) uses it.
+    /// [`Camera`](hivtac_twin::Camera) uses it.
     Axial,
 }
 

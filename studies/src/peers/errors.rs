@@ -1,7 +1,7 @@
 //! Errors of the frames that everyone accepts.
 
-use hivtac_data::loads::norm;
-use hivtac_evaluation::errors::{WEAK_N, angle_deg, mean};
+use hivtac_calibration::data::loads::norm;
+use hivtac_calibration::evaluation::errors::{WEAK_N, angle_deg, mean};
 
 use super::models::Answers;
 

@@ -6,11 +6,11 @@ use anyhow::{Context, Result, anyhow};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_data::dataset::{
+use hivtac_calibration::data::dataset::{
     Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files,
 };
-use hivtac_data::range::Range;
-use hivtac_scene::Contact;
+use hivtac_calibration::data::range::Range;
+use hivtac_twin::Contact;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use hivtac_scene::Contact;
+use hivtac_twin::Contact;
 use hivtac_terms::geometry::Preset;
 
 use crate::document;

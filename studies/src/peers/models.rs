@@ -6,10 +6,10 @@ use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{DirectionWeight, Options};
 use hivtac_calibration::weights::Weights;
-use hivtac_data::dataset::Dataset;
-use hivtac_data::rest::features_from_q16;
-use hivtac_evaluation::check::vector_n;
-use hivtac_scene::Contact;
+use hivtac_calibration::data::dataset::Dataset;
+use hivtac_calibration::data::rest::features_from_q16;
+use hivtac_calibration::evaluation::check::vector_n;
+use hivtac_twin::Contact;
 use hivtac_sensor::force;
 use hivtac_sensor::force::model::Model as Chip;
 use hivtac_sensor::force::network::Network;
@@ -52,7 +52,7 @@ impl Model {
     }
 
     fn in_floats(&self, sets: &Sets) -> Answers {
-        let answer = |row: &hivtac_data::dataset::Row| {
+        let answer = |row: &hivtac_calibration::data::dataset::Row| {
             let seen = row.seen.as_ref().ok()?;
             Some([row.force_n, self.weights.force_n(&seen.features_px())])
         };
@@ -63,7 +63,7 @@ impl Model {
         let bytes = export(&self.weights)?;
         let model = Chip::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let mut network = Network::new();
-        let answer = |row: &hivtac_data::dataset::Row| {
+        let answer = |row: &hivtac_calibration::data::dataset::Row| {
             let Ok(seen) = &row.seen else { return Ok(None) };
             let features = features_from_q16(&seen.features_q16)?;
             let output = network.run(&model, &features, &model.rest.features);

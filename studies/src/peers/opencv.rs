@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use hivtac_data::dataset::{Detection, MarkerDetector, Observation};
-use hivtac_scene::Frame;
+use hivtac_calibration::data::dataset::{Detection, MarkerDetector, Observation};
+use hivtac_twin::Frame;
 use hivtac_sensor::force::features::Features;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
@@ -148,7 +148,7 @@ fn observation(contours: &[[f64; 3]]) -> Detection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_data::dataset::Recipe;
+    use hivtac_calibration::data::dataset::Recipe;
 
     #[test]
     fn contours_become_features_whatever_their_order() {
@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn frames_and_answers_go_through_a_pipe() {
         let scene = Recipe::default().scene(0).unwrap();
-        let frame = scene.render_load(&hivtac_scene::Load::REST, 0).unwrap();
+        let frame = scene.render_load(&hivtac_twin::Load::REST, 0).unwrap();
         let answer = "[[1,1,5],[9,1,5],[9,9,5],[1,9,5]]";
         let script =
             format!("head -c 153600 >/dev/null; echo '{answer}'; head -c 153600 >/dev/null");

@@ -1,4 +1,4 @@
-use hivtac_data::dataset::{MarkerDetector, Recipe, Sensing};
+use hivtac_calibration::data::dataset::{MarkerDetector, Recipe, Sensing};
 
 use super::*;
 

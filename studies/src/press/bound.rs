@@ -2,7 +2,7 @@
 
 use crate::peers::limit::matrix::{cholesky, dot, forward, inverse};
 use anyhow::{Context, Result};
-use hivtac_scene::Load;
+use hivtac_twin::Load;
 
 use super::TestedUnit;
 

@@ -3,8 +3,8 @@
 use hivtac_calibration::forward::building::{
     FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS,
 };
-use hivtac_film::reduced::Unit;
-use hivtac_scene::{Lens, Mechanics, Mounting, Options};
+use hivtac_twin::film::reduced::Unit;
+use hivtac_twin::{Lens, Mechanics, Mounting, Options};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

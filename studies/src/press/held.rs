@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hivtac_scene::Load;
+use hivtac_twin::Load;
 use hivtac_sensor::force::model::Model;
 use serde::Serialize;
 

@@ -15,7 +15,7 @@ pub use real::RealFilm;
 pub use rows::{Errors, Off, Row, Tally};
 pub use unit::{Answer, Tared, TestedUnit};
 
-use hivtac_scene::{FilmError, Load};
+use hivtac_twin::{FilmError, Load};
 use hivtac_shell::halton;
 
 /// Forces, mN.

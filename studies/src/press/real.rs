@@ -4,8 +4,8 @@
 use std::sync::{Mutex, MutexGuard};
 
 use anyhow::Result;
-use hivtac_film::Pressed;
-use hivtac_scene::{Disc, Load, Options};
+use hivtac_twin::film::Pressed;
+use hivtac_twin::{Disc, Load, Options};
 use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed};
 use rand::Rng;
 
@@ -196,7 +196,7 @@ fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
 /// Where the dots of a scene are glued, mm.
 fn dots_mm(options: &Options) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| {
-        let at = hivtac_film::MARKER_CENTRES_MM[k];
+        let at = hivtac_twin::film::MARKER_CENTRES_MM[k];
         [0, 1].map(|i| at[i] + options.glued_mm[k][i])
     })
 }

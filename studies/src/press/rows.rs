@@ -1,9 +1,9 @@
 //! Errors of many answers, by force.
 
 use anyhow::{Context, Result};
-use hivtac_evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
-use hivtac_evaluation::errors::angle_deg;
-use hivtac_scene::Load;
+use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
+use hivtac_calibration::evaluation::errors::angle_deg;
+use hivtac_twin::Load;
 use hivtac_sensor::force::Force;
 use serde::Serialize;
 

@@ -1,9 +1,9 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
-use hivtac_data::dataset::measure;
-use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
-use hivtac_scene::{Frame, Load, Options, Scene, Truth};
+use hivtac_calibration::data::dataset::measure;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
+use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
@@ -118,7 +118,7 @@ impl TestedUnit {
 
     /// The film under a press, where it is not the scene's.
     #[cfg(test)]
-    pub fn pressed(&self, load: &Load) -> Option<Result<hivtac_film::Pressed>> {
+    pub fn pressed(&self, load: &Load) -> Option<Result<hivtac_twin::film::Pressed>> {
         let film = self.real.as_ref()?;
         Some(self.with_tip(*load).and_then(|load| film.press(&load)))
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
-use hivtac_scene::Frame;
+use hivtac_twin::Frame;
 
 /// Red, green and blue.
 pub type Colour = [u8; 3];

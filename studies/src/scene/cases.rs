@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_hard_cases::{HardCase, hard_cases};
-use hivtac_scene::{Frame, Preset, Scene};
+use hivtac_twin::hard_cases::{HardCase, hard_cases};
+use hivtac_twin::{Frame, Preset, Scene};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, Colour, WHITE};
 use super::pipeline::{Pipeline, worst_px};

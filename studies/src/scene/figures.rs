@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_scene::{Load, Preset, Scene};
+use hivtac_twin::{Load, Preset, Scene};
 use hivtac_studies::paper_model::{Design, Map, PinholeDistance};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, WHITE};

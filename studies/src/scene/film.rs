@@ -4,8 +4,8 @@ use std::str::FromStr;
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
-use hivtac_film::Film;
-use hivtac_scene::{Camera, Contact, Load, MARKERS, Preset};
+use hivtac_twin::film::Film;
+use hivtac_twin::{Camera, Contact, Load, MARKERS, Preset};
 use serde_json::{Value, json};
 
 /// The frame size that pixels are told for.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use hivtac_scene::{Load, Options, Preset, Scene};
+use hivtac_twin::{Load, Options, Preset, Scene};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, WHITE};
 

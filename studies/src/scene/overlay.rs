@@ -1,6 +1,6 @@
 //! The truth drawn into a picture.
 
-use hivtac_scene::Truth;
+use hivtac_twin::Truth;
 
 use super::canvas::{BLACK, CHARACTER, CYAN, Canvas};
 

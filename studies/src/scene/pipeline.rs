@@ -1,8 +1,8 @@
 //! The pipeline on simulated frames, with the default model where that is made for them.
 
 use anyhow::{Context, Result, anyhow, bail};
-use hivtac_data::dataset::reasons;
-use hivtac_scene::{Camera, Frame, Load, Scene, Truth};
+use hivtac_calibration::data::dataset::reasons;
+use hivtac_twin::{Camera, Frame, Load, Scene, Truth};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
@@ -87,7 +87,7 @@ impl Pipeline {
         } = self.sensor.measure_frame(&frame.to_rgb565());
         FrameMeasurement {
             centroids_px: markers.map(|markers| markers.map(centroid_px)),
-            force_n: force.map(hivtac_evaluation::check::vector_n),
+            force_n: force.map(hivtac_calibration::evaluation::check::vector_n),
             rejected: reasons(status),
         }
     }

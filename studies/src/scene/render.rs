@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use hivtac_hard_cases::hard_cases;
-use hivtac_scene::{Preset, Scene};
+use hivtac_twin::hard_cases::hard_cases;
+use hivtac_twin::{Preset, Scene};
 
 use super::canvas::Canvas;
 use super::{cases, overlay};

@@ -1,7 +1,7 @@
 //! What a tip or an object does to the film, with truth: press, drag, release, grasp, catch.
 
 use anyhow::Result;
-use hivtac_scene::Load;
+use hivtac_twin::Load;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;

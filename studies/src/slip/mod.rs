@@ -12,7 +12,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_scene::{Load, Options, Shutter};
+use hivtac_twin::{Load, Options, Shutter};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::temporal::{Moment, Temporal};

@@ -8,9 +8,9 @@ use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_data::conditions::Conditions;
-use hivtac_data::dataset::{Loads, Recipe, generate};
-use hivtac_evaluation::check::check;
+use hivtac_calibration::data::conditions::Conditions;
+use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::evaluation::check::check;
 use serde_json::json;
 
 use super::plan::{RENDERED, preset};

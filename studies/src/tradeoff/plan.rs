@@ -3,8 +3,8 @@
 use std::fmt;
 
 use hivtac_calibration::network::Arithmetic;
-use hivtac_data::dataset::Recipe;
-use hivtac_data::range::Range;
+use hivtac_calibration::data::dataset::Recipe;
+use hivtac_calibration::data::range::Range;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use serde::{Deserialize, Serialize};

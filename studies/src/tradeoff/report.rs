@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use hivtac_evaluation::plot::{Axis, COLOURS, Plot, Scale};
+use hivtac_calibration::evaluation::plot::{Axis, COLOURS, Plot, Scale};
 
 use super::pick::{Limits, best, front};
 use super::plan::{

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_film::DiscMotion;
-use hivtac_scene::Load;
+use hivtac_twin::film::DiscMotion;
+use hivtac_twin::Load;
 use hivtac_sensor::force::model::Model;
 use serde_json::{Value, json};
 

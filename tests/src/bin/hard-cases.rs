@@ -2,7 +2,7 @@
 //! hivtac-tests --bin hard-cases -- [REPEATS [CONTACT]]`.
 
 use anyhow::{Context, Result};
-use hivtac_scene::Contact;
+use hivtac_twin::Contact;
 use hivtac_tests::hard::{detect_in_all, table};
 use hivtac_tests::tared::{View, views};
 

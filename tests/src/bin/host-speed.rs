@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use std::{env, fs};
 
 use anyhow::{Context, Result};
-use hivtac_scene::{Preset, Scene};
+use hivtac_twin::{Preset, Scene};
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::markers::screen::ScreenedTable;
 use hivtac_sensor::markers::settings::Settings;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_scene::{Camera, Preset};
+use hivtac_twin::{Camera, Preset};
 use hivtac_shell::{Contact, Film};
 
 use super::compare::{self, FilmObservation, Reading, Scaled};

@@ -1,8 +1,8 @@
 //! The Cramér–Rao bound of a force that is read from the centroids of four markers.
 
 use anyhow::{Context, Result};
-use hivtac_data::loads::norm;
-use hivtac_scene::{Contact, Load, Scene};
+use hivtac_calibration::data::loads::norm;
+use hivtac_twin::{Contact, Load, Scene};
 
 use super::matrix::{cholesky, dot, forward, inverse};
 
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn the_bound_is_reached_where_the_film_is_nearly_a_line() {
         use rand::{Rng, SeedableRng};
-        let scene = hivtac_data::dataset::Recipe::default().scene(0).unwrap();
+        let scene = hivtac_calibration::data::dataset::Recipe::default().scene(0).unwrap();
         let force = [0.01, -0.005, -0.12];
         let jacobian = jacobian(&scene, Contact::Force, force).unwrap();
         let noise: Noise =

@@ -9,10 +9,10 @@ mod bound;
 pub mod matrix;
 
 use anyhow::{Context, Result};
-use hivtac_data::dataset::{MarkerDetector, Sensing};
-use hivtac_data::loads::norm;
-use hivtac_evaluation::errors::angle_deg;
-use hivtac_scene::{Contact, Load, Scene};
+use hivtac_calibration::data::dataset::{MarkerDetector, Sensing};
+use hivtac_calibration::data::loads::norm;
+use hivtac_calibration::evaluation::errors::angle_deg;
+use hivtac_twin::{Contact, Load, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! The list of effects: what each is worth can be measured by switching it.
 
-use hivtac_scene::{
+use hivtac_twin::{
     Contact, Creep, Discs, Format, Lens, Mounting, Options, Paint, Patch, Projection, Salt, Scene,
     SceneError, Shutter, Stiffness, Surface,
 };
@@ -25,7 +25,7 @@ pub enum Compare {
     /// What is found in its frames ([`Scene::frame`], at the times of a motion), through
     /// [`Frame::to_rgb565`] when its format is another.
     ///
-    /// [`Frame::to_rgb565`]: hivtac_scene::Frame::to_rgb565
+    /// [`Frame::to_rgb565`]: hivtac_twin::Frame::to_rgb565
     Found,
     /// Its true centroids, which a picture of endless pixels would show.
     Truth,
@@ -169,7 +169,7 @@ fn mounting() -> Vec<Effect> {
 }
 
 fn pitch_um(scene: &Scene) -> f64 {
-    1000.0 * hivtac_scene::FOCAL_LENGTH_MM / scene.camera().focal_px()
+    1000.0 * hivtac_twin::FOCAL_LENGTH_MM / scene.camera().focal_px()
 }
 
 fn light() -> Vec<Effect> {
@@ -268,7 +268,7 @@ fn sensor() -> Vec<Effect> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_scene::Preset;
+    use hivtac_twin::Preset;
     use std::collections::BTreeSet;
 
     #[test]

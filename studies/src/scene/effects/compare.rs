@@ -1,9 +1,9 @@
 //! How far what is found moves when an effect is switched.
 
 use anyhow::Result;
-use hivtac_data::loads::norm;
-use hivtac_evaluation::errors::{WEAK_N, angle_deg};
-use hivtac_scene::{Frame, Options, Preset, Scene};
+use hivtac_calibration::data::loads::norm;
+use hivtac_calibration::evaluation::errors::{WEAK_N, angle_deg};
+use hivtac_twin::{Frame, Options, Preset, Scene};
 
 use crate::scene::pipeline::{FrameMeasurement, Pipeline};
 use crate::scene::size::Size;

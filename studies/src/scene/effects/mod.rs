@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_scene::Preset;
+use hivtac_twin::Preset;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use anyhow::{Context, Result, anyhow, bail};
-use hivtac_scene::{Format, Load, Options, Preset, Scene};
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::model::{Model, OutputKind};

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use hivtac_scene::Scene;
+use hivtac_twin::Scene;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::rest::Rest;

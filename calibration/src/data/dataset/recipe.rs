@@ -1,0 +1,287 @@
+//! What a data set shows: camera, sessions, loads.
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use hivtac_twin::{Contact, Format, Load, Options, PresetCamera, Scene};
+use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
+use serde::{Deserialize, Serialize};
+
+use super::session::Session;
+use super::{About, Place};
+use crate::data::conditions::{Conditions, pixel_format};
+use crate::data::loads::{PaperPoses, RandomLoads};
+use crate::data::range::Range;
+
+/// Which loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Loads {
+    /// As many, with force and angles uniform within the range.
+    Random(usize),
+    /// As many for each of the paper's 357 poses, with the force uniform within the range.
+    PaperPoses(usize),
+    /// As many for each of the 286 of them that comparisons train on.
+    TrainingPoses(usize),
+    /// As many for each of the 71 that they hold out.
+    HeldOutPoses(usize),
+    /// What was measured with a unit, in so many poses; nothing to render.
+    Measured(usize),
+}
+
+/// What to generate. What has no argument is for studies, which make their recipes themselves.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
+pub struct Recipe {
+    /// Lens and camera.
+    #[arg(skip = Recipe::default().preset)]
+    pub preset: Preset,
+    /// Columns of a frame.
+    #[arg(long, default_value_t = Recipe::default().width)]
+    pub width: u16,
+    /// Rows of a frame.
+    #[arg(long, default_value_t = Recipe::default().height)]
+    pub height: u16,
+    /// What a pixel is: rgb565, yuv422 or mono.
+    #[arg(long, value_parser = pixel_format, default_value = "rgb565")]
+    pub format: PixelFormat,
+    /// How markers' positions are taken.
+    #[arg(skip = Recipe::default().centroid)]
+    pub centroid: CentroidEstimator,
+    /// What the loads' labels mean.
+    #[arg(skip)]
+    pub contact: Contact,
+    /// Random loads of each session.
+    #[arg(id = "samples", long, value_name = "COUNT", value_parser = random)]
+    #[arg(default_value = "80000")]
+    pub loads: Loads,
+    /// Frames of the untouched film, first in each session.
+    #[arg(skip = Recipe::default().rest)]
+    pub rest: usize,
+    /// The limits of the forces; the paper's poses have limits of their own for angles.
+    #[command(flatten)]
+    pub range: Range,
+    /// Sessions: the first is the nominal sensor, the others are mounted, lit and focused a little
+    /// differently.
+    #[arg(skip = Recipe::default().sessions)]
+    pub sessions: usize,
+    /// Decides loads, sessions and noise.
+    #[arg(long, default_value_t = Recipe::default().seed)]
+    pub seed: u64,
+}
+
+fn random(count: &str) -> Result<Loads, String> {
+    let count = count.parse().map_err(|_| "a number is needed")?;
+    Ok(Loads::Random(count))
+}
+
+impl Recipe {
+    /// The frames that the default model of a preset learns from.
+    pub fn of(preset: Preset) -> Self {
+        let usual = Self {
+            preset,
+            ..Self::default()
+        };
+        match preset {
+            Preset::Paper | Preset::Ov7725 => usual,
+            Preset::Mt9v034 => Self {
+                width: 160,
+                height: 152,
+                format: PixelFormat::Mono,
+                ..usual
+            },
+        }
+    }
+}
+
+impl Default for Recipe {
+    /// The frames that the default model's network learns from.
+    fn default() -> Self {
+        Self {
+            preset: Preset::Ov7725,
+            width: 320,
+            height: 240,
+            format: PixelFormat::Rgb565,
+            centroid: CentroidEstimator::RednessWeighted,
+            contact: Contact::Force,
+            loads: Loads::Random(80_000),
+            rest: 64,
+            range: Range::RENDERED,
+            sessions: 1,
+            seed: 1,
+        }
+    }
+}
+
+impl Loads {
+    /// The paper's poses among them, and how many loads each has.
+    fn poses(self) -> Option<(Poses, usize)> {
+        let [training, held_out] = PaperPoses::parts();
+        match self {
+            Loads::PaperPoses(each) => Some((Poses::All, each)),
+            Loads::TrainingPoses(each) => Some((Poses::Some(training), each)),
+            Loads::HeldOutPoses(each) => Some((Poses::Some(held_out), each)),
+            Loads::Random(_) | Loads::Measured(_) => None,
+        }
+    }
+}
+
+/// Some of the paper's poses, by number.
+enum Poses {
+    All,
+    Some(&'static [usize]),
+}
+
+impl Poses {
+    fn count(&self) -> usize {
+        match self {
+            Poses::All => PaperPoses::COUNT,
+            Poses::Some(poses) => poses.len(),
+        }
+    }
+
+    fn at(&self, index: usize) -> usize {
+        match self {
+            Poses::All => index,
+            Poses::Some(poses) => poses[index],
+        }
+    }
+}
+
+impl Recipe {
+    /// Frames of each session.
+    pub fn session_rows(&self) -> usize {
+        let loads = match self.loads {
+            Loads::Random(count) => count,
+            loads => loads
+                .poses()
+                .map_or(0, |(poses, each)| each.saturating_mul(poses.count())),
+        };
+        loads.saturating_add(self.rest)
+    }
+
+    /// Frames in all.
+    pub fn rows(&self) -> usize {
+        self.session_rows().saturating_mul(self.sessions)
+    }
+
+    /// # Errors
+    /// When there would be no frame, or more than a file is good for.
+    pub(super) fn check(&self) -> Result<()> {
+        ensure!(
+            !matches!(self.loads, Loads::Measured(_)),
+            "measured loads cannot be rendered"
+        );
+        ensure!(
+            !self.range.knows_places() || matches!(self.loads, Loads::Random(_)),
+            "only random loads press anywhere: the others press the middle"
+        );
+        ensure!(self.sessions > 0, "a data set needs at least one session");
+        ensure!(self.rows() > 0, "a data set needs at least one frame");
+        ensure!(
+            self.rows() <= 100_000_000,
+            "{} frames are more than a data set holds",
+            self.rows()
+        );
+        Ok(())
+    }
+
+    /// The scene of a session.
+    ///
+    /// # Errors
+    /// When the scene has no such frame size.
+    pub fn scene(&self, session: usize) -> Result<Scene> {
+        let scene = Scene::preset(
+            "rest",
+            self.preset,
+            self.width.into(),
+            self.height.into(),
+            self.seed,
+        )?;
+        let session = Session::numbered(session, self.seed);
+        let mut options = session.options(self.width);
+        options.markers = self.preset.usual_markers();
+        options.film.contact = self.contact;
+        options.format = match self.format {
+            PixelFormat::Rgb565 => Format::Rgb565,
+            PixelFormat::Yuv422 => Format::Yuv422,
+            PixelFormat::Mono => Format::Mono,
+        };
+        Ok(scene.with_options(options)?)
+    }
+
+    /// Where a row stands: its session and, among the paper's poses, its pose.
+    pub fn place(&self, row: usize) -> Place {
+        let (session, within) = (row / self.session_rows(), row % self.session_rows());
+        let loaded = within.checked_sub(self.rest);
+        let pose = self.loads.poses().zip(loaded);
+        Place {
+            session,
+            pose: pose.map(|((poses, each), row)| poses.at(row / each)),
+        }
+    }
+
+    /// The load of a row.
+    ///
+    /// # Errors
+    /// When the limits are no limits of a force.
+    pub fn load(&self, row: usize) -> Result<Load> {
+        let within = row % self.session_rows();
+        if within < self.rest {
+            return Ok(Load::REST);
+        }
+        let (range, seed) = (self.range, self.seed);
+        let force_n = range.force_n;
+        match (self.loads, self.place(row).pose) {
+            (Loads::Measured(_), _) => Ok(Load::REST),
+            (_, Some(pose)) => PaperPoses { force_n, seed }.load(pose, row),
+            (_, None) => RandomLoads { range, seed }.load(row),
+        }
+        .with_context(|| format!("row {row}"))
+    }
+
+    /// What the file of its data set says about it.
+    ///
+    /// # Errors
+    /// When the scene has no such frame size.
+    pub fn about(&self) -> Result<About> {
+        let scene = self.scene(0)?;
+        let options: &Options = scene.options();
+        Ok(About {
+            conditions: Conditions {
+                centroid: self.centroid,
+                contact: self.contact,
+                ..Conditions::simulated(self.preset, self.width, self.height, self.format)
+            },
+            scene: format!(
+                "reduced film, gain {}, falloff {}, noise {} of 255 levels",
+                options.gain, options.falloff, options.noise
+            ),
+            loads: self.loads,
+            rest: self.rest,
+            sessions: self.sessions,
+            seed: self.seed,
+            range: self.range,
+            free: None,
+            down: None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        recipe: Recipe,
+    }
+
+    #[test]
+    fn without_arguments_it_is_the_default() {
+        assert_eq!(Command::parse_from(["dataset"]).recipe, Recipe::default());
+    }
+}

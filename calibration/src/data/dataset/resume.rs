@@ -1,0 +1,221 @@
+//! Data sets that go on where they were interrupted.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use super::detector::{Detectors, Pool};
+use super::file::{lines, opening};
+use super::generate::{Renderer, sensing};
+use super::{About, Dataset, Recipe};
+
+/// Rows that are rendered before they are written.
+const BLOCK: usize = 512;
+
+/// A data set on its way into a file.
+struct Target {
+    path: PathBuf,
+    about: About,
+    opening: String,
+}
+
+impl Target {
+    fn of(path: PathBuf, about: About) -> Result<Self> {
+        Ok(Self {
+            path,
+            opening: opening(&about)?,
+            about,
+        })
+    }
+}
+
+/// Writes the data set of a recipe to a file, block by block, and reads it back. What an
+/// interrupted run left there is kept: the file ends up the same. `progress` is told the number of
+/// rows that are done, from any thread.
+///
+/// # Errors
+/// When the file is another data set or cannot be written, or the recipe asks for what the scene
+/// cannot do.
+pub fn generate_file(
+    recipe: &Recipe,
+    path: &Path,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Dataset> {
+    let target = Target::of(path.into(), recipe.about()?)?;
+    write(recipe, &[target], &sensing(recipe), progress)?;
+    Dataset::load(path)
+}
+
+/// The same with detectors of its own, for the same frames: each has its file, and says in `files`
+/// what its rows are.
+///
+/// # Errors
+/// As [`generate_file`], and when detectors cannot be opened or are not as many as files.
+pub fn generate_files<'a>(
+    recipe: &Recipe,
+    files: Vec<(PathBuf, About)>,
+    open: impl Fn() -> Result<Detectors<'a>> + Sync + 'a,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Dataset>> {
+    let files = files.into_iter();
+    let targets = files.map(|(path, about)| Target::of(path, about));
+    let targets: Vec<Target> = targets.collect::<Result<_>>()?;
+    write(recipe, &targets, &Pool::new(open), progress)?;
+    targets.iter().map(|t| Dataset::load(&t.path)).collect()
+}
+
+fn write(
+    recipe: &Recipe,
+    targets: &[Target],
+    pool: &Pool<'_>,
+    progress: impl Fn(u64) + Sync,
+) -> Result<()> {
+    let renderer = Renderer::new(recipe)?;
+    let mut done = recipe.rows();
+    for target in targets {
+        let rows = target.begin(recipe.rows());
+        done = rows.with_context(|| target.stuck())?.min(done);
+    }
+    for target in targets {
+        target.cut(done).with_context(|| target.stuck())?;
+    }
+    progress(done as u64);
+    for first in (done..recipe.rows()).step_by(BLOCK) {
+        let range = first..(first + BLOCK).min(recipe.rows());
+        let rows = renderer.rows(range, pool, || progress(1))?;
+        for (i, target) in targets.iter().enumerate() {
+            let seen = rows.iter().map(|row| row.get(i).cloned());
+            let rows: Option<Vec<_>> = seen.collect();
+            let rows = rows.context("there are fewer detectors than files")?;
+            let mut file = OpenOptions::new().append(true).open(&target.path)?;
+            file.write_all(&lines(&target.about, &rows)?)
+                .with_context(|| format!("cannot write {}", target.path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+impl Target {
+    fn stuck(&self) -> String {
+        format!("cannot go on with {}", self.path.display())
+    }
+
+    /// Makes the file begin with its opening; how many whole rows it has.
+    fn begin(&self, rows: usize) -> Result<usize> {
+        let bytes = match fs::read(&self.path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
+            Err(error) => return Err(error.into()),
+        };
+        // An interrupted run may have left a part of the opening, too.
+        if self.opening.as_bytes().starts_with(&bytes) {
+            fs::write(&self.path, &self.opening)?;
+            return Ok(0);
+        }
+        ensure!(
+            bytes.starts_with(self.opening.as_bytes()),
+            "it is there and holds something else: remove it, or use another name"
+        );
+        let done = ends(&bytes[self.opening.len()..]).count();
+        ensure!(done <= rows, "it has {done} rows, and {rows} are wanted");
+        Ok(done)
+    }
+
+    /// Leaves the first rows only.
+    fn cut(&self, rows: usize) -> Result<()> {
+        let bytes = fs::read(&self.path)?;
+        let start = self.opening.len();
+        let end = match rows.checked_sub(1) {
+            None => Some(0),
+            Some(last) => ends(&bytes[start..]).nth(last),
+        };
+        let end = end.context("it has changed meanwhile")?;
+        let file = OpenOptions::new().write(true).open(&self.path)?;
+        file.set_len((start + end) as u64)?;
+        Ok(())
+    }
+}
+
+/// Where each whole line ends.
+fn ends(bytes: &[u8]) -> impl Iterator<Item = usize> {
+    let ends = bytes.iter().enumerate();
+    ends.filter(|(_, byte)| **byte == b'\n').map(|(i, _)| i + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::detector::Sensing;
+    use super::super::{Loads, generate};
+    use super::*;
+    use crate::data::range::Range;
+
+    fn recipe() -> Recipe {
+        Recipe {
+            loads: Loads::Random(20),
+            rest: 2,
+            range: Range::default(),
+            sessions: 2,
+            ..Recipe::default()
+        }
+    }
+
+    #[test]
+    fn an_interrupted_file_ends_up_the_same() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("data.csv");
+        let whole = generate_file(&recipe(), &path, |_| ()).unwrap();
+        assert_eq!(whole.rows.len(), 44);
+        let bytes = fs::read(&path).unwrap();
+        for length in [0, 10, 400, bytes.len() / 2, bytes.len() - 1, bytes.len()] {
+            fs::write(&path, &bytes[..length]).unwrap();
+            assert_eq!(generate_file(&recipe(), &path, |_| ()).unwrap(), whole);
+            assert!(
+                fs::read(&path).unwrap() == bytes,
+                "cut after {length} bytes"
+            );
+        }
+    }
+
+    /// Two detectors on the same frames: files that were cut in different places end up the same.
+    #[test]
+    fn files_of_several_eyes_go_on_together() {
+        let directory = tempfile::tempdir().unwrap();
+        let recipe = recipe();
+        let path = |name: &str| directory.path().join(name);
+        let make = || {
+            let about = recipe.about().unwrap();
+            let mut other = about.clone();
+            other.scene.push_str(", seen otherwise");
+            let files = vec![(path("a.csv"), about), (path("b.csv"), other)];
+            let open = || -> Result<Detectors<'_>> {
+                let detector = || Sensing::unmodelled(&recipe);
+                Ok(vec![Box::new(detector()?), Box::new(detector()?)])
+            };
+            generate_files(&recipe, files, open, |_| ()).unwrap()
+        };
+        let whole = make();
+        assert_eq!(whole[0].rows, generate(&recipe, || ()).unwrap().rows);
+        assert_eq!(whole[0].rows, whole[1].rows);
+        let bytes = fs::read(path("a.csv")).unwrap();
+        fs::write(path("a.csv"), &bytes[..bytes.len() / 2]).unwrap();
+        assert_eq!(make(), whole);
+        assert!(fs::read(path("a.csv")).unwrap() == bytes);
+    }
+
+    #[test]
+    fn another_data_set_is_left_alone() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("data.csv");
+        generate_file(&recipe(), &path, |_| ()).unwrap();
+        let before = fs::read(&path).unwrap();
+        let other = Recipe {
+            seed: 2,
+            ..recipe()
+        };
+        let error = format!("{:#}", generate_file(&other, &path, |_| ()).unwrap_err());
+        assert!(error.contains("something else"), "{error}");
+        assert!(fs::read(&path).unwrap() == before);
+    }
+}

@@ -1,0 +1,81 @@
+//! What the chip says of a row of a data set.
+
+use anyhow::Result;
+use hivtac_sensor::force::features::Features;
+use hivtac_sensor::force::{self, Force, FrameNoise, Resting};
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network;
+use hivtac_sensor::force::rest::Rest;
+use hivtac_terms::marker::Marker;
+use hivtac_terms::status::Status;
+
+use crate::data::dataset::Observation;
+use crate::data::rest::features_from_q16;
+
+/// A model on the chip, with a rest position.
+pub struct Chip<'m> {
+    areas_px: [u32; 4],
+    model: Model<'m>,
+    tare: Features,
+    resting: Option<Resting>,
+    network: Network,
+}
+
+impl<'m> Chip<'m> {
+    /// With the rest position of a data set.
+    ///
+    /// # Errors
+    /// When its features do not fit the chip's numbers.
+    pub fn new(model: Model<'m>, rest: &crate::data::rest::Rest) -> Result<Self> {
+        let tare = features_from_q16(&rest.features_q16)?;
+        let rest = Rest {
+            features: tare,
+            areas: rest.areas_px,
+        };
+        Ok(Self {
+            areas_px: rest.areas,
+            resting: Resting::of_model(&model, &rest),
+            model,
+            tare,
+            network: Network::new(),
+        })
+    }
+
+    /// The markers' areas at rest, px.
+    pub fn areas_px(&self) -> [u32; 4] {
+        self.areas_px
+    }
+
+    /// The force that it says of what was seen, and how far to trust it.
+    ///
+    /// # Errors
+    /// When the features do not fit the chip's numbers.
+    pub fn force(&mut self, seen: &Observation) -> Result<(Force, Status)> {
+        let (force, status, _) = self.force_and_looks(seen)?;
+        Ok((force, status))
+    }
+
+    /// The same, and how often the film was run forwards for it: 0 by a model that takes no steps.
+    ///
+    /// # Errors
+    /// When the features do not fit the chip's numbers.
+    pub fn force_and_looks(&mut self, seen: &Observation) -> Result<(Force, Status, u8)> {
+        let features = features_from_q16(&seen.features_q16)?;
+        let output = self.network.run(&self.model, &features, &self.tare);
+        let forward = self.model.forward.as_ref().zip(self.resting.as_ref());
+        let Some((forward, resting)) = forward else {
+            let (force, status) = force::of_outputs(&self.model, &output);
+            return Ok((force, status, 0));
+        };
+        let marker = |k: usize| {
+            let (x, y) = features.centroids[k];
+            let area = seen.areas_px[k];
+            Marker { x, y, area }
+        };
+        let markers = std::array::from_fn(marker);
+        let noise = FrameNoise::AS_MODELLED;
+        let estimate = resting.estimate(forward, &markers, noise, &output);
+        let (force, status) = resting.told(forward, &self.model.range, noise, &estimate);
+        Ok((force, status, estimate.looks))
+    }
+}

@@ -1,0 +1,85 @@
+//! Attacks on everything that reads what others wrote, guided by coverage: one function for each,
+//! which takes any bytes. It panics when something is wrong, and tells otherwise whether the bytes
+//! came as far as what is attacked.
+//!
+//! `cargo xtask test --all attacks` runs each for some seconds where there is a C++ compiler; its
+//! corpus is run by the tests here without. [`ATTACKS`] is the list.
+//!
+//! To attack longer (`-help=1` has libFuzzer's options; cargo-fuzz can run the targets, too), and
+//! to try an input that was found:
+//!
+//! ```sh
+//! cd target/xtask/fuzz
+//! x86_64-unknown-linux-gnu/tools/model found/model ../../../../tests/fuzz/corpus/model \
+//!     -artifact_prefix=found/model/ -max_total_time=1800
+//! cargo run -p hivtac-fuzz --bin model -- found/model/crash-*
+//! ```
+#![forbid(unsafe_code)]
+
+mod calibration;
+mod capture;
+#[cfg(test)]
+mod corpus;
+mod frames;
+mod markers;
+mod model;
+mod picture;
+mod scene_file;
+mod storage;
+mod wire;
+
+/// An attack: whether the input came as far as what is attacked.
+pub type Attack = fn(&[u8]) -> bool;
+
+/// Every attack by the name of its target, which is that of its folder in `tests/fuzz/corpus`, too.
+pub const ATTACKS: [(&str, Attack); 11] = [
+    ("from_device", wire::from_device),
+    ("from_host", wire::from_host),
+    ("model", model::attack),
+    ("frames", frames::attack),
+    ("capture", capture::attack),
+    ("storage", storage::attack),
+    ("scene_file", scene_file::attack),
+    ("picture", picture::attack),
+    ("dataset", calibration::dataset),
+    ("recording", calibration::recording),
+    ("network", calibration::network),
+];
+
+/// The attack of that name.
+///
+/// # Panics
+/// When there is none: a target without its entry in [`ATTACKS`].
+pub fn attack(name: &str) -> Attack {
+    let found = ATTACKS.iter().find(|(known, _)| *known == name);
+    found.expect("every target is listed").1
+}
+
+/// Runs an attack on the files that the command line names; without libFuzzer that is all that a
+/// target does.
+///
+/// # Panics
+/// When a file cannot be read, and when the attack succeeds.
+pub fn replay(name: &str) {
+    for path in std::env::args_os().skip(1) {
+        let input = std::fs::read(&path).expect("the file can be read");
+        let reached = attack(name)(&input);
+        println!("{}: withstood, reached {reached}", path.display());
+    }
+}
+
+/// The whole of a fuzz target.
+#[macro_export]
+macro_rules! target {
+    ($name:literal) => {
+        #[cfg(fuzzing)]
+        libfuzzer_sys::fuzz_target!(|input: &[u8]| {
+            $crate::attack($name)(input);
+        });
+
+        #[cfg(not(fuzzing))]
+        fn main() {
+            $crate::replay($name);
+        }
+    };
+}

@@ -1,0 +1,136 @@
+//! The truth log: one JSON object per exposure, for whoever compares it with what the firmware
+//! says.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use anyhow::Context;
+use hivtac_twin::Shutter;
+use serde_json::{Value, json};
+
+/// Where the truth goes. It never enters the firmware.
+#[derive(Debug, Default)]
+pub struct TruthLog {
+    file: Option<File>,
+    failed: Option<String>,
+}
+
+/// One exposure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exposed {
+    /// Ends of VSYNC pulses since the camera's first register reset after the microcontroller's
+    /// reset; the first one is
+    /// 1. Zero before that.
+    pub frame: u64,
+    /// Ends of VSYNC pulses since the run began: what the scene's noise depends on.
+    pub exposure: u64,
+    /// Virtual time of the edge, ns.
+    pub at_ns: u64,
+    /// Virtual time of the middle of the exposure of the middle row, ns.
+    pub middle_ns: u64,
+    /// How long each row is exposed, ns.
+    pub exposure_ns: u64,
+    /// From the exposure of the first row to that of one below the last, ns.
+    pub readout_ns: u64,
+}
+
+impl Exposed {
+    /// The time the scene was asked for, s.
+    pub fn time_s(&self) -> f64 {
+        self.middle_ns as f64 / 1e9
+    }
+
+    /// When which row was exposed.
+    pub fn shutter(&self) -> Shutter {
+        Shutter {
+            exposure_s: self.exposure_ns as f64 / 1e9,
+            readout_s: self.readout_ns as f64 / 1e9,
+        }
+    }
+}
+
+impl TruthLog {
+    /// A log in a file, which is emptied first.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn create(path: &Path) -> anyhow::Result<Self> {
+        let file = File::create(path).with_context(|| format!("truth log {}", path.display()))?;
+        Ok(Self {
+            file: Some(file),
+            failed: None,
+        })
+    }
+
+    /// Whether anybody reads it.
+    pub fn wanted(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// Writes one exposure, at once, so that a reader that follows the file sees it.
+    pub fn exposed(&mut self, exposed: Exposed, truth: Value) {
+        let Some(file) = &mut self.file else { return };
+        let mut line = json!({
+            "frame": exposed.frame,
+            "exposure": exposed.exposure,
+            "time_us": exposed.at_ns / 1000,
+            "time_s": exposed.time_s(),
+            "exposure_s": exposed.shutter().exposure_s,
+            "readout_s": exposed.shutter().readout_s,
+        });
+        if let (Some(line), Value::Object(truth)) = (line.as_object_mut(), truth) {
+            line.extend(truth);
+        }
+        // In one piece, for who reads meanwhile.
+        if let Err(error) = file.write_all(format!("{line}\n").as_bytes()) {
+            self.failed = Some(error.to_string());
+            self.file = None;
+        }
+    }
+
+    /// Why the log ended early.
+    pub fn failure(&self) -> Option<&str> {
+        self.failed.as_deref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    /// But where it crosses a page of the file system's memory.
+    #[test]
+    fn who_reads_meanwhile_finds_whole_lines() {
+        const LINES: u64 = 2_000;
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let mut log = TruthLog::create(file.path()).unwrap();
+        let written = AtomicBool::new(false);
+        let reader = || {
+            let (mut reads, mut broken) = (0, 0);
+            while !written.load(Ordering::Relaxed) {
+                let text = std::fs::read(file.path()).unwrap();
+                reads += 1;
+                broken += u32::from(!text.is_empty() && !text.ends_with(b"\n"));
+            }
+            (reads, broken)
+        };
+        let (reads, broken) = std::thread::scope(|scope| {
+            let reader = scope.spawn(reader);
+            for frame in 0..LINES {
+                let exposed = Exposed {
+                    frame,
+                    ..Exposed::default()
+                };
+                log.exposed(exposed, json!({ "alpha_deg": 4.0 }));
+            }
+            written.store(true, Ordering::Relaxed);
+            reader.join().unwrap()
+        });
+        // On a busy computer there are few reads, and one may fall between two pages of a write.
+        assert!(broken <= 1 + reads / 20, "{broken} of {reads}");
+        let text = std::fs::read_to_string(file.path()).unwrap();
+        assert_eq!(text.lines().count() as u64, LINES);
+    }
+}

@@ -1,0 +1,170 @@
+//! What the flashed firmware says of itself, and how it gives way to the part's own loader.
+
+use crate::common::{Run, Setup, command, firmware};
+use crate::settings::{Device, of_another_version};
+use hivtac_rig::script::Action;
+use hivtac_sensor::known_answer;
+use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::network::Network;
+use hivtac_wire::frame::CRC32;
+use hivtac_wire::health::{Health, Problem, ResetReason};
+use hivtac_wire::message::{Outcome, Request};
+
+const ASKED: u16 = 40;
+const ASKED_MS: u64 = 200;
+/// While registers are read back that were written.
+const FORGETS: &str = "camera-forgets@97";
+
+fn ask(request: Request, virtual_ms: u64) -> Setup {
+    let asked = Action::Send(command(ASKED, request));
+    Setup::new(firmware(), virtual_ms).at(ASKED_MS, asked)
+}
+
+fn health(setup: Setup) -> Health {
+    told(&setup.run())
+}
+
+fn told(run: &Run) -> Health {
+    assert_eq!(run.outcome(ASKED), Outcome::Done);
+    *run.health()
+}
+
+#[test]
+fn a_device_that_was_just_switched_on_has_no_problem() {
+    let health = health(ask(Request::GetHealth, 230));
+    assert_eq!(health.reset, ResetReason::PowerOn, "{health:?}");
+    // The emulator's part is at 30 °C.
+    let temperature = health.temperature_centidegrees.expect("its sensor tells");
+    assert!((2_900..3_100).contains(&temperature), "{health:?}");
+    assert_eq!(health.stack_bytes, 35 << 10);
+    let free = health.stack_bytes - health.stack_used;
+    assert!(health.stack_used > 1_000 && free > 6_000, "{health:?}");
+    assert_eq!((health.problems, health.at_start), (0, 0), "{health:?}");
+    println!("{health:?}");
+}
+
+#[test]
+fn a_camera_that_is_not_there_is_a_problem() {
+    let health = health(ask(Request::GetHealth, 230).fault("camera-absent"));
+    let silent = Problem::CameraSilent.bit();
+    assert_eq!((health.problems, health.at_start), (silent, silent));
+}
+
+#[test]
+fn a_camera_of_another_kind_is_told() {
+    let health = health(ask(Request::GetHealth, 230).fault("camera-wrong-id"));
+    let another = Problem::AnotherCamera.bit();
+    let now = another | Problem::CameraSilent.bit();
+    assert_eq!((health.problems, health.at_start), (now, another));
+}
+
+/// Its registers go back to what they hold after a reset while they are set: it is set up anew,
+/// and forces come; that something was wrong at the start is told all the same.
+#[test]
+fn a_register_that_does_not_hold_what_was_written_is_told() {
+    let asked = Action::Send(command(ASKED, Request::GetHealth));
+    let setup = Setup::new(firmware(), 760).at(740, asked);
+    let run = setup.fault(FORGETS).run();
+    let health = told(&run);
+    let expected = (0, Problem::CameraRegisters.bit());
+    assert_eq!(
+        (health.problems, health.at_start),
+        expected,
+        "{}",
+        run.log()
+    );
+    assert!(run.samples().last().unwrap().force.is_some());
+}
+
+/// The camera's clock loop multiplies half as much as it should.
+#[test]
+fn frames_that_take_another_time_than_they_should_are_told() {
+    let asked = Action::Send(command(ASKED, Request::GetHealth));
+    let setup = Setup::new(firmware(), 340).at(320, asked);
+    let run = setup.fault("camera-slow").run();
+    let health = told(&run);
+    let clocks = Problem::Clocks.bit();
+    assert_eq!((health.problems, health.at_start), (clocks, clocks));
+    assert!(!run.samples().is_empty(), "forces go on");
+}
+
+#[test]
+fn kept_settings_that_are_not_read_are_told() {
+    let Device { flash, .. } = &Device::new();
+    of_another_version(flash);
+    let setup = Setup {
+        flash: Some(flash.clone()),
+        ..ask(Request::GetHealth, 230)
+    };
+    let health = health(setup);
+    let unread = Problem::SettingsUnread.bit();
+    assert_eq!((health.problems, health.at_start), (unread, unread));
+}
+
+/// The built-in model is another than the one that the computer asked when the firmware was built,
+/// and its checksum is right: what makes forces of markers does not do what it should.
+#[test]
+fn a_built_in_model_that_answers_otherwise_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let elf = directory.path().join("firmware.elf");
+    let mut program = std::fs::read(firmware()).unwrap();
+    let file = include_bytes!("../../../calibration/models/default.hvtm");
+    let mut windows = program.windows(file.len());
+    let at = windows.position(|window| window == file);
+    let at = at.expect("it is built in");
+    let other = of_another_answer(file);
+    program[at..at + other.len()].copy_from_slice(&other);
+    std::fs::write(&elf, program).unwrap();
+    let setup = Setup {
+        elf,
+        ..ask(Request::GetHealth, 230)
+    };
+    let health = health(setup);
+    let arithmetic = Problem::Arithmetic.bit();
+    assert_eq!((health.problems, health.at_start), (arithmetic, arithmetic));
+}
+
+/// The model with one bit changed, and its checksum, so that it answers otherwise.
+fn of_another_answer(file: &[u8]) -> Vec<u8> {
+    let answer = |file: &[u8]| {
+        let model = Model::parse(file).ok()?;
+        Some(known_answer::of(&model, &mut Network::new()))
+    };
+    let good = answer(file);
+    let end = file.len() - 4;
+    let changed = (0..end).step_by(499).map(|at| {
+        let mut other = file.to_vec();
+        other[at] ^= 0x40;
+        let crc = CRC32.checksum(&other[..end]);
+        other[end..].copy_from_slice(&crc.to_le_bytes());
+        other
+    });
+    let mut others = changed.filter(|other| answer(other).is_some_and(|it| Some(it) != good));
+    others.next().expect("some bit matters")
+}
+
+/// The loader's stand-in is gone from USB for a third of a second, and then starts the program by a
+/// jump. What was reset for it is no fault of the program: one that only restarts says so.
+#[test]
+fn the_parts_own_loader_is_started_on_request_and_leaves_no_trace() {
+    const AGAIN: u16 = 41;
+    let hello = Action::Send(crate::common::hello());
+    let asked = Action::Send(command(AGAIN, Request::GetHealth));
+    let run = ask(Request::StartLoader, 1_100)
+        .fault("camera-absent")
+        .at(1_060, hello)
+        .at(1_070, asked)
+        .run();
+    assert_eq!(run.outcome(ASKED), Outcome::Done);
+    let report = &run.report;
+    assert_eq!(report.resets, 1, "{:?}", report.usb_log);
+    assert_eq!(report.usb.enumerations, 2, "{:?}", report.usb_log);
+    assert!(report.refused.is_empty(), "{:?}", report.refused);
+    assert_eq!(run.outcome(AGAIN), Outcome::Done);
+    let health = run.health();
+    let silent = Problem::CameraSilent.bit();
+    assert_eq!(
+        (health.reset, health.problems),
+        (ResetReason::Other, silent)
+    );
+}

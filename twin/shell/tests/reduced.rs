@@ -1,0 +1,211 @@
+//! The committed tables against the full solution, and what they say of the film.
+
+use std::sync::LazyLock;
+
+use hivtac_twin::film::Film as ReducedFilm;
+use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
+use hivtac_twin::{Camera, Contact, Disc, Load, Preset};
+use hivtac_shell::{Design, Domain, Film, check, press_load};
+
+/// How far the reduced film's markers may be off, px at 320×240 `ov7725`.
+const MOST_PX: f64 = 0.1;
+/// And on a unit that differs from the nominal film as much as one that is built by hand.
+const MOST_PX_OF_A_UNIT: f64 = 0.3;
+
+static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::new(Preset::Ov7725, 320, 240).unwrap());
+
+/// A force, N, where it presses, mm, and the tip's radius, mm.
+type Case = ([f64; 3], [f64; 2], f64);
+
+fn load((force_n, place_mm, radius_mm): Case) -> Load {
+    let load = Load::from_vector(force_n).unwrap();
+    let load = load.with_offset_mm(place_mm).unwrap();
+    load.with_tip_radius_mm(radius_mm).unwrap()
+}
+
+/// Holds the reduced film of a unit and its elements against each other.
+fn agree(unit: &Unit, loads: &[Load], most_px: f64) {
+    let reduced = ReducedFilm::of(*unit).unwrap();
+    let mut film = Film::new(&Design::of(unit)).unwrap();
+    for load in loads {
+        reduced.check(load).unwrap();
+        let pressed = reduced.press(load);
+        let full = press_load(&mut film, load).unwrap();
+        for (a, b) in full.state.force_n.iter().zip(pressed.force_n) {
+            assert!((a - b).abs() < 2e-3, "{load:?}: force {a} {b} N");
+        }
+        for (id, disc) in reduced
+            .markers_mm()
+            .map(Disc::marker)
+            .into_iter()
+            .enumerate()
+        {
+            let [[x, y], [a, b]] = [
+                disc.centroid_px(|rest| film.displacement(&full.state, rest), &CAMERA),
+                disc.centroid_px(|rest| pressed.displacement(rest), &CAMERA),
+            ];
+            let error = (a - x).hypot(b - y);
+            assert!(error < most_px, "{error} px: marker {id}, {load:?}");
+        }
+    }
+}
+
+#[test]
+fn tables_are_the_full_solution() {
+    let cases = [
+        ([0.0, 0.0, -0.2], [0.0, 0.0], 0.5),
+        ([0.05, -0.11, -0.19], [-3.3, 2.2], 0.5),
+        ([0.01, 0.0, -0.05], [4.0, 3.4], 0.5),
+        ([-0.001, 0.0005, -0.002], [4.9, -4.9], 0.3),
+        ([0.02, 0.03, -0.1], [1.0, -2.7], 1.4),
+    ];
+    agree(&Unit::default(), &cases.map(load), MOST_PX);
+}
+
+#[test]
+fn a_film_built_by_hand_is_its_full_solution() {
+    let unit = Unit {
+        stiffness: 0.8,
+        thickness: 1.1,
+        grip: 1.5,
+        posts_mm: [[0.3, -0.2], [-0.3, 0.1], [0.2, 0.3], [0.1, -0.3]],
+        markers_mm: [[0.25, -0.2], [-0.15, 0.3], [0.2, 0.25], [-0.3, -0.1]],
+    };
+    let cases = [
+        ([0.01, -0.02, -0.1], [0.5, -0.3], 0.5),
+        ([-0.03, 0.01, -0.15], [-2.5, 1.0], 0.5),
+        ([0.0, 0.01, -0.03], [2.0, 3.0], 0.8),
+        // Beside glued markers.
+        ([0.01, 0.01, -0.1], [3.2, 3.0], 0.5),
+        ([0.0, -0.02, -0.1], [-2.9, -2.6], 0.5),
+        ([0.0, 0.0, -0.05], [-3.5, 2.9], 0.5),
+    ];
+    agree(&unit, &cases.map(load), MOST_PX_OF_A_UNIT);
+}
+
+/// How far the images of the reduced film with its weight are off, px, at rest and under loads.
+fn weight_off_px(down: [f64; 3], loads: &[Load]) -> f64 {
+    let reduced = ReducedFilm::default().with_down(Some(down)).unwrap();
+    let heavy = Design {
+        down,
+        ..Design::default()
+    };
+    let mut films = [Design::default(), heavy].map(|design| Film::new(&design).unwrap());
+    let mut worst = 0.0_f64;
+    for load in loads {
+        let [without, with] = films.each_mut().map(|film| press_load(film, load).unwrap());
+        let pressed = [ReducedFilm::default(), reduced.clone()].map(|film| film.press(load));
+        for disc in reduced.markers_mm().map(Disc::marker) {
+            let full = [(&films[0], &without), (&films[1], &with)].map(|(film, loaded)| {
+                disc.centroid_px(|rest| film.displacement(&loaded.state, rest), &CAMERA)
+            });
+            let ours =
+                pressed.map(|film| disc.centroid_px(|rest| film.displacement(rest), &CAMERA));
+            let effect = |[without, with]: [[f64; 2]; 2]| [0, 1].map(|c| with[c] - without[c]);
+            let ([x, y], [a, b]) = (effect(full), effect(ours));
+            worst = worst.max((a - x).hypot(b - y));
+        }
+    }
+    worst
+}
+
+/// What weight adds, apart from what tables are off without it.
+#[test]
+fn weight_does_what_the_full_solution_says() {
+    let cases = [
+        ([0.0, 0.0, -0.02], [0.0, 0.0], 0.5),
+        ([0.01, -0.02, -0.06], [-2.3, 3.2], 0.5),
+        ([0.0, 0.0, -0.2], [3.0, 2.2], 0.5),
+    ];
+    for down in [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [0.48, 0.64, -0.6],
+        [0.0, -0.8, 0.6],
+    ] {
+        let at_rest = weight_off_px(down, &[Load::REST]);
+        let pressed = weight_off_px(down, &cases.map(load));
+        let light = weight_off_px(down, &[load(([0.0, 0.0, -0.004], [1.0, -2.0], 0.5))]);
+        println!("{down:?}: {at_rest:.4}, {pressed:.4}, at 4 mN {light:.4} px");
+        assert!(at_rest < 0.005 && pressed < 0.04 && light < 0.5);
+    }
+}
+
+#[test]
+fn labels_of_a_stage_are_the_full_solution() {
+    let label = |n: f64, alpha: f64, beta: f64, contact: Contact| {
+        let load = Load::from_angles(n, alpha, beta).unwrap();
+        load.with_contact(contact).unwrap()
+    };
+    let loads = [
+        label(0.2, 4.0, -2.0, Contact::Stick),
+        label(0.05, -3.0, 1.0, Contact::Stick),
+        label(0.2, 9.0, -3.0, Contact::Slip { mu: 0.6 }),
+        label(0.1, -8.0, 6.0, Contact::Slip { mu: 0.3 }),
+    ];
+    agree(&Unit::default(), &loads, MOST_PX);
+}
+
+/// Independent loads of the whole domain: the first of those of `reduce -- film/data --check`.
+#[test]
+#[ignore = "slow: run by cargo xtask test --all"]
+fn tables_are_the_full_solution_everywhere() {
+    let threads = std::thread::available_parallelism().unwrap().get();
+    let check = |radii_mm, loads| {
+        let domain = Domain::within(4.0, radii_mm);
+        check(&Unit::default(), &domain, loads, threads, |_, _| ()).unwrap()
+    };
+    let nominal = check([NOMINAL_RADIUS_MM; 2], 40);
+    assert!(nominal.worst_px < MOST_PX, "{nominal:?}");
+    assert!(nominal.rms_px < 0.2 * MOST_PX, "{nominal:?}");
+    let other = check([SMALLEST_RADIUS_MM, LARGEST_RADIUS_MM], 20);
+    assert!(other.worst_px < 4.0 * MOST_PX, "{other:?}");
+    assert!(other.rms_px < 0.5 * MOST_PX, "{other:?}");
+}
+
+#[test]
+fn a_sliding_tip_keeps_its_friction_ratio_and_direction() {
+    let mut film = Film::new(&Design {
+        fineness: 0.5,
+        ..Design::default()
+    })
+    .unwrap();
+    let load = Load::from_angles(0.15, 8.0, 6.0).unwrap();
+    let load = load.with_contact(Contact::Slip { mu: 0.4 }).unwrap();
+    let loaded = press_load(&mut film, &load).unwrap();
+    let ([x, y, z], [sx, sy]) = (loaded.state.force_n, loaded.touches_mm);
+    assert!((x.hypot(y) + 0.4 * z).abs() < 1e-5, "{x} {y} {z}");
+    assert!(sx * x > 0.0 && (sx * y - sy * x).abs() < 1e-4 * sx.hypot(sy));
+    // The film lags behind the stage by the slide.
+    let [tx, _, tz] = loaded.state.tip_mm;
+    let [lx, _, lz] = load.vector_n();
+    assert!((tx + sx - tz * lx / lz).abs() < 1e-6);
+}
+
+/// Where a distracting thing may be: the film away from its markers is interpolated.
+#[test]
+fn the_film_between_markers_is_roughly_the_full_solution() {
+    let mut film = Film::new(&Design::default()).unwrap();
+    let reduced = ReducedFilm::default();
+    let cases = [
+        ([0.0, 0.0, -0.02], [0.0; 2], 0.5),
+        ([0.05, 0.0, -0.24], [0.0; 2], 0.5),
+        ([0.03, 0.0, -0.2], [3.0, -1.0], 0.5),
+    ];
+    for load in cases.map(load) {
+        let state = press_load(&mut film, &load).unwrap().state;
+        let pressed = reduced.press(&load);
+        let mut worst = (0.0, [0.0; 2]);
+        for (i, j) in (-14..=14).flat_map(|i| (-14..=14).map(move |j| (i, j))) {
+            let rest = [f64::from(i), f64::from(j)];
+            let full = film.displacement(&state, rest).into_iter();
+            let pair = full.zip(pressed.displacement(rest));
+            let error = pair.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+            if error > worst.0 {
+                worst = (error, rest);
+            }
+        }
+        println!("{} N: {worst:?}", load.magnitude_n());
+        assert!(worst.0 < 0.8, "{worst:?}");
+    }
+}

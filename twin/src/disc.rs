@@ -1,0 +1,248 @@
+//! Discs on the film and their images.
+
+use std::f64::consts::PI;
+
+use crate::film::{MARKER_CENTRES_MM, MARKER_RADIUS_MM};
+
+use crate::Camera;
+
+/// The markers by identity: 0 upper left, 1 upper right, 2 lower right, 3 lower left in the image.
+pub const MARKERS: [Disc; 4] = [
+    Disc::marker(MARKER_CENTRES_MM[0]),
+    Disc::marker(MARKER_CENTRES_MM[1]),
+    Disc::marker(MARKER_CENTRES_MM[2]),
+    Disc::marker(MARKER_CENTRES_MM[3]),
+];
+
+/// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than
+/// 1e-4 px.
+const CORNERS: u32 = 48;
+/// Discs of a smaller radius, mm, make do with fewer corners: they are specks of a few pixels.
+const SPECK_RADIUS_MM: f64 = 0.15;
+const SPECK_CORNERS: u32 = 12;
+
+/// A disc drawn on the film at rest; it follows the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disc {
+    /// Centre at rest, mm.
+    pub centre_mm: [f64; 2],
+    /// Radius at rest, mm.
+    pub radius_mm: f64,
+}
+
+impl Disc {
+    /// A marker with its centre there, mm.
+    pub const fn marker(centre_mm: [f64; 2]) -> Disc {
+        Disc {
+            centre_mm,
+            radius_mm: MARKER_RADIUS_MM,
+        }
+    }
+
+    /// The same disc farther along x and y, mm.
+    pub(crate) fn moved(&self, [x, y]: [f64; 2]) -> Disc {
+        Disc {
+            centre_mm: [self.centre_mm[0] + x, self.centre_mm[1] + y],
+            ..*self
+        }
+    }
+
+    /// The centroid of the disc's image, px, on a film that moves its points (mm) by
+    /// `displacement`.
+    pub fn centroid_px(
+        &self,
+        displacement: impl Fn([f64; 2]) -> [f64; 3],
+        camera: &Camera,
+    ) -> [f64; 2] {
+        self.image(displacement, camera).area_and_centroid().1
+    }
+
+    /// The disc's image on a film that moves its points (mm) by `displacement`: the image of its
+    /// rim, not of its centre.
+    pub(crate) fn image(
+        &self,
+        displacement: impl Fn([f64; 2]) -> [f64; 3],
+        camera: &Camera,
+    ) -> Outline {
+        let rim = rim(self.centre_mm, self.radius_mm);
+        let seen = rim.map(|[x, y]| {
+            let [dx, dy, dz] = displacement([x, y]);
+            camera.project([x + dx, y + dy, dz])
+        });
+        Outline {
+            corners: seen.collect(),
+        }
+    }
+}
+
+/// Corners of a regular polygon of the circle's area.
+fn rim([x, y]: [f64; 2], radius: f64) -> impl Iterator<Item = [f64; 2]> {
+    let corners = if radius < SPECK_RADIUS_MM {
+        SPECK_CORNERS
+    } else {
+        CORNERS
+    };
+    let step = 2.0 * PI / f64::from(corners);
+    let radius = radius * (step / libm::sin(step)).sqrt();
+    (0..corners).map(move |corner| {
+        let (sin, cos) = libm::sincos(step * f64::from(corner));
+        [x + radius * cos, y + radius * sin]
+    })
+}
+
+/// A closed polygon in the picture, px, clockwise on the screen (x towards y).
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Outline {
+    pub(crate) corners: Vec<[f64; 2]>,
+}
+
+impl Outline {
+    /// Its edges, each from a corner to the next, closed.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
+        let next = self.corners.iter().cycle().skip(1);
+        self.corners.iter().copied().zip(next.copied())
+    }
+
+    /// Smallest and largest x and y.
+    pub(crate) fn bounds(&self) -> ([f64; 2], [f64; 2]) {
+        let start = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        self.corners.iter().fold(start, |(low, high), corner| {
+            (
+                [low[0].min(corner[0]), low[1].min(corner[1])],
+                [high[0].max(corner[0]), high[1].max(corner[1])],
+            )
+        })
+    }
+
+    /// Area in px²; 0 without corners.
+    pub(crate) fn area(&self) -> f64 {
+        if self.corners.is_empty() {
+            return 0.0;
+        }
+        self.area_and_centroid().0
+    }
+
+    /// Area in px² and its centroid in px. There must be corners; without an area the centroid is
+    /// no number.
+    pub(crate) fn area_and_centroid(&self) -> (f64, [f64; 2]) {
+        // Moments about a corner, so that no digits are lost far from the origin.
+        let [ox, oy] = self.corners[0];
+        let (mut twice_area, mut mx, mut my) = (0.0, 0.0, 0.0);
+        for ([ax, ay], [bx, by]) in self.edges() {
+            let (ax, ay, bx, by) = (ax - ox, ay - oy, bx - ox, by - oy);
+            let cross = ax * by - bx * ay;
+            twice_area += cross;
+            mx += (ax + bx) * cross;
+            my += (ay + by) * cross;
+        }
+        let centroid = [ox + mx / (3.0 * twice_area), oy + my / (3.0 * twice_area)];
+        (twice_area / 2.0, centroid)
+    }
+
+    /// The part of it inside a frame with a margin around it, px; without corners where there is
+    /// none.
+    pub(crate) fn clipped(&self, width: u32, height: u32, margin: f64) -> Outline {
+        let before = 0.5 + margin;
+        let right = f64::from(width) - 0.5 + margin;
+        let bottom = f64::from(height) - 0.5 + margin;
+        self.clip_half(|[x, _]| x + before)
+            .clip_half(|[x, _]| right - x)
+            .clip_half(|[_, y]| y + before)
+            .clip_half(|[_, y]| bottom - y)
+    }
+
+    /// Moved as a whole, px.
+    pub(crate) fn moved(mut self, [dx, dy]: [f64; 2]) -> Outline {
+        for corner in &mut self.corners {
+            *corner = [corner[0] + dx, corner[1] + dy];
+        }
+        self
+    }
+
+    /// The part where `inside` (a signed distance) is not negative (Sutherland and Hodgman).
+    fn clip_half(&self, inside: impl Fn([f64; 2]) -> f64) -> Outline {
+        let mut corners = Vec::with_capacity(self.corners.len() + 1);
+        for (a, b) in self.edges() {
+            let (da, db) = (inside(a), inside(b));
+            if da >= 0.0 {
+                corners.push(a);
+            }
+            if (da >= 0.0) != (db >= 0.0) {
+                let t = da / (da - db);
+                corners.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+            }
+        }
+        Outline { corners }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preset;
+    use crate::film::MARKER_REST_MM;
+
+    fn circle(centre: [f64; 2], radius: f64) -> Outline {
+        Outline {
+            corners: rim(centre, radius).collect(),
+        }
+    }
+
+    #[test]
+    fn a_circle_has_its_area_and_centroid() {
+        let (area, [x, y]) = circle([100.25, 7.5], 6.5).area_and_centroid();
+        assert!((area - PI * 42.25).abs() < 1e-9);
+        assert!((x - 100.25).abs() < 1e-12 && (y - 7.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn clipping_keeps_the_half_inside() {
+        let (area, [x, _]) = circle([-0.5, 50.0], 6.0)
+            .clipped(320, 240, 0.0)
+            .area_and_centroid();
+        assert!((area - PI * 18.0).abs() < 1e-6);
+        // Centroid of a half disc: 4 r / 3π from its straight side.
+        assert!((x + 0.5 - 8.0 / PI).abs() < 0.01);
+        let outside = circle([-20.0, 50.0], 6.0).clipped(320, 240, 0.0);
+        assert!(outside.corners.is_empty());
+    }
+
+    /// Centroid of a resting disc's image on the diagonal, mm from the axis, by a sum over the
+    /// disc: every part of the film counts by the area of its image, r·r′/ρ with r = f·arctan(ρ /
+    /// D).
+    fn centroid_radius_mm(centre_mm: f64, radius_mm: f64) -> f64 {
+        const N: i32 = 400;
+        let at = |i: i32| (f64::from(i) + 0.5) / f64::from(N) * radius_mm;
+        let (mut area, mut moment) = (0.0, 0.0);
+        for (i, j) in (-N..N).flat_map(|i| (-N..N).map(move |j| (i, j))) {
+            if at(i) * at(i) + at(j) * at(j) > radius_mm * radius_mm {
+                continue;
+            }
+            let along = centre_mm + at(i);
+            let rho = (along * along + at(j) * at(j)).sqrt();
+            let r = 2.1 * libm::atan(rho / 10.0);
+            let slope = 2.1 / (10.0 * (1.0 + rho * rho / 100.0));
+            area += r * slope / rho;
+            moment += r * slope / rho * (r * along / rho);
+        }
+        moment / area
+    }
+
+    #[test]
+    fn the_centroid_is_that_of_the_disc_and_not_the_image_of_its_centre() {
+        let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
+        let image = MARKERS[2].image(|_| [0.0; 3], &camera);
+        let (_, [x, y]) = image.area_and_centroid();
+        assert!((x - 159.5 - (y - 119.5)).abs() < 1e-9, "on the diagonal");
+        let radius_px = (x - 159.5) * std::f64::consts::SQRT_2;
+        let expected_mm = centroid_radius_mm(MARKER_REST_MM * std::f64::consts::SQRT_2, 0.5);
+        let error_px = radius_px - expected_mm / 0.012;
+        assert!(error_px.abs() < 5e-4, "{error_px} px");
+        let of_centre_px = 175.0 * libm::atan(MARKER_REST_MM * std::f64::consts::SQRT_2 / 10.0);
+        assert!((of_centre_px - 84.694).abs() < 0.001, "{of_centre_px} px");
+        assert!(
+            of_centre_px - radius_px > 0.1,
+            "the fisheye squeezes the outer half"
+        );
+    }
+}

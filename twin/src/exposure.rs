@@ -1,0 +1,104 @@
+//! The images that discs leave in one frame: where they are while their rows are exposed, and how
+//! sharp.
+
+use crate::camera::centre;
+use crate::disc::Outline;
+use crate::lens::Discs;
+use crate::{Camera, Disc, FILM_DISTANCE_MM, Lens, Load, MarkerTruth, Mechanics, Shutter};
+use crate::film::{Film, Pressed};
+
+/// Everything that decides where discs are seen.
+pub(crate) struct Exposure<'a, L: Fn(f64) -> Load> {
+    pub(crate) film: &'a Film,
+    pub(crate) mechanics: &'a Mechanics,
+    pub(crate) camera: &'a Camera,
+    pub(crate) lens: &'a Lens,
+    pub(crate) shutter: &'a Shutter,
+    /// The load at a time in seconds from the frame's.
+    pub(crate) load: L,
+    /// The film at the frame's time.
+    pub(crate) now: Pressed,
+}
+
+/// The image of one disc.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Image {
+    /// Its outlines during the exposure, at least one.
+    pub(crate) outlines: Vec<Outline>,
+    /// Standard deviation of its blur.
+    pub(crate) blur_px: f64,
+}
+
+impl<L: Fn(f64) -> Load> Exposure<'_, L> {
+    /// The image of a disc.
+    pub(crate) fn image(&self, disc: &Disc) -> Image {
+        let now = self.outline(disc, &self.now);
+        let still = *self.shutter == Shutter::default();
+        let outlines = match still {
+            true => vec![now],
+            false => self.smeared(disc, &now),
+        };
+        Image {
+            outlines,
+            blur_px: self.blur_px(disc),
+        }
+    }
+
+    /// The outlines while the row is exposed in which the disc is seen at the frame's time.
+    fn smeared(&self, disc: &Disc, now: &Outline) -> Vec<Outline> {
+        let (_, [_, row]) = now.area_and_centroid();
+        let height = f64::from(self.camera.height());
+        let row = row.clamp(0.0, height - 1.0);
+        let below = (row - centre(self.camera.height())) / height;
+        let instants = self.shutter.instants(below);
+        let pressed = instants.map(|time_s| self.mechanics.seen(self.film, &(self.load)(time_s)));
+        pressed.map(|film| self.outline(disc, &film)).collect()
+    }
+
+    fn outline(&self, disc: &Disc, film: &Pressed) -> Outline {
+        let outline = disc.image(|rest| film.displacement(rest), self.camera);
+        match self.lens.discs {
+            Discs::Whole => outline,
+            Discs::ByCentre => {
+                let [x, y] = self.camera.project(centre_mm(disc, film));
+                let (_, [from_x, from_y]) = outline.area_and_centroid();
+                outline.moved([x - from_x, y - from_y])
+            }
+        }
+    }
+
+    fn blur_px(&self, disc: &Disc) -> f64 {
+        if self.lens.aperture_mm == 0.0 {
+            return self.lens.blur_px;
+        }
+        let [_, _, z] = centre_mm(disc, &self.now);
+        self.lens
+            .blur_px_at(FILM_DISTANCE_MM + z, self.camera.focal_px())
+    }
+}
+
+/// Where a disc's centre is on a pressed film, mm.
+fn centre_mm(disc: &Disc, film: &Pressed) -> [f64; 3] {
+    let [x, y] = disc.centre_mm;
+    let [dx, dy, dz] = film.displacement([x, y]);
+    [x + dx, y + dy, dz]
+}
+
+impl Image {
+    /// Its mean area and centroid; `None` where no part of it is in the frame.
+    pub(crate) fn truth(&self, camera: &Camera) -> Option<MarkerTruth> {
+        let (mut area, mut inside, mut moment) = (0.0, 0.0, [0.0; 2]);
+        for outline in &self.outlines {
+            let (part, [x, y]) = outline.area_and_centroid();
+            area += part;
+            moment = [moment[0] + part * x, moment[1] + part * y];
+            inside += outline.clipped(camera.width(), camera.height(), 0.0).area();
+        }
+        let visible = inside / area;
+        (visible > 0.0).then_some(MarkerTruth {
+            centroid_px: moment.map(|sum| sum / area),
+            area_px2: area / self.outlines.len() as f64,
+            visible: visible.min(1.0),
+        })
+    }
+}

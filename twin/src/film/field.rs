@@ -1,0 +1,163 @@
+//! The film between tip, markers and posts, roughly.
+//!
+//! It follows the tip by a share that depends on the place from it only, and what that leaves at
+//! the markers is spread around them. Close to a marker it moves as the marker does.
+
+use crate::film::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed};
+
+/// Within this distance of a marker's centre the film moves as the marker does, mm: its rim as a
+/// polygon is inside.
+const OWN_MM: f64 = 1.05 * MARKER_RADIUS_MM;
+/// Beyond this one, as tip and markers together say, mm.
+const OTHERS_MM: f64 = 2.0;
+
+pub fn displacement(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
+    let k = nearest(rest_mm);
+    let centre = pressed.centres_mm[k];
+    let from = [rest_mm[0] - centre[0], rest_mm[1] - centre[1]];
+    let away = length(from);
+    let own = pressed.discs[k].at(from);
+    if away <= OWN_MM {
+        return own;
+    }
+    if away >= OTHERS_MM {
+        return rough(pressed, rest_mm);
+    }
+    let rough = rough(pressed, rest_mm);
+    let part = smooth((away - OWN_MM) / (OTHERS_MM - OWN_MM));
+    std::array::from_fn(|c| own[c] + part * (rough[c] - own[c]))
+}
+
+fn nearest([x, y]: [f64; 2]) -> usize {
+    match (x >= 0.0, y >= 0.0) {
+        (false, false) => 0,
+        (true, false) => 1,
+        (true, true) => 2,
+        (false, true) => 3,
+    }
+}
+
+fn rough(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
+    // Nothing is known of the film beyond its posts.
+    let place = rest_mm.map(|part| part.clamp(-HALF_SIDE_MM, HALF_SIDE_MM));
+    let (of_tip, of_markers) = (share(from_tip(pressed, place)), spread(pressed, place));
+    let at_markers = pressed
+        .centres_mm
+        .map(|centre| share(from_tip(pressed, centre)));
+    let component = |c: usize| {
+        let discs = pressed.discs.iter().zip(at_markers).zip(of_markers);
+        let left = discs
+            .map(|((disc, share), part)| part * (disc.moved_mm[c] - share * pressed.tip_mm[c]));
+        of_tip * pressed.tip_mm[c] + left.sum::<f64>()
+    };
+    std::array::from_fn(component)
+}
+
+/// A place as it is from the tip, the film's border being where it is from the middle.
+fn from_tip(pressed: &Pressed, place: [f64; 2]) -> [f64; 2] {
+    std::array::from_fn(|c| {
+        let tip = pressed.touches_mm[c];
+        let away = place[c] - tip;
+        let free = HALF_SIDE_MM - away.signum() * tip;
+        away * HALF_SIDE_MM / free
+    })
+}
+
+/// How far the film goes at a place where its markers go so far, roughly.
+pub fn from_markers(at_markers: f64, place: [f64; 2]) -> f64 {
+    at_markers * share(place) / share([MARKER_REST_MM; 2])
+}
+
+/// The part of the tip's depth that a place takes under a straight press, from the full solution at
+/// 0.02 and 0.25 N (within 0.03): 1 at the tip, 0.70 and 0.67 at the markers, 0.36 and 0.39 in the
+/// middle of an edge, 0 at the posts.
+fn share(place: [f64; 2]) -> f64 {
+    let [a, b] = place.map(|part| part / HALF_SIDE_MM);
+    let (r, corner) = (length([a, b]), a * a * b * b);
+    let along = 1.0 - 0.849 * r + 0.1398 * r * r + 0.0677 * r * r * r;
+    (along - 0.883 * corner + 0.3006 * corner * r * r).max(0.0)
+}
+
+/// Each marker's part: all of it at the marker itself, nothing at the others, at the tip and at the
+/// film's border.
+fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
+    let near = |from: [f64; 2]| length([place[0] - from[0], place[1] - from[1]]);
+    // From the markers outward it falls to nothing at the border.
+    let border = place.map(|part| {
+        let [own, marker] =
+            [part, MARKER_REST_MM].map(|part| 1.0 - (part / HALF_SIDE_MM) * (part / HALF_SIDE_MM));
+        (own / marker).clamp(0.0, 1.0)
+    });
+    let weigh = |k: usize| {
+        let centre = pressed.centres_mm[k];
+        // The tip under a marker leaves it nothing but its own.
+        let apart = |from: [f64; 2]| length([centre[0] - from[0], centre[1] - from[1]]);
+        let clear =
+            smooth((near(pressed.touches_mm) / apart(pressed.touches_mm).max(0.1)).min(1.0));
+        let others = (0..4).filter(|other| *other != k).map(|other| {
+            let other = pressed.centres_mm[other];
+            (near(other) / apart(other)).min(1.0)
+        });
+        let far = (near(centre) / MARKER_REST_MM).min(2.0);
+        clear * others.map(smooth).product::<f64>() * (1.0 - smooth(far / 2.0))
+    };
+    std::array::from_fn(|k| weigh(k) * border[0] * border[1])
+}
+
+/// From 0 to 1 with level ends.
+fn smooth(part: f64) -> f64 {
+    part * part * (3.0 - 2.0 * part)
+}
+
+fn length([x, y]: [f64; 2]) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Film, Load, MARKER_CENTRES_MM};
+
+    fn pressed() -> Pressed {
+        let load = Load::from_angles(0.2, 8.0, -5.0).unwrap();
+        Film::default().press(&load)
+    }
+
+    fn close(a: [f64; 3], b: [f64; 3], tolerance: f64) {
+        for (a, b) in a.iter().zip(b) {
+            assert!((a - b).abs() <= tolerance, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn markers_move_by_their_discs_and_the_tip_by_its_own() {
+        let pressed = pressed();
+        for (disc, centre) in pressed.discs.iter().zip(MARKER_CENTRES_MM) {
+            close(displacement(&pressed, centre), disc.moved_mm, 0.0);
+            let [x, y] = centre;
+            close(
+                displacement(&pressed, [x + 0.3, y - 0.4]),
+                disc.at([0.3, -0.4]),
+                1e-15,
+            );
+            close(rough(&pressed, centre), disc.moved_mm, 1e-12);
+        }
+        close(displacement(&pressed, [0.0; 2]), pressed.tip_mm, 1e-12);
+    }
+
+    #[test]
+    fn posts_stay_and_nothing_is_torn() {
+        let pressed = pressed();
+        close(displacement(&pressed, [14.0, -14.0]), [0.0; 3], 0.01);
+        for (i, j) in (-300..=300).flat_map(|i| (-300..=300).step_by(7).map(move |j| (i, j))) {
+            let at = [f64::from(i) * 0.05, f64::from(j) * 0.05];
+            let here = displacement(&pressed, at);
+            close(displacement(&pressed, [at[0] + 0.01, at[1]]), here, 0.02);
+            close(
+                displacement(&pressed, [at[1], at[0] + 0.01]),
+                displacement(&pressed, [at[1], at[0]]),
+                0.02,
+            );
+        }
+    }
+}

@@ -1,0 +1,393 @@
+//! The film of a unit under a load.
+
+use std::sync::{Arc, LazyLock};
+
+use crate::film::label::{Felt, Reached, Stage};
+use crate::film::reduced::{
+    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit, Weight,
+};
+use crate::film::{Contact, DiscMotion, FilmError, Load, MARKER_CENTRES_MM, field};
+
+/// Half the distance between the posts that hold the film, in mm (the paper's a = 14 mm).
+pub const HALF_SIDE_MM: f64 = 14.0;
+/// The largest force that the film's tables hold for, N.
+pub const MAX_FORCE_N: f64 = 0.25;
+/// The largest tangential force, in parts of the normal one.
+pub const MAX_RATIO: f64 = 0.8;
+/// How far from the middle, along x and along y, a tip may press, mm.
+pub const MAX_PLACE_MM: f64 = 5.0;
+/// The largest label where the tip sticks or slides, N: the force on the film is larger.
+pub const MAX_LABEL_N: f64 = 0.22;
+/// The largest of |F_x / F_z| and |F_y / F_z| of a label where the tip sticks or slides: tan 12°.
+pub const MAX_TANGENT: f64 = 0.212_556_561_670_022_13;
+/// How far from the middle, along x and along y, such a tip may first touch the film, mm.
+pub const MAX_OFFSET_MM: f64 = 0.25;
+
+/// The nominal film.
+static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
+    let tables = Tables::from_bytes(include_bytes!("../../data/film.bin"));
+    Film {
+        tables: Arc::new(tables.expect("the committed tables are a film's")),
+        unit: Unit::default(),
+        down: None,
+    }
+});
+
+/// What its own weight does.
+static WEIGHT: LazyLock<Weight> = LazyLock::new(|| {
+    let weight = Weight::from_bytes(include_bytes!("../../data/weight.bin"));
+    weight.expect("the committed table is one of weight")
+});
+
+/// How far from one a direction's length may be.
+const UNIT_LENGTH: f64 = 1e-3;
+
+/// The film by its tables: markers within 0.1 px of the full solution at 320×240
+/// (`shell/README.md`); the film between them roughly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    tables: Arc<Tables>,
+    unit: Unit,
+    /// Where gravity pulls, in parts of g; none: it weighs nothing.
+    down: Option<[f64; 3]>,
+}
+
+impl Default for Film {
+    /// The nominal film: the paper's, 28 × 28 mm between its posts.
+    fn default() -> Film {
+        NOMINAL.clone()
+    }
+}
+
+impl Film {
+    /// The film as one unit has it.
+    ///
+    /// # Errors
+    /// When the unit is farther from the nominal one than the tables hold.
+    pub fn of(unit: Unit) -> Result<Film, FilmError> {
+        unit.check()?;
+        Ok(Film {
+            unit,
+            ..NOMINAL.clone()
+        })
+    }
+
+    /// The same film with a weight, held so that gravity pulls along `down`, a unit vector in the
+    /// film's frame; of none it weighs nothing. Markers are within 0.1 px of the full solution
+    /// (`shell/README.md`) at rest and from 20 mN on.
+    ///
+    /// # Errors
+    /// When `down` is no unit vector.
+    pub fn with_down(self, down: Option<[f64; 3]>) -> Result<Film, FilmError> {
+        let length = |[x, y, z]: [f64; 3]| libm::sqrt(x * x + y * y + z * z);
+        let length = down.map_or(1.0, length);
+        if !(1.0 - UNIT_LENGTH..=1.0 + UNIT_LENGTH).contains(&length) {
+            return Err(FilmError::Load(format!(
+                "down is {length} long: use a vector of length 1, such as [0, 0, -1]"
+            )));
+        }
+        let down = down.map(|down| down.map(|part| part / length));
+        Ok(Film { down, ..self })
+    }
+
+    /// Whether the film can take this load.
+    ///
+    /// # Errors
+    /// When the load is outside what the tables hold for.
+    pub fn check(&self, load: &Load) -> Result<(), FilmError> {
+        let radius = load.tip_radius_mm();
+        if !(SMALLEST_RADIUS_MM..=LARGEST_RADIUS_MM).contains(&radius) {
+            return Err(FilmError::Load(format!(
+                "the tip's radius is {radius} mm: use {SMALLEST_RADIUS_MM} to {LARGEST_RADIUS_MM}"
+            )));
+        }
+        if load.magnitude_n() == 0.0 {
+            return Ok(());
+        }
+        let [x, y, z] = load.vector_n();
+        if load.contact() == Contact::Force {
+            within(
+                "the tangential over the normal force",
+                libm::hypot(x, y) / -z,
+                MAX_RATIO,
+                "",
+            )?;
+            for part in load.offset_mm() {
+                within("the tip's offset", part.abs(), MAX_PLACE_MM, "mm")?;
+            }
+            return within("|F|", load.magnitude_n(), MAX_FORCE_N, "N");
+        }
+        if self.down.is_some() {
+            return Err(FilmError::Load(format!(
+                "the contact is {} and the film has a weight: what its tip's way means is known \
+                 of a weightless film alone; use the contact force, or leave down out",
+                load.contact()
+            )));
+        }
+        within("|F_x / F_z|", (x / z).abs(), MAX_TANGENT, "(12°)")?;
+        within("|F_y / F_z|", (y / z).abs(), MAX_TANGENT, "(12°)")?;
+        for part in load.offset_mm() {
+            within("the tip's offset", part.abs(), MAX_OFFSET_MM, "mm")?;
+        }
+        within("|F|", load.magnitude_n(), MAX_LABEL_N, "N")
+    }
+
+    /// The film under a load that [`Film::check`] accepts. Under another one it stays at the
+    /// tables' limit.
+    pub fn press(&self, load: &Load) -> Pressed {
+        let pressed = self.pressed(load);
+        match self.down {
+            None => pressed,
+            Some(down) => self.weighted(pressed, down),
+        }
+    }
+
+    /// As if it weighed nothing.
+    fn pressed(&self, load: &Load) -> Pressed {
+        if load.magnitude_n() == 0.0 {
+            return Pressed {
+                touches_mm: load.offset_mm(),
+                centres_mm: self.markers_mm(),
+                ..Pressed::default()
+            };
+        }
+        let (pose, force_n) = self.reached(load);
+        let disc = |k| self.tables.disc(&pose, load.tip_radius_mm(), &self.unit, k);
+        Pressed {
+            tip_mm: self.tables.tip_mm(&pose, load.tip_radius_mm()),
+            force_n,
+            touches_mm: pose.place_mm,
+            centres_mm: self.markers_mm(),
+            discs: std::array::from_fn(disc),
+        }
+    }
+
+    /// With what weight does to a film that is pressed so.
+    fn weighted(&self, mut pressed: Pressed, down: [f64; 3]) -> Pressed {
+        let pose = self.pose(pressed.force_n, pressed.touches_mm);
+        let mut sag_mm = 0.0;
+        for (k, disc) in pressed.discs.iter_mut().enumerate() {
+            let more = WEIGHT.disc(&pose, down, &self.unit, k);
+            *disc = sum(disc, &more);
+            sag_mm += more.moved_mm[2] / 4.0;
+        }
+        pressed.tip_mm[2] += field::from_markers(sag_mm, pressed.touches_mm);
+        pressed
+    }
+
+    /// How the film around one marker moves, by its identity 0–3: [`Self::press`] without what it
+    /// says of the others and of the tip.
+    pub fn marker_motion(&self, load: &Load, marker: usize) -> DiscMotion {
+        let mut pose = Pose::default();
+        let mut disc = DiscMotion::default();
+        if load.magnitude_n() > 0.0 {
+            (pose, _) = self.reached(load);
+            disc = (self.tables).disc(&pose, load.tip_radius_mm(), &self.unit, marker);
+        }
+        match self.down {
+            None => disc,
+            Some(down) => sum(&disc, &WEIGHT.disc(&pose, down, &self.unit, marker)),
+        }
+    }
+
+    /// The load and the force, N, that a load which presses comes to.
+    fn reached(&self, load: &Load) -> (Pose, [f64; 3]) {
+        match load.contact() {
+            Contact::Force => (
+                self.pose(load.vector_n(), load.offset_mm()),
+                load.vector_n(),
+            ),
+            Contact::Stick => self.on_stage(load, MAX_RATIO),
+            Contact::Slip { mu } => self.on_stage(load, mu),
+        }
+    }
+
+    /// The load of a force, N, at a place, mm; at the tables' limit where it is beyond.
+    fn pose(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> Pose {
+        let stiffness = self.unit.bending_and_stretching();
+        let mut pose = Pose::of_force(force_n, place_mm, stiffness);
+        let steep = libm::hypot(pose.tilt[0], pose.tilt[1]) / LARGEST_TILT;
+        pose.size = pose.size.min(LARGEST_SIZE);
+        pose.tilt = pose.tilt.map(|part| part / steep.max(1.0));
+        pose
+    }
+
+    /// The load and the force, N, of a label whose tip is on a stage.
+    fn on_stage(&self, load: &Load, friction: f64) -> (Pose, [f64; 3]) {
+        let [x, y, z] = load.vector_n();
+        let stage = Stage {
+            tangents: [x, y].map(|part| (part / -z).clamp(-MAX_TANGENT, MAX_TANGENT)),
+            force_n: load.magnitude_n().min(MAX_LABEL_N),
+            offset_mm: load.offset_mm(),
+            friction,
+        };
+        let under = Under {
+            film: self,
+            radius_mm: load.tip_radius_mm(),
+        };
+        let Reached { pose, magnitude_n } = stage.reach(&under);
+        (pose, pose.direction().map(|part| magnitude_n * part))
+    }
+
+    /// Where the markers' centres are at rest, by identity, mm.
+    pub fn markers_mm(&self) -> [[f64; 2]; 4] {
+        let centre = |k: usize, c: usize| MARKER_CENTRES_MM[k][c] + self.unit.markers_mm[k][c];
+        std::array::from_fn(|k| [0, 1].map(|c| centre(k, c)))
+    }
+}
+
+/// A film under a tip of a radius.
+struct Under<'a> {
+    film: &'a Film,
+    radius_mm: f64,
+}
+
+impl Felt for Under<'_> {
+    fn tip_mm(&self, pose: &Pose) -> [f64; 3] {
+        self.film.tables.tip_mm(pose, self.radius_mm)
+    }
+
+    fn size_of(&self, force_n: f64) -> f64 {
+        self.film.pose([0.0, 0.0, -force_n], [0.0; 2]).size
+    }
+}
+
+/// The film in one state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pressed {
+    /// Where the tip went, mm, film frame (z away from the camera: a press goes to z < 0).
+    pub tip_mm: [f64; 3],
+    /// The tip's force on the film, N.
+    pub force_n: [f64; 3],
+    /// Which point of the film the tip is on, by where it rests, mm: a tip that slides leaves the
+    /// load's offset.
+    pub touches_mm: [f64; 2],
+    /// Where the markers' centres rest, by identity, mm.
+    pub centres_mm: [[f64; 2]; 4],
+    /// How the film moved at the markers, by identity.
+    pub discs: [DiscMotion; 4],
+}
+
+impl Default for Pressed {
+    /// The nominal film at rest.
+    fn default() -> Pressed {
+        Pressed {
+            tip_mm: [0.0; 3],
+            force_n: [0.0; 3],
+            touches_mm: [0.0; 2],
+            centres_mm: MARKER_CENTRES_MM,
+            discs: [DiscMotion::default(); 4],
+        }
+    }
+}
+
+impl Pressed {
+    /// Where the point of the film's camera side that rests at (x, y) mm moves, mm, film frame.
+    ///
+    /// On a marker this is the marker's own motion; elsewhere an interpolation between tip, markers
+    /// and posts that is off the full solution by up to 0.4 mm at 0.25 N: good for a thing that
+    /// distracts, not for one that measures.
+    pub fn displacement(&self, rest_mm: [f64; 2]) -> [f64; 3] {
+        field::displacement(self, rest_mm)
+    }
+}
+
+fn sum(a: &DiscMotion, b: &DiscMotion) -> DiscMotion {
+    let sum = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|c| a[c] + b[c]);
+    DiscMotion {
+        moved_mm: sum(a.moved_mm, b.moved_mm),
+        along_x: sum(a.along_x, b.along_x),
+        along_y: sum(a.along_y, b.along_y),
+    }
+}
+
+fn within(what: &str, value: f64, most: f64, unit: &str) -> Result<(), FilmError> {
+    // Angles come back from a vector with a rounding.
+    if value <= most * (1.0 + 1e-9) {
+        return Ok(());
+    }
+    Err(FilmError::Load(format!(
+        "{what} is {value} {unit} and the film's tables hold up to {most}: press less, or \
+         straighter"
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(force_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
+        Load::from_angles(force_n, alpha_deg, beta_deg).unwrap()
+    }
+
+    #[test]
+    fn beyond_the_tables_is_refused() {
+        let film = Film::default();
+        let refused = |f, a, b| film.check(&load(f, a, b)).unwrap_err().to_string();
+        assert!(refused(0.26, 0.0, 0.0).contains("|F| is 0.26 N"));
+        assert!(refused(0.2, -30.0, 30.0).contains("tangential"));
+        assert_eq!(film.check(&load(0.25, 30.0, -20.0)), Ok(()));
+        let far = load(0.2, 0.0, 0.0).with_offset_mm([0.0, 5.1]).unwrap();
+        assert!(
+            film.check(&far)
+                .unwrap_err()
+                .to_string()
+                .contains("offset is 5.1")
+        );
+        let blunt = load(0.2, 0.0, 0.0).with_tip_radius_mm(2.5).unwrap();
+        assert!(
+            film.check(&blunt)
+                .unwrap_err()
+                .to_string()
+                .contains("radius is 2.5")
+        );
+        assert_eq!(film.check(&Load::REST), Ok(()));
+    }
+
+    #[test]
+    fn no_force_moves_nothing() {
+        let film = Film::default();
+        assert_eq!(film.press(&Load::REST), Pressed::default());
+        let slight = film.press(&load(1e-9, 0.0, 0.0)).tip_mm[2];
+        assert!(slight.abs() < 1e-4, "{slight}");
+    }
+
+    #[test]
+    fn the_tip_goes_as_deep_as_the_full_solution_says() {
+        let depth = |force_n| -Film::default().press(&load(force_n, 0.0, 0.0)).tip_mm[2];
+        for (force_n, expected) in [(0.01, 1.96), (0.1, 4.71), (0.2, 6.03)] {
+            assert!((depth(force_n) - expected).abs() < 0.006, "{force_n} N");
+        }
+    }
+
+    #[test]
+    fn one_marker_alone_moves_as_with_the_others() {
+        let mut unit = Unit::default();
+        (unit.thickness, unit.posts_mm[1]) = (1.1, [0.2, -0.1]);
+        unit.markers_mm[2] = [0.1, 0.3];
+        let film = Film::of(unit).unwrap();
+        let off = load(0.1, 8.0, -3.0).with_offset_mm([1.0, 2.5]).unwrap();
+        let stuck = load(0.2, 4.0, 0.0).with_contact(Contact::Stick).unwrap();
+        for load in &[Load::REST, off, stuck] {
+            let discs = film.press(load).discs;
+            for (marker, disc) in discs.iter().enumerate() {
+                assert_eq!(film.marker_motion(load, marker), *disc);
+            }
+        }
+    }
+
+    #[test]
+    fn mirrored_loads_move_mirrored_markers() {
+        let film = Film::default();
+        let [right, left] = [6.0, -6.0].map(|alpha| film.press(&load(0.2, alpha, 3.0)));
+        for (a, b) in [(0, 1), (3, 2)] {
+            let (a, b) = (right.discs[a], left.discs[b]);
+            for at in [[0.0, 0.0], [0.3, 0.1]] {
+                let [x, y, z] = a.at(at);
+                let [mx, my, mz] = b.at([-at[0], at[1]]);
+                assert!((x + mx).abs() < 1e-12 && (y - my).abs() < 1e-12);
+                assert!((z - mz).abs() < 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! The film of a HiVTac sensor: from a load to where tip and markers go, for every frame.
+//!
+//! The film is a nonlinear shell; its finite elements (`hivtac-shell`) take more than half a second for
+//! one press. What a frame needs of it are tables in `data/`, made from full solutions by a command
+//! of that package.
+//!
+//! The same bits on every machine: transcendental functions come from `libm` only, and nothing is
+//! fused. Frame and units as in `docs/architecture.md`: x right and y down in the image, z away
+//! from the camera; mm, N.
+//!
+//! | file | subject |
+//! |---|---|
+//! | `load` | the force on the film and its convention |
+//! | `loaded` | the film of a unit, under a load |
+//! | `label` | the force that a label of the paper's stage means |
+//! | `markers` | where the markers are at rest |
+//! | `disc_motion`, `field` | how the film moves at the markers, and roughly between them |
+//! | [`reduced`] | the tables, and what they are made of |
+
+mod disc_motion;
+mod error;
+mod field;
+mod label;
+mod load;
+mod loaded;
+mod markers;
+pub mod reduced;
+
+pub use disc_motion::DiscMotion;
+pub use error::FilmError;
+pub use loaded::{
+    Film, HALF_SIDE_MM, MAX_FORCE_N, MAX_LABEL_N, MAX_OFFSET_MM, MAX_PLACE_MM, MAX_RATIO,
+    MAX_TANGENT, Pressed,
+};
+pub use load::{Contact, Load};
+pub use markers::{MARKER_CENTRES_MM, MARKER_RADIUS_MM, MARKER_REST_MM};

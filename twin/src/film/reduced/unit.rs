@@ -1,0 +1,106 @@
+//! How one film differs from the nominal one.
+
+use crate::film::FilmError;
+
+/// A film as it was made: each part beside the nominal film's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "file", derive(serde::Deserialize))]
+#[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
+pub struct Unit {
+    /// Young's modulus in parts of the nominal 1 MPa, 0.5 to 2.
+    pub stiffness: f64,
+    /// Thickness in parts of the nominal 0.5 mm, 0.7 to 1.3.
+    pub thickness: f64,
+    /// The grip of its posts in parts of the nominal 20 N/mm³, 0.2 to 5.
+    pub grip: f64,
+    /// How far each post is off its place, by the identity of the marker beside it, mm, within ±1.
+    pub posts_mm: [[f64; 2]; 4],
+    /// How far each marker's centre is off its place, mm, within ±1.
+    #[cfg_attr(feature = "file", serde(skip))]
+    pub markers_mm: [[f64; 2]; 4],
+}
+
+impl Default for Unit {
+    /// The nominal film.
+    fn default() -> Unit {
+        Unit {
+            stiffness: 1.0,
+            thickness: 1.0,
+            grip: 1.0,
+            posts_mm: [[0.0; 2]; 4],
+            markers_mm: [[0.0; 2]; 4],
+        }
+    }
+}
+
+impl Unit {
+    /// How many times as stiff as the nominal film it is in bending and in stretching.
+    pub(crate) fn bending_and_stretching(&self) -> [f64; 2] {
+        let Unit {
+            stiffness: e,
+            thickness: t,
+            ..
+        } = *self;
+        [e * t * t * t, e * t]
+    }
+
+    /// # Errors
+    /// When a part is outside its range.
+    pub fn check(&self) -> Result<(), FilmError> {
+        let parts = [
+            ("the film's stiffness", self.stiffness, [0.5, 2.0]),
+            ("the film's thickness", self.thickness, [0.7, 1.3]),
+            ("the posts' grip", self.grip, [0.2, 5.0]),
+        ];
+        let places = [("a post's", self.posts_mm), ("a marker's", self.markers_mm)];
+        let places = places.into_iter().flat_map(|(what, places)| {
+            let parts = places.into_iter().flatten();
+            parts.map(move |part| (what, part, [-1.0, 1.0]))
+        });
+        for (what, value, [from, to]) in parts.into_iter().chain(places) {
+            if !(from..=to).contains(&value) {
+                return Err(FilmError::Load(format!(
+                    "{what} difference from the nominal film is {value}: use {from} to {to}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// What the film's tables are multiplied with: see [`super::tables::UNIT_PARTS`].
+    pub(super) fn parts(&self) -> [f64; 10] {
+        let grip = libm::log(self.grip / self.stiffness);
+        let thickness = libm::log(self.thickness);
+        let [a, b, c, d] = self.posts_mm;
+        [
+            thickness, grip, a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1],
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nominal_film_differs_in_nothing() {
+        assert_eq!(Unit::default().parts(), [0.0; 10]);
+        assert_eq!(Unit::default().check(), Ok(()));
+    }
+
+    #[test]
+    fn what_no_one_builds_is_refused() {
+        let thick = Unit {
+            thickness: 1.5,
+            ..Unit::default()
+        };
+        let text = thick.check().unwrap_err().to_string();
+        assert!(
+            text.contains("thickness") && text.contains("0.7 to 1.3"),
+            "{text}"
+        );
+        let mut far = Unit::default();
+        far.markers_mm[2][1] = f64::NAN;
+        assert!(far.check().is_err());
+    }
+}

@@ -1,0 +1,83 @@
+//! The simulated HiVTac sensor: what presses the film, how the film gives, what the camera sees of
+//! it.
+//!
+//! ```text
+//! load → film → marker discs in space → fisheye
+//!      → coverage of pixels → light → noise → pixels
+//! ```
+//!
+//! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure
+//! functions of scene, seed, frame number and load, and the same bytes on every machine:
+//! transcendental functions come from `libm` only, nothing is fused, and the noise generator is the
+//! crate's own.
+//!
+//! ```
+//! use hivtac_twin::{Preset, Scene};
+//!
+//! let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, 1)?;
+//! let frame = scene.frame(7, 7.0 / 30.0);
+//! assert_eq!(frame.pixels.len(), 320 * 240);
+//! assert!(frame.truth.force.magnitude_n() > 0.02);
+//! # Ok::<(), hivtac_twin::SceneError>(())
+//! ```
+//!
+//! | file | subject |
+//! |---|---|
+//! | [`film`] | where the film goes under a load, by tables |
+//! | `camera` | presets, equidistant fisheye |
+//! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |
+//! | `options` | what makes a frame hard, and its ranges |
+//! | `light`, `patch`, `lens` | light and colours; what lies on the film; projection, focus, mounting and shutter |
+//! | `exposure` | where a disc is while its rows are exposed |
+//! | `noise` | seeded sensor noise |
+//! | `format`, `jpeg`, `frame` | RGB565, YUV422, mono and JPEG; the frame and the truth |
+//! | `mechanics`, `surface` | the film as it is, or simplified |
+//! | `creep` | what the film remembers of its loads |
+//! | `motion`, `scene` | loads in time; the scene itself |
+//! | `file` | scenes from TOML files |
+//! | `hard_cases` | scenes in which markers are hard to find (feature `jpeg`) |
+
+mod camera;
+mod coverage;
+mod creep;
+mod disc;
+mod error;
+mod exposure;
+#[cfg(feature = "file")]
+mod file;
+pub mod film;
+mod format;
+mod frame;
+#[cfg(feature = "jpeg")]
+mod jpeg;
+#[cfg(feature = "jpeg")]
+pub mod hard_cases;
+mod lens;
+mod light;
+mod mechanics;
+mod motion;
+mod noise;
+mod options;
+mod patch;
+mod scene;
+mod surface;
+
+pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, PresetCamera};
+pub use creep::{Creep, Memory};
+pub use disc::{Disc, MARKERS};
+pub use error::SceneError;
+pub use format::Format;
+#[cfg(feature = "jpeg")]
+pub use format::JPEG_QUALITY;
+pub use frame::{Frame, MarkerTruth, Truth};
+pub use film::{
+    Contact, DiscMotion, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed,
+};
+pub use hivtac_terms::geometry::Preset;
+pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
+pub use mechanics::{Mechanics, Stiffness};
+pub use motion::{Catch, Drag, Grasp, Motion, Press, Vibration};
+pub use options::{Options, Salt};
+pub use patch::{Paint, Patch, Specks};
+pub use scene::Scene;
+pub use surface::Surface;

@@ -1,0 +1,190 @@
+//! The film as it is, or simplified: to see what each part of its answer is worth.
+
+use crate::{Contact, Creep, Load, SceneError};
+use crate::film::DiscMotion;
+use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
+use crate::film::{Film, FilmError, Pressed};
+
+/// What the scene takes of the film's answer to a load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "file", derive(serde::Deserialize))]
+#[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
+pub struct Mechanics {
+    /// Which of the film's surfaces carries the markers.
+    pub surface: crate::Surface,
+    /// How far it gives for how much force.
+    pub stiffness: Stiffness,
+    /// Whether a tilted force moves it sideways; without, |F| presses straight, whatever its
+    /// direction.
+    pub lateral: bool,
+    /// Where gravity pulls on it, a unit vector in the film's frame; `None`: it weighs nothing.
+    pub down: Option<[f64; 3]>,
+    /// How it differs from the nominal film.
+    pub unit: Unit,
+    /// What the labels of loads mean that do not say so themselves.
+    pub contact: Contact,
+    /// Where the tip of loads first touches that do not say so themselves, mm from the middle,
+    /// within ±5 (±0.25 where it sticks or slides).
+    pub offset_mm: [f64; 2],
+    /// Radius of the disc over which the tip of loads spreads their force that do not say so
+    /// themselves, mm, 0.25 to 2.
+    pub tip_radius_mm: f64,
+    /// What it remembers of a scene's motion.
+    pub creep: Creep,
+}
+
+/// How far the film gives for how much force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "file", derive(serde::Deserialize))]
+#[cfg_attr(feature = "file", serde(rename_all = "lowercase"))]
+pub enum Stiffness {
+    /// As its finite elements say: soft at first, five times stiffer at 0.2 N.
+    #[default]
+    Computed,
+    /// In proportion, and as computed at 0.2 N; no further beyond.
+    Linear,
+}
+
+/// Where a linear film agrees with the computed one, N.
+const LINEAR_UP_TO_N: f64 = 0.2;
+
+impl Default for Mechanics {
+    /// All of it.
+    fn default() -> Mechanics {
+        Mechanics {
+            surface: crate::Surface::CameraSide,
+            stiffness: Stiffness::Computed,
+            lateral: true,
+            down: None,
+            unit: Unit::default(),
+            contact: Contact::Force,
+            offset_mm: [0.0; 2],
+            tip_radius_mm: NOMINAL_RADIUS_MM,
+            creep: Creep::default(),
+        }
+    }
+}
+
+impl Mechanics {
+    /// The film that it asks for, with markers so far beside their places, by identity, mm.
+    ///
+    /// # Errors
+    /// When a film differs too much from the nominal one, or a contact cannot be.
+    pub(crate) fn film(&self, markers_mm: [[f64; 2]; 4]) -> Result<Film, SceneError> {
+        if self.down.is_some() && self.stiffness == Stiffness::Linear {
+            let why = "a linear film weighs nothing: leave down out, or use computed".to_owned();
+            return Err(FilmError::Load(why).into());
+        }
+        let film = Film::of(Unit {
+            markers_mm,
+            ..self.unit
+        })?;
+        let film = film.with_down(self.down)?;
+        film.check(&self.completed(&Load::REST.with_contact(self.contact)?))?;
+        Ok(film)
+    }
+
+    /// Whether a film can take a load, held for ever.
+    ///
+    /// # Errors
+    /// When the load is outside what the film's tables hold for.
+    pub(crate) fn check(&self, film: &Film, load: &Load) -> Result<(), SceneError> {
+        let load = self.completed(load);
+        film.check(&load)?;
+        Ok(film.check(&self.creep.at_last(&load))?)
+    }
+
+    /// A load with what it leaves open.
+    pub(crate) fn completed(&self, load: &Load) -> Load {
+        load.or(self.contact, self.offset_mm, self.tip_radius_mm)
+    }
+
+    /// The film under a load that it accepts.
+    pub(crate) fn press(&self, film: &Film, load: &Load) -> Pressed {
+        let load = &self.completed(load);
+        match self.stiffness {
+            Stiffness::Computed => film.press(&self.taken(load, load.magnitude_n())),
+            Stiffness::Linear => {
+                let full = film.press(&self.taken(load, LINEAR_UP_TO_N));
+                let part = (load.magnitude_n() / LINEAR_UP_TO_N).min(1.0);
+                scaled(full, part)
+            }
+        }
+    }
+
+    /// The motion of what carries the markers under a load that the film accepts.
+    pub(crate) fn seen(&self, film: &Film, load: &Load) -> Pressed {
+        self.surface.of(self.press(film, load))
+    }
+
+    /// A load of another size, straight when its direction does not matter.
+    fn taken(&self, load: &Load, magnitude_n: f64) -> Load {
+        if self.lateral && magnitude_n == load.magnitude_n() {
+            return *load;
+        }
+        let (alpha, beta) = match self.lateral {
+            true => (load.alpha_deg(), load.beta_deg()),
+            false => (0.0, 0.0),
+        };
+        // The angles of a load, and a size, make a load.
+        let other = Load::from_angles(magnitude_n, alpha, beta).unwrap_or(*load);
+        other.or(load.contact(), load.offset_mm(), load.tip_radius_mm())
+    }
+}
+
+fn scaled(pressed: Pressed, part: f64) -> Pressed {
+    let times = |vector: [f64; 3]| vector.map(|component| part * component);
+    Pressed {
+        tip_mm: times(pressed.tip_mm),
+        force_n: times(pressed.force_n),
+        touches_mm: pressed.touches_mm,
+        centres_mm: pressed.centres_mm,
+        discs: pressed.discs.map(|disc| DiscMotion {
+            moved_mm: times(disc.moved_mm),
+            along_x: times(disc.along_x),
+            along_y: times(disc.along_y),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn depth(mechanics: Mechanics, force_n: f64, alpha_deg: f64) -> [f64; 3] {
+        let load = Load::from_angles(force_n, alpha_deg, 0.0).unwrap();
+        mechanics.press(&Film::default(), &load).discs[1].moved_mm
+    }
+
+    #[test]
+    fn the_default_is_the_film_itself() {
+        let load = Load::from_angles(0.13, 4.0, -3.0).unwrap();
+        let film = Film::default();
+        assert_eq!(Mechanics::default().press(&film, &load), film.press(&load));
+    }
+
+    #[test]
+    fn a_linear_film_gives_in_proportion() {
+        let linear = Mechanics {
+            stiffness: Stiffness::Linear,
+            ..Mechanics::default()
+        };
+        let full = depth(Mechanics::default(), 0.2, 5.0);
+        for (force_n, part) in [(0.05, 0.25), (0.2, 1.0), (0.25, 1.0)] {
+            for (a, b) in depth(linear, force_n, 5.0).iter().zip(full) {
+                assert!((a - part * b).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn without_the_lateral_mode_a_force_has_no_direction() {
+        let straight = Mechanics {
+            lateral: false,
+            ..Mechanics::default()
+        };
+        assert_eq!(depth(straight, 0.1, 8.0), depth(straight, 0.1, 0.0));
+        let [x, ..] = depth(Mechanics::default(), 0.1, 8.0);
+        assert!((x - depth(straight, 0.1, 8.0)[0]).abs() > 0.005);
+    }
+}

@@ -1,0 +1,342 @@
+//! The scene: what presses the sensor, and the frames its camera takes of it.
+
+use crate::coverage::Coverage;
+use crate::exposure::{Exposure, Image};
+use crate::frame::Raster;
+use crate::light::{Channel, Light, STEPS};
+use crate::motion::Motion;
+use crate::noise::{LOTS, Noise};
+use crate::{
+    Camera, Disc, Format, Frame, Load, MARKERS, Mechanics, Options, Paint, Preset, SceneError,
+    Shutter, Truth,
+};
+use crate::film::{Film, Pressed};
+
+/// A simulated sensor and what presses it. Frames depend on nothing but the scene and the
+/// arguments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    film: Film,
+    camera: Camera,
+    motion: Motion,
+    options: Options,
+    seed: u64,
+    light: Light,
+    noise: Noise,
+    specks: Vec<Disc>,
+}
+
+impl Scene {
+    /// A scene by name, with the preset's options, at a frame size that the preset has
+    /// ([`Camera::new`]). The seed decides the noise, and where `demo` starts.
+    ///
+    /// - `rest`: nothing presses.
+    /// - `static`: 0.1 N at α = 4°, β = −3°.
+    /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F|
+    ///   0.02–0.2 N, |α| ≤ 8°, |β| ≤ 6°.
+    /// - `sweep`: |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then at α = ±8°, then
+    ///   at β = ±6°.
+    /// - `press`, `drag`, `grasp`, `catch`, `vibration`: after a tenth of a second of rest, what
+    ///   [`Press`](crate::Press), [`Drag`](crate::Drag), [`Grasp`](crate::Grasp),
+    ///   [`Catch`](crate::Catch) and [`Vibration`](crate::Vibration) are by default.
+    ///
+    /// # Errors
+    /// When there is no scene of that name or the size is another.
+    pub fn preset(
+        name: &str,
+        preset: Preset,
+        width: u32,
+        height: u32,
+        seed: u64,
+    ) -> Result<Scene, SceneError> {
+        let camera = Camera::new(preset, width, height)?;
+        let options = Options::of(preset);
+        Ok(Scene {
+            film: Film::default(),
+            motion: Motion::named(name, seed)?,
+            light: Light::new(&camera, &options, seed),
+            noise: Noise::new(options.noise * STEPS, seed),
+            specks: Vec::new(),
+            camera,
+            options,
+            seed,
+        })
+    }
+
+    /// The same scene under one constant load.
+    ///
+    /// # Errors
+    /// When the film cannot take the load.
+    pub fn with_load(self, load: Load) -> Result<Scene, SceneError> {
+        self.with_motion(Motion::Static(load))
+    }
+
+    /// The same scene with something else that presses.
+    ///
+    /// # Errors
+    /// When a parameter is outside its range, or the film cannot take a load within the motion's
+    /// first ten seconds.
+    pub fn with_motion(mut self, motion: Motion) -> Result<Scene, SceneError> {
+        self.try_motion(&motion)?;
+        self.motion = motion;
+        Ok(self)
+    }
+
+    /// The same scene under other conditions.
+    ///
+    /// # Errors
+    /// When an option is outside its range, or the film that it asks for cannot take what presses.
+    pub fn with_options(mut self, options: Options) -> Result<Scene, SceneError> {
+        options.check()?;
+        self.film = options.film.film(options.glued_mm)?;
+        self.camera = self.camera.fitted(&options.lens, &options.mounting);
+        self.light = Light::new(&self.camera, &options, self.seed);
+        self.specks = options.specks.discs(self.seed);
+        self.noise = Noise::new(options.noise * STEPS, self.seed);
+        let other_film = self.options.film != options.film;
+        self.options = options;
+        if other_film {
+            self.try_motion(&self.motion)?;
+        }
+        Ok(self)
+    }
+
+    fn try_motion(&self, motion: &Motion) -> Result<(), SceneError> {
+        motion.check(|load| self.options.film.check(&self.film, load))
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// What presses.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// The conditions.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// The frame taken at a time in seconds; its number selects its noise.
+    pub fn frame(&self, number: u64, time_s: f64) -> Frame {
+        self.frame_by(&self.options.shutter, number, time_s)
+    }
+
+    /// The same by a camera with another shutter, whose times are in their ranges.
+    pub fn frame_by(&self, shutter: &Shutter, number: u64, time_s: f64) -> Frame {
+        let force = self.motion.load(time_s);
+        self.expose(
+            &self.exposure(shutter, self.course(shutter, time_s)),
+            &force,
+            number,
+        )
+    }
+
+    /// The load that the elastic film answers to as this one does to the motion, so many seconds
+    /// after a time, while a shutter is open.
+    fn course(&self, shutter: &Shutter, time_s: f64) -> impl Fn(f64) -> Load {
+        let mechanics = &self.options.film;
+        let load = move |time_s| mechanics.completed(&self.motion.load(time_s));
+        // The first row is exposed so much earlier than the middle one.
+        let begin_s = time_s - shutter.exposure_s - shutter.readout_s;
+        let memory = mechanics.creep.memory(begin_s, load);
+        move |after_s| {
+            let now_s = time_s + after_s;
+            memory.after(begin_s, now_s, load).effective(&load(now_s))
+        }
+    }
+
+    /// What is true at a time in seconds, without rendering.
+    pub fn truth(&self, time_s: f64) -> Truth {
+        self.truth_by(&self.options.shutter, time_s)
+    }
+
+    /// The same of a camera with another shutter, whose times are in their ranges.
+    pub fn truth_by(&self, shutter: &Shutter, time_s: f64) -> Truth {
+        let exposure = self.exposure(shutter, self.course(shutter, time_s));
+        self.truth_of(
+            &exposure,
+            &self.motion.load(time_s),
+            &self.marker_images(&exposure),
+        )
+    }
+
+    /// What is true under any constant load, whatever the scene's motion, without rendering.
+    ///
+    /// # Errors
+    /// When the film cannot take the load.
+    pub fn truth_under(&self, load: &Load) -> Result<Truth, SceneError> {
+        self.options.film.check(&self.film, load)?;
+        let exposure = self.exposure(&self.options.shutter, |_| *load);
+        Ok(self.truth_of(&exposure, load, &self.marker_images(&exposure)))
+    }
+
+    /// A frame under any constant load, whatever the scene's motion; the number selects its noise.
+    ///
+    /// # Errors
+    /// When the film cannot take the load.
+    pub fn render_load(&self, load: &Load, number: u64) -> Result<Frame, SceneError> {
+        self.options.film.check(&self.film, load)?;
+        let exposure = self.exposure(&self.options.shutter, |_| *load);
+        Ok(self.expose(&exposure, load, number))
+    }
+
+    /// A frame of a film that somebody else pressed, such as finite elements; the number selects
+    /// its noise, and the load is what the frame's truth says. The film's markers are those of this
+    /// scene.
+    pub fn render_pressed(&self, pressed: Pressed, load: &Load, number: u64) -> Frame {
+        let shutter = Shutter::default();
+        let exposure = Exposure {
+            now: pressed,
+            ..self.exposure(&shutter, |_| *load)
+        };
+        self.expose(&exposure, load, number)
+    }
+
+    /// What is true of such a film, without rendering.
+    pub fn truth_of_pressed(&self, pressed: Pressed, load: &Load) -> Truth {
+        let shutter = Shutter::default();
+        let exposure = Exposure {
+            now: pressed,
+            ..self.exposure(&shutter, |_| *load)
+        };
+        self.truth_of(&exposure, load, &self.marker_images(&exposure))
+    }
+
+    /// The frame of a camera with a shutter under a load in time that is no [`Motion`]: what
+    /// presses so many seconds after the middle of the exposure. The number selects its noise.
+    ///
+    /// # Errors
+    /// When the film cannot take the load in that middle. Loads around it are those of the film's
+    /// limits.
+    pub fn frame_under(
+        &self,
+        shutter: &Shutter,
+        number: u64,
+        load: impl Fn(f64) -> Load,
+    ) -> Result<Frame, SceneError> {
+        let force = load(0.0);
+        self.options.film.check(&self.film, &force)?;
+        Ok(self.expose(&self.exposure(shutter, load), &force, number))
+    }
+
+    fn exposure<'a, L: Fn(f64) -> Load>(
+        &'a self,
+        shutter: &'a Shutter,
+        load: L,
+    ) -> Exposure<'a, L> {
+        Exposure {
+            film: &self.film,
+            mechanics: &self.options.film,
+            camera: &self.camera,
+            lens: &self.options.lens,
+            shutter,
+            now: self.options.film.seen(&self.film, &load(0.0)),
+            load,
+        }
+    }
+
+    fn expose<L: Fn(f64) -> Load>(
+        &self,
+        exposure: &Exposure<'_, L>,
+        force: &Load,
+        number: u64,
+    ) -> Frame {
+        let markers = self.marker_images(exposure);
+        let picture = self.picture(exposure, &markers);
+        let Raster { words, bytes } = self.digitize(&picture, number);
+        Frame {
+            width: self.camera.width(),
+            height: self.camera.height(),
+            format: self.options.format,
+            pixels: words,
+            mono: bytes,
+            truth: self.truth_of(exposure, force, &markers),
+        }
+    }
+
+    /// The images of the markers that have not come off.
+    fn marker_images<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>) -> [Option<Image>; 4] {
+        std::array::from_fn(|id| {
+            let there = !self.options.missing[id];
+            there.then(|| exposure.image(&MARKERS[id].moved(self.options.glued_mm[id])))
+        })
+    }
+
+    /// Film, specks, markers and patches in their light, before any noise.
+    fn picture<L: Fn(f64) -> Load>(
+        &self,
+        exposure: &Exposure<'_, L>,
+        markers: &[Option<Image>; 4],
+    ) -> Vec<[Channel<i16>; 3]> {
+        let mut picture = self.light.bare_film();
+        for speck in &self.specks {
+            self.paint(&mut picture, &exposure.image(speck), Paint::Red);
+        }
+        for marker in markers.iter().flatten() {
+            self.paint(&mut picture, marker, self.options.markers);
+        }
+        for patch in &self.options.patches {
+            self.paint(&mut picture, &exposure.image(&patch.disc()), patch.paint);
+        }
+        picture
+    }
+
+    fn paint(&self, picture: &mut [[Channel<i16>; 3]], image: &Image, paint: Paint) {
+        let (width, height) = (self.camera.width(), self.camera.height());
+        for (pixel, part) in Coverage::of(image, width, height).pixels(width, height) {
+            picture[pixel] = self.light.painted(pixel, picture[pixel], paint, part);
+        }
+    }
+
+    fn digitize(&self, picture: &[[Channel<i16>; 3]], number: u64) -> Raster {
+        let salt = self.light.in_the_middle(self.options.salt.paint);
+        let salted = (self.options.salt.fraction * f64::from(LOTS)) as u32;
+        let noise = self.noise.of_frame(number);
+        let noisy = picture.iter().zip(noise).map(|(clean, (noise, lot))| {
+            let clean = if lot < salted {
+                salt
+            } else {
+                clean.map(Channel::from)
+            };
+            let clean = self.as_seen(clean);
+            std::array::from_fn(|channel| clean[channel] + noise[channel])
+        });
+        self.options.format.code(self.camera.width(), noisy)
+    }
+
+    /// Red, green and blue as the camera tells them apart: one that sees no colours not at all.
+    fn as_seen(&self, colour: [Channel; 3]) -> [Channel; 3] {
+        if self.options.format != Format::Mono {
+            return colour;
+        }
+        let weighed = (self.options.mono.iter().zip(colour)).map(|(w, c)| w * f64::from(c.bits()));
+        [Channel::from_bits(weighed.sum::<f64>().round() as i32); 3]
+    }
+
+    fn truth_of<L: Fn(f64) -> Load>(
+        &self,
+        exposure: &Exposure<'_, L>,
+        force: &Load,
+        markers: &[Option<Image>; 4],
+    ) -> Truth {
+        let Mechanics { creep, .. } = self.options.film;
+        let force = self.options.film.completed(force);
+        let presses = force.magnitude_n() > 0.0;
+        // Force and place are the tip's, whatever else the film remembers.
+        let touched = match creep.is_elastic() {
+            true => exposure.now,
+            false => self.options.film.press(&self.film, &force),
+        };
+        Truth {
+            force,
+            on_film_n: touched.force_n,
+            tip_mm: exposure.now.tip_mm,
+            touches_mm: presses.then_some(touched.touches_mm),
+            markers: std::array::from_fn(|id| markers[id].as_ref()?.truth(&self.camera)),
+        }
+    }
+}
