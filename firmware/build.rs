@@ -1,9 +1,9 @@
 //! Links anew when the memory map changes, which cargo does not look at by itself, and names the
 //! model file to embed, with its answer to the known question.
 
-use hivtac_sensor::known_answer::{self, Answer};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;
+use hivtac_sensor::known_answer::{self, Answer};
 use std::path::Path;
 
 fn main() {

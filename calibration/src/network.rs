@@ -2,9 +2,9 @@
 
 mod reach;
 
+use crate::data::loads::{from_polar, polar};
 use anyhow::{Result, ensure};
 use clap::ValueEnum;
-use crate::data::loads::{from_polar, polar};
 use serde::{Deserialize, Serialize};
 
 /// Features that enter the network (`force::features`).

@@ -13,11 +13,11 @@ use hivtac_sensor::force::packing::{MAX_ACTIVATION8, WeightWidth};
 use hivtac_sensor::force::rest;
 use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
+use crate::data::range::Range;
+use crate::data::rest::{Rest, features_from_q16, q16};
 use crate::forward::FilmModel;
 use crate::network::{Layer, Meaning, Network, Standardization};
 use crate::weights::{Uncertainty, Weights};
-use crate::data::range::Range;
-use crate::data::rest::{Rest, features_from_q16, q16};
 
 /// Steps of the network's input in one standard deviation of a feature.
 const INPUT_STEPS: f64 = 4096.0;

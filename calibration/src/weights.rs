@@ -6,12 +6,12 @@ use std::{fs, path::Path};
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 
-use crate::forward::FilmModel;
-use crate::network::{INPUTS, Network};
-pub use crate::uncertainty::Uncertainty;
 use crate::data::conditions::Conditions;
 use crate::data::range::Range;
 use crate::data::rest::{Rest, features_from_q16};
+use crate::forward::FilmModel;
+use crate::network::{INPUTS, Network};
+pub use crate::uncertainty::Uncertainty;
 
 /// What the file calls itself.
 const FORMAT: &str = "hivtac-weights 2";

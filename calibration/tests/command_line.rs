@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use hivtac_calibration::weights::Weights;
 use hivtac_calibration::data::dataset::{Loads, Recipe, generate_file};
 use hivtac_calibration::data::range::Range;
+use hivtac_calibration::weights::Weights;
 use hivtac_twin::Contact;
 
 fn run(directory: &Path, arguments: &[&str]) -> Output {

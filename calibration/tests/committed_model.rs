@@ -4,12 +4,12 @@
 use std::fs;
 use std::path::PathBuf;
 
-use hivtac_calibration::quantize::export;
-use hivtac_calibration::weights::Weights;
 use hivtac_calibration::data::dataset::{Loads, Recipe, generate, measure};
 use hivtac_calibration::data::range::Range;
 use hivtac_calibration::evaluation::check::{check, recipe, sensor};
 use hivtac_calibration::evaluation::{Coverage, Covered, Evaluation, Judged, by_place, coverage};
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::{Model, Origin, OutputKind};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};

@@ -2,13 +2,13 @@
 
 use std::sync::LazyLock;
 
+use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::evaluation::Evaluation;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
-use hivtac_calibration::data::range::Range;
-use hivtac_calibration::evaluation::Evaluation;
 use hivtac_terms::conditions::CentroidEstimator;
 
 /// A tip in the film's middle.

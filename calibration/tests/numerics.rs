@@ -4,14 +4,14 @@
 
 use std::collections::HashMap;
 
+use hivtac_calibration::data::conditions::Conditions;
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::data::rest::{Rest, features_from_q16, q16};
 use hivtac_calibration::import::parse;
 use hivtac_calibration::network::{INPUTS, Layer, Network, OUTPUTS, Standardization};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{Options, Samples, train};
 use hivtac_calibration::weights::{Training, Uncertainty, Weights};
-use hivtac_calibration::data::conditions::Conditions;
-use hivtac_calibration::data::range::Range;
-use hivtac_calibration::data::rest::{Rest, features_from_q16, q16};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::{Network as ChipNetwork, Output};
 use hivtac_terms::geometry::Preset;

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
+use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::data::range::Range;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::import::{load, parse};
 use hivtac_calibration::network::{INPUTS, Meaning, Network, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::data::range::Range;
 use safetensors::tensor::{Dtype, TensorView};
 use safetensors::{SafeTensors, serialize};
 

@@ -1,14 +1,14 @@
 //! The exported network against the floats that it came from: never further than its roundings add
 //! up to.
 
+use hivtac_calibration::data::conditions::Conditions;
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::data::rest::{Rest, features_from_q16, q16};
 use hivtac_calibration::network::{
     Arithmetic, INPUTS, Layer, Meaning, Network, OUTPUTS, Standardization,
 };
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Training, Uncertainty, Weights};
-use hivtac_calibration::data::conditions::Conditions;
-use hivtac_calibration::data::range::Range;
-use hivtac_calibration::data::rest::{Rest, features_from_q16, q16};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network as ChipNetwork;
 use hivtac_terms::fixed::Q;

@@ -1,12 +1,12 @@
 //! Training, small: it learns, it is repeatable, it says what it cannot learn from.
 
+use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::evaluation::{Evaluation, by_place};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{DirectionWeight, Options, Samples, train};
-use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
-use hivtac_calibration::data::range::Range;
-use hivtac_calibration::evaluation::{Evaluation, by_place};
 
 /// A tip in the film's middle.
 const MIDDLE: Range = Range {

@@ -3,9 +3,9 @@
 //! arithmetic work there.
 
 use crate::force::features::Features;
-use crate::force::{self, Resting};
 use crate::force::model::Model;
 use crate::force::network::Network;
+use crate::force::{self, Resting};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 

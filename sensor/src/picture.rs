@@ -1,12 +1,12 @@
 //! Pictures of discs, for tests: drawn without light or noise, so that what a test asserts is
 //! exact.
 
-use crate::pipeline::{Measurement, Sensor};
-use crate::tare::TareBuilder;
 use crate::force::forward::Drift;
 use crate::force::model::Model;
 use crate::force::rest::Rest;
 use crate::markers::settings::Settings;
+use crate::pipeline::{Measurement, Sensor};
+use crate::tare::TareBuilder;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;

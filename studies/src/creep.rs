@@ -5,16 +5,16 @@ use std::fmt::Write;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
+use hivtac_calibration::evaluation::bounds::MAGNITUDE_BOUND;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::evaluation::bounds::MAGNITUDE_BOUND;
-use hivtac_twin::film::reduced::Unit;
-use hivtac_twin::{Creep, Load, Mechanics, Memory, Options};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::temporal::Moment;
 use hivtac_terms::temporal::{Creep as Undone, TemporalSettings};
 use hivtac_terms::units::SmallPermille;
+use hivtac_twin::film::reduced::Unit;
+use hivtac_twin::{Creep, Load, Mechanics, Memory, Options};
 use rayon::prelude::*;
 
 use crate::anywhere::WEIGHTS;

@@ -4,17 +4,17 @@ use std::fmt::Write;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
+use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
+use hivtac_calibration::data::range::Range;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
-use hivtac_calibration::data::range::Range;
-use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
-use hivtac_twin::Options;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_twin::Options;
+use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
 use rayon::prelude::*;
 
 use crate::page;

@@ -8,13 +8,13 @@ use clap::Args;
 use hivtac_calibration::data::dataset::{Recipe, measure};
 use hivtac_calibration::data::loads::RandomLoads;
 use hivtac_calibration::data::range::Range;
-use hivtac_twin::{Lens, Load, MarkerTruth, Options, Paint, PresetCamera, Scene};
-use hivtac_sensor::pipeline::Sensor;
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, Mono, Threshold};
+use hivtac_twin::{Lens, Load, MarkerTruth, Options, Paint, PresetCamera, Scene};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -3,14 +3,14 @@
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use hivtac_calibration::fit::fit;
-use hivtac_calibration::network::{Arithmetic, Meaning};
-use hivtac_calibration::quantize::export;
-use hivtac_calibration::train::Options as Training;
 use hivtac_calibration::data::dataset::{Dataset, Observation};
 use hivtac_calibration::data::loads::norm;
 use hivtac_calibration::evaluation::answer::Chip;
 use hivtac_calibration::evaluation::errors::angle_deg;
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::network::{Arithmetic, Meaning};
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options as Training;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;

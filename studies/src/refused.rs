@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
+use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
-use hivtac_twin::{Format, Load, MARKERS, Options, Paint, Patch, Salt, Specks};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::status::Status;
+use hivtac_twin::{Format, Load, MARKERS, Options, Paint, Patch, Salt, Specks};
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -6,9 +6,9 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_twin::Options;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::status::Status;
+use hivtac_twin::Options;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -4,18 +4,18 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use hivtac_twin::{Preset, Scene};
 use hivtac_sensor::force::model::{Model, OutputKind};
 use hivtac_sensor::force::network::Network;
-use hivtac_sensor::pipeline::Sensor;
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
 use hivtac_sensor::markers::screen::ScreenedTable;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::markers::tables::Table;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::{ByteOrder, HsvBox};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures;
+use hivtac_twin::{Preset, Scene};
 
 /// Columns and rows of the frames.
 const SIZES: [[u16; 2]; 2] = [[320, 240], [800, 600]];

@@ -7,11 +7,11 @@ use std::vec;
 use std::vec::Vec;
 
 use anyhow::Result;
-use hivtac_twin::hard_cases::{Expected, HardCase, hard_cases, hard_loads};
-use hivtac_twin::{Contact, Frame, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::PixelFormat;
+use hivtac_twin::hard_cases::{Expected, HardCase, hard_cases, hard_loads};
+use hivtac_twin::{Contact, Frame, Scene};
 
 use crate::tared::{Detection, View};
 

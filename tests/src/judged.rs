@@ -4,10 +4,10 @@
 use std::format;
 use std::string::String;
 
-use hivtac_twin::{Load, SceneError, Truth};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;
+use hivtac_twin::{Load, SceneError, Truth};
 
 use crate::pictures::Random;
 

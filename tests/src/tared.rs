@@ -5,18 +5,18 @@ use std::boxed::Box;
 use std::vec::Vec;
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_twin::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Model, OutputKind};
-use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::down::Down;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
+use hivtac_twin::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scene, SceneError};
 
 use crate::models;
 

@@ -1,6 +1,5 @@
 //! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
 
-use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::layer::MAX_WIDTH;
@@ -15,6 +14,7 @@ use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu;
 use hivtac_tests::script::Script;
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 
 /// Runs a script on both and compares what they print, byte for byte. Gives the text for further
 /// checks.

@@ -6,13 +6,13 @@ use std::fs;
 use std::path::Path;
 
 use crate::rig::{Rig, ToolOutput, json_lines, tool};
-use hivtac_twin::{Format, Options, Preset, Scene, Shutter};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::artifact;
+use hivtac_twin::{Format, Options, Preset, Scene, Shutter};
 use serde_json::{Value, json};
 
 const SEED: u64 = 5;

@@ -1,9 +1,9 @@
 //! Markers in frames of the scene's other pixel formats.
 
-use hivtac_twin::{Format, Frame, Load, Options, Preset, Scene};
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::Pixels;
 use hivtac_terms::threshold::{Mono, Yuv422};
+use hivtac_twin::{Format, Frame, Load, Options, Preset, Scene};
 
 fn frame(format: Format, load: &Load) -> Frame {
     let options = Options {

@@ -3,10 +3,10 @@
 
 use std::fmt::Debug;
 
-use hivtac_twin::film::{MAX_FORCE_N, MAX_LABEL_N};
-use hivtac_twin::{Contact, Load};
 use hivtac_tests::hard::detect_in_all;
 use hivtac_tests::tared::{Detection, View, views};
+use hivtac_twin::film::{MAX_FORCE_N, MAX_LABEL_N};
+use hivtac_twin::{Contact, Load};
 
 /// Every case is right or refused; what is plain to see is found in half of the frames at least.
 /// The views see the same frames.

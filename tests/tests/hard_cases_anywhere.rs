@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use hivtac_twin::hard_cases::{Expected, HardCase, hard_cases};
-use hivtac_twin::Preset;
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::TaredSensor;
+use hivtac_twin::Preset;
+use hivtac_twin::hard_cases::{Expected, HardCase, hard_cases};
 
 /// What presses hard cases: within the calibrated range.
 const PRESSES: Contacts = Contacts {

@@ -1,12 +1,12 @@
 //! Frames that are looked at again: disturbed ones keep their force, within what it states; what
 //! hides too much of a marker stays refused; good frames are looked at once.
 
-use hivtac_twin::{MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Specks};
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::TaredSensor;
+use hivtac_twin::{MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Specks};
 
 const PRESSES: Contacts = Contacts {
     force_n: [0.01, 0.15],

@@ -1,10 +1,10 @@
 //! What the marker rules let through on rendered frames: every honest frame, and no false one
 //! beyond a bound.
 
-use hivtac_twin::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_tests::tared::{Detection, TaredSensor, View, views};
+use hivtac_twin::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 
 /// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small
 /// spot on its edge.

@@ -6,11 +6,11 @@
 use std::fs;
 use std::path::Path;
 
-use hivtac_twin::{Motion, Preset, Scene, Shutter, Vibration};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::{Motion, Preset, Scene, Shutter, Vibration};
 
 /// Lines of an OV7725's frame, of which 240 are rows.
 const LINES: u16 = 278;

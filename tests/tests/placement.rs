@@ -61,12 +61,7 @@ fn the_sensing_runs_from_itcm() {
     // Bridges of the linker between the memories are no code of the project.
     let code = code.filter(|symbol| !symbol.name.contains("Thunk"));
     let is_sensing = |symbol: &&Symbol| {
-        let packages = [
-            "hivtac_terms",
-            "hivtac_markers",
-            "hivtac_force",
-            "hivtac_sensor",
-        ];
+        let packages = ["hivtac_terms", "hivtac_sensor"];
         packages.iter().any(|package| symbol.name.contains(package))
             || symbol.name.starts_with("hivtac_")
     };
@@ -74,8 +69,8 @@ fn the_sensing_runs_from_itcm() {
     // there, or stands for one without a film: no loop over pixels or weights. And what only
     // another look at a refused frame needs.
     let seldom = [
-        "hivtac_force5model",
-        "hivtac_force..model",
+        "hivtac_sensor5force5model",
+        "hivtac_sensor..force..model",
         "hivtac_sensor4tare",
         "hivtac_sensor8temporal",
         "hivtac_sensor6rezero",
@@ -101,7 +96,7 @@ fn the_sensing_runs_from_itcm() {
         "$GT$9configure17h",
         "$GT$13set_threshold17h",
         "8pipeline6taring",
-        "hivtac_force4rest",
+        "hivtac_sensor5force4rest",
         "5trust5Trust3new",
         "8pipeline5again",
         "8majority8Majority",

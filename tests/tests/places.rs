@@ -1,11 +1,11 @@
 //! Honest contacts anywhere get a force from a model that tells places, and few of them from one
 //! that does not.
 
-use hivtac_twin::{Contact, Frame};
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::Contacts;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::{Detection, View, views};
+use hivtac_twin::{Contact, Frame};
 
 /// Frames of each view.
 const FRAMES: u64 = 2_400;

@@ -1,7 +1,7 @@
 //! The rig with the firmware, and the host tool as a user runs it.
 //!
 //! The rig is not a program of its own here: so what one run translated of the firmware serves the
-//! next. The tests of `rig/` and those in Python have it as a program.
+//! next. The tests of `twin/rig/` and those in Python have it as a program.
 
 use std::ffi::OsString;
 use std::fs;

@@ -1,12 +1,12 @@
 //! The film run forwards, by the committed model: it finds the contact that moves the markers so,
 //! refuses what none does, and survives anything.
 
-use hivtac_sensor::force::{Force, FrameNoise, Resting};
 use hivtac_sensor::force::forward::{Forward, Markers, Pose, STEPS_AT_MOST};
 use hivtac_sensor::force::model::encode::FORWARD_OFFSET;
 use hivtac_sensor::force::model::{Model, ModelError};
 use hivtac_sensor::force::network::Output;
 use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::force::{Force, FrameNoise, Resting};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;

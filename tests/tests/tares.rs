@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
-use hivtac_twin::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensor::tare::Refusal;
 use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::TaredSensor;
+use hivtac_twin::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, Preset, Scene};
 
 const FRAMES: u16 = 16;
 

@@ -1,6 +1,5 @@
 //! A sensor that is turned over: its film hangs the other way.
 
-use hivtac_twin::{Frame, Load, Mechanics, Options, Preset, Scene};
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::Refusal;
 use hivtac_terms::down::{Direction, Down};
@@ -9,6 +8,7 @@ use hivtac_tests::judged::{Contacts, Judged, errors};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::TaredSensor;
+use hivtac_twin::{Frame, Load, Mechanics, Options, Preset, Scene};
 
 const FRAMES: u16 = 16;
 const PRESSES: Contacts = Contacts {

@@ -3,9 +3,9 @@
 
 use crate::camera::centre;
 use crate::disc::Outline;
+use crate::film::{Film, Pressed};
 use crate::lens::Discs;
 use crate::{Camera, Disc, FILM_DISTANCE_MM, Lens, Load, MarkerTruth, Mechanics, Shutter};
-use crate::film::{Film, Pressed};
 
 /// Everything that decides where discs are seen.
 pub(crate) struct Exposure<'a, L: Fn(f64) -> Load> {

@@ -49,9 +49,9 @@ pub mod film;
 mod format;
 mod frame;
 #[cfg(feature = "jpeg")]
-mod jpeg;
-#[cfg(feature = "jpeg")]
 pub mod hard_cases;
+#[cfg(feature = "jpeg")]
+mod jpeg;
 mod lens;
 mod light;
 mod mechanics;
@@ -66,13 +66,13 @@ pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, PresetCamera};
 pub use creep::{Creep, Memory};
 pub use disc::{Disc, MARKERS};
 pub use error::SceneError;
+pub use film::{
+    Contact, DiscMotion, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed,
+};
 pub use format::Format;
 #[cfg(feature = "jpeg")]
 pub use format::JPEG_QUALITY;
 pub use frame::{Frame, MarkerTruth, Truth};
-pub use film::{
-    Contact, DiscMotion, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed,
-};
 pub use hivtac_terms::geometry::Preset;
 pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
 pub use mechanics::{Mechanics, Stiffness};

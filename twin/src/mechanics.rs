@@ -1,9 +1,9 @@
 //! The film as it is, or simplified: to see what each part of its answer is worth.
 
-use crate::{Contact, Creep, Load, SceneError};
 use crate::film::DiscMotion;
 use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
 use crate::film::{Film, FilmError, Pressed};
+use crate::{Contact, Creep, Load, SceneError};
 
 /// What the scene takes of the film's answer to a load.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,6 +2,7 @@
 
 use crate::coverage::Coverage;
 use crate::exposure::{Exposure, Image};
+use crate::film::{Film, Pressed};
 use crate::frame::Raster;
 use crate::light::{Channel, Light, STEPS};
 use crate::motion::Motion;
@@ -10,7 +11,6 @@ use crate::{
     Camera, Disc, Format, Frame, Load, MARKERS, Mechanics, Options, Paint, Preset, SceneError,
     Shutter, Truth,
 };
-use crate::film::{Film, Pressed};
 
 /// A simulated sensor and what presses it. Frames depend on nothing but the scene and the
 /// arguments.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_calibration::progress::bar;
 use hivtac_calibration::data::dataset::{Dataset, Recipe, generate, generate_file};
+use hivtac_calibration::progress::bar;
 
 /// Options of `dataset`.
 #[derive(Args)]

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_calibration::network::Meaning;
-use hivtac_calibration::train::Options;
 use hivtac_calibration::data::conditions::pixel_format;
 use hivtac_calibration::data::dataset::{Loads, Recipe};
+use hivtac_calibration::network::Meaning;
+use hivtac_calibration::train::Options;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_calibration::progress::bar;
-use hivtac_calibration::quantize::export;
-use hivtac_calibration::weights::Weights;
 use hivtac_calibration::data::dataset::Dataset;
 use hivtac_calibration::evaluation::Evaluation;
 use hivtac_calibration::evaluation::check::check;
+use hivtac_calibration::progress::bar;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
 
 /// Frames that are checked.
 const CHECKED: usize = 4000;

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail, ensure};
 use clap::Args;
+use hivtac_calibration::data::dataset::Dataset;
+use hivtac_calibration::evaluation::errors::{Errors, WEAK_N};
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::forward::Known;
 use hivtac_calibration::network::Meaning;
@@ -11,8 +13,6 @@ use hivtac_calibration::progress::bar;
 use hivtac_calibration::train::Options;
 use hivtac_calibration::unit::GuideArgs;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::data::dataset::Dataset;
-use hivtac_calibration::evaluation::errors::{Errors, WEAK_N};
 
 /// Options of `train`.
 #[derive(Args)]

@@ -2,11 +2,11 @@
 
 use anyhow::{Context, Result, ensure};
 use hivtac_host::shown::unit_number;
-use hivtac_twin::{Camera, Contact};
 use hivtac_sensor::force::model::{self, Origin};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_twin::{Camera, Contact};
 use serde::{Deserialize, Serialize};
 
 /// Everything about frames and labels that a model depends on (`docs/model-file.md`, conditions).

@@ -8,7 +8,7 @@
 //! | file | subject |
 //! |---|---|
 //! | `loads`, `range` | which forces, and where |
-//! | `dataset` | frames seen by `sensing` itself; the CSV file |
+//! | `dataset` | frames seen by the sensing itself; the CSV file |
 //! | `collect` | data from a real unit and a force gauge |
 //! | `rest` | the untouched film, which all else is compared with |
 //! | `conditions` | what a data set and a model hold for |

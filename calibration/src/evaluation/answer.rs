@@ -2,10 +2,10 @@
 
 use anyhow::Result;
 use hivtac_sensor::force::features::Features;
-use hivtac_sensor::force::{self, Force, FrameNoise, Resting};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::force::{self, Force, FrameNoise, Resting};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 

@@ -5,18 +5,18 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use anyhow::{Result, anyhow, bail, ensure};
-use hivtac_twin::Contact;
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::conditions::ContactReading;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::Contact;
 use rayon::prelude::*;
 
-use crate::evaluation::errors::{Errors, WEAK_N};
 use crate::data::conditions::meaning;
 use crate::data::dataset::{Loads, Recipe, measure, reasons};
 use crate::data::range::Range;
+use crate::evaluation::errors::{Errors, WEAK_N};
 
 /// What a check found.
 #[derive(Clone, Debug)]

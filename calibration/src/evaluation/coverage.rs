@@ -1,8 +1,8 @@
 //! Whether the uncertainties that come with every force are honest.
 
 use super::Judged;
-use crate::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND};
 use crate::data::loads::norm;
+use crate::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND};
 
 const PARTS: usize = 10;
 

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::Judged;
 use super::numbers::errors;
-use crate::evaluation::plot::{Axis, COLOURS, Plot, Scale};
 use crate::data::loads::PaperPoses;
+use crate::evaluation::plot::{Axis, COLOURS, Plot, Scale};
 
 /// The most points of a scatter plot.
 const MOST_POINTS: usize = 2500;

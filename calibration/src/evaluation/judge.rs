@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
 use anyhow::{Result, anyhow, ensure};
-use hivtac_twin::Contact;
-use hivtac_sensor::force::{Force, Place};
 use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::{Force, Place};
 use hivtac_terms::status::Status;
+use hivtac_twin::Contact;
 
-use crate::evaluation::answer::Chip;
-use crate::evaluation::errors::angle_deg;
 use crate::data::conditions::OriginName;
 use crate::data::dataset::{Dataset, Row, reasons};
 use crate::data::loads::{from_polar, polar};
+use crate::evaluation::answer::Chip;
+use crate::evaluation::errors::angle_deg;
 
 /// One answer with its truth. Angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! How good answers are where the tip is off the film's middle.
 
 use super::Judged;
+use crate::data::loads::norm;
 use crate::evaluation::bounds::PLACE_BOUND;
 use crate::evaluation::errors::{WEAK_N, mean};
-use crate::data::loads::norm;
 
 /// Distances from the middle that are told apart, mm.
 const RINGS_MM: [f64; 6] = [0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY];

@@ -7,10 +7,10 @@ use super::figures::{error_against_force, found_against_true, histograms, pose_m
 use super::numbers::{PoseNumbers, by_pose, errors};
 use super::places::{PlaceNumbers, by_place};
 use super::{Evaluation, Interval, Judged, Numbers};
-use crate::evaluation::errors::WEAK_N;
-use crate::evaluation::plot::escaped;
 use crate::data::conditions::meaning;
 use crate::data::loads::norm;
+use crate::evaluation::errors::WEAK_N;
+use crate::evaluation::plot::escaped;
 
 const STYLE: &str = "body{font-family:sans-serif;max-width:1320px;margin:1em auto;padding:0 1em}\
 table{border-collapse:collapse;margin:1em 0}td,th{border:1px solid #bbb;padding:.3em \

@@ -6,16 +6,16 @@ use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network as ChipNetwork;
 
-use crate::network::Network;
-use crate::quantize::export;
-use crate::train::{Options, Progress, Samples, train};
-use crate::uncertainty::Miss;
-use crate::weights::{Training, Uncertainty, Weights};
 use crate::data::dataset::{About, Dataset, Observation, Sample};
 use crate::data::loads::norm;
 use crate::data::range::Range;
 use crate::data::rest::features_from_q16;
 use crate::evaluation::errors::Errors;
+use crate::network::Network;
+use crate::quantize::export;
+use crate::train::{Options, Progress, Samples, train};
+use crate::uncertainty::Miss;
+use crate::weights::{Training, Uncertainty, Weights};
 
 /// What was held out together, in files: single rows, whatever their pose.
 const WITHIN_POSE: &str = "within-pose";
@@ -223,7 +223,7 @@ fn record(dataset: &Dataset, rows: usize) -> Training {
     }
 }
 
-/// What the exported model answers, run by `sensing`'s own arithmetic.
+/// What the exported model answers, run by the sensing's own arithmetic.
 fn quantized_answers(weights: &Weights, tare: &Features, rows: &Rows<'_>) -> Result<Vec<Answer>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes)

@@ -1,8 +1,8 @@
 //! What a film's tables leave of how a unit's images move: covariances at even places and sizes.
 
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 use hivtac_sensor::force::forward::EQUATIONS;
 use hivtac_sensor::force::model::CovarianceSpec;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 
 use super::matrix::cholesky;
 

@@ -2,9 +2,9 @@
 //! terms: the principal components over places, markers and directions.
 
 use anyhow::Result;
-use hivtac_twin::film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use hivtac_sensor::force::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
 use hivtac_sensor::force::model::{TableSpec, TablesSpec};
+use hivtac_twin::film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 
 use super::matrix::{Matrix, cholesky, principal};
 use super::nearest::{self, splines};

@@ -1,17 +1,17 @@
 //! Uncertainties that hold: widened until the errors on a data set lie within what they say.
 
 use anyhow::{Context, Result, anyhow, ensure};
-use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_sensor::force::model::Model;
+use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
 
 use super::{FilmModel, Noise};
-use crate::quantize::export;
-use crate::weights::Weights;
 use crate::data::dataset::Dataset;
 use crate::data::loads::norm;
 use crate::evaluation::answer::Chip;
 use crate::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use crate::evaluation::errors::angle_deg;
+use crate::quantize::export;
+use crate::weights::Weights;
 
 /// The part of the errors that the 95 % bounds hold on the rows that they are made from, a little
 /// more than they promise.

@@ -16,11 +16,11 @@ mod weight;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
+use hivtac_sensor::force::forward::{self, DOTS, Limits, RestImage, Stiffness};
+use hivtac_sensor::force::model::{ForwardSpec, TablesSpec, WeightSpec};
 use hivtac_twin::film::Film;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::{Camera, Disc, FILM_DISTANCE_MM, Load, Preset};
-use hivtac_sensor::force::forward::{self, DOTS, Limits, RestImage, Stiffness};
-use hivtac_sensor::force::model::{ForwardSpec, TablesSpec, WeightSpec};
 use serde::{Deserialize, Serialize};
 
 use crate::unit_fit::OwnFilm;

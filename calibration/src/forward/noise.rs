@@ -1,9 +1,9 @@
 //! How well markers are seen, from frames of presses whose force and place are known.
 
 use anyhow::{Context, Result, ensure};
+use hivtac_twin::MARKERS;
 use hivtac_twin::film::Film;
 use hivtac_twin::film::reduced::{Pose, Unit};
-use hivtac_twin::MARKERS;
 
 use super::UnitSetup;
 use crate::data::dataset::{Dataset, Sample};

@@ -3,9 +3,6 @@
 //! moves them as far.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_twin::film::MARKER_CENTRES_MM;
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_twin::{Camera, Disc};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::{DOTS, EQUATIONS, Forward, Markers, Mounting, Stiffness};
 use hivtac_sensor::force::forward::{Pose as ChipPose, RELATIVE};
@@ -13,6 +10,9 @@ use hivtac_sensor::force::model::{CovarianceSpec, OthersSpec};
 use hivtac_sensor::force::rest::Rest;
 use hivtac_shell::{Design, Equilibrium, Film, Law, Material};
 use hivtac_terms::units::Px;
+use hivtac_twin::film::MARKER_CENTRES_MM;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_twin::{Camera, Disc};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

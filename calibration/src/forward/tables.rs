@@ -1,11 +1,11 @@
 //! The tables of a film run forwards, from the simulated sensor.
 
 use anyhow::Result;
+use hivtac_sensor::force::forward::MOST_TILTS;
+use hivtac_sensor::force::model::TablesSpec;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
 use hivtac_twin::film::{Film, MAX_PLACE_MM};
 use hivtac_twin::{Camera, Disc, Load};
-use hivtac_sensor::force::forward::MOST_TILTS;
-use hivtac_sensor::force::model::TablesSpec;
 use rayon::prelude::*;
 
 use super::functions::{Sampled, compressed};

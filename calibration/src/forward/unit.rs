@@ -3,13 +3,13 @@
 use anyhow::{Context, Result, ensure};
 
 use super::FilmModel;
+use crate::data::conditions::Conditions;
+use crate::data::dataset::Dataset;
+use crate::data::rest::Rest;
 use crate::loads::{Certainty, Rough, SeenLoad, loads_of};
 use crate::quantize::export;
 use crate::unit_fit::{Bench, Fit, OwnFilm, fit};
 use crate::weights::Weights;
-use crate::data::conditions::Conditions;
-use crate::data::dataset::Dataset;
-use crate::data::rest::Rest;
 use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::{Camera, Preset};
 
@@ -142,8 +142,8 @@ fn places(features_px: &[f64]) -> [[f64; 2]; 4] {
 mod tests {
     use std::path::Path;
 
-    use hivtac_twin::Contact;
     use hivtac_terms::threshold::PixelFormat;
+    use hivtac_twin::Contact;
 
     use super::*;
     use crate::data::dataset::{Loads, Recipe, generate};

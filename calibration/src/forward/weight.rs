@@ -1,10 +1,12 @@
 //! What a film's own weight does, as a model file has it.
 
 use anyhow::Result;
-use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
-use hivtac_sensor::force::forward::weight::{AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms};
+use hivtac_sensor::force::forward::weight::{
+    AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms,
+};
 use hivtac_sensor::force::forward::{EQUATIONS, Gravity, Stiffness};
 use hivtac_sensor::force::model::WeightSpec;
+use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
 use rayon::prelude::*;
 
 use super::covariances::Moved;

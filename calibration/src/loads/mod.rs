@@ -12,11 +12,11 @@ mod representative;
 
 use std::cell::RefCell;
 
-use anyhow::{Result, anyhow};
 use crate::data::dataset::{Dataset, Observation, Sample};
 use crate::data::loads::norm;
 use crate::data::rest::Rest;
 use crate::evaluation::answer::Chip;
+use anyhow::{Result, anyhow};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::marker::Marker;

@@ -2,8 +2,8 @@
 //! asked for, weighed across the force by how much of a direction it is.
 
 use super::{DirectionWeight, Samples};
-use crate::network::OUTPUTS;
 use crate::data::loads::norm;
+use crate::network::OUTPUTS;
 
 /// How much what is off across each row's force counts; along it, every row counts the same.
 pub(super) struct Across {

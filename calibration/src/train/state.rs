@@ -12,9 +12,9 @@ use super::loss::{Across, loss};
 use super::mlp::Mlp;
 use super::whitening::Whitening;
 use super::{Options, Samples, rounded, scaling};
+use crate::data::rest::{features_from_q16, q16};
 use crate::network::{Arithmetic, INPUTS, Layer, Network, Standardization};
 use crate::quantize::input_scaling;
-use crate::data::rest::{features_from_q16, q16};
 
 /// Rows that are measured at a time.
 const MEASURED_ROWS: usize = 256;

@@ -5,12 +5,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::mlp::Mlp;
 use super::*;
-use crate::network::{Arithmetic, Meaning};
-use crate::quantize::export;
-use crate::weights::{Training, Uncertainty, Weights};
 use crate::data::conditions::Conditions;
 use crate::data::range::Range;
 use crate::data::rest::{Rest, features_from_q16};
+use crate::network::{Arithmetic, Meaning};
+use crate::quantize::export;
+use crate::weights::{Training, Uncertainty, Weights};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;

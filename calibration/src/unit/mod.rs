@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::forward::Known;
-use crate::quantize::export;
-use crate::weights::Weights;
 use crate::data::collect::assemble::{DIRECTION_DEG, Gauge, How, assemble};
 use crate::data::collect::direction_deg;
 use crate::data::collect::folder::{self, Recording};
 use crate::data::collect::gauge_port::GaugeArgs;
 use crate::data::collect::poses::{self, Task};
 use crate::data::collect::record::{self, FreeArgs, RecordArgs, seconds};
+use crate::forward::Known;
+use crate::quantize::export;
+use crate::weights::Weights;
 use plan::MOST_LOADS;
 use verdict::Verdict;
 

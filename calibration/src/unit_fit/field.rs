@@ -8,8 +8,8 @@
 //! there the motion of the dot itself is interpolated, with its slopes by the place.
 
 use anyhow::{Context, Result};
-use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use hivtac_shell::{Equilibrium, Film, Response};
+use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use rayon::prelude::*;
 
 use super::problem::{At, Problem, apart_mm};

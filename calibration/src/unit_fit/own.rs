@@ -4,11 +4,11 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
-use hivtac_twin::Camera;
 use hivtac_sensor::force::forward::{DOTS, EQUATIONS, MOST_TILTS, Noise, Stiffness};
 use hivtac_sensor::force::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use hivtac_shell::Equilibrium;
+use hivtac_twin::Camera;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

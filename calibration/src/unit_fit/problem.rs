@@ -1,8 +1,8 @@
 //! A unit's numbers, held against its rest position and its loads.
 
 use anyhow::Result;
-use hivtac_twin::Camera;
 use hivtac_shell::{Change, Design, Equilibrium, Film};
+use hivtac_twin::Camera;
 use rayon::prelude::*;
 
 use super::equations::{LoadEquations, LoadSlopes, Normal};

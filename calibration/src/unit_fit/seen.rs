@@ -3,8 +3,8 @@
 
 use std::f64::consts::PI;
 
-use hivtac_twin::{Camera, Disc};
 use hivtac_shell::{Equilibrium, Film, Response};
+use hivtac_twin::{Camera, Disc};
 
 use crate::forward::in_focal_lengths;
 

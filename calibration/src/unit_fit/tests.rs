@@ -1,6 +1,6 @@
-use hivtac_twin::{Camera, MARKERS, Preset};
 use hivtac_sensor::force::forward::{self as chip, Forward};
 use hivtac_shell::{Design, Equilibrium, Film, Law};
+use hivtac_twin::{Camera, MARKERS, Preset};
 
 use super::problem::Made;
 use super::seen::View;

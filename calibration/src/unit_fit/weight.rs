@@ -1,11 +1,11 @@
 //! What gravity does to a unit's film when it is turned, by finite elements.
 
 use anyhow::{Context, Result, ensure};
-use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_TILT, Pose};
 use hivtac_sensor::force::forward::weight::{AT_REST, SIZES, TERMS, UNDER_LOAD};
 use hivtac_sensor::force::forward::{EQUATIONS, Stiffness};
 use hivtac_sensor::force::model::WeightSpec;
 use hivtac_shell::{Design, Equilibrium, Film};
+use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_TILT, Pose};
 use serde::{Deserialize, Serialize};
 
 use super::descent::Found;

@@ -5,13 +5,13 @@ use std::sync::{Arc, Mutex};
 
 use hivtac_calibration::data::collect::simulated::SimulatedGauge;
 use hivtac_calibration::data::dataset::{MarkerDetector, Recipe, Sensing};
-use hivtac_twin::Load;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
+use hivtac_twin::Load;
 use hivtac_wire::message::Sample;
 
 use crate::fake::*;

@@ -4,8 +4,8 @@ use super::find::{Levels, find, limit};
 use super::levels::Scale;
 use super::*;
 use crate::focus::tests::{device, frame};
-use hivtac_twin::{Format, Options as Scene, Paint, Patch};
 use hivtac_terms::threshold::{HsvBox, Mono, Yuv422};
+use hivtac_twin::{Format, Options as Scene, Paint, Patch};
 use hivtac_wire::message::{ModelIdentity, ModelSource};
 
 /// A device whose model was made for this threshold.

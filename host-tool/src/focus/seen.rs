@@ -3,8 +3,8 @@
 use super::rim::{Edge, Field, edge};
 use hivtac_host::frame::Frame;
 use hivtac_host::look;
-use hivtac_sensor::pipeline::Sensor;
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker as terms;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};

@@ -1,9 +1,9 @@
 //! Pictures of the simulated sensor, right and wrong, and what is said of them.
 
 use super::*;
-use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 
 const RED: [u8; 6] = [170, 10, 100, 255, 45, 255];
 

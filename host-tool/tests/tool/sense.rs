@@ -1,10 +1,10 @@
 //! `hivtac sense` on pictures that are drawn here.
 
 use crate::run::*;
-use hivtac_twin::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 use tempfile::TempDir;

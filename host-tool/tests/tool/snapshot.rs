@@ -2,11 +2,11 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
 use hivtac_terms::units::Px;
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_wire::message::*;
 use serde_json::Value;
 use std::path::Path;

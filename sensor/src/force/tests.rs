@@ -122,7 +122,10 @@ fn output(values: [i32; 3]) -> Output {
     }
 }
 
-fn force_of(outputs: [i32; 3], edit: fn(&mut crate::force::model::encode::ModelSpec)) -> (Force, Status) {
+fn force_of(
+    outputs: [i32; 3],
+    edit: fn(&mut crate::force::model::encode::ModelSpec),
+) -> (Force, Status) {
     let mut spec = spec(&[11, 3]);
     edit(&mut spec);
     let bytes = spec.encode().unwrap();

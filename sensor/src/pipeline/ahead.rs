@@ -69,8 +69,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::{Pattern, Picture, RED, tared};
     use crate::force::forward::Drift;
+    use crate::picture::{Pattern, Picture, RED, tared};
     use hivtac_terms::geometry::{Geometry, Preset};
     use proptest::prelude::*;
 

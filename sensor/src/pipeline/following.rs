@@ -1,10 +1,10 @@
 //! From one frame to the next: contact, slip and filter, and where the untouched film rests.
 
 use super::{Measurement, Sensor};
-use crate::rezero::{Tare, Told};
-use crate::temporal::{Followed, Moment};
 use crate::force::rest::Rest;
 use crate::markers::tables::Table;
+use crate::rezero::{Tare, Told};
+use crate::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{TemporalError, TemporalSettings};
 use hivtac_terms::units::{MilliPx, Px};
@@ -74,9 +74,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force::forward::Drift;
     use crate::picture::sensor;
     use crate::temporal::tests::{frame, pressed, rest};
-    use crate::force::forward::Drift;
     use hivtac_terms::geometry::{Geometry, Preset};
     use hivtac_terms::temporal::Rezero;
     use hivtac_terms::units::Milliseconds;

@@ -1,10 +1,10 @@
 //! Which way the sensor is held: the film hangs by its own weight.
 
 use super::Sensor;
-use crate::rezero::Tare;
 use crate::force::forward::{Gravity, Turned};
 use crate::force::rest::Rest;
 use crate::markers::tables::Table;
+use crate::rezero::Tare;
 use hivtac_terms::down::{Direction, Down};
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {

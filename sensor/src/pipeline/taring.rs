@@ -1,10 +1,10 @@
 //! The frame that was measured, as one of those that make a rest position.
 
 use super::{Look, Measurement, Sensor};
-use crate::tare::{Refusal, TareBuilder};
-use crate::force::{Resting, is_force};
 use crate::force::rest::Rest;
+use crate::force::{Resting, is_force};
 use crate::markers::tables::Table;
+use crate::tare::{Refusal, TareBuilder};
 use hivtac_terms::status::Status;
 use hivtac_terms::units::MicroNewtons;
 

@@ -1,6 +1,6 @@
 use super::*;
-use crate::picture::{GREY, Pattern, Picture, RED, rest_of, sensor, tared};
 use crate::force::model::{Origin, encode::ModelSpec, samples::spec};
+use crate::picture::{GREY, Pattern, Picture, RED, rest_of, sensor, tared};
 use hivtac_terms::threshold::{HsvBox, Mono};
 use hivtac_terms::units::{MicroNewtons, Micrometres, Px};
 use proptest::prelude::*;

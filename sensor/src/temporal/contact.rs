@@ -5,8 +5,8 @@
 //! uncertain a film's strength is. It ends below the lower limit, or below half of that certainty.
 
 use super::ContactLimits;
-use crate::pipeline::Measurement;
 use crate::force::CONTACT_SIGMAS;
+use crate::pipeline::Measurement;
 use hivtac_terms::status::Status;
 
 /// What was known is forgotten when no frame had a force for so long, µs.

@@ -12,11 +12,11 @@ mod slip;
 #[cfg(test)]
 pub(crate) mod tests;
 
+use crate::force::Force;
 use crate::pipeline::Measurement;
 use contact::Contact;
 use creep::Memory;
 use filter::ForceFilter;
-use crate::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, SlipLimits, TemporalError, TemporalSettings};
 use slip::Slip;

@@ -37,9 +37,9 @@ pub fn pressed(magnitude: i32, sigma: u32) -> Force {
 }
 
 use super::{Moment, Temporal};
-use crate::pipeline::Measurement;
 use crate::force::features::Features;
 use crate::force::rest::Rest;
+use crate::pipeline::Measurement;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalError, TemporalSettings};

@@ -3,7 +3,9 @@
 
 use crate::reference::{Mask, scan, settings};
 use hivtac_sensor::markers::blob::Blob;
-use hivtac_sensor::markers::scanner::{MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, ScanSettings, Scanner};
+use hivtac_sensor::markers::scanner::{
+    MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, ScanSettings, Scanner,
+};
 use hivtac_sensor::markers::tables::ByteTable;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, HsvBox};

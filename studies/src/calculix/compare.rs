@@ -1,8 +1,8 @@
 //! Two films under the same press, and what one makes of the other's markers.
 
 use anyhow::Result;
-use hivtac_twin::Camera;
 use hivtac_shell::{Contact, Design, Equilibrium, Film, Marker, markers};
+use hivtac_twin::Camera;
 
 /// Gauss–Newton steps at most, and how small they are (N, mm) at the end.
 const MAX_STEPS: usize = 20;

@@ -1,9 +1,9 @@
 //! A film that CalculiX solves, as a scene shows it.
 
 use anyhow::Result;
+use hivtac_shell::{Design, Film, pressed_on};
 use hivtac_twin::film::Pressed;
 use hivtac_twin::{Disc, Load};
-use hivtac_shell::{Design, Film, pressed_on};
 
 use super::Solver;
 use super::deck::{Deck, Law};

@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use hivtac_twin::MARKER_REST_MM;
 use hivtac_shell::Design;
+use hivtac_twin::MARKER_REST_MM;
 
 /// How fast elements grow away from tip and posts, mm per mm.
 const GROWTH: f64 = 0.25;

@@ -17,8 +17,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_twin::{Camera, MARKER_REST_MM};
 use hivtac_shell::{Design, Film, markers_on, paper_camera};
+use hivtac_twin::{Camera, MARKER_REST_MM};
 
 use compare::{FilmObservation, Reading};
 use deck::Deck;

@@ -1,8 +1,8 @@
 //! Ways from first guesses to a contact, as the sensor goes them.
 
 use anyhow::Result;
-use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force;
+use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::{
     Descent, Estimate, Forward, Mounting, Observed, Pose, STEPS_AT_MOST, UNEXPLAINED,
 };

@@ -3,16 +3,16 @@
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, anyhow};
-use hivtac_calibration::fit::fit;
-use hivtac_calibration::quantize::export;
-use hivtac_calibration::train::Options;
 use hivtac_calibration::data::dataset::{
     Dataset, Detectors, Loads, MarkerDetector, Recipe, Sensing, generate_files,
 };
 use hivtac_calibration::data::range::Range;
-use hivtac_twin::Contact;
+use hivtac_calibration::fit::fit;
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::train::Options;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_twin::Contact;
 
 use super::PeersArgs;
 use super::models::How;

@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use hivtac_twin::Contact;
 use hivtac_terms::geometry::Preset;
+use hivtac_twin::Contact;
 
 use crate::document;
 use crate::scene::size::Size;

@@ -1,18 +1,18 @@
 //! The models that are compared.
 
 use anyhow::{Context, Result, anyhow};
+use hivtac_calibration::data::dataset::Dataset;
+use hivtac_calibration::data::rest::features_from_q16;
+use hivtac_calibration::evaluation::check::vector_n;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{DirectionWeight, Options};
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::data::dataset::Dataset;
-use hivtac_calibration::data::rest::features_from_q16;
-use hivtac_calibration::evaluation::check::vector_n;
-use hivtac_twin::Contact;
 use hivtac_sensor::force;
 use hivtac_sensor::force::model::Model as Chip;
 use hivtac_sensor::force::network::Network;
+use hivtac_twin::Contact;
 
 use super::frames::{Frames, Sets};
 use super::{PeersArgs, there};

@@ -8,10 +8,10 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use hivtac_calibration::data::dataset::{Detection, MarkerDetector, Observation};
-use hivtac_twin::Frame;
 use hivtac_sensor::force::features::Features;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
+use hivtac_twin::Frame;
 
 const ENVIRONMENT: &str = include_str!("../../python/opencv_environment.py");
 const PIPELINE: &str = include_str!("../../python/paper_pipeline.py");

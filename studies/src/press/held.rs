@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use hivtac_twin::Load;
 use hivtac_sensor::force::model::Model;
+use hivtac_twin::Load;
 use serde::Serialize;
 
 use super::{Answer, Bound, Errors, Noise, Row, TestedUnit};

@@ -4,9 +4,9 @@
 use std::sync::{Mutex, MutexGuard};
 
 use anyhow::Result;
+use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed};
 use hivtac_twin::film::Pressed;
 use hivtac_twin::{Disc, Load, Options};
-use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed};
 use rand::Rng;
 
 use super::seeded;

@@ -2,19 +2,19 @@
 
 use anyhow::{Result, anyhow};
 use hivtac_calibration::data::dataset::measure;
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
-use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
+use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
-use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_sensor::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
+use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 
 use super::{Drawn, RealFilm};
 use crate::calculix::Solver;

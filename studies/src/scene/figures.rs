@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_twin::{Load, Preset, Scene};
 use hivtac_studies::paper_model::{Design, Map, PinholeDistance};
+use hivtac_twin::{Load, Preset, Scene};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, WHITE};
 use super::cases::CasesArgs;

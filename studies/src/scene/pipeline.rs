@@ -2,15 +2,15 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use hivtac_calibration::data::dataset::reasons;
-use hivtac_twin::{Camera, Frame, Load, Scene, Truth};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
-use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::{Camera, Frame, Load, Scene, Truth};
 
 /// The model that firmware and host tool embed.
 static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");

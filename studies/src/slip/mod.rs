@@ -12,11 +12,11 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_twin::{Load, Options, Shutter};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::temporal::{Moment, Temporal};
 use hivtac_terms::status::Status;
+use hivtac_twin::{Load, Options, Shutter};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 

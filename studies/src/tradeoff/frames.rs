@@ -5,20 +5,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow, ensure};
+use hivtac_calibration::data::dataset::{
+    Dataset, Loads, Observation, Recipe, Row, measure, reasons,
+};
 use hivtac_calibration::network::{INPUTS, Layer, Meaning, Network, Standardization};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::{Training, Uncertainty, Weights};
-use hivtac_calibration::data::dataset::{Dataset, Loads, Observation, Recipe, Row, measure, reasons};
-use hivtac_twin::Frame;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
-use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::Frame;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -4,13 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use hivtac_calibration::data::conditions::Conditions;
+use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::evaluation::check::check;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_calibration::data::conditions::Conditions;
-use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::evaluation::check::check;
 use serde_json::json;
 
 use super::plan::{RENDERED, preset};

@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use hivtac_calibration::network::Arithmetic;
 use hivtac_calibration::data::dataset::Recipe;
 use hivtac_calibration::data::range::Range;
+use hivtac_calibration::network::Arithmetic;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use serde::{Deserialize, Serialize};

@@ -3,9 +3,9 @@
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network as Inference;
-use hivtac_sensor::pipeline;
 use hivtac_sensor::markers::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::Pixels;
+use hivtac_sensor::pipeline;
 use hivtac_terms::threshold::ByteOrder;
 
 use crate::data::{Frame, Network};

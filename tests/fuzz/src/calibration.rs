@@ -1,12 +1,12 @@
 //! What calibration reads: data sets, recordings of a unit and a gauge, networks.
 
-use hivtac_calibration::import;
-use hivtac_calibration::quantize;
-use hivtac_calibration::weights::Weights;
 use hivtac_calibration::data::collect::assemble::{Gauge, How, assemble};
 use hivtac_calibration::data::collect::folder::Recording;
 use hivtac_calibration::data::collect::gauge_file;
 use hivtac_calibration::data::dataset::Dataset;
+use hivtac_calibration::import;
+use hivtac_calibration::quantize;
+use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
 
 /// Ends one of several files in an input.

@@ -4,9 +4,9 @@
 use arbitrary::{Result, Unstructured};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{AlignedFile, Model};
+use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
-use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::{Geometry, Preset};

@@ -2,11 +2,11 @@
 
 use arbitrary::{Result, Unstructured};
 use hivtac_sensor::force::features::Features;
-use hivtac_sensor::force::{Force, Resting, of_outputs};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::model::samples::{place_spec, spec, spec16};
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::force::{Force, Resting, of_outputs};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_wire::frame::CRC32;

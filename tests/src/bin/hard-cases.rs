@@ -2,9 +2,9 @@
 //! hivtac-tests --bin hard-cases -- [REPEATS [CONTACT]]`.
 
 use anyhow::{Context, Result};
-use hivtac_twin::Contact;
 use hivtac_tests::hard::{detect_in_all, table};
 use hivtac_tests::tared::{View, views};
+use hivtac_twin::Contact;
 
 /// Frames for each case and load.
 const REPEATS: u64 = 4;

@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 use std::{env, fs};
 
 use anyhow::{Context, Result};
-use hivtac_twin::{Preset, Scene};
-use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::markers::screen::ScreenedTable;
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::pictures;
+use hivtac_twin::{Preset, Scene};
 use serde_json::json;
 
 /// Columns and rows of the frames.

@@ -12,15 +12,15 @@ use core::fmt::{self, Write};
 use core::ops::Range;
 
 use hivtac_sensor::force::features::{FEATURES, Features};
-use hivtac_sensor::force::{Polar, Resting};
-use hivtac_sensor::markers::formats::Formats;
 use hivtac_sensor::force::model::{AlignedFile, Model};
 use hivtac_sensor::force::network::Network;
-use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::force::{Polar, Resting};
+use hivtac_sensor::markers::formats::Formats;
 use hivtac_sensor::markers::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::markers::tables::{ByteTable, Pixels};
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};

@@ -3,9 +3,9 @@
 use crate::common::{Run, Setup, command, firmware};
 use crate::settings::{Device, of_another_version};
 use hivtac_rig::script::Action;
-use hivtac_sensor::known_answer;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;
+use hivtac_sensor::known_answer;
 use hivtac_wire::frame::CRC32;
 use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::{Outcome, Request};

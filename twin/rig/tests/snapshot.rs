@@ -2,8 +2,8 @@
 
 use crate::common::{HELLO_MS, Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
-use hivtac_twin::{Preset, Scene, Shutter};
 use hivtac_terms::status::Status;
+use hivtac_twin::{Preset, Scene, Shutter};
 use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Request, Snapshot};
 
 /// When it is asked for, ms.

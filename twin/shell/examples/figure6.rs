@@ -5,8 +5,8 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use hivtac_twin::{Camera, MARKERS};
 use hivtac_shell::{Contact, Design, Equilibrium, Film, ShellError, paper_camera};
+use hivtac_twin::{Camera, MARKERS};
 
 /// How far the tip goes, mm, and in steps of how much.
 const TRAVEL_MM: f64 = 10.0;

@@ -10,11 +10,13 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use hivtac_twin::film::reduced::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::{Solved, octant, solve_place};
 use hivtac_shell::{
     Check, Design, Domain, ShellError, check, paper_camera, record, tables, weight,
+};
+use hivtac_twin::film::reduced::{
+    Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit,
 };
 
 const USAGE: &str = "reduce FOLDER [--weight|--check]

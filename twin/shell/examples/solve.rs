@@ -5,8 +5,8 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use hivtac_twin::film::{Contact, FilmError, Load};
 use hivtac_shell::{Design, Film, markers, paper_camera, press_load};
+use hivtac_twin::film::{Contact, FilmError, Load};
 
 const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--contact \
                      force|stick|slip:0.6] [--offset-x-mm 0] [--offset-y-mm 0] [--overhang-mm 0] \

@@ -1,7 +1,7 @@
 use std::fmt;
 
-use hivtac_twin::film::FilmError;
 use hivtac_twin::SceneError;
+use hivtac_twin::film::FilmError;
 
 /// Why a film cannot be made or pressed.
 #[derive(Clone, Debug, PartialEq)]

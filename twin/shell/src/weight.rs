@@ -3,9 +3,9 @@
 use std::array::from_fn;
 
 use faer::prelude::*;
+use hivtac_twin::Camera;
 use hivtac_twin::film::DiscMotion;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Pull, Unit, Weight};
-use hivtac_twin::Camera;
 
 use crate::parallel::in_parallel;
 use crate::path::Path;

@@ -2,10 +2,10 @@
 
 use std::sync::LazyLock;
 
+use hivtac_shell::{Design, Domain, Film, check, press_load};
 use hivtac_twin::film::Film as ReducedFilm;
 use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_twin::{Camera, Contact, Disc, Load, Preset};
-use hivtac_shell::{Design, Domain, Film, check, press_load};
 
 /// How far the reduced film's markers may be off, px at 320×240 `ov7725`.
 const MOST_PX: f64 = 0.1;

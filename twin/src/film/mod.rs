@@ -28,9 +28,9 @@ pub mod reduced;
 
 pub use disc_motion::DiscMotion;
 pub use error::FilmError;
+pub use load::{Contact, Load};
 pub use loaded::{
     Film, HALF_SIDE_MM, MAX_FORCE_N, MAX_LABEL_N, MAX_OFFSET_MM, MAX_PLACE_MM, MAX_RATIO,
     MAX_TANGENT, Pressed,
 };
-pub use load::{Contact, Load};
 pub use markers::{MARKER_CENTRES_MM, MARKER_RADIUS_MM, MARKER_REST_MM};

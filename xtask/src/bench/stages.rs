@@ -156,7 +156,10 @@ mod tests {
     #[test]
     fn the_innermost_function_of_the_sensing_decides() {
         let core = "/rustc/1/library/core/src/slice.rs";
-        let (label, scanner) = ("/p/sensor/src/markers/label.rs", "/p/sensor/src/markers/scanner.rs");
+        let (label, scanner) = (
+            "/p/sensor/src/markers/label.rs",
+            "/p/sensor/src/markers/scanner.rs",
+        );
         assert_eq!(
             stage_of(&[core, label, scanner]),
             Some("runs, labels, moments")

@@ -17,11 +17,11 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_twin::Contact;
 use hivtac_terms::down::Direction;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
+use hivtac_twin::Contact;
 use hivtac_wire::message::{DeviceHello, Sample};
 use serde::{Deserialize, Serialize};
 

@@ -1,17 +1,17 @@
-//! What finds markers in rendered frames: `sensing`, or something that it is compared with.
+//! What finds markers in rendered frames: the sensing, or something that it is compared with.
 
 use std::sync::Mutex;
 
 use anyhow::{Result, anyhow};
-use hivtac_twin::Frame;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
-use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, Threshold};
+use hivtac_twin::Frame;
 
 use super::{Observation, Recipe};
 
@@ -30,7 +30,7 @@ pub trait MarkerDetector: Send {
 /// Detectors for the same frames: each gives a data set of its own.
 pub type Detectors<'a> = Vec<Box<dyn MarkerDetector + 'a>>;
 
-/// `sensing` as a detector.
+/// The sensing as a detector.
 pub struct Sensing<'m>(Box<Sensor<'m>>);
 
 impl Sensing<'static> {

@@ -1,4 +1,4 @@
-//! Data sets from the scene: render a frame, let `sensing` measure it.
+//! Data sets from the scene: render a frame, let the sensing measure it.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Data sets: forces with the features that `sensing` found in the frames.
+//! Data sets: forces with the features that the sensing found in the frames.
 
 mod detector;
 mod file;

@@ -2,10 +2,10 @@
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use hivtac_twin::{Contact, Format, Load, Options, PresetCamera, Scene};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
+use hivtac_twin::{Contact, Format, Load, Options, PresetCamera, Scene};
 use serde::{Deserialize, Serialize};
 
 use super::session::Session;

@@ -5,7 +5,7 @@
 /// code.
 ///
 /// ```
-/// # use hivtac_force::model::AlignedFile;
+/// # use hivtac_sensor::force::model::AlignedFile;
 /// static FILE: &AlignedFile<[u8]> = &AlignedFile(*b"what include_bytes! gives");
 /// assert!(FILE.0.as_ptr().cast::<u32>().is_aligned());
 /// ```

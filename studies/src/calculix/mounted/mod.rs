@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use hivtac_twin::{Camera, Preset};
 use hivtac_shell::{Contact, Film};
+use hivtac_twin::{Camera, Preset};
 
 use super::compare::{self, FilmObservation, Reading, Scaled};
 use super::deck::Deck;

@@ -105,7 +105,9 @@ mod tests {
     #[test]
     fn the_bound_is_reached_where_the_film_is_nearly_a_line() {
         use rand::{Rng, SeedableRng};
-        let scene = hivtac_calibration::data::dataset::Recipe::default().scene(0).unwrap();
+        let scene = hivtac_calibration::data::dataset::Recipe::default()
+            .scene(0)
+            .unwrap();
         let force = [0.01, -0.005, -0.12];
         let jacobian = jacobian(&scene, Contact::Force, force).unwrap();
         let noise: Noise =

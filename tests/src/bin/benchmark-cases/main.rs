@@ -13,13 +13,12 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use anyhow::{Context, Result, anyhow, bail};
-use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::model::{Model, OutputKind};
-use hivtac_sensor::pipeline::Sensor;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::markers::settings::Settings;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::conditions::CentroidEstimator::{self, BinaryMask, RednessWeighted};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::Marker;
@@ -27,6 +26,7 @@ use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::script::Script;
 use hivtac_tests::{pictures, qemu};
+use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use serde_json::{Value, json};
 
 /// The model that the sensor runs.

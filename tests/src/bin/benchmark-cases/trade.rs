@@ -7,7 +7,6 @@
 use std::path::Path;
 
 use anyhow::Result;
-use hivtac_twin::Scene;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::rest::Rest;
@@ -16,6 +15,7 @@ use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::script::Script;
+use hivtac_twin::Scene;
 use serde_json::{Value, json};
 
 use super::{SIZES, position, stepping, usual_frame, write};

@@ -1,8 +1,8 @@
 //! The eight ways in which a square film looks like itself.
 
+use hivtac_twin::MARKERS;
 use hivtac_twin::film::DiscMotion;
 use hivtac_twin::film::reduced::Pose;
-use hivtac_twin::MARKERS;
 
 /// A mirror: v becomes `matrix`·v along the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
