@@ -35,16 +35,44 @@
 
 use crate::band_dma::BandDma;
 use crate::bands::SHAPE;
-use crate::camera::{self, Format};
+use crate::camera::{self, Format, USUAL_FORMAT};
 use crate::seeded_bugs::INVERTED_POLARITIES;
-use crate::shared::{BANDS_FINISHED, CAPTURE, CAPTURE_ACTIVITY, CAPTURE_EVENTS, CAPTURED_FORMAT};
 use crate::{stats, vsync};
-use core::cell::Cell;
-use core::sync::atomic::Ordering;
+use core::cell::{Cell, RefCell};
+use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 use embassy_stm32::pac::{DCMI, RCC};
 use embassy_stm32::{Peri, peripherals, rcc};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
 use hivtac_capture::{Edge, Event, Interface, Tracker};
+
+/// The tracker and the hardware that it steers. Used by the capture handlers, the capture task and
+/// the pipeline, one at a time.
+static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
+    CriticalSectionMutex::new(RefCell::new(None));
+
+/// Pixels of the frames that are captured. Written by the capture task while the capture is
+/// stopped; read by the capture handlers and the capture task.
+static CAPTURED_FORMAT: CriticalSectionMutex<Cell<Format>> =
+    CriticalSectionMutex::new(Cell::new(USUAL_FORMAT));
+
+/// Bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by the
+/// pipeline.
+static BANDS_FINISHED: AtomicU32 = AtomicU32::new(0);
+
+/// Capture events so far, lost ones too. Written by the capture handlers and the capture task; read
+/// by the capture task.
+static CAPTURE_ACTIVITY: AtomicU32 = AtomicU32::new(0);
+
+/// Capture events that wait: more than bands that are still whole.
+const CAPTURE_EVENTS_WAITING: usize = 72;
+
+/// What happens, in order. From the capture handlers and the capture task to the pipeline. When
+/// there is no room a handler's event is lost; the pipeline notices that by the next one.
+pub static CAPTURE_EVENTS: Channel<CriticalSectionRawMutex, CaptureEvent, CAPTURE_EVENTS_WAITING> =
+    Channel::new();
 
 /// An event, and what pixels the camera sends since the newest start.
 #[derive(Clone, Copy)]
@@ -56,7 +84,7 @@ pub struct CaptureEvent {
 }
 
 /// The tracker, and what it steers.
-pub struct Running {
+struct Running {
     tracker: Tracker,
     hardware: Hardware,
 }

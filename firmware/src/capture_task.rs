@@ -4,17 +4,30 @@
 use crate::board;
 use crate::camera::{self, Camera, Format, Setting};
 use crate::capture::Capture;
-use crate::health::{self, Condition};
+use crate::condition::{self, Condition};
 use crate::session::Asked;
-use crate::shared::{CAMERA_AFRESH, CAMERA_ORDER, CAMERA_ORDERED, REQUESTED_FORMAT};
 use crate::{log, outbox, self_test, stats, vsync};
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::select::{Either4, select4};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use hivtac_capture::Event;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::fixed::Q;
 use hivtac_wire::message::{DeviceMessage, Inspection, LogLevel, Outcome};
+
+/// The newest thing that the capture task is asked for.
+type Request<T> = Signal<CriticalSectionRawMutex, T>;
+
+/// What pixels the camera shall send. From the pipeline.
+static REQUESTED_FORMAT: Request<Format> = Request::new();
+/// What a host asks of the camera. From the USB tasks.
+static CAMERA_ORDER: Request<CameraOrder> = Request::new();
+/// Such an order is under way. Set by the USB tasks, cleared by the capture task.
+static CAMERA_ORDERED: AtomicBool = AtomicBool::new(false);
+/// The camera is to be set as a new device's. From the memory task.
+static CAMERA_AFRESH: Request<()> = Request::new();
 
 /// So many frame times without a band or the end of a frame are a silence. Bands come all the
 /// time but for the vertical blanking, a seventh of a frame.
@@ -25,7 +38,7 @@ const SILENCES: u32 = 3;
 const RETRY: Duration = Duration::from_millis(500);
 
 /// What a host asks of the camera, and who.
-pub struct CameraOrder {
+struct CameraOrder {
     action: Action,
     asked: Asked,
 }
@@ -49,6 +62,16 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
     let asked = Asked::by(id);
     CAMERA_ORDER.signal(CameraOrder { action, asked });
     None
+}
+
+/// Has the camera send such pixels.
+pub fn request_format(format: Format) {
+    REQUESTED_FORMAT.signal(format);
+}
+
+/// Has the camera set as a new device's.
+pub fn set_afresh() {
+    CAMERA_AFRESH.signal(());
 }
 
 /// The order has been carried out.
@@ -123,7 +146,7 @@ impl CaptureTask {
         stats::CAMERA_TIMEOUTS.count();
         self.silences += 1;
         if self.silences >= SILENCES {
-            health::set(Condition::NoCamera);
+            condition::set(Condition::NoCamera);
             self.silences = 0;
             log::say(
                 LogLevel::Warning,
@@ -239,7 +262,7 @@ impl CaptureTask {
 
     async fn try_until_it_answers(&mut self) {
         while let Err(error) = self.try_camera().await {
-            health::set(Condition::NoCamera);
+            condition::set(Condition::NoCamera);
             self_test::camera_failed(&error, self.starting);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             if let Some(order) = CAMERA_ORDER.try_take() {

@@ -7,8 +7,7 @@
 //! | interrupt without a handler | reset |
 //! | thread mode stands still for 2 s, or the core is locked up | reset by the watchdog |
 
-use crate::shared::RESET_REASON;
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicU8, Ordering};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use embassy_stm32::pac::{DBGMCU, RCC};
@@ -17,6 +16,9 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_time::{Duration, Timer};
 use hivtac_wire::health::ResetReason;
 use panic_probe as _;
+
+/// Why the microcontroller started, a `ResetReason`. Written at boot; read by the memory task.
+static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
 
 /// A quarter of the watchdog's time.
 const FEED_PERIOD: Duration = Duration::from_millis(500);
@@ -42,6 +44,20 @@ pub fn report_reset() {
         reasons.iwdg1rstf()
     );
     RCC.rsr().modify(|w| w.set_rmvf(true));
+}
+
+/// Why the microcontroller started.
+pub fn reset_reason() -> ResetReason {
+    const REASONS: [ResetReason; 5] = [
+        ResetReason::PowerOn,
+        ResetReason::BrownOut,
+        ResetReason::Pin,
+        ResetReason::Software,
+        ResetReason::Watchdog,
+    ];
+    let number = RESET_REASON.load(Ordering::Relaxed);
+    let reason = REASONS.into_iter().find(|reason| *reason as u8 == number);
+    reason.unwrap_or(ResetReason::Other)
 }
 
 /// Starts the watchdog and feeds it from thread mode: it bites when something above never lets

@@ -8,7 +8,7 @@
 //!                                         └→ memory → flash
 //! ```
 //!
-//! Who interrupts whom: [`priorities`]. What they share: [`shared`]. What lies where: `memory.x`,
+//! Who interrupts whom: [`priorities`]. What they share: `docs/firmware.md`. What lies where: `memory.x`,
 //! [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
@@ -23,19 +23,21 @@ mod camera;
 mod capture;
 mod capture_task;
 mod commands;
+mod condition;
+mod dtcm_table;
 mod faults;
 mod flash;
-mod health;
 mod info;
+mod led;
 mod loader;
 mod log;
 mod memory;
 mod model;
 mod model_slots;
 mod model_upload;
-mod near_table;
 mod next_model;
 mod next_threshold;
+mod orders;
 mod outbox;
 mod pipeline_task;
 mod priorities;
@@ -43,7 +45,6 @@ mod seeded_bugs;
 mod self_test;
 mod session;
 mod settings;
-mod shared;
 mod snapshot;
 mod snapshot_copy;
 mod stack;
@@ -58,17 +59,16 @@ use band_copy::BandCopy;
 use camera::Format;
 use cortex_m_rt::entry;
 use defmt_rtt as _;
+use dtcm_table::Sensor;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_terms::camera::CameraSettings;
-use hivtac_terms::threshold::Threshold;
 use hivtac_wire::kept::Record;
 use memory::Memory;
 use model::Chosen;
 use next_model::InUse;
-use pipeline_task::Sensor;
 use snapshot_copy::SnapshotCopy;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -116,7 +116,7 @@ fn start() -> Foreground {
     priorities::set();
     let board = board::start();
     faults::report_reset();
-    vsync::start();
+    vsync::start(camera::VSYNC_BLANKING_IS_HIGH);
     let sensor = SENSOR.take();
     let mut memory = Memory::open(board.flash, board.thermometer);
     settings::set_name(memory.record().name.clone());
@@ -129,7 +129,7 @@ fn start() -> Foreground {
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
     usb.spawn(token(memory::run(memory)));
-    usb.spawn(token(health::run(board.led)));
+    usb.spawn(token(led::run(board.led)));
     let capture = CAPTURE_EXECUTOR.start(priorities::CAPTURE_EXECUTOR);
     capture.spawn(token(capture_task::run(
         board.camera,
@@ -148,11 +148,7 @@ fn start() -> Foreground {
 /// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
 fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
     let Chosen { model, source, .. } = chosen;
-    let mut settings = model::settings(model.as_ref());
-    let is_sent = |kept: &Threshold| Format::of(kept.format()).is_some() && kept.check().is_ok();
-    if let Some(threshold) = kept.threshold.filter(is_sent) {
-        settings.threshold = threshold;
-    }
+    let settings = model::settings(model.as_ref(), kept.threshold);
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
     }

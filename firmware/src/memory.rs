@@ -10,14 +10,15 @@
 use crate::flash::SecondBank;
 use crate::model::{self, Chosen};
 use crate::model_upload::{self, Whole};
-use crate::pipeline_task::Order;
+use crate::orders::{ORDERS, Order};
 use crate::self_test::{self, OfFlash};
 use crate::session::Asked;
 use crate::settings::InUse;
-use crate::shared::{CAMERA_AFRESH, MEMORY_ORDER, MEMORY_ORDERED, NEXT_MODEL, ORDERS};
 use crate::thermometer::Thermometer;
-use crate::{camera, log, model_slots, outbox, settings};
-use core::sync::atomic::Ordering;
+use crate::{camera, capture_task, log, model_slots, outbox, settings};
+use core::sync::atomic::{AtomicBool, Ordering};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::down::Down;
@@ -27,8 +28,14 @@ use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
 
 const _: () = assert!(MAX_BYTES <= PAYLOAD_LIMIT);
 
+/// What a host asks of the flash. From the USB tasks.
+static MEMORY_ORDER: Signal<CriticalSectionRawMutex, MemoryOrder> = Signal::new();
+
+/// Such an order is under way. Set by the USB tasks, cleared by the memory task.
+static MEMORY_ORDERED: AtomicBool = AtomicBool::new(false);
+
 /// What a host asks of it, and who.
-pub struct MemoryOrder {
+struct MemoryOrder {
     action: Action,
     asked: Asked,
 }
@@ -58,6 +65,11 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
     let asked = Asked::by(id);
     MEMORY_ORDER.signal(MemoryOrder { action, asked });
     None
+}
+
+/// Whether something is under way.
+pub fn is_ordered() -> bool {
+    MEMORY_ORDERED.load(Ordering::Relaxed)
 }
 
 /// What is kept, and where.
@@ -128,9 +140,12 @@ impl Memory {
             Err(outcome) => Some(outcome),
             // The pipeline replies, when it uses the model.
             Ok(next) => {
-                NEXT_MODEL.signal(next);
-                let afresh = matches!(action, Action::Reset);
-                ORDERS.send(Order::UseModel { asked, afresh }).await;
+                let order = Order::UseModel {
+                    asked,
+                    next,
+                    afresh: matches!(action, Action::Reset),
+                };
+                ORDERS.send(order).await;
                 None
             }
         };
@@ -288,7 +303,7 @@ impl Memory {
         settings::set_name(Name::new());
         settings::set_down(Down::default());
         if camera::report().settings != CameraSettings::default() {
-            CAMERA_AFRESH.signal(());
+            capture_task::set_afresh();
         }
         Ok(Chosen::built_in(ModelSource::BuiltIn))
     }

@@ -1,9 +1,9 @@
 //! The model: the built-in one, or one that a host sent; and whether it is one for this sensor.
 
 use crate::camera::{self, Format};
+use crate::dtcm_table::Sensor;
 use crate::flash::SecondBank;
 use crate::model_slots;
-use crate::pipeline_task::Sensor;
 use core::fmt;
 use hivtac_sensor::force::model::{AlignedFile, Model, ModelError, Origin};
 use hivtac_sensor::known_answer::Answer;
@@ -170,20 +170,20 @@ pub fn check(file: &'static [u8]) -> Result<Model<'static>, Refusal> {
     if matches!(conditions.origin, Origin::Unit(unit) if unit != embassy_stm32::uid::uid()) {
         return Err(Refusal::Unit);
     }
-    match settings(Some(&model)).check() {
+    match settings(Some(&model), None).check() {
         Ok(()) => Ok(model),
         Err(_) => Err(Refusal::Settings),
     }
 }
 
-/// The camera's frames and the threshold that the model was made for, or the usual one of its
-/// pixels. A built-in model for pixels that the camera does not send gives no force then, and every
-/// sample says so.
-pub fn settings(model: Option<&Model<'static>>) -> Settings {
+/// The camera's frames, and the user's `own` threshold, the one that the model was made for, or the
+/// usual one of the camera's pixels: the first that is for pixels that the camera sends. A built-in
+/// model for other pixels gives no force then, and every sample says so.
+pub fn settings(model: Option<&Model<'static>>, own: Option<Threshold>) -> Settings {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;
-    let sent = |model: &&Model| Format::of(model.conditions.threshold.format()).is_some();
-    match model.filter(sent) {
+    let is_sent = |threshold: &Threshold| Format::of(threshold.format()).is_some();
+    let usual = match model.filter(|model| is_sent(&model.conditions.threshold)) {
         Some(model) => Settings {
             geometry,
             ..model.conditions.settings(order)
@@ -192,5 +192,10 @@ pub fn settings(model: Option<&Model<'static>>) -> Settings {
             threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
             ..Settings::usual(geometry, order)
         },
+    };
+    let own = own.filter(|own| is_sent(own) && own.check().is_ok());
+    Settings {
+        threshold: own.unwrap_or(usual.threshold),
+        ..usual
     }
 }

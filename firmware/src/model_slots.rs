@@ -6,12 +6,15 @@
 //! that does not change until it is given back: by the memory task when it is refused, by the
 //! pipeline when another model is in use.
 
-use crate::shared::LENT;
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 use hivtac_wire::message::MODEL_BYTES;
 
 /// How many there are.
-pub const COUNT: usize = 2;
+const COUNT: usize = 2;
+
+/// Slots that may not be written. Set at boot and by the memory task; cleared by them and the
+/// pipeline.
+static LENT: [AtomicBool; COUNT] = [const { AtomicBool::new(false) }; _];
 
 /// Files lie at a multiple of four, so that kernels run them, and of a line of the data cache.
 #[repr(C, align(32))]

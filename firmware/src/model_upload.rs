@@ -2,13 +2,17 @@
 
 use crate::model_slots;
 use crate::session;
-use crate::shared::{MEMORY_ORDERED, UPLOAD};
-use core::sync::atomic::Ordering;
+use core::cell::Cell;
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use hivtac_wire::message::{MODEL_BYTES, ModelPart, Outcome};
+
+/// A model on its way. Used by the USB tasks and the memory task.
+static UPLOAD: CriticalSectionMutex<Cell<Option<Upload>>> =
+    CriticalSectionMutex::new(Cell::new(None));
 
 /// What has come so far.
 #[derive(Clone, Copy)]
-pub struct Upload {
+struct Upload {
     conversation: u32,
     slot: u8,
     bytes: u32,
@@ -24,13 +28,13 @@ pub struct Whole {
     pub bytes: u32,
 }
 
-/// A file of so many bytes begins; what came before is forgotten.
+/// A file of so many bytes begins; what came before is forgotten. Only while the memory task has no
+/// order.
 pub fn begin(bytes: u32) -> Outcome {
     if bytes == 0 || bytes > MODEL_BYTES as u32 {
         return Outcome::InvalidArgument;
     }
-    let free = model_slots::free().filter(|_| !MEMORY_ORDERED.load(Ordering::Relaxed));
-    let upload = free.map(|slot| Upload {
+    let upload = model_slots::free().map(|slot| Upload {
         conversation: session::number(),
         slot,
         bytes,

@@ -1,8 +1,8 @@
 //! The model in use, and how another one takes its place: between two frames.
 
+use crate::dtcm_table::Sensor;
 use crate::model::{self, Chosen};
 use crate::model_slots;
-use crate::pipeline_task::Sensor;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::ModelSource;
 
@@ -39,13 +39,13 @@ pub fn bring_into_use(
     let used = *sensor.settings();
     let made_for = sensor.model().map(|model| model.conditions.threshold);
     let is_own = made_for.is_some_and(|threshold| threshold != used.threshold);
-    let mut settings = model::settings(next.model.as_ref());
-    let wanted = match is_own && !afresh {
-        true => used.threshold,
-        false => settings.threshold,
-    };
+    let own = (is_own && !afresh).then_some(used.threshold);
+    let mut settings = model::settings(next.model.as_ref(), own);
+    let wanted = settings.threshold;
     let sends_it = wanted.format() == used.threshold.format();
-    settings.threshold = if sends_it { wanted } else { used.threshold };
+    if !sends_it {
+        settings.threshold = used.threshold;
+    }
     let now = InUse::of(&next);
     let configured = match afresh {
         true => sensor.configure(settings, next.model),

@@ -2,9 +2,9 @@
 //! another pixel format, with the first frame of that format. Until then the one before serves.
 
 use crate::camera::Format;
-use crate::pipeline_task::Sensor;
+use crate::capture_task;
+use crate::dtcm_table::Sensor;
 use crate::session::Asked;
-use crate::shared::REQUESTED_FORMAT;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::Outcome;
 
@@ -54,7 +54,7 @@ impl NextThreshold {
 
     fn begin(&mut self, asked: Asked, threshold: Threshold, format: Format) {
         self.0 = Some((asked, threshold));
-        REQUESTED_FORMAT.signal(format);
+        capture_task::request_format(format);
     }
 
     /// Brings the threshold that waited into use: the camera sends its pixels now. Tells who asked

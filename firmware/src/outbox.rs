@@ -1,10 +1,21 @@
 //! What waits to be sent to the host. Bounded: nobody who measures ever waits for the host.
 
-use crate::shared::{ANSWERS, SAMPLES};
-use crate::snapshot::Outgoing;
 use crate::{session, stats};
-use embassy_futures::select::{Either3, select3};
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
 use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Sample};
+
+/// What waits for the sender, one of the USB tasks.
+type Queue<T, const N: usize> = Channel<CriticalSectionRawMutex, T, N>;
+
+/// Hellos, replies, statistics and log lines. From the USB tasks, the pipeline and the capture task.
+static ANSWERS: Queue<DeviceMessage, 8> = Queue::new();
+
+/// Samples: 0.2 s of them. Older ones are worth more than a gap, but not more than a fresh
+/// measurement's latency. From the pipeline.
+#[unsafe(link_section = ".sram.samples")]
+static SAMPLES: Queue<Sample, 32> = Queue::new();
 
 /// Queues an answer that the host waits for; waits for room. Only for tasks that serve the host.
 pub async fn answer(message: DeviceMessage) {
@@ -28,12 +39,11 @@ pub fn offer_sample(sample: Sample) {
     }
 }
 
-/// The next message to send; answers go before samples, and these before a snapshot's parts.
-pub async fn next(snapshot: &mut Outgoing) -> DeviceMessage {
-    match select3(ANSWERS.receive(), SAMPLES.receive(), snapshot.next()).await {
-        Either3::First(answer) => answer,
-        Either3::Second(sample) => DeviceMessage::Sample(sample),
-        Either3::Third(message) => message,
+/// The next message to send; answers go before samples.
+pub async fn next() -> DeviceMessage {
+    match select(ANSWERS.receive(), SAMPLES.receive()).await {
+        Either::First(answer) => answer,
+        Either::Second(sample) => DeviceMessage::Sample(sample),
     }
 }
 

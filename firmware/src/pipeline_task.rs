@@ -3,13 +3,14 @@
 use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
 use crate::camera;
-use crate::capture::{self, CaptureEvent};
-use crate::health::{self, Condition};
-use crate::near_table::NearTable;
+use crate::capture::{self, CAPTURE_EVENTS, CaptureEvent};
+use crate::condition::{self, Condition};
+use crate::dtcm_table::Sensor;
+use crate::model::Chosen;
 use crate::next_model::{self, InUse};
 use crate::next_threshold::NextThreshold;
+use crate::orders::{ORDERS, Order};
 use crate::session::Asked;
-use crate::shared::{CAPTURE_EVENTS, NEXT_MODEL, ORDERS};
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
 use crate::{outbox, session, settings, stats, vsync};
@@ -18,59 +19,12 @@ use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::rest::Rest;
-use hivtac_sensor::pipeline::{self, Measurement};
+use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::TemporalSettings;
-use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{DeviceMessage, Outcome, Sample};
 use hivtac_wire::settings::RestPosition;
-
-/// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
-pub enum Order {
-    /// Use this threshold and its pixel format as soon as possible.
-    SetThreshold {
-        /// Of the command.
-        id: u16,
-        /// As it came, unchecked.
-        threshold: Threshold,
-    },
-    /// Take the mean of the next good frames as the rest position.
-    Tare {
-        /// Of the command.
-        id: u16,
-        /// How many; unchecked.
-        frames: u16,
-        /// Also when something moves or touches the film.
-        insists: bool,
-    },
-    /// Take this as the rest position, or none.
-    SetTare {
-        /// Of the command.
-        id: u16,
-        /// As it came, unchecked.
-        position: Option<RestPosition>,
-    },
-    /// Follow forces so from the next frame on.
-    SetTemporal {
-        /// Of the command.
-        id: u16,
-        /// As they came, unchecked.
-        settings: TemporalSettings,
-    },
-    /// Keep the next whole frame and send it.
-    Snapshot(Asked),
-    /// Use the model of [`NEXT_MODEL`].
-    UseModel {
-        /// Of the command.
-        asked: Asked,
-        /// With its threshold and no tare, whatever is in use.
-        afresh: bool,
-    },
-}
-
-/// The pipeline, its table in DTCM.
-pub type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
 /// Runs for ever in thread mode. `sensor` is configured with `model`.
 #[embassy_executor::task]
@@ -196,7 +150,7 @@ impl PipelineTask {
         stats::DROPPED_SIZE.add(tally.size);
         stats::DROPPED_SETUP.add(tally.passed);
         if tally.overrun + tally.size > 0 {
-            health::set(Condition::NoForce);
+            condition::set(Condition::NoForce);
         }
     }
 
@@ -235,11 +189,7 @@ impl PipelineTask {
                 }
             }
             Order::Tare { id, .. } if self.taring.is_some() => outbox::reply(id, Outcome::Busy),
-            Order::Tare {
-                id,
-                frames,
-                insists,
-            } => match Taring::begin(id, frames, insists) {
+            Order::Tare { id, frames, anyway } => match Taring::begin(id, frames, anyway) {
                 Some(taring) => self.taring = Some(taring),
                 None => outbox::reply(id, Outcome::InvalidArgument),
             },
@@ -255,15 +205,16 @@ impl PipelineTask {
                 outbox::reply(id, outcome);
             }
             Order::Snapshot(asked) => self.snapshots.begin(asked),
-            Order::UseModel { asked, afresh } => self.use_model(asked, afresh),
+            Order::UseModel {
+                asked,
+                next,
+                afresh,
+            } => self.use_model(asked, next, afresh),
         }
     }
 
     /// Between two frames, so that none is of two models.
-    fn use_model(&mut self, asked: Asked, afresh: bool) {
-        let Some(next) = NEXT_MODEL.try_take() else {
-            return;
-        };
+    fn use_model(&mut self, asked: Asked, next: Chosen, afresh: bool) {
         self.give_up_tare();
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
@@ -358,7 +309,7 @@ impl PipelineTask {
             self.follow();
         }
         self.tare_with(&measurement);
-        health::set(match measurement.force {
+        condition::set(match measurement.force {
             Some(_) => Condition::Good,
             None => Condition::NoForce,
         });
@@ -374,9 +325,9 @@ impl PipelineTask {
     /// Looks at the frame again when the pipeline asks for it and all its bands are still in the
     /// ring. What is overwritten meanwhile leaves the measurement as it is.
     fn look_again(&mut self, measurement: &mut Measurement, delivery: &Delivery) {
-        if !self.sensor.look_again() {
+        let Some(again) = self.sensor.look_again() else {
             return;
-        }
+        };
         self.bands.rewind();
         let first = self.last_band.wrapping_sub(u32::from(SHAPE.bands()) - 1);
         for index in 0..SHAPE.bands() {
@@ -390,7 +341,7 @@ impl PipelineTask {
             };
             self.sensor.push_rows_below(fetched.above, fetched.rows);
         }
-        *measurement = self.sensor.finish_frame();
+        *measurement = self.sensor.finish_again(again);
     }
 
     fn sample(

@@ -12,16 +12,23 @@
 //! were sent, and the built-in model that kernels and arithmetic work. `docs/firmware.md` has the
 //! argument.
 
-use crate::health::{self, Condition};
+use crate::condition::{self, Condition};
+use crate::dtcm_table::Sensor;
 use crate::model;
-use crate::pipeline_task::Sensor;
 use crate::settings;
-use crate::shared::{AT_START, CAMERA_PROBLEM, RESET_REASON};
-use crate::{camera, stack};
-use core::sync::atomic::Ordering;
+use crate::{camera, faults, stack};
+use core::sync::atomic::{AtomicU32, Ordering};
 use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::ModelSource;
 use hivtac_wire::settings::Found;
+
+/// What the self-test found at the start, bits of `Problem`. Written at boot and by the capture
+/// task; read by the memory task and the LED task.
+static AT_START: AtomicU32 = AtomicU32::new(0);
+
+/// Why the camera could not be set up, a bit of `Problem`; 0 when it could. Written by the capture
+/// task; read by the memory task.
+static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
 
 /// Above this the microcontroller is hotter than its data sheet has it, hundredths of a degree.
 const HOTTEST: i16 = 8_500;
@@ -43,11 +50,14 @@ pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health 
     let at_start = AT_START.load(Ordering::Relaxed);
     let is_hot = temperature_centidegrees.is_none_or(|temperature| temperature > HOTTEST);
     let found = [
-        (Problem::CameraSilent, health::get() == Condition::NoCamera),
+        (
+            Problem::CameraSilent,
+            condition::get() == Condition::NoCamera,
+        ),
         (Problem::Temperature, is_hot),
     ];
     Health {
-        reset: reset_reason(),
+        reset: faults::reset_reason(),
         temperature_centidegrees,
         stack_used: stack::used(),
         stack_bytes: stack::bytes(),
@@ -68,7 +78,7 @@ pub fn at_start(flash: &OfFlash, sensor: &mut Sensor) {
 
 /// What can be looked at any time.
 fn standing(flash: &OfFlash) -> u32 {
-    let reset = reset_reason();
+    let reset = faults::reset_reason();
     let model = settings::of_pipeline().and_then(|told| told.model);
     let source = model.as_ref().map(|model| model.source);
     bits(&[
@@ -129,17 +139,4 @@ pub fn failed_at_start() -> bool {
     let otherwise = TOLD_OTHERWISE.map(Problem::bit);
     let otherwise = otherwise.iter().fold(0, |all, bit| all | bit);
     AT_START.load(Ordering::Relaxed) & !otherwise != 0
-}
-
-fn reset_reason() -> ResetReason {
-    const REASONS: [ResetReason; 5] = [
-        ResetReason::PowerOn,
-        ResetReason::BrownOut,
-        ResetReason::Pin,
-        ResetReason::Software,
-        ResetReason::Watchdog,
-    ];
-    let number = RESET_REASON.load(Ordering::Relaxed);
-    let reason = REASONS.into_iter().find(|reason| *reason as u8 == number);
-    reason.unwrap_or(ResetReason::Other)
 }

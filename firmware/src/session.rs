@@ -1,7 +1,16 @@
 //! Whether a host listens, and what it wants: a conversation as `docs/wire.md` defines it.
 
-use crate::shared::{CONVERSATION, SESSION_OPEN, STREAMING, WITH_MARKERS};
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+/// A host speaks our version. This and the following are written by the USB tasks; this one is read
+/// by them, the pipeline and the capture task.
+static SESSION_OPEN: AtomicBool = AtomicBool::new(false);
+/// Samples and statistics flow. Read by the pipeline and the USB tasks.
+static STREAMING: AtomicBool = AtomicBool::new(false);
+/// Samples carry markers. Read by the pipeline.
+static WITH_MARKERS: AtomicBool = AtomicBool::new(false);
+/// Another one for each conversation. Read by the USB tasks, the pipeline and the capture task.
+static CONVERSATION: AtomicU32 = AtomicU32::new(0);
 
 /// A hello began a new conversation; `understood` when host and device speak the same version.
 pub fn begin(understood: bool) {

@@ -1,9 +1,9 @@
 //! The settings in use, as the host sees them and as they are kept: told by the pipeline, read by
 //! the USB tasks.
 
-use crate::pipeline_task::Sensor;
-use crate::shared::{DOWN, NAME, PIPELINE};
+use crate::dtcm_table::Sensor;
 use core::cell::Cell;
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::CameraMotion;
 use hivtac_sensor::force::rest::Rest;
@@ -18,6 +18,18 @@ use hivtac_terms::threshold::Threshold;
 use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{ModelIdentity, ModelSource, Outcome};
 use hivtac_wire::settings::{Moved, Name, RestPosition, TareReport};
+
+/// What the pipeline measures with; nothing before it is configured. Written at boot and by the
+/// pipeline; read by the USB tasks and the memory task.
+static PIPELINE: CriticalSectionMutex<Cell<Option<OfPipeline>>> =
+    CriticalSectionMutex::new(Cell::new(None));
+
+/// The device's name. Written at boot and by the USB tasks; read by them and the memory task.
+static NAME: CriticalSectionMutex<Cell<Name>> = CriticalSectionMutex::new(Cell::new(Name::new()));
+
+/// What is known of gravity. Written at boot, by the USB tasks and, when all is forgotten, by the
+/// memory task; read by that and, before each frame, by the pipeline.
+static DOWN: CriticalSectionMutex<Cell<Down>> = CriticalSectionMutex::new(Cell::new(Down::Fixed));
 
 /// What the pipeline measures with.
 #[derive(Clone)]

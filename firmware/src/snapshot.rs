@@ -7,17 +7,24 @@
 //! as soon as they look, so that it never stands in the next one's way.
 
 use crate::bands::{BAND_BYTES, SHAPE};
-use crate::commands;
+use crate::orders::{self, Order};
 use crate::outbox;
-use crate::pipeline_task::Order;
 use crate::session::{self, Asked};
-use crate::shared::{SNAPSHOT_FOR, SNAPSHOT_TAKEN};
 use core::mem::MaybeUninit;
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicU32, Ordering};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use heapless::Vec;
 use hivtac_wire::message::{
     DeviceMessage, Outcome, Reply, SNAPSHOT_PART_BYTES, Snapshot, SnapshotPart,
 };
+
+/// The conversation that a snapshot is under way for; 0 when none is. Set by the USB tasks, cleared
+/// by them and the pipeline.
+static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
+
+/// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
+static SNAPSHOT_TAKEN: Signal<CriticalSectionRawMutex, Taken> = Signal::new();
 
 /// Bytes of a frame.
 pub const FRAME_BYTES: usize = SHAPE.bands() as usize * BAND_BYTES;
@@ -49,11 +56,16 @@ pub fn ask(id: u16) -> Option<Outcome> {
         return Some(Outcome::Busy);
     }
     let asked = Asked::by(id);
-    let refused = commands::order(Order::Snapshot(asked));
+    let refused = orders::order(Order::Snapshot(asked));
     if refused.is_some() {
         end(asked);
     }
     refused
+}
+
+/// Has the sender send a frame.
+pub fn send(taken: Taken) {
+    SNAPSHOT_TAKEN.signal(taken);
 }
 
 /// The snapshot is no longer under way.

@@ -16,7 +16,6 @@ use crate::block_move::{BlockMove, End};
 use crate::camera::{HEIGHT, WIDTH};
 use crate::outbox;
 use crate::session::Asked;
-use crate::shared::SNAPSHOT_TAKEN;
 use crate::snapshot::{self, FRAME_BYTES, Taken};
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::{Duration, Instant};
@@ -107,7 +106,7 @@ impl SnapshotCopy {
             bytes: FRAME_BYTES as u32,
         };
         let asked = wanted.asked;
-        SNAPSHOT_TAKEN.signal(Taken { asked, header });
+        snapshot::send(Taken { asked, header });
     }
 
     /// There was no whole frame in time.

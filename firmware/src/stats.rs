@@ -1,6 +1,5 @@
 //! Counters since boot, from every task and handler.
 
-use crate::shared::PASSING_OVER;
 use crate::vsync;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_time::{Duration, Instant};
@@ -44,8 +43,12 @@ impl Counter {
     }
 }
 
+/// Number of the newest frame before the camera's set-up, while that lasts. Written by the capture
+/// task; read by the USB tasks.
+static PASSING_OVER: AtomicU32 = AtomicU32::new(NOT_PASSING);
+
 /// [`PASSING_OVER`] while the camera is not being set up.
-pub const NOT_PASSING: u32 = u32::MAX;
+const NOT_PASSING: u32 = u32::MAX;
 
 /// From now on, every frame after number `last` counts as dropped.
 pub fn pass_over_frames_after(last: u32) {

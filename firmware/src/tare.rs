@@ -1,7 +1,7 @@
 //! A tare under way: which command it answers, what it has, and when it gives up.
 
 use crate::camera;
-use crate::pipeline_task::Sensor;
+use crate::dtcm_table::Sensor;
 use crate::session;
 use embassy_time::{Duration, Instant};
 use hivtac_sensor::force::rest::Rest;
@@ -23,20 +23,16 @@ pub struct Taring {
 }
 
 impl Taring {
-    /// For command `id`, over `frames` good frames; when the host `insists`, also while something
+    /// For command `id`, over `frames` good frames; when the host `anyway`, also while something
     /// moves or touches the film. `None` when that number is out of its range.
-    pub fn begin(id: u16, frames: u16, insists: bool) -> Option<Self> {
+    pub fn begin(id: u16, frames: u16, anyway: bool) -> Option<Self> {
         let frame_time = camera::frame_time(camera::report().settings.rate);
         let patience = frame_time * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
         let builder = TareBuilder::new(frames)?;
         Some(Self {
             id,
             conversation: session::number(),
-            builder: if insists {
-                builder.insisting()
-            } else {
-                builder
-            },
+            builder: if anyway { builder.insisting() } else { builder },
             deadline: Instant::now() + patience,
         })
     }

@@ -19,6 +19,7 @@ use crate::snapshot::Outgoing;
 use crate::usb_guard::Guarded;
 use crate::{commands, outbox, session, stats};
 use embassy_futures::join::join5;
+use embassy_futures::select::{Either, select};
 use embassy_stm32::usb::{self, Driver};
 use embassy_stm32::{bind_interrupts, peripherals};
 use embassy_time::{Duration, Ticker, with_timeout};
@@ -115,7 +116,9 @@ async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
     let mut cut = true;
     let mut snapshot = Outgoing::NONE;
     loop {
-        let message = outbox::next(&mut snapshot).await;
+        // What waits in the outbox goes before a snapshot's parts.
+        let (Either::First(message) | Either::Second(message)) =
+            select(outbox::next(), snapshot.next()).await;
         let Some(frame) = buffer.get_mut(1..) else {
             return;
         };

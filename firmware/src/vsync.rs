@@ -5,25 +5,30 @@
 //! frame's first row until then the newest counted edge is the one that began it, however late a
 //! handler looks within that time.
 
-use crate::camera;
-use crate::shared::NEWEST_EDGE;
 use core::cell::Cell;
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::{self, EXTI, SYSCFG};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::Instant;
 use hivtac_capture::Edge;
+
+/// The newest edge. Written by the handler below, and set to zero by the capture task; read by the
+/// capture handlers, the capture task, the pipeline and the USB tasks.
+static NEWEST_EDGE: CriticalSectionMutex<Cell<Edge>> = CriticalSectionMutex::new(Cell::new(Edge {
+    number: 0,
+    time_us: 0,
+}));
 
 /// The VSYNC pin is PB7 on every board with this camera connector.
 const LINE: usize = 7;
 const PORT_B: u8 = 1;
 
 /// Begins to listen. The pin itself is set up with the camera interface's pins: EXTI sees it
-/// whatever its function.
-pub fn start() {
+/// whatever its function. The level is that of the line during vertical blanking.
+pub fn start(blanking_is_high: bool) {
     SYSCFG
         .exticr(LINE / 4)
         .modify(|w| w.set_exti(LINE % 4, PORT_B));
-    let blanking_is_high = camera::VSYNC_BLANKING_IS_HIGH;
     critical_section::with(|_| {
         EXTI.ftsr(0).modify(|w| w.set_line(LINE, blanking_is_high));
         EXTI.rtsr(0).modify(|w| w.set_line(LINE, !blanking_is_high));

@@ -127,9 +127,9 @@ impl<'a> Bench<'a> {
         let mut measurement = sensor.measure_frame(&picture.pixels);
         // What the threshold makes of the picture, whatever another look does.
         let blobs = sensor.blobs().to_vec();
-        if sensor.look_again() {
+        if let Some(again) = sensor.look_again() {
             sensor.push_rows(&picture.pixels);
-            measurement = sensor.finish_frame();
+            measurement = sensor.finish_again(again);
         }
         let finding = Finding::new(path, sensor.settings(), &blobs, measurement);
         Ok(if self.options.json {

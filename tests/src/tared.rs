@@ -278,15 +278,16 @@ impl TaredSensor {
                 sensor.push_rows_below(above, band);
                 above = band;
             }
-            sensor.finish_frame()
         };
         sensor.forget_frame();
         sensor.begin_frame();
-        let mut measurement = push(sensor);
-        if sensor.look_again() {
-            measurement = push(sensor);
-        }
-        measurement
+        push(sensor);
+        let measurement = sensor.finish_frame();
+        let Some(again) = sensor.look_again() else {
+            return measurement;
+        };
+        push(sensor);
+        sensor.finish_again(again)
     }
 
     /// What the pipeline makes of a frame.

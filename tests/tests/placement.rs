@@ -118,7 +118,7 @@ fn the_sensing_runs_from_itcm() {
 fn what_every_pixel_needs_lies_in_dtcm() {
     let symbols = symbols();
     let rows = variables(&symbols, &["band_copy", "BUFFERS"]);
-    let table = variables(&symbols, &["near_table", "TABLE"]);
+    let table = variables(&symbols, &["dtcm_table", "TABLE"]);
     for symbol in rows.into_iter().chain(table) {
         assert!(symbol.lies_in(&DTCM), "{}", symbol.name);
     }

@@ -1,10 +1,9 @@
 //! The board in use: all of its pins and clocks. A cargo feature says which; each is one file with
 //! the same names.
 
-mod free_bus;
 mod parts;
 mod silicon;
-pub use parts::{BUS_CLOCK, CameraLines, StatusLed, UsbPort, free_camera_bus};
+pub use parts::{StatusLed, UsbPort};
 pub use silicon::revision as silicon_revision;
 
 #[cfg(feature = "board-openmv-h7")]

@@ -12,11 +12,11 @@
 //! | LED (green) | PC1, low = on |
 //! | crystal | 12 MHz |
 
-use super::parts::{self, Board, CameraLines, StatusLed, UsbPort, WATCHDOG};
+use super::parts::{self, Board, StatusLed, UsbPort, WATCHDOG};
 use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
-use crate::camera::{Bus, Camera};
+use crate::camera::{Bus, Camera, CameraLines, XCLK_HZ};
 use crate::capture::Capture;
 use crate::flash::SecondBank;
 use crate::priorities;
@@ -33,15 +33,13 @@ use embassy_stm32::{Peri, pac, peripherals};
 
 /// Name in the device's hello.
 pub const NAME: &str = "openmv-h7";
-/// The camera's clock: what timers count, divided.
-pub const XCLK_HZ: u32 = TIMER_HZ / XCLK_DIVIDER;
-
 const CRYSTAL_HZ: u32 = 12_000_000;
 /// What TIM1 counts: twice the peripherals' clock.
 const TIMER_HZ: u32 = 240_000_000;
-/// 26.67 MHz, of which the MT9V034 takes 27 at most. High for four ninths of it: OpenMV's firmware
-/// gives the module the same.
+/// The camera's clock is high for four ninths of its period: OpenMV's firmware gives the module the
+/// same.
 const XCLK_DIVIDER: u32 = 9;
+const _: () = assert!(XCLK_HZ == TIMER_HZ / XCLK_DIVIDER);
 
 /// Starts the clocks and sets up every pin. Call once. On silicon that is too old it does not
 /// return.

@@ -1,9 +1,8 @@
 //! What boards have in common: an STM32H743 with a camera on DCMI and I²C1, a crystal, USB and an
 //! LED.
 
-use super::free_bus::{self, Lines};
 use crate::band_copy::BandCopy;
-use crate::camera::Camera;
+use crate::camera::{BUS_CLOCK, Camera};
 use crate::capture::Capture;
 use crate::flash::SecondBank;
 use crate::seeded_bugs;
@@ -14,19 +13,14 @@ use embassy_stm32::i2c;
 use embassy_stm32::rcc::*;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Peri, pac, peripherals};
-use embassy_time::{Duration, Timer};
+use embassy_stm32::{Peri, peripherals};
+use embassy_time::Duration;
 
-/// Of the camera's control bus. The pins' own pull-ups help those on the board.
-pub const BUS_CLOCK: Hertz = Hertz::khz(100);
 /// The watchdog resets a program whose thread mode stood still for so long.
 pub const WATCHDOG: Duration = Duration::from_secs(2);
 
 /// DCMI's alternate function on each of its pins.
 const DCMI_FUNCTION: u8 = 13;
-/// How long the camera's reset line is held: thousands of its clocks.
-const RESET_PULSE: Duration = Duration::from_millis(1);
-
 /// The board's parts, set up and idle.
 pub struct Board {
     /// The camera's control side; its clock runs.
@@ -72,26 +66,6 @@ impl StatusLed {
     pub fn set(&mut self, on: bool) {
         let high = (self.on == Level::High) == on;
         self.pin.set_level(high.into());
-    }
-}
-
-/// The camera's lines besides its buses.
-pub struct CameraLines {
-    /// High = standby: the registers keep their values.
-    pub standby: Output<'static>,
-    /// Low = reset, where the microcontroller has that line.
-    pub reset: Option<Output<'static>>,
-}
-
-impl CameraLines {
-    /// Has the camera run, out of a reset where there is the line for one.
-    pub async fn wake(&mut self) {
-        self.standby.set_low();
-        if let Some(reset) = &mut self.reset {
-            reset.set_low();
-            Timer::after(RESET_PULSE).await;
-            reset.set_high();
-        }
     }
 }
 
@@ -150,18 +124,7 @@ pub fn connect_camera(pins: [Peri<'static, AnyPin>; 11]) {
     }
 }
 
-/// Has a camera that holds the control bus let go of it, and brings I²C1 to its state after a
-/// reset.
-pub fn free_camera_bus() {
-    let lines = Lines {
-        port: pac::GPIOB,
-        clock: 8,
-        data: 9,
-    };
-    lines.free();
-    free_bus::reset_i2c1();
-}
-
+/// Of the camera's control bus.
 pub fn bus_config() -> i2c::Config {
     let mut config = i2c::Config::default();
     config.frequency = BUS_CLOCK;

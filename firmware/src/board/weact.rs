@@ -11,11 +11,11 @@
 //! | LED | PE3, high = on |
 //! | crystal | 25 MHz |
 
-use super::parts::{self, Board, CameraLines, StatusLed, UsbPort, WATCHDOG};
+use super::parts::{self, Board, StatusLed, UsbPort, WATCHDOG};
 use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
-use crate::camera::{Bus, Camera};
+use crate::camera::{self, Bus, Camera, CameraLines};
 use crate::capture::Capture;
 use crate::flash::SecondBank;
 use crate::priorities;
@@ -29,10 +29,9 @@ use embassy_stm32::{Peri, pac, peripherals};
 
 /// Name in the device's hello.
 pub const NAME: &str = "weact-h743";
-/// The camera's clock: the crystal halved.
-pub const XCLK_HZ: u32 = CRYSTAL_HZ / 2;
-
 const CRYSTAL_HZ: u32 = 25_000_000;
+// The camera's clock is the crystal's, halved.
+const _: () = assert!(camera::XCLK_HZ == CRYSTAL_HZ / 2);
 
 /// Starts the clocks and sets up every pin. Call once. On silicon that is too old it does not
 /// return.

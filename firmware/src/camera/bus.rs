@@ -7,11 +7,15 @@
 //! was none (errata ES0396, "spurious bus error detection in master mode"), upon which the HAL
 //! gives the transfer up in its middle.
 
-use crate::board::{self, BUS_CLOCK};
+use super::free_bus::{self, Lines};
 use embassy_embedded_hal::SetConfig;
 use embassy_stm32::i2c::{self, I2c, Master};
 use embassy_stm32::mode::Blocking;
+use embassy_stm32::pac;
+use embassy_stm32::time::Hertz;
 
+/// Of the camera's control bus. The pins' own pull-ups help those on the board.
+pub const BUS_CLOCK: Hertz = Hertz::khz(100);
 /// Times that a transfer is tried.
 const ATTEMPTS: u32 = 3;
 
@@ -65,7 +69,7 @@ impl Bus {
                 Ok(value) => return Ok(value),
                 Err(error) => error,
             };
-            board::free_camera_bus();
+            free();
             // Never fails: the clock is the one it was made with.
             let _ = self.0.set_config(&BUS_CLOCK);
             if attempt == ATTEMPTS {
@@ -74,4 +78,16 @@ impl Bus {
             attempt += 1;
         }
     }
+}
+
+/// Has a camera that holds the control bus let go of it, and brings I²C1 to its state after a
+/// reset.
+fn free() {
+    let lines = Lines {
+        port: pac::GPIOB,
+        clock: 8,
+        data: 9,
+    };
+    lines.free();
+    free_bus::reset_i2c1();
 }

@@ -2,10 +2,13 @@
 //! same names.
 
 mod bus;
+mod free_bus;
 mod identity;
+mod lines;
 mod registers;
-pub use bus::Bus;
+pub use bus::{BUS_CLOCK, Bus};
 pub use identity::Error;
+pub use lines::CameraLines;
 pub use registers::Comparison;
 
 #[cfg(feature = "board-openmv-h7")]
@@ -22,15 +25,33 @@ mod ov7725_registers;
 #[cfg(feature = "board-weact")]
 pub use {ov7725::*, ov7725_registers::Format};
 
-use crate::shared::{CAMERA, EXPOSURE_MIDDLE_US};
 use crate::{stats, vsync};
-use core::sync::atomic::Ordering;
+use core::cell::Cell;
+use core::sync::atomic::{AtomicI32, Ordering};
+use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::{Duration, Instant};
 use hivtac_capture::Edge;
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
+
+/// From VSYNC to the middle of the exposure, µs. Written by the capture task; read by the pipeline.
+static EXPOSURE_MIDDLE_US: AtomicI32 = AtomicI32::new(0);
+
+/// How the camera is set. Written at boot and by the capture task; read by the USB tasks, the
+/// memory task and the pipeline.
+static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
+    CriticalSectionMutex::new(Cell::new(CameraReport {
+        settings: CameraSettings {
+            exposure: None,
+            gain: None,
+            rate: Rate::Full,
+        },
+        exposure: Microseconds(0),
+        gain: Sixteenths(0),
+        limits: LIMITS,
+    }));
 
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);

@@ -7,8 +7,7 @@ use super::mt9v034_registers::{
     ROW_CLOCKS, SHUTTER_WIDTH, TABLE, blank_rows, longest_exposure, rows_for,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Pace, Search, Setting, frame_time, store};
-use crate::board::{CameraLines, XCLK_HZ};
+use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
 use embassy_time::{Duration, Timer};
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, Rate};
@@ -27,6 +26,9 @@ pub const USUAL_FORMAT: Format = Format::Mono;
 pub const WIDTH: u16 = 160;
 /// Rows of a frame, px: what the markers reach in the calibrated range.
 pub const HEIGHT: u16 = 152;
+
+/// Clock that the board gives it, Hz: it takes 27 MHz at most.
+pub const XCLK_HZ: u32 = 240_000_000 / 9;
 
 /// When its rows are exposed: all at once.
 pub const MOTION: Motion = Motion::GLOBAL;

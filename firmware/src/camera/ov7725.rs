@@ -7,8 +7,7 @@ use super::ov7725_registers::{
     clock,
 };
 use super::registers::Registers;
-use super::{Bus, Error, Pace, Search, Setting, frame_time, store};
-use crate::board::{CameraLines, XCLK_HZ};
+use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
 use embassy_time::{Duration, Timer};
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraSettings, Rate};
@@ -27,6 +26,9 @@ pub const USUAL_FORMAT: Format = Format::Rgb565;
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
+
+/// Clock that the board gives it, Hz.
+pub const XCLK_HZ: u32 = 12_500_000;
 
 /// Lines from frame to frame, blank ones included.
 const LINES: u16 = 278;

@@ -60,35 +60,36 @@ pub(super) enum Look {
     /// The usual one; it gave this, and another may give more.
     Wanted(Measurement),
     /// By the cleaned mask.
-    Again(First),
+    Again,
 }
 
-/// What the first look gave.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct First {
+/// Another look under way, with what the first one gave: [`Sensor::finish_again`] ends it.
+#[derive(Debug)]
+#[must_use]
+pub struct Again {
     measurement: Measurement,
     /// Pixels that passed the threshold.
     set_pixels: u32,
 }
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// Whether another look at the frame that was finished last may give a force, and begins it:
-    /// push all rows of the frame again, and [finish](Self::finish_frame) it.
+    /// Begins another look at the frame that was finished last, if it may give a force: push all
+    /// rows of the frame again, and [finish](Self::finish_again) it.
     #[inline(never)]
-    pub fn look_again(&mut self) -> bool {
+    pub fn look_again(&mut self) -> Option<Again> {
         let Look::Wanted(measurement) = self.look else {
-            return false;
+            return None;
         };
-        let set_pixels = self.scanner.finish(&self.pixels).set_pixels;
-        self.look = Look::Again(First {
+        let again = Again {
             measurement,
-            set_pixels,
-        });
+            set_pixels: self.scanner.finish(&self.pixels).set_pixels,
+        };
+        self.look = Look::Again;
         let settings = ScanSettings {
             cleaned: true,
             ..self.settings.scan()
         };
-        self.scanner.begin(settings).is_ok()
+        self.scanner.begin(settings).ok().map(|()| again)
     }
 
     /// Whether what the first look gave calls for another.
@@ -98,17 +99,17 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         status.intersects(AGAIN) && !status.intersects(NEVER) && matches!(resting, Some(Some(_)))
     }
 
-    /// Ends another look: gives what it gave when that is a force, or else what the `first` did.
+    /// Ends another look: gives what it gave when that is a force, or else what the first one did.
     #[inline(never)]
-    pub(super) fn finish_look(&mut self, first: &First) -> Measurement {
+    pub fn finish_again(&mut self, again: Again) -> Measurement {
         let found = self.end_scan().and_then(|()| self.find_markers());
         let mut second = self.measurement(found);
         // Where markers are tells the next frame how they move, even without a force.
         if second.markers.is_some() {
             self.motion.ended(second.markers.as_ref());
         }
-        if second.force.is_none() || !self.is_disturbed(first) {
-            return first.measurement;
+        if second.force.is_none() || !self.is_disturbed(&again) {
+            return again.measurement;
         }
         second.status |= Status::FRAME_DISTURBED;
         second
@@ -116,7 +117,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 
     /// Whether specks that can be taken out, little light or noise are why the first look gave
     /// nothing.
-    fn is_disturbed(&mut self, first: &First) -> bool {
+    fn is_disturbed(&mut self, first: &Again) -> bool {
         let Geometry { width, height, .. } = self.settings.geometry;
         let pixels = u32::from(width) * u32::from(height);
         let Scan {

@@ -26,6 +26,7 @@ use crate::markers::tables::{ByteTable, Table};
 use crate::motion::Motion;
 use crate::rezero::Tare;
 use crate::temporal::Temporal;
+pub use again::Again;
 use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
@@ -288,22 +289,15 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// The same, and [looks again](Self::look_again) when that may help.
     pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
         let measurement = self.measure_frame(frame);
-        if !self.look_again() {
+        let Some(again) = self.look_again() else {
             return measurement;
-        }
+        };
         self.push_rows(frame);
-        self.finish_frame()
+        self.finish_again(again)
     }
 
     /// Ends the frame.
     pub fn finish_frame(&mut self) -> Measurement {
-        match self.look {
-            Look::Again(first) => self.finish_look(&first),
-            Look::First | Look::Wanted(_) => self.finish_first_look(),
-        }
-    }
-
-    fn finish_first_look(&mut self) -> Measurement {
         let measurement = self.measure_scanned();
         self.motion.ended(measurement.markers.as_ref());
         if self.wants_again(&measurement) {
@@ -465,7 +459,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         let resting = prepared.resting.as_ref();
         let (force, trust) = match model.forward.as_ref().zip(resting) {
             Some((forward, resting)) => {
-                let is_again = matches!(self.look, Look::Again(_));
+                let is_again = matches!(self.look, Look::Again);
                 let blur = if is_again { BLUR } else { Px(0) };
                 let noise = self.noise.of_frame(blur);
                 let estimate = resting.estimate(forward, markers, noise, &output);

@@ -26,7 +26,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         measurement: &Measurement,
     ) -> Option<Result<Rest, Refusal>> {
         // The blobs of another look are no rest position's.
-        if matches!(self.look, Look::Again(..)) {
+        if matches!(self.look, Look::Again) {
             return None;
         }
         let markers = measurement.markers.as_ref()?;

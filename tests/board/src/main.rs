@@ -9,10 +9,10 @@
 #![no_main]
 
 mod data;
+#[path = "../../../firmware/src/dtcm_table.rs"]
+mod dtcm_table;
 mod measure;
 mod meter;
-#[path = "../../../firmware/src/near_table.rs"]
-mod near_table;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug;

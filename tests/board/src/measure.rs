@@ -9,11 +9,10 @@ use hivtac_sensor::pipeline;
 use hivtac_terms::threshold::ByteOrder;
 
 use crate::data::{Frame, Network};
+use crate::dtcm_table::Sensor;
 use crate::meter::Meter;
-use crate::near_table::NearTable;
 
 /// As in the firmware.
-type Sensor = pipeline::Sensor<'static, 64, NearTable>;
 
 /// Widest row, in pixels.
 const ROW: usize = MAX_WIDTH as usize;

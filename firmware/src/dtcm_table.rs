@@ -1,16 +1,20 @@
-//! The threshold's table of 64 KiB, in DTCM whatever else the pipeline holds lies in.
+//! The threshold's table of 64 KiB, in DTCM; the rest of the pipeline lies where its owner does.
 
 use hivtac_sensor::markers::tables::{ByteTable, Pixels, Run, Table, Weights};
+use hivtac_sensor::pipeline;
 use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 use static_cell::ConstStaticCell;
 
 /// `.bss`, which is in DTCM.
 static TABLE: ConstStaticCell<ByteTable> = ConstStaticCell::new(ByteTable::CLOSED);
 
-/// The one that was set first has the table; every other accepts nothing.
-pub struct NearTable(Option<&'static mut ByteTable>);
+/// The pipeline, its threshold table in DTCM.
+pub type Sensor = pipeline::Sensor<'static, 64, DtcmTable>;
 
-impl NearTable {
+/// The threshold table in DTCM. One instance can own it; others reject every pixel.
+pub struct DtcmTable(Option<&'static mut ByteTable>);
+
+impl DtcmTable {
     /// The table, taken when it is needed first: not while pixels are not RGB565.
     fn table(&mut self) -> Option<&mut ByteTable> {
         if self.0.is_none() {
@@ -20,8 +24,8 @@ impl NearTable {
     }
 }
 
-impl Table for NearTable {
-    const CLOSED: Self = NearTable(None);
+impl Table for DtcmTable {
+    const CLOSED: Self = DtcmTable(None);
 
     fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError> {
         match self.table() {
@@ -35,7 +39,7 @@ impl Table for NearTable {
     }
 }
 
-impl Pixels for NearTable {
+impl Pixels for DtcmTable {
     fn row_length(&self, width: u16) -> usize {
         usize::from(width)
     }

@@ -9,23 +9,10 @@
 //! | two flashes a second | silicon too old: `board/silicon.rs` |
 
 use crate::board::StatusLed;
+use crate::condition::{self, Condition};
 use crate::self_test;
-use crate::shared::CONDITION;
-use core::sync::atomic::Ordering;
 use embassy_time::{Duration, Instant, Timer};
 use micromath::F32Ext;
-
-/// How the sensor is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Condition {
-    /// The camera does not answer or sends nothing.
-    NoCamera = 0,
-    /// Frames arrive but give no force.
-    NoForce = 1,
-    /// Frames give forces.
-    Good = 2,
-}
 
 /// One period of the LED's dimming: fast enough not to flicker.
 const PERIOD: Duration = Duration::from_millis(10);
@@ -33,20 +20,6 @@ const BREATH: Duration = Duration::from_secs(4);
 const SLOW_BLINK: Duration = Duration::from_secs(1);
 const FLASHES: Duration = Duration::from_secs(2);
 const FAST_BLINK: Duration = Duration::from_millis(200);
-
-/// Tells how the sensor is doing from now on.
-pub fn set(condition: Condition) {
-    CONDITION.store(condition as u8, Ordering::Relaxed);
-}
-
-/// How it is doing.
-pub fn get() -> Condition {
-    match CONDITION.load(Ordering::Relaxed) {
-        condition if condition == Condition::Good as u8 => Condition::Good,
-        condition if condition == Condition::NoForce as u8 => Condition::NoForce,
-        _ => Condition::NoCamera,
-    }
-}
 
 /// Drives the LED for ever.
 #[embassy_executor::task]
@@ -66,7 +39,7 @@ pub async fn run(mut led: StatusLed) {
 
 /// How long the LED is on in the dimming period that begins at `now`.
 fn lit_time(now: Instant) -> Duration {
-    match get() {
+    match condition::get() {
         Condition::NoCamera => blink(now, FAST_BLINK),
         _ if self_test::failed_at_start() => three_flashes(now),
         Condition::Good => {

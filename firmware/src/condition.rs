@@ -1,0 +1,33 @@
+//! How the sensor is doing: from whoever notices to LED and self-test.
+
+use core::sync::atomic::{AtomicU8, Ordering};
+
+/// A [`Condition`]. Written by the pipeline and the capture task; read by the LED task and the
+/// memory task.
+static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
+
+/// How the sensor is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Condition {
+    /// The camera does not answer or sends nothing.
+    NoCamera = 0,
+    /// Frames arrive but give no force.
+    NoForce = 1,
+    /// Frames give forces.
+    Good = 2,
+}
+
+/// Tells how the sensor is doing from now on.
+pub fn set(condition: Condition) {
+    CONDITION.store(condition as u8, Ordering::Relaxed);
+}
+
+/// How it is doing.
+pub fn get() -> Condition {
+    match CONDITION.load(Ordering::Relaxed) {
+        condition if condition == Condition::Good as u8 => Condition::Good,
+        condition if condition == Condition::NoForce as u8 => Condition::NoForce,
+        _ => Condition::NoCamera,
+    }
+}
