@@ -10,8 +10,8 @@ use serde::Serialize;
 
 /// Widest rim, px. A sharp lens makes one of 1.3, one that blurs every point by a pixel (standard
 /// deviation) one of 3, and by two pixels one of 5.3; of the hard cases of the simulated sensor,
-/// all frames are accepted at one pixel and most are refused at two (`docs/scene.md`, blur-1 and
-/// blur-2).
+/// all frames are accepted at one pixel and most are refused at two (`docs/results/hard-cases.md`,
+/// blur-1 and blur-2).
 const RIM_PX: f64 = 3.5;
 /// In YUV422, where two pixels share a colour.
 const RIM_OF_PAIRS_PX: f64 = 4.0;

@@ -1,4 +1,5 @@
-//! The pictures of `docs/scene.md`, `docs/paper-model.md` and `docs/building-a-sensor.md`.
+//! The pictures of `docs/scene.md`, `docs/results/hard-cases.md`, `docs/paper-model.md` and
+//! `docs/building-a-sensor.md`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
