@@ -3,7 +3,7 @@
     python calibration/python/train_pytorch.py data.csv net.safetensors
         [--hidden 64,64] [--epochs 100]
 
-Needs torch and safetensors. The layout that it writes is described in docs/calibration.md.
+Needs torch and safetensors. The layout that it writes is described in docs/training.md.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-//! A network trained in PyTorch, through a safetensors file (`docs/calibration.md` has the layout).
+//! A network trained in PyTorch, through a safetensors file (`docs/training.md` has the layout).
 
 use std::fs;
 use std::path::Path;

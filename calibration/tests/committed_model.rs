@@ -1,5 +1,5 @@
 //! The model that firmware and host tool embed: the committed weights give it, byte for byte, and
-//! it is as good as `docs/calibration.md` says.
+//! it is as good as `docs/training.md` says.
 
 use std::fs;
 use std::path::PathBuf;
