@@ -2,4 +2,5 @@
 
 mod dependencies;
 mod readme;
+mod shared_state;
 mod unsafe_code;
