@@ -1,6 +1,6 @@
-//! Documents that list what the sources hold list all of it, and nothing else.
+//! Documents list all that the sources hold, and lead where they say.
 
 mod dependencies;
-mod readme;
+mod links;
 mod shared_state;
 mod unsafe_code;
