@@ -22,8 +22,8 @@ use rigless::soc::stm32h743::peripherals::rcc::{HSI_HZ, HSI48_HZ, Pll, Tap, Time
 use rigless::soc::{Bus, Error};
 
 use crate::camera::{Supply, part};
-use crate::crs;
-use crate::dcmi::Pins;
+use crate::peripherals::crs;
+use crate::peripherals::dcmi::Pins;
 
 /// Port numbers as the part counts them.
 const A: usize = 0;

@@ -12,10 +12,10 @@
 //! | module | subject |
 //! |---|---|
 //! | [`command`], [`run`], [`report`] | one run from arguments to outcome |
-//! | [`chip`], [`board`], [`crs`], [`machine`], `rom`, `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
-//! | [`dcmi`], [`camera`], [`frame_source`], `control_bus` | the camera interface; the sensor; what it looks at; what goes wrong on its control bus |
-//! | [`mdma`], [`flash`] | the DMA controller that reaches DTCM; the flash's second bank, and cuts of the power |
-//! | [`otg`], [`usb_host`], [`link`], [`script`] | the USB device core; the host; who uses its serial port |
+//! | [`chip`], [`board`], [`machine`], `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
+//! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM and clock recovery |
+//! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
+//! | [`usb_host`], [`link`], [`script`] | the host; who uses its serial port |
 //! | [`faults`], [`rules`], `late_line`, `late_flags`, [`dma_reach`] | what goes wrong on request; what firmware must not do |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
@@ -26,22 +26,17 @@ pub mod camera;
 pub mod chip;
 pub mod command;
 mod control_bus;
-pub mod crs;
-pub mod dcmi;
 pub mod dma_reach;
 mod dma_requests;
 pub mod faults;
-pub mod flash;
 pub mod frame_source;
 mod late_flags;
 mod late_line;
 pub mod link;
 pub mod machine;
-pub mod mdma;
 pub mod mpu;
-pub mod otg;
+pub mod peripherals;
 pub mod report;
-mod rom;
 pub mod rules;
 pub mod run;
 pub mod script;

@@ -8,7 +8,7 @@ use rigless::snapshot::Store;
 
 use crate::chip::Chip;
 use crate::mpu::Mpu;
-use crate::rom;
+use crate::peripherals::rom;
 use crate::translations;
 
 /// The core's clock, Hz. Only SysTick's reference depends on it.

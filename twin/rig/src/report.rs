@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 
 use crate::camera::SharedCamera;
 use crate::chip::Chip;
-use crate::dcmi;
-use crate::flash::{Bank, Operation};
+use crate::peripherals::dcmi;
+use crate::peripherals::flash::{Bank, Operation};
 use crate::usb_host::{self, Port, SharedHost};
 
 /// Counters of a run.

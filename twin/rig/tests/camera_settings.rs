@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::{Run, Setup, command, firmware, openmv};
 use crate::cuts;
 use crate::settings::Device;
-use hivtac_rig::flash::Contents;
+use hivtac_rig::peripherals::flash::Contents;
 use hivtac_rig::script::Action;
 use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::status::Status;

@@ -9,7 +9,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use hivtac_rig::flash::{BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES};
+use hivtac_rig::peripherals::flash::{
+    BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES,
+};
 
 /// What is found in a device at its start, and the words of its flash that decided that.
 pub type Start<T> = (T, BTreeSet<u32>);

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use crate::common::{Run, Setup, command, firmware};
 use crate::cuts;
-use hivtac_rig::flash::{BANK, Contents, Cut, Leaves, Operation};
+use hivtac_rig::peripherals::flash::{BANK, Contents, Cut, Leaves, Operation};
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{PixelFormat, Threshold, Yuv422};

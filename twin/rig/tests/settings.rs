@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use crate::common::{Setup, command, down, firmware};
 use crate::cuts::{self, Start};
-use hivtac_rig::flash::{Contents, Cut, Leaves};
+use hivtac_rig::peripherals::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::status::Status;

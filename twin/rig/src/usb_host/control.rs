@@ -1,6 +1,6 @@
 //! Control transfers: SETUP, data, status, one transaction at a time.
 
-use crate::otg::{Answer, Core, Packet};
+use crate::peripherals::otg::{Answer, Core, Packet};
 
 /// The address the host gives the device.
 pub const ADDRESS: u8 = 7;

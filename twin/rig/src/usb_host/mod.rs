@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::arrivals::Arrivals;
 use crate::faults::{Faults, Kind};
-use crate::otg::{Answer, Core, Packet};
+use crate::peripherals::otg::{Answer, Core, Packet};
 use control::{Begins, Progress, Transfer};
 use descriptors::Function;
 

@@ -17,7 +17,7 @@ use rigless::time::{EventId, VirtualNanos};
 
 use crate::busy_bus::{Chance, InterruptLine};
 use crate::faults::{Faults, Kind};
-use crate::flash::{BANK, Bank};
+use crate::peripherals::flash::{BANK, Bank};
 use crate::rules::Rules;
 use block::{Block, asked_for};
 

@@ -142,9 +142,9 @@ impl Dcmi {
 mod tests {
     use super::*;
     use crate::camera::{Camera, SharedCamera, Supply, part};
-    use crate::dcmi::Pins;
     use crate::faults::Faults;
     use crate::frame_source::TestPicture;
+    use crate::peripherals::dcmi::Pins;
     use crate::rules::Rules;
     use crate::truth::TruthLog;
     use rigless::device::Device;

@@ -1,0 +1,10 @@
+//! What the emulator lacks of the STM32H743, or has too roughly: peripherals that know nothing of
+//! this sensor's camera or messages. `README.md` says what each simulates and what ties it to the
+//! rig.
+
+pub mod crs;
+pub mod dcmi;
+pub mod flash;
+pub mod mdma;
+pub mod otg;
+pub(crate) mod rom;
