@@ -47,7 +47,7 @@ impl Observed<'_> {
         self.add_noise(covariance);
         let drift = self.drift.into_iter().flatten();
         for (i, (row, of_drift)) in covariance.iter_mut().zip(drift).enumerate() {
-            for (sum, part) in row[..=i].iter_mut().zip(of_drift) {
+            for (sum, part) in row.iter_mut().take(i + 1).zip(of_drift) {
                 *sum += part;
             }
         }
