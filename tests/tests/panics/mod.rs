@@ -35,7 +35,7 @@ const NEVER: [&str; 7] = [
 
 /// Functions that may panic: a part of their mangled names, the most sites, and why none is
 /// reached. The first that fits counts.
-const REASONS: [(&str, usize, &str); 21] = [
+const REASONS: [(&str, usize, &str); 20] = [
     (
         "embassy_usb_synopsys_otg",
         37,
@@ -70,11 +70,6 @@ const REASONS: [(&str, usize, &str); 21] = [
         "hivtac_firmware12capture_task",
         12,
         "set-up of the camera: what has ended is not polled again",
-    ),
-    (
-        "hivtac_firmware6outbox",
-        3,
-        "a queue's cell, in a critical section and so never borrowed twice",
     ),
     (
         "hivtac_firmware13pipeline_task",
