@@ -1,4 +1,4 @@
-//! How exactly units are built: standard deviations of what they differ in.
+//! How exactly units are built: standard deviations of their numbers.
 
 /// ln of the film's Young's modulus.
 pub const STIFFNESS: f64 = 0.2;

@@ -1,4 +1,4 @@
-//! What a film's tables leave of how a unit's images move: covariances at even places and sizes.
+//! Covariances of the images' motion around a film's tables, at even places and sizes.
 
 use hivtac_sensor::force::forward::EQUATIONS;
 use hivtac_sensor::force::model::CovarianceSpec;
@@ -6,20 +6,20 @@ use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 
 use super::matrix::cholesky;
 
-/// Places go to so many mm either way.
+/// Places range to this, ±, mm.
 const END_MM: f64 = 4.2;
-/// Knots along the size, along y and along x, of a unit that was calibrated.
+/// Knots along the size, along y and along x, for a calibrated unit.
 pub const KNOTS: [u8; 3] = [5, 5, 5];
 /// The same where covariances do not depend on the place.
 const ANYWHERE: [u8; 3] = [5, 2, 2];
 
-/// How much all images move, x and y of each marker, focal lengths along the film's axes.
+/// Motion of all images, x and y of each marker, focal lengths along the film's axes.
 pub type Moved = [f64; EQUATIONS];
 
 /// The covariance of images' motion.
 pub type Covariance = [[f64; EQUATIONS]; EQUATIONS];
 
-/// The sum of squares of differences of motion.
+/// The sum over motions of each times its transpose.
 pub fn sum_of_squares(differences: &[Moved]) -> Covariance {
     let mut sum = Covariance::default();
     for difference in differences {
@@ -32,7 +32,7 @@ pub fn sum_of_squares(differences: &[Moved]) -> Covariance {
     sum
 }
 
-/// The loads of so many knots along the size, along y and along x, straight, in a file's order.
+/// The loads at this number of knots along size, y and x, without tilt, in a file's order.
 pub fn knots([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
     let along = |k: u8, count: u8| f64::from(k) / f64::from(count - 1);
     let place = move |k: u8, count: u8| END_MM * (2.0 * along(k, count) - 1.0);
@@ -49,7 +49,7 @@ pub fn knots([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
     (0..sizes).flat_map(of_size)
 }
 
-/// Covariances that are known at so many [`knots`], as a model file has them.
+/// Covariances given at these [`knots`], as a model file holds them.
 pub fn covariances(counts: [u8; 3], knots: &[Covariance]) -> CovarianceSpec {
     CovarianceSpec {
         factors: knots.iter().map(factor).collect(),
@@ -58,8 +58,8 @@ pub fn covariances(counts: [u8; 3], knots: &[Covariance]) -> CovarianceSpec {
     }
 }
 
-/// Independent errors of every coordinate, everywhere the same, that grow with the size: so large,
-/// focal lengths, at the largest.
+/// Independent errors of every coordinate, the same everywhere. They grow in proportion to size, to
+/// `largest` focal lengths at the largest.
 pub fn even(largest: f64) -> CovarianceSpec {
     let at = |pose: &Pose| {
         let mut covariance = Covariance::default();
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
     use hivtac_sensor::force::forward::{CovarianceGrid, Limits, Pose as ChipPose};
 
-    /// What a chip reads of a grid is what went in, at knots and between them.
+    /// The chip reads the covariances that were written, at knots and between them.
     #[test]
     fn a_chip_reads_what_was_written() {
         let wave = |k: usize, pose: &Pose| -> Moved {

@@ -1,5 +1,5 @@
-//! The few functions of size and tilt that a film's tables are made of, from coefficients of many
-//! terms: the principal components over places, markers and directions.
+//! Finds the few functions of size and tilt that a film's tables are made of. They are the
+//! principal components, over places, markers and directions, of the coefficients of many terms.
 
 use anyhow::Result;
 use hivtac_sensor::force::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
@@ -9,13 +9,13 @@ use hivtac_twin::film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use super::matrix::{Matrix, cholesky, principal};
 use super::nearest::{self, splines};
 
-/// Loads by which components are judged: so many sizes, evenly from nothing to the largest, and
-/// directions of each, so many at each part of the largest tilt, as many as cover it evenly. Weak
-/// forces are most of them: the same error turns them most.
+/// Loads by which components are judged: the number of sizes, evenly from 0 to the largest; and the
+/// directions of each size. Each ring has its part of the largest tilt and the number of directions
+/// that cover it evenly. Weak forces are most of them: the same error turns them most.
 const SIZES: u8 = 16;
 const RINGS: [(f64, u8); 4] = [(0.0, 1), (0.4, 6), (0.7, 10), (0.95, 16)];
 
-/// A marker's motion at the nodes of its own axes.
+/// A marker's motion at the nodes of its table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampled {
     /// The nodes along x and along y, mm of the tip's place, growing; 6 to 16 each.
@@ -29,12 +29,12 @@ pub struct Sampled {
     pub coefficients: Vec<Vec<[Vec<f64>; OUTPUTS]>>,
 }
 
-/// The tables of markers that move so, with as few functions of size and tilt as leave no more than
-/// `left`, root mean square over loads, places and directions, in focal lengths; or with `most`
-/// where it takes more. Also what these leave.
+/// The tables of markers with this motion, with the fewest functions of size and tilt whose error
+/// is at most `left`. That is root mean square over loads, places and directions, in focal lengths.
+/// With `most` functions where more would be needed. Also returns the remaining error.
 ///
 /// # Errors
-/// When an axis has nodes that are none.
+/// When an axis has invalid nodes.
 pub fn compressed(
     sizes: [u8; MOST_TILTS],
     dots: &[Sampled],
@@ -67,16 +67,16 @@ pub fn compressed(
     Ok((tables, square.max(0.0).sqrt()))
 }
 
-/// What markers' motion is made of.
+/// A principal component of the markers' motion.
 struct Component {
     /// Its mean square.
     square: f64,
     direction: Vec<f64>,
-    /// Whether it is of odd powers of the tilt's second part.
+    /// Whether it consists of odd powers of the tilt's second component.
     is_odd: bool,
 }
 
-/// Of a matrix that is apart: even and odd components, the largest first.
+/// Components of a block matrix without entries between even and odd terms; the largest first.
 fn components(matrix: Matrix, odd: &[bool]) -> Vec<Component> {
     let of = |is_odd: bool| {
         let own: Vec<usize> = (0..odd.len()).filter(|k| odd[*k] == is_odd).collect();
@@ -101,8 +101,8 @@ fn components(matrix: Matrix, odd: &[bool]) -> Vec<Component> {
     all
 }
 
-/// Which terms are of odd powers of the tilt's second part: a mirror at the first one's axis turns
-/// them.
+/// Which terms have odd powers of the tilt's second component: those change sign when mirrored at
+/// the axis of the first.
 fn odd_terms(sizes: [u8; MOST_TILTS]) -> Vec<bool> {
     let of_degree = |(degree, sizes): (usize, &u8)| {
         let sizes = usize::from(*sizes);
@@ -111,7 +111,7 @@ fn odd_terms(sizes: [u8; MOST_TILTS]) -> Vec<bool> {
     sizes.iter().enumerate().flat_map(of_degree).collect()
 }
 
-/// A matrix without what joins even and odd terms.
+/// The matrix with zeros between even and odd terms.
 fn apart(mut matrix: Matrix, odd: &[bool]) -> Matrix {
     for (row, of_row) in matrix.iter_mut().zip(odd) {
         for (entry, of_entry) in row.iter_mut().zip(odd) {
@@ -123,7 +123,7 @@ fn apart(mut matrix: Matrix, odd: &[bool]) -> Matrix {
     matrix
 }
 
-/// A marker's table, of functions along these directions.
+/// A marker's table of functions along these directions.
 fn table(dot: &Sampled, metric: &[Vec<f64>], kept: &[&[f64]]) -> Result<TableSpec> {
     let at = |outputs: &[Vec<f64>; OUTPUTS]| -> Vec<f64> {
         let outputs = outputs.iter().map(|row| along(metric, row));
@@ -144,7 +144,7 @@ fn table(dot: &Sampled, metric: &[Vec<f64>], kept: &[&[f64]]) -> Result<TableSpe
     })
 }
 
-/// Mean products of terms over loads as they come: sums of terms are as large as what they sum up.
+/// Mean products of terms over typical loads: with them, sums of terms are as large as the motions.
 fn gram(terms: &Terms) -> Vec<Vec<f64>> {
     let count = terms.count();
     let mut sum = vec![vec![0.0; count]; count];
@@ -178,7 +178,7 @@ fn loads() -> Vec<Pose> {
     loads
 }
 
-/// Lᵀ·c: as long as the sum of terms with coefficients c is large.
+/// Lᵀ·c: its length is the size of the sum of terms with coefficients c.
 fn along(metric: &[Vec<f64>], coefficients: &[f64]) -> Vec<f64> {
     let part = |j: usize| {
         let rows = metric.iter().zip(coefficients).skip(j);
@@ -187,7 +187,7 @@ fn along(metric: &[Vec<f64>], coefficients: &[f64]) -> Vec<f64> {
     (0..coefficients.len()).map(part).collect()
 }
 
-/// The coefficients that [`along`] makes this of; nothing of what loads do not tell.
+/// The inverse of [`along`]; 0 for coefficients that the loads do not determine.
 fn back(metric: &[Vec<f64>], along: &[f64]) -> Vec<f64> {
     let mut coefficients = along.to_vec();
     for j in (0..coefficients.len()).rev() {
@@ -202,7 +202,7 @@ fn back(metric: &[Vec<f64>], along: &[f64]) -> Vec<f64> {
     coefficients
 }
 
-/// Mean squares of motion over places, markers and directions.
+/// Mean products of motion over places, markers and directions.
 fn squares(dots: &[Sampled], metric: &[Vec<f64>], count: usize) -> Vec<Vec<f64>> {
     let mut sum = vec![vec![0.0; count]; count];
     let outputs = (OUTPUTS * dots.len()) as f64;
@@ -219,7 +219,7 @@ fn squares(dots: &[Sampled], metric: &[Vec<f64>], count: usize) -> Vec<Vec<f64>>
     sum
 }
 
-/// Which part of an axis each node stands for.
+/// The part of an axis that each node represents.
 fn parts(nodes: &[f64]) -> Vec<f64> {
     let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
     let part = |k: usize| {

@@ -1,4 +1,4 @@
-//! Uncertainties that hold: widened until the errors on a data set lie within what they say.
+//! Widens stated uncertainties until the errors on a data set lie within their bounds.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_sensor::force::model::Model;
@@ -13,32 +13,31 @@ use crate::evaluation::errors::angle_deg;
 use crate::quantize::export;
 use crate::weights::Weights;
 
-/// The part of the errors that the 95 % bounds hold on the rows that they are made from, a little
-/// more than they promise.
+/// The part of errors that the 95 % bounds must contain on the rows that they are made from: a
+/// little more than they promise.
 const COVERED: f64 = 0.96;
-/// What the tables may leave of a marker under the largest force, px, and the part of the largest
-/// size from which on forces show it.
+/// Candidates for the tables' error of a marker under the largest force, px; and the part of the
+/// largest size from which on forces reveal it.
 const BESIDE_PX: [f64; 8] = [0.0, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012];
 const LARGE: f64 = 0.6;
 
-/// What a row's uncertainties would have to be at the least for its errors to lie within their
-/// bounds.
+/// Factors on a row's uncertainties with which its errors would just lie within their bounds.
 struct Needed {
-    /// The size of the force that was found, in parts of the largest.
+    /// Size of the force that was found, in parts of the largest.
     size: f64,
-    /// Of direction, |F| and place: times what they are.
+    /// Of direction, |F| and place.
     times: [f64; 3],
 }
 
 impl Weights {
-    /// These weights with the nominal film run forwards beside the network, in so many Gauss–Newton
+    /// These weights with the nominal film run forwards after the network, in `steps` Gauss–Newton
     /// steps, 0–3. The noise of markers is that of a data set of presses anywhere, widened until 96
-    /// of 100 errors of direction and place lie within their bounds; where that is not enough for
-    /// large forces, the tables leave something of their markers' motion. What is known of other
+    /// of 100 errors of direction and place lie within their bounds. Where large forces need more,
+    /// the tables get an error of their own in the markers' motion. What the weights hold of other
     /// units stays.
     ///
     /// # Errors
-    /// When the network tells no place, or the data set has too few presses of known places.
+    /// When the network gives no place, or the data set has too few presses at known places.
     pub fn with_film(mut self, steps: u8, dataset: &Dataset) -> Result<Weights> {
         let noise = Noise::of(dataset, NOMINAL_RADIUS_MM)?;
         let mut film = FilmModel {
@@ -84,7 +83,7 @@ fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
         let size = forward
             .stiffness
             .size_of(magnitude_n as f32, forward.limits.size);
-        // Each over its stated standard uncertainty.
+        // Each error over its stated standard uncertainty.
         let direction = angle / DIRECTION_BOUND / (f64::from(force.direction_sigma.0) * 1e-3);
         let off_n = (magnitude_n - norm(sample.force_n)).abs();
         let magnitude = off_n / MAGNITUDE_BOUND / (f64::from(force.magnitude_sigma.0) * 1e-6);
@@ -101,7 +100,7 @@ fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
     Ok(all)
 }
 
-/// What a part of the values are at most; nothing of none.
+/// The value that this part of the values do not exceed; 0 without values.
 fn quantile(part: f64, values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);

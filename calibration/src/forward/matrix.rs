@@ -1,4 +1,4 @@
-//! Small symmetric matrices: plain loops, the same numbers on every machine.
+//! Small symmetric matrices in plain loops: the same numbers on every machine.
 
 /// Jacobi's sweeps; eight bring a hundred rows to rounding.
 const SWEEPS: usize = 12;
@@ -8,8 +8,8 @@ const LEAST_LEFT: f64 = 1e-14;
 /// A square matrix, by rows.
 pub type Matrix = Vec<Vec<f64>>;
 
-/// The lower factor of a symmetric matrix that is no covariance's opposite: a row that says nothing
-/// beside those before it has nothing on the diagonal, nor below.
+/// The lower Cholesky factor of a positive semidefinite matrix. A row that depends on those before
+/// it has zeros on the diagonal and below.
 pub fn cholesky(mut matrix: Matrix) -> Matrix {
     let count = matrix.len();
     for i in 0..count {
@@ -29,7 +29,7 @@ pub fn cholesky(mut matrix: Matrix) -> Matrix {
     matrix
 }
 
-/// Eigenvalues and eigenvectors of a symmetric matrix, by Jacobi's rotations: the largest first.
+/// Eigenvalues and eigenvectors of a symmetric matrix by Jacobi's rotations; the largest first.
 pub fn principal(mut matrix: Matrix) -> Vec<(f64, Vec<f64>)> {
     let count = matrix.len();
     let one = |i: usize| (0..count).map(|j| f64::from(u8::from(i == j))).collect();
@@ -62,7 +62,7 @@ fn turned([cos, sin]: [f64; 2], a: f64, b: f64) -> (f64, f64) {
     (cos * a - sin * b, sin * a + cos * b)
 }
 
-/// Turns two rows of a matrix.
+/// Rotates two rows of a matrix.
 fn rotate(matrix: &mut Matrix, [i, j]: [usize; 2], parts: [f64; 2]) {
     let (before, after) = matrix.split_at_mut(j);
     for (a, b) in before[i].iter_mut().zip(&mut after[0]) {
@@ -74,7 +74,7 @@ fn rotate(matrix: &mut Matrix, [i, j]: [usize; 2], parts: [f64; 2]) {
 mod tests {
     use super::*;
 
-    /// Of rank 3, of five rows.
+    /// Five rows, rank 3.
     fn matrix() -> Matrix {
         let part = |i: usize, k: usize| (((3 * i + 1) * (k + 2)) as f64 * 0.83).sin();
         let entry = |i: usize, j: usize| (0..3).map(|k| part(i, k) * part(j, k)).sum();

@@ -1,5 +1,5 @@
-//! The film run forwards, from what is known of a unit: a few numbers in a weights file, tables in
-//! a model file.
+//! The film run forwards, from the known numbers of a unit: a few numbers in a weights file, tables
+//! in a model file.
 
 pub mod building;
 mod covariances;
@@ -41,32 +41,32 @@ pub use weight::{Pressed, Weighed, everywhere, weight};
 pub struct FilmModel {
     /// Gauss–Newton steps from the network's answer, 0–3.
     pub steps: u8,
-    /// What a tare takes for the rest position less where markers 0–3 rest, px: what the pixel grid
-    /// does there.
+    /// Rest position as a tare measures it, minus where markers 0–3 rest, px: the pixel grid's
+    /// effect.
     pub rest_px: [[f64; 2]; 4],
-    /// Standard uncertainty of a marker in a frame, px, when it is as large as at rest: away from
-    /// the pattern's middle, and across that.
+    /// Standard uncertainty of a marker in a frame, px, while it is as large as at rest: away from
+    /// the pattern's middle, and across that direction.
     pub noise_px: [f64; 2],
-    /// How many times that it is when the marker is four times as large.
+    /// Factor on it when the marker's area is four times that at rest.
     pub noise_at_four_areas: [f64; 2],
-    /// What the chip's tables leave of each coordinate of a marker under the largest force,
-    /// standard uncertainty, px at 320×240; less in parts of the size under smaller ones.
+    /// Standard uncertainty of each coordinate of a marker due to the chip's tables under the
+    /// largest force, px at 320×240. It falls in proportion to size under smaller forces.
     #[serde(default)]
     pub beside_px: f64,
-    /// What is known of other units' films.
+    /// How other units' films differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub others: Option<Box<OtherUnits>>,
-    /// The unit's own film; without it the film is the nominal one, and the rest picture tells the
-    /// markers' places.
+    /// The unit's own film. Without it the film is the nominal one, with the markers where the rest
+    /// picture shows them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub own: Option<Box<OwnFilm>>,
 }
 
 impl Weights {
-    /// These weights with what is known of other units, beside their film.
+    /// These weights, their film extended by how other units' films differ.
     ///
     /// # Errors
-    /// As [`FilmModel::with_others`]; when they have no film.
+    /// As [`FilmModel::with_others`]; and when the weights have no film.
     pub fn with_others(mut self) -> Result<Self> {
         let film = self.film.take().context("the weights have no film")?;
         self.film = Some(film.with_others()?);
@@ -78,7 +78,7 @@ impl Weights {
 const FOCAL_PX: f64 = 175.0;
 
 impl FilmModel {
-    /// The nominal film, for units of which nothing is known.
+    /// The nominal film, for uncalibrated units.
     pub fn nominal(steps: u8, noise: &Noise) -> Self {
         Self {
             steps,
@@ -91,7 +91,7 @@ impl FilmModel {
         }
     }
 
-    /// With what is known of other units: films as people mount them, solved by finite elements.
+    /// Adds how other units' films differ: films as people mount them, solved by finite elements.
     /// This takes minutes.
     ///
     /// # Errors
@@ -111,7 +111,7 @@ impl FilmModel {
     /// Checks that every number is in range.
     ///
     /// # Errors
-    /// Says which is not.
+    /// Names the number that is not.
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.steps <= forward::MOST_STEPS,
@@ -141,7 +141,7 @@ impl FilmModel {
         self.own.as_deref().map_or(Ok(()), OwnFilm::check)
     }
 
-    /// What a model file holds of it.
+    /// The film as a model file holds it.
     ///
     /// # Errors
     /// When a number is out of range.
@@ -173,7 +173,7 @@ impl FilmModel {
     }
 }
 
-/// What every file of the nominal film under the nominal tip has: made once.
+/// What all files of the nominal film under the nominal tip share; computed once.
 #[derive(Clone)]
 struct Nominal {
     stiffness: Stiffness,
@@ -207,13 +207,13 @@ impl Weighed for UnitSetup<'_> {
 }
 
 impl UnitSetup<'_> {
-    /// Its film when gravity pulls so.
+    /// Its film with gravity in this direction.
     fn under(&self, down: [f64; 3]) -> Result<Film> {
         let down = Some(down).filter(|down| *down != [0.0; 3]);
         Ok(Film::of(self.unit)?.with_down(down)?)
     }
 
-    /// All markers' images, each from its number.
+    /// All markers' images, each computed from the marker's number.
     fn images(&self, of_marker: impl Fn(usize) -> Result<[f64; 2]>) -> Result<Moved> {
         let mut moved = Moved::default();
         for (marker, place) in moved.as_chunks_mut::<2>().0.iter_mut().enumerate() {
@@ -252,13 +252,13 @@ pub(crate) fn limits() -> Limits {
     }
 }
 
-/// A film as the chip reads it.
+/// Parses a film's bytes as the chip does.
 fn parsed(bytes: &[u8]) -> Result<forward::Forward<'_>> {
     forward::Forward::parse(bytes)
         .map_err(|error| anyhow!("a film's tables cannot be kept: {error}"))
 }
 
-/// Where markers at these places, mm, are seen at rest, focal lengths from the axis.
+/// Images of markers at these places, mm, at rest; focal lengths from the axis.
 fn at_rest(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> [[f64; 2]; DOTS] {
     places_mm.map(|place_mm| {
         let at = Disc::marker(place_mm).centroid_px(|_| [0.0; 3], camera);
@@ -266,14 +266,13 @@ fn at_rest(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> [[f64; 2]; DOTS] {
     })
 }
 
-/// A point of a camera's picture, px, in focal lengths from the axis.
+/// Converts a point of a camera's picture from px to focal lengths from the axis.
 pub(crate) fn in_focal_lengths(at_px: [f64; 2], camera: &Camera) -> [f64; 2] {
     let middle = [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0);
     [0, 1].map(|i| (at_px[i] - middle[i]) / camera.focal_px())
 }
 
-/// What a rest picture says of markers at these places, mm: of the nominal camera, on a film 10 mm
-/// away.
+/// The rest picture of markers at these places, mm, by the nominal camera, 10 mm from the film.
 pub(crate) fn rest_image(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> RestImage {
     let film_mm = places_mm.map(|[x, y]| {
         let (distance, radius) = (FILM_DISTANCE_MM, libm::hypot(x, y));
@@ -293,8 +292,8 @@ mod tests {
     use hivtac_twin::film::Film;
     use hivtac_twin::film::reduced::Pose;
 
-    /// What a film's tables say of a pose, as the chip reads them, of markers that are glued so far
-    /// beside theirs.
+    /// The motion that a film's tables predict for a pose, as the chip reads them, for markers at
+    /// this distance from the tables' places.
     fn told(
         forward: &forward::Forward<'_>,
         pose: &Pose,
@@ -318,7 +317,8 @@ mod tests {
         FilmModel::nominal(2, &noise)
     }
 
-    /// The number's digits in a base, mirrored at the point: fills 0 to 1 evenly.
+    /// Halton's sequence: the number's digits in a base, mirrored at the point. It fills 0 to 1
+    /// evenly.
     fn halton(mut number: u32, base: u32) -> f64 {
         let (mut sum, mut part) = (0.0, 1.0);
         while number > 0 {
@@ -347,8 +347,8 @@ mod tests {
         })
     }
 
-    /// How far what the chip predicts is from the simulated film, px at 320×240: root mean square
-    /// and largest.
+    /// Difference between the chip's prediction and the simulated film, px at 320×240: root mean
+    /// square and largest.
     fn off_px(model: &FilmModel) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
         let setup = UnitSetup {
@@ -375,8 +375,8 @@ mod tests {
         [(sum / count).sqrt(), worst]
     }
 
-    /// How far the chip is off what weight does under loads of these sizes, N, from how the film
-    /// hangs at rest, px at 320×240: root mean square and largest.
+    /// Error of the chip's prediction of what weight does under loads of these sizes, N, from the
+    /// film hanging at rest. In px at 320×240: root mean square and largest.
     fn weight_off_px(sizes_n: [f64; 2]) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
         let setup = UnitSetup {

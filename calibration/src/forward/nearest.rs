@@ -1,25 +1,26 @@
-//! Sums of terms that are nearest to samples, and splines through nodes: plain loops, the same
-//! numbers on every machine.
+//! Fits sums of terms to samples, and splines through nodes, in plain loops: the same numbers on
+//! every machine.
 
 use anyhow::{Result, ensure};
 use hivtac_twin::film::reduced::Axis;
 
-/// What is told least of the terms is at least this part of what is told most.
+/// Terms whose remainder after Gram–Schmidt is below this fraction of the largest cannot be
+/// distinguished.
 const LEAST_TOLD: f64 = 1e-9;
 
-/// Finds terms' coefficients from samples at always the same loads.
+/// Fits coefficients of terms to samples at fixed loads.
 pub struct Nearest {
-    /// Columns at right angles, by term.
+    /// Orthonormal columns, by term.
     units: Vec<Vec<f64>>,
-    /// What each column is made of, by term: parts of the units up to its own.
+    /// Each column in parts of the units up to its own, by term.
     parts: Vec<Vec<f64>>,
 }
 
 impl Nearest {
-    /// Of the terms' values, a row for each sample.
+    /// From the terms' values, a row for each sample.
     ///
     /// # Errors
-    /// When the samples do not tell the terms apart.
+    /// When the samples do not distinguish the terms.
     pub fn new(rows: &[Vec<f64>]) -> Result<Self> {
         let terms = rows.first().map_or(0, Vec::len);
         let (mut units, mut parts) = (Vec::<Vec<f64>>::new(), Vec::new());
@@ -27,7 +28,7 @@ impl Nearest {
         for term in 0..terms {
             let mut column: Vec<f64> = rows.iter().map(|row| row[term]).collect();
             let mut of = vec![0.0; term + 1];
-            // Gram and Schmidt's way, twice: the second time takes away what rounding left.
+            // Gram–Schmidt, twice: the second pass removes what rounding left.
             for _ in 0..2 {
                 for (unit, part) in units.iter().zip(&mut of) {
                     let along = dot(unit, &column);
@@ -49,7 +50,7 @@ impl Nearest {
         Ok(Self { units, parts })
     }
 
-    /// The coefficients nearest to these samples.
+    /// The coefficients with the least squared differences from these samples.
     pub fn coefficients(&self, samples: &[f64]) -> Vec<f64> {
         let mut left = samples.to_vec();
         let mut along = Vec::with_capacity(self.units.len());
@@ -69,14 +70,14 @@ impl Nearest {
     }
 }
 
-/// The coefficients of splines through rows of numbers at the nodes of axes along x and y: by node
+/// The coefficients of splines through rows of numbers at the nodes of axes along x and y. By node
 /// along y and, within, along x.
 pub fn splines([x, y]: [&Axis; 2], rows: &[Vec<Vec<f64>>]) -> Result<Vec<Vec<Vec<f64>>>> {
     let [x, y] = [x, y].map(|axis| Nearest::new(&collocation(axis)));
     Ok(turned(&y?, &turned(&x?, rows)))
 }
 
-/// What the splines' coefficients give at each node.
+/// The splines' values at each node.
 fn collocation(axis: &Axis) -> Vec<Vec<f64>> {
     let count = axis.nodes().len();
     let row = |node: &f64| {
@@ -88,7 +89,7 @@ fn collocation(axis: &Axis) -> Vec<Vec<f64>> {
     axis.nodes().iter().map(row).collect()
 }
 
-/// Solves along the inner axis, and makes the outer one of it.
+/// Solves along the inner axis and makes the outer axis the inner one.
 fn turned(through: &Nearest, rows: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
     let (outer, inner, numbers) = (rows.len(), rows[0].len(), rows[0][0].len());
     let mut all = vec![vec![vec![0.0; numbers]; outer]; inner];

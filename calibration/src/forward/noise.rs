@@ -1,4 +1,4 @@
-//! How well markers are seen, from frames of presses whose force and place are known.
+//! Measures how exactly markers are seen, from frames of presses with known force and place.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_twin::MARKERS;
@@ -8,31 +8,32 @@ use hivtac_twin::film::reduced::{Pose, Unit};
 use super::UnitSetup;
 use crate::data::dataset::{Dataset, Sample};
 
-/// The mean of what is normally distributed, without sign, over its standard deviation: √(2/π).
+/// Mean absolute value of a normal distribution over its standard deviation: √(2/π).
 const MEAN_SIZE: f64 = 0.797_884_560_802_865_4;
-/// Fewer rows tell no noise.
+/// The fewest rows that determine the noise.
 const FEWEST: usize = 200;
 
-/// How far markers are seen from where they are.
+/// Errors of markers' seen positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// What a tare takes for the rest position less where markers 0–3 rest, px.
+    /// Rest position as a tare measures it, minus where markers 0–3 rest, px.
     pub rest_px: [[f64; 2]; 4],
     /// Standard uncertainty of a marker as large as at rest, px: away from the pattern's middle,
-    /// and across that.
+    /// and across that direction.
     pub at_rest_px: [f64; 2],
-    /// How many times that when it is four times as large.
+    /// Factor on it when the marker's area is four times that at rest.
     pub at_four_areas: [f64; 2],
 }
 
-/// A row's eight coordinates: how far they are off, px, and the areas' ratios to those at rest.
+/// A row's errors of eight coordinates, px, and the areas' ratios to those at rest.
 struct Off {
     px: [[f64; 2]; 4],
     areas: [f64; 4],
 }
 
 impl Noise {
-    /// Of a data set whose rows know places, on the nominal film under a tip of a radius in mm.
+    /// From the rows of a data set with known places, on the nominal film under a tip of a radius
+    /// in mm.
     ///
     /// # Errors
     /// When there are too few such rows.

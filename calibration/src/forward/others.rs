@@ -1,6 +1,5 @@
-//! Units that somebody built and did not calibrate: how far their images move otherwise than the
-//! nominal film's, as the chip reads them by their rest picture, and how strong the force is that
-//! moves them as far.
+//! Describes uncalibrated units: how their images move differently from the nominal film's, as the
+//! chip reads them by their rest picture, and which force moves them as far.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::features::Features;
@@ -22,46 +21,47 @@ use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS}
 use super::covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
 
-/// Films that are drawn.
+/// Number of films that are drawn.
 const FILMS: u64 = 60;
-/// Nothing is drawn farther than so many standard deviations.
+/// The largest deviation that is drawn, in standard deviations.
 const AT_MOST: f64 = 2.5;
 /// The stretch with which films are mounted, along each axis.
 const STRETCH: [f64; 2] = [-0.003, 0.03];
-/// How far they reach beyond the posts, mm; every third not at all.
+/// Range of their overhang beyond the posts, from 0, mm; every third has none.
 const OVERHANG_MM: f64 = 8.0;
-/// The radii of what holds them, mm.
+/// Radii of the posts that hold them, mm.
 const POST_RADIUS_MM: [f64; 2] = [1.0, 3.0];
-/// Slopes and curves of their thickness, either way.
+/// Range of slopes and curves of their thickness, ±.
 const UNEVEN: f64 = 0.05;
-/// C₂/C₁ of rubber that stiffens.
+/// Range of C₂/C₁ of rubber that stiffens.
 const STIFFENING: [f64; 2] = [0.02, 0.2];
-/// Tips' radii are evenly between, mm, and forces tilted by at most this along x and y, rad.
+/// Range of the tips' radii, evenly drawn, mm, and the largest tilt of forces along x and y, rad.
 const TIP_RADIUS_MM: [f64; 2] = [0.25, 1.0];
 const TILT: f64 = 0.2;
-/// The focal length behind which rest pictures are read, px.
+/// The focal length by which rest pictures are read, px.
 const FOCAL_PX: f64 = 175.0;
-/// How fine the meshes are.
+/// Fineness of the meshes.
 const FINENESS: f64 = 0.3;
 const _: () = assert!(KNOTS[0] as usize == RELATIVE, "their sizes are the same");
-/// A force is found when its images' size is as near to the one asked for, in parts of it.
+/// Tolerance of the size of images when a force is searched, in parts of the wanted size.
 const NEAR: f64 = 0.06;
-/// Forces that are tried for each size.
+/// The number of forces that are tried for each size.
 const TRIES: usize = 3;
-/// Newton's steps to the size of images.
+/// Newton's steps to the size of the images.
 const SIZE_STEPS: usize = 8;
 
-/// What is known of units of which there is a rest picture and nothing else.
+/// How units differ of which only a rest picture is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OtherUnits {
-    /// |F| = a·s + b·s³ of images that move as far as the nominal film's under the size s: a and b
-    /// of the film as the guide builds it, without stretch, N.
+    /// Coefficients a and b, N, of |F| = a·s + b·s³, the force whose images move as far as the
+    /// nominal film's at the size s. Those of the film as the guide builds it, without stretch.
     pub stiffness_n: [f64; 2],
-    /// Standard uncertainty of that, in parts of it, at the squares of even parts of the largest
-    /// size: 95 of 100 films are within 1.96 times it.
+    /// Standard uncertainty of that force, in parts of it, at the squares of even parts of the
+    /// largest size: 95 of 100 films are within 1.96 times it.
     pub relative: [f64; RELATIVE],
-    /// Knots along the size, y and x of what the motion's shape leaves beside its size.
+    /// Number of knots along size, y and x of the covariance of the motion's shape, apart from its
+    /// size.
     counts: [u8; 3],
     end_mm: f32,
     /// Row by row, of each knot.
@@ -69,7 +69,7 @@ pub struct OtherUnits {
 }
 
 impl OtherUnits {
-    /// Of films as people mount them, solved by finite elements, and read by a chip.
+    /// From films as people mount them, solved by finite elements and read by a chip.
     ///
     /// # Errors
     /// When too many of them find no equilibrium.
@@ -110,7 +110,7 @@ impl OtherUnits {
             std::array::from_fn(|k| LARGEST_SIZE * (k as f64 / (RELATIVE - 1) as f64).powi(2));
         let law = &chip.stiffness;
         let relative = |k: usize| {
-            // Without size there is no force.
+            // At size 0 there is no force.
             let size = sizes[k.max(1)];
             let nominal_n = f64::from(law.magnitude_n(size as f32));
             let mut off: Vec<f64> = magnitudes(size)
@@ -129,7 +129,7 @@ impl OtherUnits {
         })
     }
 
-    /// As a model file has it.
+    /// As a model file holds it.
     pub(super) fn spec(&self) -> OthersSpec {
         let [linear_n, cubic_n] = self.stiffness_n.map(|part| part as f32);
         OthersSpec {
@@ -144,7 +144,7 @@ impl OtherUnits {
     }
 }
 
-/// A unit, and what a chip makes of its rest picture.
+/// A unit, and how a chip reads its rest picture.
 struct Other<'a> {
     film: Film,
     rest: Equilibrium,
@@ -153,14 +153,14 @@ struct Other<'a> {
     camera: &'a Camera,
     to_px: [f64; 2],
     chip: &'a Forward<'a>,
-    /// How the forces are tilted that press it.
+    /// Tilt of the forces that press it.
     tilt: [f64; 2],
 }
 
-/// The force that moves a unit's images as far as a load the nominal film's.
+/// The force that moves a unit's images as far as a load moves the nominal film's.
 struct Match {
     magnitude_n: f64,
-    /// What remains of their motion, focal lengths.
+    /// The remaining difference of their motion, focal lengths.
     left: Moved,
 }
 
@@ -192,7 +192,7 @@ impl<'a> Other<'a> {
         Ok(other)
     }
 
-    /// Where the camera sees the dots, px from its axis.
+    /// Images of the dots, px from the camera's axis.
     fn seen(&self, state: &Equilibrium) -> [[f64; 2]; DOTS] {
         let [cos, sin] = self.to_px;
         std::array::from_fn(|dot| {
@@ -210,7 +210,7 @@ impl<'a> Other<'a> {
         let mut all: Vec<Option<Match>> = poses.iter().map(|_| None).collect();
         for place in 0..places {
             let mut state = self.rest.clone();
-            // In parts of the nominal film's force.
+            // Ratio of this film's force to the nominal film's.
             let mut stiffer = 1.0;
             for knot in (place..poses.len()).step_by(places) {
                 let pose = Pose {
@@ -255,8 +255,8 @@ impl<'a> Other<'a> {
         unreachable!("the loop ends at the last attempt")
     }
 
-    /// The size at which the chip's film moves the images most nearly as far under the same tilt at
-    /// the same place, and what remains.
+    /// The size at which the chip's film moves the images most nearly as far, at the same tilt and
+    /// place; and the remaining motion.
     fn nearest(&self, pose: &Pose, state: &Equilibrium) -> (f64, Moved) {
         let seen = self.seen(state);
         let mut moved = Moved::default();
@@ -292,7 +292,7 @@ impl<'a> Other<'a> {
     }
 }
 
-/// A film as somebody mounts it.
+/// Draws a film as somebody mounts it.
 fn design(number: u64, random: &mut ChaCha8Rng) -> Design {
     let usual = |random: &mut ChaCha8Rng, sigma: f64| sigma * normal(random);
     let beside = |random: &mut ChaCha8Rng, sigma: f64| [(); 2].map(|()| usual(random, sigma));
@@ -302,7 +302,7 @@ fn design(number: u64, random: &mut ChaCha8Rng) -> Design {
         2 => random.random_range(STIFFENING[0]..STIFFENING[1]),
         _ => 0.0,
     };
-    // Every third is cut at its holes.
+    // Every third has no overhang.
     let overhang_mm = match number / 3 % 3 {
         0 => 0.0,
         _ => random.random_range(0.0..OVERHANG_MM),
@@ -345,7 +345,7 @@ fn design(number: u64, random: &mut ChaCha8Rng) -> Design {
     }
 }
 
-/// What a rest picture shows.
+/// The rest picture as the sensor measures it.
 fn rest(seen_px: &Markers) -> Rest {
     let px = |part: f32| Px((part * 65_536.0) as i32);
     Rest {

@@ -1,4 +1,4 @@
-//! The tables of a film run forwards, from the simulated sensor.
+//! Makes the tables of a film run forwards, from the simulated sensor.
 
 use anyhow::Result;
 use hivtac_sensor::force::forward::MOST_TILTS;
@@ -11,38 +11,38 @@ use rayon::prelude::*;
 use super::functions::{Sampled, compressed};
 use super::nearest::Nearest;
 
-/// Places of the tip along an axis at which the simulated film knows the motion of a marker to the
-/// right of the middle, or below it, mm: close where the marker is.
+/// Places of the tip along an axis at which the simulated film's tables hold a marker's motion, mm.
+/// For a marker to the right of the middle, or below it; closer together near the marker.
 const FILM_NODES_MM: [f64; 16] = [
     -5.0, -3.8, -2.5, -1.4, 0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0,
 ];
-/// The distance of other nodes grows with that from the marker: it is twice as large this far away,
-/// mm.
+/// Distance from the marker, mm, at which the spacing of other nodes is twice that at the marker.
+/// The spacing grows with the distance.
 const TWICE_MM: f64 = 2.0;
-/// How many sizes there are without tilt, with its first degree, and so on.
+/// Number of powers of size in the terms without tilt, of its first degree, and higher degrees.
 const TERMS: [u8; MOST_TILTS] = [8, 6, 5, 4, 3];
-/// What functions of size and tilt may leave, root mean square, focal lengths: 0.0022 px at
+/// The error allowed to functions of size and tilt, root mean square, focal lengths: 0.0022 px at
 /// 320×240.
 const LEFT: f64 = 0.0022 / 175.0;
-/// As many as there are at most, for files that a device has room for.
+/// The most functions, for files that fit into a device.
 const FUNCTIONS: usize = 16;
-/// How much less samples of the largest tilt count than those of none, less one.
+/// Samples of the largest tilt weigh less than those without tilt by this factor plus one.
 const STEEP_COUNTS_LESS: f64 = 12.0;
-/// Loads lie within the film's own limits, to a rounding.
+/// Keeps loads within the film's own limits, in spite of rounding.
 const WITHIN: f64 = 1.0 - 1e-6;
 
-/// A film under a tip of a radius, and how a camera sees it.
+/// A film under a tip of a radius, as a camera sees it.
 pub struct UnitSetup<'a> {
     /// The unit's film.
     pub unit: Unit,
     /// The tip's radius, mm.
     pub tip_radius_mm: f64,
-    /// The camera: its tables are in focal lengths and hold for every camera of its lens.
+    /// The camera. Tables are in focal lengths and hold for every camera with its lens.
     pub camera: &'a Camera,
 }
 
 impl UnitSetup<'_> {
-    /// How the image of a marker moves under a load, in focal lengths.
+    /// Motion of a marker's image under a load, focal lengths.
     pub fn moved(&self, film: &Film, pose: &Pose, marker: usize) -> Result<[f64; 2]> {
         let force_n = self.force_n(pose);
         let load = Load::from_vector(force_n.map(|part| WITHIN * part))?
@@ -51,7 +51,7 @@ impl UnitSetup<'_> {
         self.moved_by(film, &load, marker)
     }
 
-    /// The same under a load that says its force.
+    /// The same for a load given by its force.
     pub fn moved_by(&self, film: &Film, load: &Load, marker: usize) -> Result<[f64; 2]> {
         let disc = Disc::marker(film.markers_mm()[marker]);
         let motion = film.marker_motion(load, marker);
@@ -70,7 +70,7 @@ impl UnitSetup<'_> {
         pose.direction().map(|part| magnitude_n * part)
     }
 
-    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    /// Coefficients a and b, N, of |F| = a·s + b·s³ at a size s.
     pub fn stiffness_n(&self) -> [f64; 2] {
         let Unit {
             stiffness,
@@ -81,10 +81,10 @@ impl UnitSetup<'_> {
         [LINEAR_N * stretching * thickness * thickness, stretching]
     }
 
-    /// Tables of how all markers move, and what they leave of that, focal lengths.
+    /// Tables of all markers' motion, and their error, focal lengths.
     ///
     /// # Errors
-    /// When the unit cannot be made, or its motion not kept.
+    /// When the unit is invalid, or its motion does not fit into tables.
     pub fn tables(&self) -> Result<(TablesSpec, f64)> {
         let film = Film::of(self.unit)?;
         let dots = film.markers_mm().map(Dot::of_film);
@@ -92,17 +92,17 @@ impl UnitSetup<'_> {
     }
 }
 
-/// A marker of which a table is made.
+/// A marker for which a table is made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dot {
     /// Where it is at rest, mm.
     pub place_mm: [f64; 2],
-    /// Places of the tip along x and along y at which its motion is sampled, mm, growing.
+    /// Places of the tip along x and along y at which its motion is sampled, mm, ascending.
     pub nodes_mm: [Vec<f64>; 2],
 }
 
 impl Dot {
-    /// At a place, with so many nodes (6 to 16) along each axis, close where it is.
+    /// At a place, with `count` nodes (6 to 16) along each axis, closer together near it.
     pub fn new(place_mm: [f64; 2], count: usize) -> Dot {
         Dot {
             place_mm,
@@ -110,7 +110,7 @@ impl Dot {
         }
     }
 
-    /// With the nodes that the simulated film's own tables have.
+    /// With the nodes of the simulated film's own tables.
     fn of_film(place_mm: [f64; 2]) -> Dot {
         let nodes = |part: f64| {
             let mut nodes = FILM_NODES_MM;
@@ -126,7 +126,7 @@ impl Dot {
         }
     }
 
-    /// The direction from the film's middle; along x in the middle.
+    /// Unit vector from the film's middle; along x in the middle.
     fn away(&self) -> [f64; 2] {
         let [x, y] = self.place_mm;
         let far = libm::hypot(x, y);
@@ -137,7 +137,7 @@ impl Dot {
     }
 }
 
-/// Even steps of a measure of which there is most at a place.
+/// Nodes with even steps of a measure that is densest at a place.
 fn nodes_near(place_mm: f64, count: usize) -> Vec<f64> {
     let measure = |at_mm: f64| {
         let far = (at_mm - place_mm).abs() / TWICE_MM;
@@ -155,11 +155,11 @@ fn nodes_near(place_mm: f64, count: usize) -> Vec<f64> {
     (0..count).map(at).collect()
 }
 
-/// The tables of markers that move so under a load, by a marker's number, in focal lengths; and
-/// what they leave, root mean square over loads and places, focal lengths.
+/// The tables of markers whose image motion under a load is `moved`, by marker number, focal
+/// lengths. Also their error, root mean square over loads and places, focal lengths.
 ///
 /// # Errors
-/// When a sample cannot be had, or the tables cannot hold what the markers do.
+/// When a sample cannot be computed, or the tables cannot hold the motion.
 pub fn tables(
     dots: &[Dot],
     moved: impl Fn(&Pose, usize) -> Result<[f64; 2]> + Sync,
@@ -216,7 +216,7 @@ pub fn turned([a, b]: [f64; 2], [x, y]: [f64; 2]) -> [f64; 2] {
     [a * x - b * y, b * x + a * y]
 }
 
-/// What a sample counts: those of little tilt more, as most presses have.
+/// Weight of a sample: larger at little tilt, where most presses are.
 fn weight(pose: &Pose) -> f64 {
     let [a, b] = pose.tilt.map(|part| part / LARGEST_TILT);
     1.0 / (1.0 + STEEP_COUNTS_LESS * (a * a + b * b))

@@ -1,4 +1,4 @@
-//! A unit's own model from a data set of a handful of loads.
+//! Fits a unit's own model to a data set of a handful of loads.
 
 use anyhow::{Context, Result, ensure};
 
@@ -13,10 +13,10 @@ use crate::weights::Weights;
 use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::{Camera, Preset};
 
-/// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
-/// left of noise. With it χ² of simulated units is 1 over its degrees of freedom, on average.
+/// Standard uncertainty of a marker's mean coordinates, px, from the pixel grid and the remaining
+/// noise. With it, χ² of simulated units is 1 over its degrees of freedom, on average.
 const MEAN_PX: f64 = 0.008;
-/// Fewer loads tell no unit; nor a film in a unit whose camera and dots are known.
+/// The fewest loads that determine a unit; and a film in a unit whose camera and dots are known.
 const FEWEST_LOADS: usize = 4;
 const FEWEST_SWAPPED: usize = 3;
 
@@ -25,20 +25,20 @@ const FEWEST_SWAPPED: usize = 3;
 pub struct Known<'a> {
     /// Standard uncertainty of a load's |F|, N.
     pub gauge_n: f64,
-    /// That of the stage's zero on the film along x and y, mm.
+    /// Standard uncertainty of the stage's zero on the film along x and y, mm.
     pub stage_mm: f64,
-    /// That of each noted place on its own, beside the zero, mm.
+    /// Standard uncertainty of each noted place relative to the zero, mm.
     pub place_mm: f64,
     /// The same unit with another film: its camera and its dots are known.
     pub from: Option<&'a Weights>,
 }
 
 impl Weights {
-    /// These weights for the unit that a data set shows: its rest position, and its film and camera
-    /// as its loads tell them.
+    /// These weights for the unit in a data set, with its rest position, and its film and camera
+    /// fitted to its loads.
     ///
     /// # Errors
-    /// When the data set has other conditions, or as with [`Self::fitted`].
+    /// When the data set has other conditions; and as [`Self::fitted`].
     pub fn for_unit(self, dataset: &Dataset, known: Known<'_>) -> Result<(Weights, Fit)> {
         let [own, other] = [&self.conditions, &dataset.about.conditions];
         ensure!(
@@ -74,7 +74,7 @@ impl Weights {
         Ok((weights, found))
     }
 
-    /// The loads of a data set, as they are known.
+    /// The loads of a data set with their uncertainties.
     fn loads(&self, dataset: &Dataset, known: Known<'_>) -> Result<Vec<SeenLoad>> {
         let certainty = Certainty::of(self, known.gauge_n, known.place_mm);
         let model = export(self)?;
@@ -91,7 +91,7 @@ impl Weights {
         Ok(loads)
     }
 
-    /// These weights for the unit that rests so and answers loads so, gravity being `down` in the
+    /// These weights for the unit with this rest position and these loads. `down` is gravity in the
     /// film frame, parts of g, if known.
     ///
     /// # Errors
@@ -161,7 +161,7 @@ mod tests {
         Weights::load(&models.join("default.weights")).unwrap()
     }
 
-    /// The unit's own threshold is the model's: with another one it would give no force.
+    /// A unit's model takes the unit's own threshold: with a different one it would give no force.
     #[test]
     fn a_model_has_the_threshold_of_its_unit() {
         let recipe = Recipe {
@@ -184,7 +184,7 @@ mod tests {
         );
     }
 
-    /// Markers that are seen worse than a camera's noise explains leave more open: here each load's
+    /// Markers with more scatter than a camera's noise leave more uncertainty. Here, each load's
     /// are some hundredths of a pixel off.
     #[test]
     fn loads_that_scatter_tell_less() {
@@ -216,7 +216,7 @@ mod tests {
         assert!(less > 1.05 * known, "{less} {known}");
     }
 
-    /// A pressing direction is no direction of the force that the film model explains.
+    /// A pressing direction is not the direction of the force that the film model explains.
     #[test]
     fn loads_of_another_contact_reading_are_refused() {
         let recipe = Recipe {

@@ -1,4 +1,4 @@
-//! What a film's own weight does, as a model file has it.
+//! The effect of a film's own weight on its images, as a model file holds it.
 
 use anyhow::Result;
 use hivtac_sensor::force::forward::weight::{
@@ -12,38 +12,37 @@ use rayon::prelude::*;
 use super::covariances::Moved;
 use super::nearest::Nearest;
 
-/// Directions of gravity around the film, in the planes of x and z and of y and z, at which it is
-/// known how it rests.
+/// Number of directions of gravity around the film, in the planes of x and z and of y and z, at
+/// which its rest is computed.
 const AROUND: usize = 24;
 /// Places of the tip along each axis, and tilts of its force, in parts of the largest.
 const PLACES_MM: [f64; 7] = [-4.5, -3.2, -1.6, 0.0, 1.6, 3.2, 4.5];
 const TILTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.6], [0.0, -0.6]];
-/// Standard uncertainty of what weight does, in parts of that: of a film that was fitted to its
-/// loads, and of any other.
+/// Standard uncertainty of the effect of weight, in parts of that effect: for a film that was
+/// fitted to its loads, and for any other.
 const UNSURE: [f32; 2] = [0.05, 0.5];
 
-/// Where a film is pressed to tell what weight does under a load: place of the tip, mm, and tilt.
+/// A load under which the effect of weight is computed: place of the tip, mm, and tilt.
 pub type Pressed = ([f64; 2], [f64; 2]);
 
 /// A film whose images can be computed under loads and gravity.
 pub trait Weighed: Sync {
-    /// Weight of the film, as the press that sinks it as much, N.
+    /// Weight of the film, as the press that makes it sink as far, N.
     fn press_n(&self) -> f64 {
         AS_A_PRESS_N
     }
 
-    /// Where it is pressed: at least as many as there are terms.
+    /// Where it is pressed: at least as many loads as there are terms.
     fn pressed(&self) -> Vec<Pressed>;
 
-    /// How the images of all markers are moved at one place and tilt under growing sizes when
-    /// gravity pulls so, from where they are when the film weighs nothing and nothing presses it,
-    /// focal lengths.
+    /// Motion of all markers' images at one place and tilt under growing sizes with gravity in this
+    /// direction, focal lengths. It counts from the untouched, weightless film.
     ///
     /// # Errors
     /// When no equilibrium is found.
     fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>>;
 
-    /// The same of the untouched film.
+    /// The same for the untouched film.
     ///
     /// # Errors
     /// When no equilibrium is found.
@@ -60,7 +59,7 @@ pub fn everywhere() -> Vec<Pressed> {
         .collect()
 }
 
-/// What weight does on a film, of whose tables and own rest position gravity is `down`.
+/// The effect of weight on a film whose tables and rest position hold with gravity `down`.
 ///
 /// # Errors
 /// When no equilibrium is found.
@@ -96,7 +95,7 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
     nearest(&rows.collect::<Vec<_>>(), |i, c| sides[i][c])
 }
 
-/// What is added under loads, by size, function of gravity, coordinate and term.
+/// The effect added under loads, by size, function of gravity, coordinate and term.
 fn under_load(
     film: &impl Weighed,
     functions: &Functions,
@@ -130,8 +129,8 @@ fn under_load(
     Ok(under_load)
 }
 
-/// The parts of each of `N` functions, whose values are rows, that sum up nearest to what is known
-/// of each coordinate.
+/// Coefficients of `N` functions, whose values are the rows, nearest to the known values of each
+/// coordinate.
 fn nearest<const N: usize>(
     rows: &[[f64; N]],
     known: impl Fn(usize, usize) -> f64,
@@ -147,8 +146,8 @@ fn nearest<const N: usize>(
     }))
 }
 
-/// What loads of these sizes add to what gravity does at rest by each function of it. Gravity along
-/// z and −z tells what goes with Δ and with its square, gravity along the film is in proportion.
+/// What loads of these sizes add to the effect of gravity at rest, by function of gravity. Gravity
+/// along z and −z separates the parts in Δ and in its square; that along the film is proportional.
 fn added(
     film: &impl Weighed,
     functions: &Functions,

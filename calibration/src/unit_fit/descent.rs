@@ -10,31 +10,32 @@ use super::own::FoundNumber;
 use super::problem::{At, Problem, Solved, Trust, Unknowns};
 use crate::loads::SeenLoad;
 
-/// So many loads tell a unit well enough to begin with all of them there.
+/// With more loads than this, the descent begins with a selection of them; it determines a unit
+/// well enough to continue with all of them from there.
 const FIRST: usize = 16;
-/// Where descents begin: whether the film is taut and weighs nothing at first, and gravity along z,
-/// g, which decides to which side a slack film sags. How far a film sags that is hardly taut is no
-/// linear matter: steps do not lead to it from afar.
+/// Where descents begin: whether the film is at first taut and weightless, and gravity along z, g,
+/// which decides to which side a slack film sags. How far a barely taut film sags is far from
+/// linear, so steps from afar do not reach it.
 const STARTS: [(bool, f64); 4] = [(true, 0.0), (false, 0.0), (false, 0.7), (false, -0.7)];
 /// The least stretch of a taut film.
 const TAUT: f64 = 1e-3;
-/// How far a descent trusts what is seen, one after the other.
+/// The trust of each stage of a descent, in order.
 const TRUSTS: [Trust; 3] = [apart(100.0), apart(10.0), Trust::WHOLE];
-/// χ² over the coordinates that are seen of a fit that explains them.
+/// χ² over the number of seen coordinates below which a fit explains them.
 pub const EXPLAINED: f64 = 1.4;
-/// χ² of the nominal family is at most so many standard deviations above what chance makes.
+/// The greatest excess of the nominal family's χ² over its expectation, in standard deviations.
 const BY_CHANCE: f64 = 3.0;
-/// Steps at most, and the change of χ² that ends them.
+/// The greatest number of steps, and the fall of χ² below which they end.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 0.3;
-/// χ² over the coordinates above which a fit is far from the loads, and the part of it that a step
-/// then takes away at least; with less it does not come near them.
+/// χ² over the number of coordinates above which a fit is far from the loads. There, steps end when
+/// they lower χ² by less than this part of it, because they then do not come near the loads.
 const FAR: f64 = 100.0;
 const FAR_SETTLED: f64 = 0.03;
-/// How much is added to what is known of each number, in parts of what was known before, until χ²
-/// falls (Levenberg–Marquardt).
+/// Damping factors, tried in order until χ² falls (Levenberg–Marquardt): each is added to the prior
+/// of every number, in parts of that prior.
 const DAMPINGS: [f64; 6] = [0.0, 3.0, 30.0, 300.0, 3e3, 3e4];
-/// Parts of a load's own step that are tried, the first at which χ² falls is taken.
+/// Parts of a load's own step that are tried; the first at which χ² falls is taken.
 const LENGTHS: [f64; 4] = [1.0, 0.4, 0.15, 0.05];
 
 const fn apart(blur: f64) -> Trust {
@@ -46,9 +47,9 @@ const fn apart(blur: f64) -> Trust {
 
 /// Where a descent ended.
 pub struct Found {
-    /// The values, and what they explain.
+    /// The unknowns there, and the film and residuals that follow from them.
     pub at: At,
-    /// The equations there, and what is known of the numbers.
+    /// The equations there, and the covariance of the numbers.
     pub solved: Solved,
 }
 
@@ -58,7 +59,7 @@ impl Found {
         chi_square(&self.at)
     }
 
-    /// The number of the load that is explained worst.
+    /// Index of the load that the fit explains worst.
     pub fn worst(&self) -> usize {
         let of_load = |residual: &Vec<f64>| residual.iter().map(|part| part * part).sum::<f64>();
         let squares: Vec<f64> = self.at.residuals.iter().map(of_load).collect();
@@ -66,7 +67,7 @@ impl Found {
         worst.unwrap_or_default()
     }
 
-    /// How many times larger variances are than they were thought to be, at least 1.
+    /// Factor by which variances exceed the stated ones, at least 1.
     pub fn scatter(&self) -> f64 {
         self.chi_square().max(1.0)
     }
@@ -81,13 +82,13 @@ fn coordinates(at: &At) -> usize {
     at.residuals.iter().flatten().count() + 2 * at.made.dots_mm.len()
 }
 
-/// What a load adds to χ².
+/// A load's contribution to χ².
 fn own_square(parts: &[f64; UNKNOWNS], residual: &[f64]) -> f64 {
     parts.iter().chain(residual).map(|part| part * part).sum()
 }
 
 impl Problem<'_> {
-    /// What was found of each number.
+    /// Value and standard uncertainty of each number.
     pub fn found_numbers(&self, found: &Found) -> Vec<FoundNumber> {
         let parts = self
             .priors
@@ -102,7 +103,7 @@ impl Problem<'_> {
         of_number.collect()
     }
 
-    /// Every unknown as it is most likely before there is a load.
+    /// Every unknown at its prior mean.
     fn likeliest(&self) -> Unknowns {
         Unknowns {
             numbers: vec![0.0; self.priors.len()],
@@ -110,8 +111,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Descends from where it is likeliest before; `None` where that does not explain all that is
-    /// seen, or the film finds no equilibrium.
+    /// Descends from the prior means. `None` when that does not explain all that is seen, or the
+    /// film finds no equilibrium.
     ///
     /// # Errors
     /// When a state is not stable.
@@ -128,7 +129,8 @@ impl Problem<'_> {
         Ok(Some(self.with_all(&some, best)?).filter(is_explained))
     }
 
-    /// Descends by some of the loads, from several starts until one explains them, then by all.
+    /// Descends by some of the loads, from several starts until one explains them; then by all
+    /// loads.
     ///
     /// # Errors
     /// When the film finds no equilibrium from any start.
@@ -155,13 +157,13 @@ impl Problem<'_> {
         self.with_all(&some, best?)
     }
 
-    /// The loads to begin with.
+    /// The selection of loads to begin with.
     fn some(&self) -> Vec<SeenLoad> {
         let every = self.loads.len().div_ceil(FIRST);
         self.loads.iter().step_by(every).cloned().collect()
     }
 
-    /// With other loads.
+    /// The same problem with other loads.
     fn with<'b>(&'b self, loads: &'b [SeenLoad]) -> Problem<'b> {
         Problem {
             bench: self.bench,
@@ -172,7 +174,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Descends by all loads from what some of them told.
+    /// Descends by all loads from the fit of some of them.
     fn with_all(&self, some: &[SeenLoad], best: Found) -> Result<Found> {
         if some.len() == self.loads.len() {
             return Ok(best);
@@ -185,9 +187,8 @@ impl Problem<'_> {
         self.descend(self.located(here)?)
     }
 
-    /// Descends with more and more trust in what is seen, from what is most likely of a film on
-    /// which gravity pulls so, g; of one that is taut and weighs nothing at first, if it is asked
-    /// for.
+    /// Descends with growing trust from the prior means, with gravity along z at `down`, g. If
+    /// `taut`, the film is taut and weightless at first.
     fn start(&self, taut: bool, down: f64) -> Result<Found> {
         let mut unknowns = self.likeliest();
         let mut way = Problem {
@@ -223,8 +224,8 @@ impl Problem<'_> {
         self.descend(self.at(from.at.unknowns.clone(), near)?)
     }
 
-    /// Each load where it explains most with the unit as it is, whatever the others do: a place
-    /// that is known roughly would spoil steps of all unknowns.
+    /// Moves each load to its best place and force with the unit held as it is, independently of
+    /// the other loads. A roughly known place would spoil steps of all unknowns.
     ///
     /// # Errors
     /// When a state is not stable.

@@ -1,4 +1,4 @@
-//! Normal equations of a unit's numbers, and what each load says in them.
+//! Normal equations of a unit's numbers, and each load's contribution to them.
 
 use anyhow::Result;
 
@@ -6,7 +6,7 @@ use super::linear::{Matrix, dot, inverse, times};
 use super::load::UNKNOWNS;
 use super::numbers::Prior;
 
-/// How what is left over of a load answers.
+/// Derivatives of a load's residual.
 pub struct LoadSlopes {
     /// By number.
     pub numbers: Vec<Vec<f64>>,
@@ -24,8 +24,7 @@ pub struct Normal {
 }
 
 impl Normal {
-    /// What is known before anything is seen, of numbers so many standard deviations beside their
-    /// means.
+    /// The prior alone, for numbers that many standard deviations from their means.
     pub fn before(numbers: &[f64]) -> Normal {
         let count = numbers.len();
         let row = |i: usize| (0..count).map(|j| f64::from(u8::from(i == j))).collect();
@@ -35,7 +34,7 @@ impl Normal {
         }
     }
 
-    /// Adds equations: columns by number, and what is left over.
+    /// Adds equations: columns by number, and the residual.
     pub fn add(&mut self, columns: &[Vec<f64>], residual: &[f64]) {
         for (i, left) in columns.iter().enumerate() {
             for (j, right) in columns.iter().enumerate() {
@@ -45,12 +44,12 @@ impl Normal {
         }
     }
 
-    /// Their solution in which no number, so many standard deviations beside its mean, leaves its
-    /// range: one that would is held at its end, and the others are solved for anew. Damping is
-    /// added to what is known of each number.
+    /// The step that solves the equations and keeps every number in its range. `at` holds the
+    /// numbers, in standard deviations from their means. A number that would leave its range stops
+    /// at its end, and the others are solved again. `damping` is added to each number's prior.
     ///
     /// # Errors
-    /// When they do not tell the numbers.
+    /// When the equations do not determine the numbers.
     pub fn step_within(&self, priors: &[Prior], at: &[f64], damping: f64) -> Result<Vec<f64>> {
         let mut damped = self.clone();
         for k in 0..at.len() {
@@ -74,7 +73,7 @@ impl Normal {
         }
     }
 
-    /// Their solution where some steps are given.
+    /// The solution in which some steps are given.
     fn step_with(&self, held: &[Option<f64>]) -> Result<Vec<f64>> {
         let Normal {
             mut matrix,
@@ -95,7 +94,7 @@ impl Normal {
         Ok(times(&inverse(matrix)?, &side))
     }
 
-    /// Adds so much of what a load says.
+    /// Adds this part of a load's contribution; −1 takes it out.
     pub fn take(&mut self, load: &LoadEquations, part: f64) {
         for (sum, row) in self.matrix.iter_mut().zip(&load.said.matrix) {
             for (sum, entry) in sum.iter_mut().zip(row) {
@@ -110,12 +109,12 @@ impl Normal {
 
 /// The equations of one load, its own unknowns eliminated.
 pub struct LoadEquations {
-    /// What it says of the unit's numbers.
+    /// Its contribution to the equations of the unit's numbers.
     said: Normal,
-    /// How its residual answers to the numbers, and to its own unknowns.
+    /// Derivatives of its residual by the numbers, and by its own unknowns.
     slopes: LoadSlopes,
     residual: Vec<f64>,
-    /// Its own unknowns: where they are, their covariance, and the right side of their equations.
+    /// Its own unknowns: their values, their covariance, and the right side of their equations.
     at: [f64; UNKNOWNS],
     own: Matrix,
     own_side: Vec<f64>,
@@ -124,10 +123,10 @@ pub struct LoadEquations {
 }
 
 impl LoadEquations {
-    /// Of slopes, what is left over, and where its own unknowns are.
+    /// From the residual and its slopes, and the values of the load's own unknowns.
     ///
     /// # Errors
-    /// When a number is none.
+    /// When the equations of its own unknowns have no solution.
     pub fn new(slopes: LoadSlopes, residual: &[f64], at: &[f64; UNKNOWNS]) -> Result<Self> {
         let count = slopes.numbers.len();
         let mut said = Normal {
@@ -158,7 +157,7 @@ impl LoadEquations {
         })
     }
 
-    /// The step of its own unknowns, where the numbers take one.
+    /// The step of its own unknowns when the numbers take this step.
     pub fn step(&self, numbers: &[f64]) -> [f64; UNKNOWNS] {
         let mut left = self.own_side.clone();
         for (row, step) in self.mixed.iter().zip(numbers) {
@@ -170,11 +169,12 @@ impl LoadEquations {
         std::array::from_fn(|i| step[i])
     }
 
-    /// How far beside what is told, in parts of its uncertainties, a sensor would find the load
-    /// where the numbers are so much otherwise: by what is seen alone.
+    /// How far from its stated values a sensor would find the load, in parts of their
+    /// uncertainties, after this step of the numbers. Uses the seen coordinates only, without the
+    /// load's stated values.
     ///
     /// # Errors
-    /// When what is seen does not tell the load's parts.
+    /// When the seen coordinates do not determine the load's unknowns.
     pub fn found(&self, numbers: &[f64]) -> Result<[f64; UNKNOWNS]> {
         let mut residual = self.residual.clone();
         let columns = self.slopes.numbers.iter().zip(numbers);

@@ -1,19 +1,19 @@
-//! What χ² of a fit says of its loads, and what to do about it.
+//! Explains in words what a fit's χ² says of its loads, and what to do about it.
 
 use std::fmt;
 
 use super::descent::EXPLAINED;
 use crate::loads::SeenLoad;
 
-/// χ² above which a load is told wrongly, rather than known less well than was said: its markers
-/// are some hundredths of a pixel off.
+/// χ² above which a load's stated values are wrong, rather than less certain than stated. Its
+/// markers are then some hundredths of a pixel from the fit.
 const WRONG: f64 = 10.0;
 
 /// How well a fit explains its loads.
 pub struct Explained<'a> {
-    /// χ² over the coordinates that are seen.
+    /// χ² over the number of seen coordinates.
     pub chi_square: f64,
-    /// The load that is explained worst.
+    /// The load that the fit explains worst.
     pub worst: &'a SeenLoad,
 }
 

@@ -1,11 +1,12 @@
-//! How a unit's film moves its dots under any load: from finite elements at few places of the tip
-//! to every place.
+//! Computes how a unit's film moves its dots under any load: interpolates from finite elements at
+//! few places of the tip to every place.
 //!
-//! The dimple under a tip moves with it. So the motion of a dot near the tip is that of the point
-//! as far from the tip, with the tip at solved places nearby: interpolated between these it changes
-//! slowly, although the film moves quite otherwise a little beside a tip. Far from the tip the film
-//! moves alike with the tip at places nearby, and dots, which are stiffer, stay where they are:
-//! there the motion of the dot itself is interpolated, with its slopes by the place.
+//! The dimple under a tip moves with it. So a dot near the tip takes its motion from solutions with
+//! the tip nearby, at the point that lies equally far from their tip. From solution to solution
+//! this changes slowly, although the motion varies strongly within a short distance of a tip. Far
+//! from the tip, the film moves alike for neighbouring tip places, and dots, which are stiffer,
+//! stay where they are. There the motion of the dot itself is interpolated, with its slopes by the
+//! place.
 
 use anyhow::{Context, Result};
 use hivtac_shell::{Equilibrium, Film, Response};
@@ -16,36 +17,37 @@ use super::problem::{At, Problem, apart_mm};
 use super::seen::{Rim, View};
 use crate::forward::Nearest;
 
-/// Places of the tip along x and along y at which the film is solved: from the first, so far apart,
-/// mm.
+/// Tip places along x and along y at which the film is solved: the first, their spacing, mm, and
+/// their number.
 const FIRST_MM: f64 = -5.0;
 const APART_MM: f64 = 2.0;
 const TIPS: usize = 6;
-/// How far from the tip a dot is in its dimple, and outside it, mm.
+/// Distances between tip and dot, mm: up to the first the dot is in the dimple, from the second on
+/// outside it.
 const FAR_MM: [f64; 2] = [1.5, 3.0];
-/// Places that a value in the dimple is interpolated from, along each axis.
+/// Solved places along each axis from which a value in the dimple is interpolated.
 const SPAN: usize = 4;
 /// The force of the largest size, N.
 const LARGEST_N: f64 = 0.256;
-/// Loads at each place: sizes in parts of the largest without tilt, and with tilts: radius in parts
-/// of the largest, the turn of the first of four, °, and the size.
+/// Loads at each place: sizes in parts of the largest, without tilt; and tilted loads. A tilted
+/// load has a tilt in parts of the largest, the direction of the first of four, °, and a size.
 const STRAIGHT: [f64; 6] = [0.03, 0.12, 0.3, 0.52, 0.77, 1.0];
 const TILTED: [(f64, f64, f64); 2] = [(0.6, 20.0, 0.4), (0.8, 65.0, 0.9)];
-/// What slopes count for beside values.
+/// Weight of slopes relative to values.
 const SLOPES_COUNT: f64 = 0.05;
-/// Step by which images are differentiated along a slope, in its unit.
+/// Step by which images are differentiated along a slope, in the slope's unit.
 const SLOPE_STEP: f64 = 3e-3;
-/// How many sizes the terms have without tilt, with its first degree, and so on.
+/// Number of powers of size in the terms without tilt, of its first degree, and higher degrees.
 const TERMS: [u8; 5] = [8, 5, 3, 1, 0];
 
 /// A unit's film, solved under some loads at some places of the tip.
 pub struct Field<'a> {
     problem: &'a Problem<'a>,
     at: &'a At,
-    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    /// Coefficients a and b, N, of |F| = a·s + b·s³ at a size s.
     stiffness_n: [f64; 2],
     poses: Vec<Pose>,
-    /// By place along y, place along x and load.
+    /// By place along y, place along x, and load.
     solved: Vec<Solved>,
     nearest: Nearest,
     terms: Terms,
@@ -53,9 +55,9 @@ pub struct Field<'a> {
 
 struct Solved {
     state: Equilibrium,
-    /// By size, and by tilt along x and y, 1/rad.
+    /// By size, 1, and by tilt along x and y, 1/rad.
     slopes: [Response; 3],
-    /// By the place along x and y, per mm.
+    /// By the tip's place along x and y, per mm.
     by_place: [Response; 2],
 }
 
@@ -63,7 +65,7 @@ struct Solved {
 pub type Coefficients = [Vec<f64>; 2];
 
 impl<'a> Field<'a> {
-    /// Solves the film of a unit that was found.
+    /// Solves the film of a fitted unit.
     ///
     /// # Errors
     /// When the film finds no equilibrium.
@@ -92,7 +94,7 @@ impl<'a> Field<'a> {
         Ok(field)
     }
 
-    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    /// Coefficients a and b, N, of |F| = a·s + b·s³ at a size s.
     pub fn stiffness_n(&self) -> [f64; 2] {
         self.stiffness_n
     }
@@ -136,7 +138,7 @@ impl<'a> Field<'a> {
         Ok(solved)
     }
 
-    /// How the force answers to size and tilt, N and N/rad.
+    /// Derivatives of the force by size and by tilt, N and N/rad.
     fn per_pose(&self, pose: &Pose) -> [[f64; 3]; 3] {
         const STEP: f64 = 1e-5;
         [0, 1, 2].map(|axis| {
@@ -152,7 +154,8 @@ impl<'a> Field<'a> {
         })
     }
 
-    /// The terms' coefficients of the motion of a dot's image with the tip at a place at rest, mm.
+    /// Coefficients of the terms of a dot's image motion, with the tip at a place of the resting
+    /// film, mm.
     pub fn coefficients(&self, dot_mm: [f64; 2], place_mm: [f64; 2]) -> Coefficients {
         let At {
             film, rest, made, ..
@@ -235,13 +238,13 @@ impl<'a> Field<'a> {
     }
 }
 
-/// The force of a pose, N, on a film of this stiffness, |F| = a·s + b·s³: a and b, N.
+/// The force of a pose, N, on a film with |F| = a·s + b·s³: a and b, N.
 pub fn force_n([a, b]: [f64; 2], pose: &Pose) -> [f64; 3] {
     let size_n = a * pose.size + b * pose.size * pose.size * pose.size;
     pose.direction().map(|part| size_n * part)
 }
 
-/// The state under a pose that another one's slopes foretell.
+/// The state under `pose`, extrapolated by the slopes of the solved state under `there`.
 fn foretold(film: &Film, from: &Solved, there: &Pose, pose: &Pose) -> Equilibrium {
     let steps = [
         pose.size - there.size,
@@ -254,7 +257,7 @@ fn foretold(film: &Film, from: &Solved, there: &Pose, pose: &Pose) -> Equilibriu
     })
 }
 
-/// The solved places around a place, and what each counts for.
+/// The solved places around a place, and the weight of each.
 struct Around {
     first: [usize; 2],
     parts: [[f64; SPAN]; 2],
@@ -282,8 +285,8 @@ impl Around {
         }
     }
 
-    /// Adds a vector of each solved place: by its number along x and y, how far it is from the
-    /// place, mm, and what it counts for.
+    /// Adds a vector of each solved place. `of` takes its index along x and y, its distance from
+    /// the place, mm, and its weight.
     fn add(&self, sum: &mut [f64; 3], of: impl Fn([usize; 2], [f64; 2], f64) -> [f64; 3]) {
         for (j, down) in self.parts[1].iter().enumerate() {
             for (i, right) in self.parts[0].iter().enumerate() {
@@ -297,8 +300,8 @@ impl Around {
     }
 }
 
-/// The four solved places that a place is between, and what values there and slopes along x and y
-/// count for: Adini's polynomials, of the third degree.
+/// The four solved places around a place, and the weights of their values and slopes along x and y:
+/// Adini's polynomials, of the third degree.
 struct Between {
     corners: [([usize; 2], [f64; 3]); 4],
 }
@@ -307,7 +310,7 @@ impl Between {
     fn new(place_mm: [f64; 2]) -> Between {
         let at = place_mm.map(|part| (part - FIRST_MM) / APART_MM);
         let first = at.map(|at| at.floor().clamp(0.0, (TIPS - 2) as f64));
-        // From −1 to 1 across the four.
+        // From −1 to 1 between the four.
         let [x, y] = [0, 1].map(|axis| 2.0 * (at[axis] - first[axis]) - 1.0);
         let half_mm = APART_MM / 2.0;
         let corner = |k: usize| {
@@ -327,8 +330,8 @@ impl Between {
         }
     }
 
-    /// Adds a vector of each corner: by its number along x and y, and what value and slopes count
-    /// for.
+    /// Adds a vector of each corner. `of` takes its index along x and y, and the weights of value
+    /// and slopes.
     fn add(&self, sum: &mut [f64; 3], of: impl Fn([usize; 2], &[f64; 3]) -> [f64; 3]) {
         for (tip, parts) in &self.corners {
             for (sum, value) in sum.iter_mut().zip(of(*tip, parts)) {
@@ -338,8 +341,8 @@ impl Between {
     }
 }
 
-/// The part of a dot's motion that is interpolated where the dot is; the rest is interpolated as
-/// far from the tip as the dot is: 0 for dots in the dimple, 1 for far ones.
+/// The part of a dot's motion that is interpolated at the dot itself: 0 in the dimple, 1 far from
+/// the tip. The remainder is interpolated at equal distance from the tip.
 fn far_part(apart_mm: f64) -> f64 {
     let [from_mm, to_mm] = FAR_MM;
     let along = ((apart_mm - from_mm) / (to_mm - from_mm)).clamp(0.0, 1.0);
@@ -366,7 +369,7 @@ fn poses() -> Vec<Pose> {
     straight.into_iter().chain(tilted).map(pose).collect()
 }
 
-/// Finds the terms' coefficients nearest to values and slopes under the poses.
+/// Fits the terms' coefficients to values and slopes under the poses.
 fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Nearest> {
     let of_pose = |pose: &Pose| {
         let [value, slopes @ ..] = terms.rows(pose);
@@ -377,7 +380,7 @@ fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Nearest> {
     Nearest::new(&rows).context("the tables' loads")
 }
 
-/// How strong the force of a size is: sizes grow like the depth of a tip in the film's middle.
+/// Coefficients of force by size: sizes grow like the depth of a tip in the film's middle.
 fn stiffness_n(at: &At) -> Result<[f64; 2]> {
     let mut start = at.rest.clone();
     let mut pairs = Vec::new();
@@ -389,7 +392,7 @@ fn stiffness_n(at: &At) -> Result<[f64; 2]> {
         pairs.push((deepest, force));
     }
     let [a, b] = cubic_law(pairs);
-    // Either may be near nothing, never below.
+    // Both must stay positive; either may be near 0.
     let (a, b) = (
         a.max(1e-3 * LARGEST_N / deepest),
         b.max(1e-3 * LARGEST_N / deepest.powi(3)),
@@ -405,7 +408,8 @@ fn depth(at: &At, state: &Equilibrium) -> f64 {
     rest - here
 }
 
-/// a and b of f = a·x + b·x³ nearest to these, each f > 0 in parts of itself.
+/// Coefficients a and b of f = a·x + b·x³ with the least relative squared errors at these pairs, f
+/// > 0.
 fn cubic_law(pairs: impl IntoIterator<Item = (f64, f64)>) -> [f64; 2] {
     let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
     for (x, f) in pairs {

@@ -1,4 +1,4 @@
-//! How good a unit's model is on loads that it was not fitted to.
+//! Errors of a unit's model on loads that it was not fitted to.
 
 use anyhow::Result;
 
@@ -7,23 +7,24 @@ use super::equations::LoadEquations;
 use super::linear::{inverse, times};
 use super::problem::Problem;
 
-/// How far a sensor would find a load from what is told of it, with a model fitted to all others.
+/// Difference between a load found with a model fitted to all others, and its stated values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeftOut {
-    /// |F| found less |F| told, N.
+    /// F| found minus |F| stated, N.
     pub size_n: f64,
-    /// Between the directions, degrees.
+    /// Angle between the two directions, degrees.
     pub direction_deg: f64,
-    /// The place found less the place told, mm; `None` where nobody noted it.
+    /// The place found minus the place stated, mm; `None` where nobody noted it.
     pub place_mm: Option<[f64; 2]>,
 }
 
 impl Found {
-    /// Each load left out of the fit: by the equations where the fit ended, so that nothing is
-    /// solved anew.
+    /// The error of each load when it is left out of the fit. It follows from the equations where
+    /// the fit ended, without another solution.
     ///
     /// # Errors
-    /// When the other loads do not tell the unit's numbers, or what is seen of one not the load.
+    /// When the other loads do not determine the unit's numbers, or a load's picture does not
+    /// determine the load.
     pub fn left_out(&self, problem: &Problem<'_>) -> Result<Vec<LeftOut>> {
         let of_load = |(number, load): (usize, &LoadEquations)| {
             let mut others = self.solved.whole.clone();

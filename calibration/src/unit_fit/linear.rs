@@ -1,4 +1,4 @@
-//! Small dense linear algebra of a fit.
+//! Small dense linear algebra for a fit.
 
 use anyhow::{Result, ensure};
 
@@ -31,10 +31,10 @@ pub fn cholesky(mut matrix: Matrix) -> Result<Matrix> {
     Ok(matrix)
 }
 
-/// The inverse of a symmetric matrix that is positive definite.
+/// The inverse of a symmetric matrix.
 ///
 /// # Errors
-/// When it is not.
+/// When the matrix is not positive definite.
 pub fn inverse(matrix: Matrix) -> Result<Matrix> {
     let (count, factor) = (matrix.len(), cholesky(matrix)?);
     // Columns of the factor's inverse, then their products.

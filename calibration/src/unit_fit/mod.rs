@@ -1,18 +1,19 @@
-//! A unit's film and camera from known loads: least squares over the numbers in which units differ,
-//! each drawn to its mean as strongly as units scatter, with the film solved by finite elements.
+//! Fits a unit's film and camera to known loads, with the film solved by finite elements. Least
+//! squares over the numbers in which units differ; each is drawn to its mean as strongly as units
+//! scatter.
 //!
 //! | file | subject |
 //! |---|---|
-//! | `numbers` | the numbers, and what is known of them before there is a load |
-//! | `load` | what is not known of a load |
+//! | `numbers` | the numbers, and what is known of them before any load |
+//! | `load` | the unknowns of a load |
 //! | `seen` | where a camera sees the dots of a solved film |
-//! | `problem` | numbers and loads held against what is seen |
-//! | `equations` | that linearized, as normal equations |
-//! | `descent` | Gauss–Newton steps to what explains it best |
+//! | `problem` | residuals of numbers and loads, and their rates |
+//! | `equations` | the linearized problem as normal equations |
+//! | `descent` | Gauss–Newton steps to the least χ² |
 //! | `explained` | what χ² says of the loads, in words |
-//! | `left_out` | how good the fit is on loads left out of it |
+//! | `left_out` | the fit's errors on loads left out of it |
 //! | `field` | from few solved places of the tip to every place |
-//! | `own` | the unit's tables and what is not known of them, for its model file |
+//! | `own` | the unit's tables and their uncertainty, for its model file |
 //! | `weight` | what gravity does to the unit's film when it is turned |
 
 mod descent;
@@ -40,33 +41,34 @@ pub use own::{FoundNumber, OwnFilm};
 pub use problem::Bench;
 use problem::{Problem, Trust};
 
-/// How fine the film's mesh is: coarser ones do not show how the film bends between a tip and a dot
-/// beside it.
+/// Fineness of the film's mesh. Coarser meshes do not resolve how the film bends between a tip and
+/// a dot near it.
 const FINENESS: f64 = 0.5;
 
-/// How fine a mesh is that tells how a film answers to its numbers.
+/// Fineness of the mesh on which rates by the numbers are computed.
 const COARSE: f64 = 0.3;
 
-/// χ² over the coordinates that are seen beyond which loads contradict each other: they are off by
-/// some tenths of a pixel then, which no film in tolerance is.
+/// χ² over the number of seen coordinates above which loads contradict each other. Coordinates are
+/// then some tenths of a pixel from the fit, which no film in tolerance reaches.
 const CONTRADICTED: f64 = 2_500.0;
 
-/// What a fit found.
+/// The result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The unit's film, as a model file holds it.
     pub own: OwnFilm,
-    /// χ² of what is seen and of what was known before, over the coordinates that are seen.
+    /// χ² of the seen coordinates and of the priors, over the number of seen coordinates.
     pub chi_square: f64,
-    /// Whether gravity was known under the loads.
+    /// Whether the direction of gravity was known under the loads.
     is_held: bool,
-    /// The load that is explained worst.
+    /// The load that the fit explains worst.
     worst: SeenLoad,
-    /// Each load, left out of the fit.
+    /// The error of each load when it is left out of the fit.
     pub left_out: Vec<LeftOut>,
 }
 
-/// Fits a unit to its rest position and to loads.
+/// Fits a unit to its rest position and to loads. `stage_mm` is the standard uncertainty of the
+/// stage's zero; `from` is the fit of the unit's old film.
 ///
 /// # Errors
 /// When the film finds no equilibrium under a load, or the loads contradict each other.

@@ -1,4 +1,4 @@
-//! The numbers in which units differ, and what is known of them before there is a load.
+//! The numbers in which units differ, and their priors before any load.
 
 use hivtac_shell::{Change, Design};
 
@@ -6,36 +6,36 @@ use super::own::{FoundNumber, OwnFilm};
 use super::problem::Bench;
 use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
-/// Standard deviations of what the pixel grid does to a marker at rest, px, and of how far the
-/// camera is from the film beyond its nominal distance, mm.
+/// Standard deviations of the pixel grid's effect on a marker at rest, px, and of the camera's
+/// distance from the film beyond the nominal one, mm.
 const REST_PX: f64 = 0.006;
 const DISTANCE_MM: f64 = 0.1;
 
-/// Standard deviation of gravity along the film, g, of a unit that may be held any way.
+/// Standard deviation of gravity along the film, g, of a unit that may be held in any orientation.
 const SIDEWAYS: f64 = 0.6;
-/// Standard deviation of each part of a known direction of gravity, g: a degree.
+/// Standard deviation of each component of a known direction of gravity, g: a degree.
 const DOWN: f64 = 0.02;
 
-/// The overhang by which what it does to the film falls to a part of e, mm.
+/// The overhang over which its effect on the film falls by a factor of e, mm.
 const OVERHANG_MM: f64 = 2.0;
 
 /// A number of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Number {
-    /// Of the film: ln of Young's modulus, thickness and grip in parts of the nominal ones, of an
-    /// overhang exp(−mm/[`OVERHANG_MM`]), all others in the unit of the change.
+    /// Of the film: ln of Young's modulus, thickness and grip over the nominal ones;
+    /// exp(−mm/[`OVERHANG_MM`]) of an overhang; all others in the unit of the change.
     Film(Change),
-    /// How far a marker is glued beside its place along x or y, mm.
+    /// Distance of a marker from its nominal place along x or y, mm.
     Marker(usize, usize),
-    /// What the pixel grid does to a marker at rest along x or y, px.
+    /// Effect of the pixel grid on a marker at rest along x or y, px.
     Rest(usize, usize),
-    /// How far the camera is rolled, x towards y, degrees.
+    /// The camera's roll, x towards y, degrees.
     Roll,
-    /// ln of the focal length in parts of the nominal one.
+    /// ln of the focal length over the nominal one.
     Focal,
-    /// How much farther than nominal the camera is from the film, mm.
+    /// Distance of the camera from the film beyond the nominal one, mm.
     Distance,
-    /// Where the camera's axis meets the picture, beside the nominal point, px.
+    /// Where the camera's axis meets the picture, minus the nominal point, px.
     Middle(usize),
     /// The stage's zero on the film along x or y, mm.
     Stage(usize),
@@ -52,7 +52,7 @@ pub struct Prior {
 }
 
 impl Number {
-    /// Whether it stays what it is when the unit gets another film.
+    /// Whether it stays the same when the unit gets another film.
     fn stays(self) -> bool {
         use Number::{Film, Focal, Middle, Roll};
         matches!(
@@ -61,7 +61,7 @@ impl Number {
         )
     }
 
-    /// What it is, with its unit.
+    /// Its name, with its unit.
     pub fn name(self) -> String {
         let along = |axis: usize| ["x", "y", "z"][axis];
         match self {
@@ -104,12 +104,12 @@ impl Prior {
         }
     }
 
-    /// The same about 0.
+    /// The same with mean 0.
     pub fn about_zero(number: Number, sigma: f64) -> Prior {
         Prior::about(number, 0.0, sigma)
     }
 
-    /// Takes what was found of the number for what is known.
+    /// Takes the value and uncertainty that an earlier fit found as the prior.
     fn narrow(&mut self, known: &OwnFilm) {
         let name = self.number.name();
         let found = known.numbers.iter().find(|found| found.name == name);
@@ -120,13 +120,13 @@ impl Prior {
         }
     }
 
-    /// The nearest number of standard deviations beside the mean that is within the range.
+    /// Limits a value, in standard deviations from the mean, to the range.
     pub fn within(&self, part: f64) -> f64 {
         let [least, largest] = self.range.map(|end| (end - self.mean) / self.sigma);
         part.clamp(least, largest)
     }
 
-    /// The value that lies so many standard deviations beside the mean, within the range.
+    /// The value at `part` standard deviations from the mean, within the range.
     pub fn value(&self, part: f64) -> f64 {
         let [least, largest] = self.range;
         (self.mean + self.sigma * part).clamp(least, largest)
@@ -157,14 +157,14 @@ const FILM: [(Change, [f64; 4]); 17] = [
 /// What is known of how a film is made and mounted, before anything is seen of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
-    /// As the simulated sensor's: even, weightless, without stretch, cut at its holes.
+    /// Like the simulated sensor's: even, weightless, without stretch, cut at its holes.
     Nominal,
     /// As people make and mount them.
     Real,
 }
 
 impl Family {
-    /// Whether its films differ in this.
+    /// Whether its films differ in this change.
     fn differs_in(self, change: Change) -> bool {
         use Change::{Grip, Thickness, TipRadius, Youngs};
         match self {
@@ -174,8 +174,8 @@ impl Family {
     }
 }
 
-/// The numbers of units before a bench whose stage's zero is known to so many mm; the camera and
-/// the posts of a unit whose old film was fitted are known.
+/// The priors of a unit's numbers. `stage_mm` is the standard uncertainty of the stage's zero. With
+/// `from`, the fit of the unit's old film, its camera and posts are known from there.
 pub fn priors(family: Family, bench: &Bench, stage_mm: f64, from: Option<&OwnFilm>) -> Vec<Prior> {
     let film = FILM.iter();
     let film = film.filter(|(change, _)| family.differs_in(*change));
@@ -244,7 +244,7 @@ pub fn set(design: &mut Design, change: Change, value: f64) {
     }
 }
 
-/// The unit of a change per unit of its number.
+/// Derivative of a change by its number.
 pub fn per_number(design: &Design, change: Change) -> f64 {
     match change {
         Change::Thickness => design.material.thickness_mm,

@@ -1,4 +1,4 @@
-//! A unit's own film as a model file holds it: tables of its dots, and what is not known of them.
+//! A unit's own film as a model file holds it: tables of its dots, and their uncertainty.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -25,35 +25,36 @@ use crate::forward::{
 /// Nodes along each axis of a dot's table.
 const NODES: usize = 13;
 
-/// A unit's film as its loads tell it.
+/// A unit's film as fitted to its loads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnFilm {
-    /// What was found of each number of the unit.
+    /// The fitted numbers of the unit.
     pub numbers: Vec<FoundNumber>,
-    /// |F| = a·s + b·s³ of a size s: a and b, N.
+    /// Coefficients a and b, N, of |F| = a·s + b·s³ at a size s.
     pub stiffness_n: [f64; 2],
-    /// Focal lengths per px of its camera, a complex number.
+    /// Focal lengths per px of its camera, a complex number (scale and roll).
     pub per_px: [f64; 2],
-    /// What a tare takes for the rest position less where the markers rest, px.
+    /// Rest position as a tare measures it, minus where the markers rest, px.
     pub rest_px: Vec<[f64; 2]>,
-    /// How many sizes the tables' terms have without tilt, with its first degree, and so on.
+    /// Number of powers of size in the tables' terms without tilt, of its first degree, and higher
+    /// degrees.
     terms: [u8; MOST_TILTS],
-    /// The load functions, each so much of each term.
+    /// The load functions: coefficients of the terms.
     functions: Vec<Vec<f32>>,
     dots: Vec<OwnTable>,
     covariance: OwnCovariance,
-    /// What gravity does, if it was known under the loads, and the film finds an equilibrium any
-    /// way it is turned.
+    /// What gravity does. Present if gravity was known under the loads and the film finds an
+    /// equilibrium in every orientation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weight: Option<Box<OwnWeight>>,
 }
 
-/// A number of a unit that was found.
+/// A number of a unit, as fitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FoundNumber {
-    /// What it is, with its unit.
+    /// Its name, with its unit.
     pub name: String,
     /// The likeliest value.
     pub value: f64,
@@ -61,7 +62,7 @@ pub struct FoundNumber {
     pub sigma: f64,
 }
 
-/// A dot's table: as [`TableSpec`].
+/// A dot's table, like [`TableSpec`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OwnTable {
@@ -72,7 +73,7 @@ struct OwnTable {
     coefficients: Vec<f64>,
 }
 
-/// As [`CovarianceSpec`].
+/// Like [`CovarianceSpec`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct OwnCovariance {
@@ -83,7 +84,7 @@ struct OwnCovariance {
 }
 
 impl OwnFilm {
-    /// Of a unit that was found.
+    /// Of a fitted unit.
     ///
     /// # Errors
     /// When its film finds no equilibrium under a load of the tables.
@@ -91,7 +92,7 @@ impl OwnFilm {
         let field = Field::new(problem, &found.at)?;
         let made = &found.at.made;
         let (tables, left) = tables_of(&field, &made.dots_mm)?;
-        // A scatter beyond the noise is what no number explains.
+        // Scatter beyond the noise comes from differences that no number describes.
         let scatter_px = problem.bench.noise_px * (found.scatter() - 1.0).sqrt();
         let beside = left.hypot(scatter_px.hypot(mesh_px(problem.family)) / made.focal_px);
         let covariance = left_open(problem, found, &field, beside)?;
@@ -131,10 +132,10 @@ impl OwnFilm {
         self.weight.is_some()
     }
 
-    /// Checks that it can be a unit's.
+    /// Checks that every value is valid.
     ///
     /// # Errors
-    /// Says what cannot.
+    /// Names the first that is not.
     pub fn check(&self) -> Result<()> {
         let numbers = self.stiffness_n.iter().chain(&self.per_px);
         ensure!(
@@ -152,10 +153,11 @@ impl OwnFilm {
         self.covariance().map(|_| ())
     }
 
-    /// What a model file holds of it, with so many Gauss–Newton steps and this noise of markers.
+    /// The film as a model file holds it, with this number of Gauss–Newton steps and this noise of
+    /// markers.
     ///
     /// # Errors
-    /// When the covariance is of other markers.
+    /// When the covariance is of a different number of coordinates.
     pub fn spec(&self, steps: u8, noise: Noise, camera: &Camera) -> Result<ForwardSpec> {
         let [linear_n, cubic_n] = self.stiffness_n.map(|part| part as f32);
         let mut rest_px = noise.rest_px;
@@ -176,7 +178,7 @@ impl OwnFilm {
         })
     }
 
-    /// The tables, as a model file has them.
+    /// The tables as a model file holds them.
     fn tables(&self) -> TablesSpec {
         let table = |table: &OwnTable| TableSpec {
             nodes_mm: table.nodes_mm.clone(),
@@ -190,10 +192,10 @@ impl OwnFilm {
         }
     }
 
-    /// What is not known of the unit's motion, as a model file has it.
+    /// The uncertainty of the unit's motion as a model file holds it.
     ///
     /// # Errors
-    /// When a knot has another number of entries than a covariance.
+    /// When a knot has a different number of entries than a covariance.
     fn covariance(&self) -> Result<CovarianceSpec> {
         let factor = |entries: &Vec<f64>| -> Option<Covariance> {
             let (rows, rest) = entries.as_chunks::<EQUATIONS>();
@@ -210,8 +212,8 @@ impl OwnFilm {
     }
 }
 
-/// What a fit's mesh leaves of the motion under the largest load, standard uncertainty of each
-/// coordinate, px at 320×240: where many numbers are open, they stand for it.
+/// Standard uncertainty of each coordinate due to the fit's mesh under the largest load, px at
+/// 320×240. 0 for real films: their many open numbers include it.
 fn mesh_px(family: Family) -> f64 {
     match family {
         Family::Nominal => 0.02,
@@ -219,14 +221,13 @@ fn mesh_px(family: Family) -> f64 {
     }
 }
 
-/// The tables of dots on a film, and what they leave of the motion, root mean square, focal
-/// lengths.
+/// The tables of dots on a film, and their error in motion, root mean square, focal lengths.
 fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64)> {
     let dots: Vec<Dot> = dots_mm
         .iter()
         .map(|place| Dot::new(*place, NODES))
         .collect();
-    // All loads of a node are asked for one after the other.
+    // A node's coefficients give all its loads, which are queried one after the other.
     let known: Mutex<HashMap<[u64; 3], Coefficients>> = Mutex::default();
     tables(&dots, |pose, number| {
         let [x, y] = pose.place_mm.map(f64::to_bits);
@@ -246,8 +247,9 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
     })
 }
 
-/// What the loads leave open of how the unit's dots move, with errors of each coordinate, focal
-/// lengths, that grow with the size to this at the largest.
+/// Covariances of how the unit's dots move, as the loads leave them open. `beside` is an
+/// independent error of each coordinate at the largest size, focal lengths; it grows in proportion
+/// to size.
 fn left_open(
     problem: &Problem<'_>,
     found: &Found,
@@ -309,13 +311,13 @@ fn left_open(
     Ok(covariances(KNOTS, &all))
 }
 
-/// What a table leaves of each coordinate of a dot with the tip at a place, standard uncertainty in
-/// parts of how far the dot is moved: most where the dimple is.
+/// Standard uncertainty of each coordinate of a dot due to its table, in parts of the dot's motion.
+/// It is largest in the dimple.
 fn table_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
     2.5e-4_f64.hypot(1.5e-3 * near_tip(dot_mm, place_mm, 2.4))
 }
 
-/// The film at the knots of its covariance: sizes, the smallest first, lines and places.
+/// The film at the knots of its covariance: by size, the smallest first, then line and place.
 fn knot_states(at: &At, field: &Field<'_>, poses: &[Pose]) -> Result<Vec<Equilibrium>> {
     let places = poses.len() / usize::from(KNOTS[0]);
     let of_place = |place: usize| -> Result<Vec<Equilibrium>> {

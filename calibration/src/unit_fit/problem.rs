@@ -1,4 +1,4 @@
-//! A unit's numbers, held against its rest position and its loads.
+//! Compares a unit's numbers with its rest position and its loads: residuals and their rates.
 
 use anyhow::Result;
 use hivtac_shell::{Change, Design, Equilibrium, Film};
@@ -13,16 +13,17 @@ use super::seen::View;
 use super::{COARSE, FINENESS};
 use crate::loads::SeenLoad;
 
-/// So many loads are not alike: places and directions all over the film.
+/// Beyond this number, loads repeat each other: these cover places and directions all over the
+/// film.
 const APART: usize = 10;
-/// Standard uncertainty of the rest position while it counts little, px, times the blur.
+/// Standard uncertainty of the rest position while it has little weight, px, times the blur.
 const LITTLE_REST_PX: f64 = 0.05;
-/// What the family of films leaves of a real one's motion, standard uncertainty, px at 320×240.
+/// Standard uncertainty of a real film's motion around the family's nearest film, px at 320×240.
 const FAMILY_PX: f64 = 0.006;
-/// The same of loads whose places nobody noted: the family alone tells how far apart they are.
+/// The same for loads whose places nobody noted: then only the family of films relates them.
 const FAMILY_PX_NOWHERE: f64 = 0.02;
 
-/// What is known of the camera and the rest position before there is a load.
+/// What is known of the camera and the rest position before any load.
 #[derive(Clone, Debug)]
 pub struct Bench {
     /// The camera's nominal focal length, px.
@@ -35,13 +36,13 @@ pub struct Bench {
     pub noise_px: f64,
     /// Where dots are nominally glued, mm.
     pub dots_mm: Vec<[f64; 2]>,
-    /// The camera whose lens sees the film; images count in its focal lengths.
+    /// The camera whose lens sees the film; images are in its focal lengths.
     pub camera: Camera,
-    /// Where gravity pulls in the film frame at rest and under all loads, parts of g, if known.
+    /// Direction of gravity in the film frame at rest and under all loads, parts of g, if known.
     pub down: Option<[f64; 3]>,
 }
 
-/// A unit's numbers, what is known of them, and loads to hold them against.
+/// A unit's numbers, their priors, and the loads to compare them with.
 pub struct Problem<'a> {
     pub bench: &'a Bench,
     pub loads: &'a [SeenLoad],
@@ -50,32 +51,32 @@ pub struct Problem<'a> {
     pub trust: Trust,
 }
 
-/// How far a fit trusts what is seen: from far away one that trusts it less finds its way.
+/// How much a fit trusts the seen coordinates: with less trust it converges from farther away.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trust {
-    /// How many times larger than it is what is seen is taken to scatter, ≥ 1.
+    /// Factor on the standard uncertainty of the seen coordinates, ≥ 1.
     pub blur: f64,
-    /// Whether dots under loads are held against how far they are seen beside their rest position,
-    /// or against where in the picture they are, with a rest position that counts little: that of a
-    /// slack film jumps, and would take all loads with it.
+    /// If true, dots under loads are compared by their shift from the rest position. If false, they
+    /// are compared by their place in the picture, and the rest position has little weight. The
+    /// rest position of a slack film jumps, and would shift all loads.
     pub from_rest: bool,
 }
 
 impl Trust {
-    /// What is seen is what is known.
+    /// Full trust: the stated uncertainties hold.
     pub const WHOLE: Trust = Trust {
         blur: 1.0,
         from_rest: true,
     };
 }
 
-/// A unit as some values of its numbers make it.
+/// A unit with given values of its numbers.
 #[derive(Clone, Debug)]
 pub struct Made {
     pub design: Design,
     /// Where its dots are on the film, mm.
     pub dots_mm: Vec<[f64; 2]>,
-    /// What a tare takes for the rest position less where the markers rest, px.
+    /// Rest position as a tare measures it, minus where the markers rest, px.
     pub rest_px: Vec<[f64; 2]>,
     pub roll_deg: f64,
     pub focal_px: f64,
@@ -85,16 +86,16 @@ pub struct Made {
     pub stage_mm: [f64; 2],
 }
 
-/// Values of all unknowns, in parts of their standard deviations.
+/// Values of all unknowns, in standard deviations from their means.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknowns {
-    /// Of the unit's numbers.
+    /// The unit's numbers.
     pub numbers: Vec<f64>,
-    /// Of each load.
+    /// The unknowns of each load.
     pub loads: Vec<[f64; UNKNOWNS]>,
 }
 
-/// What some values explain.
+/// The film, its states and the residuals at given values of the unknowns.
 pub struct At {
     pub unknowns: Unknowns,
     pub made: Made,
@@ -102,16 +103,16 @@ pub struct At {
     pub rest: Equilibrium,
     /// The dots' images at rest, focal lengths.
     images: Vec<[f64; 2]>,
-    /// Under each load.
+    /// The film under each load.
     pub states: Vec<Equilibrium>,
-    /// What is seen less what should be, in parts of its uncertainty: at rest, and under each load.
+    /// Residuals, seen minus predicted, in standard uncertainties: at rest, and under each load.
     rest_residual: Vec<f64>,
     pub residuals: Vec<Vec<f64>>,
 }
 
-/// How residuals answer to the unknowns.
+/// Derivatives of the residuals by the unknowns.
 struct Slopes {
-    /// By number: of the rest position.
+    /// By number: of the rest position's residuals.
     rest: Vec<Vec<f64>>,
     loads: Vec<LoadSlopes>,
 }
@@ -122,21 +123,21 @@ struct Images {
     pressed: Vec<Vec<[f64; 2]>>,
 }
 
-/// What is seen of a unit, x and y of each dot, px.
+/// What a unit with given images shows, x and y of each dot, px.
 struct Seen {
     rest: Vec<f64>,
     pressed: Vec<Vec<f64>>,
 }
 
-/// How what is seen of a unit answers to the unknowns: x and y of each dot, px.
+/// Derivatives of what is seen by the unknowns: x and y of each dot, px.
 pub struct UnitRates {
-    /// By number, per standard deviation: where the dots rest.
+    /// By number, per standard deviation: of where the dots rest.
     pub rest: Vec<Vec<f64>>,
-    /// How far beside that they are in each state.
+    /// Of the dots' shift from there, in each state.
     pub pressed: Vec<Rates>,
 }
 
-/// How dots under a load move.
+/// Derivatives of the shift of dots under a load.
 pub struct Rates {
     /// By number, per standard deviation.
     pub numbers: Vec<Vec<f64>>,
@@ -146,18 +147,18 @@ pub struct Rates {
     pub place: Vec<Vec<f64>>,
 }
 
-/// The equations of the unknowns, and what they tell of them.
+/// The normal equations of the unknowns, and the covariance that follows from them.
 pub struct Solved {
-    /// Of the numbers, in parts of their standard deviations before.
+    /// Of the numbers, in parts of their prior standard deviations.
     pub covariance: Matrix,
-    /// All equations of the numbers, and each load's.
+    /// The equations of the numbers, from the rest position and all loads.
     pub whole: Normal,
-    /// By load.
+    /// Those of each load.
     pub loads: Vec<LoadEquations>,
 }
 
 impl Made {
-    /// Turns what the camera sees, in focal lengths, into px.
+    /// Converts a point of the picture from focal lengths to px.
     pub fn to_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.roll_deg.to_radians());
         [
@@ -168,7 +169,7 @@ impl Made {
 }
 
 impl At {
-    /// χ²: what is seen, and how far the unknowns are from what was known of them.
+    /// χ²: the squares of all residuals and of all unknowns' distances from their priors.
     pub fn square(&self) -> f64 {
         let seen = self.residuals.iter().flatten().chain(&self.rest_residual);
         let own = self.unknowns.loads.iter().flatten();
@@ -178,7 +179,7 @@ impl At {
 }
 
 impl Problem<'_> {
-    /// The changes that the film's numbers are.
+    /// The film's numbers: index and change of each.
     fn changes(&self) -> impl Iterator<Item = (usize, Change)> {
         let all = self.priors.iter().enumerate();
         all.filter_map(|(k, prior)| match prior.number {
@@ -187,7 +188,7 @@ impl Problem<'_> {
         })
     }
 
-    /// The unit that some values make.
+    /// The unit with these values of the numbers.
     pub fn made(&self, parts: &[f64]) -> Made {
         let bench = self.bench;
         let mut made = Made {
@@ -220,7 +221,7 @@ impl Problem<'_> {
         made
     }
 
-    /// A unit on a mesh good enough to tell how it answers to its numbers, with no loads.
+    /// The unit without loads, on a mesh that is fine enough for rates by the numbers.
     ///
     /// # Errors
     /// When the film finds no rest.
@@ -231,7 +232,7 @@ impl Problem<'_> {
         Ok(self.unloaded(at.unknowns.clone(), made, film))
     }
 
-    /// A unit and its film, with no loads.
+    /// The unit and its film, without loads.
     fn unloaded(&self, unknowns: Unknowns, made: Made, film: Film) -> At {
         let rest = film.rest();
         let images = self.view(&made, &film).images(&rest, &made.dots_mm);
@@ -247,7 +248,7 @@ impl Problem<'_> {
         }
     }
 
-    /// A film of the unit before its camera.
+    /// The unit's film in front of its camera.
     pub fn view<'a>(&'a self, made: &Made, film: &'a Film) -> View<'a> {
         View {
             film,
@@ -256,8 +257,8 @@ impl Problem<'_> {
         }
     }
 
-    /// What some values explain, found from a film nearby and its states under the loads, as far as
-    /// there are any.
+    /// The film, its states and the residuals at these unknowns. Starts from a film nearby and its
+    /// states under the loads, as far as there are any.
     ///
     /// # Errors
     /// When the film finds no equilibrium.
@@ -278,8 +279,8 @@ impl Problem<'_> {
         Ok(at)
     }
 
-    /// The unit's film under a load that is so many standard uncertainties beside what is told, and
-    /// what is seen of it less what should be, in parts of its uncertainty.
+    /// The unit's film under a load whose unknowns are these, in standard uncertainties. Also the
+    /// load's residual, in parts of its uncertainty.
     ///
     /// # Errors
     /// When the film finds no equilibrium.
@@ -305,7 +306,7 @@ impl Problem<'_> {
         Ok((state, residual.collect()))
     }
 
-    /// Where the dots' images are at rest and in some states, focal lengths.
+    /// Images of the dots at rest and in some states, focal lengths.
     fn images(&self, at: &At, made: &Made, states: &[Equilibrium]) -> Images {
         let view = self.view(made, &at.film);
         let of = |state: &Equilibrium| view.images(state, &made.dots_mm);
@@ -315,8 +316,8 @@ impl Problem<'_> {
         }
     }
 
-    /// What a unit with these images is seen to do, px: where its dots rest, and how far beside the
-    /// rest position that a tare takes they are in each state.
+    /// What a unit with these images shows, px: where its dots rest, and their shift in each state
+    /// from the rest position as a tare measures it.
     fn seen(&self, made: &Made, images: &Images) -> Seen {
         let pressed = images.pressed.iter();
         Seen {
@@ -327,9 +328,9 @@ impl Problem<'_> {
         }
     }
 
-    /// Standard uncertainty of each coordinate under a load, px: of what is seen, and of what a
-    /// mesh leaves of the film's shape beside the tip. What no film of the family does is alike in
-    /// loads that are alike: more loads than [`APART`] do not tell it better.
+    /// Standard uncertainty of each coordinate under a load, px: of the seen coordinates, and of
+    /// the mesh near the tip. The family's own error is the same in similar loads. More loads than
+    /// [`APART`] do not average it out, so each then counts less.
     fn noise_px(&self, load: &SeenLoad, made: &Made) -> Vec<f64> {
         let more = self.loads.len().saturating_sub(APART) as f64 / APART as f64;
         let family_px = match load.each_place_mm.is_finite() {
@@ -346,15 +347,15 @@ impl Problem<'_> {
         made.dots_mm.iter().zip(seen).flat_map(of_dot).collect()
     }
 
-    /// How far a unit's dots are beside their rest position in a state, x and y of each, px.
+    /// Shift of a unit's dots from their rest position in a state, x and y of each, px.
     pub fn moved_px(&self, at: &At, state: &Equilibrium) -> Vec<f64> {
         let view = self.view(&at.made, &at.film);
         let images = view.images(state, &at.made.dots_mm);
         self.pressed_px(&at.made, &images, &at.images)
     }
 
-    /// How far dots with these images should be seen beside the rest position of a tare, x and y of
-    /// each, px.
+    /// Predicted shift of dots with these images from the rest position of a tare, x and y of each,
+    /// px.
     fn pressed_px(&self, made: &Made, there: &[[f64; 2]], rest: &[[f64; 2]]) -> Vec<f64> {
         if self.trust.from_rest {
             return moved_px(made, there, rest);
@@ -378,7 +379,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Where the dots are seen to rest less where they should, in parts of its uncertainty.
+    /// Residuals of the rest position, in parts of its uncertainty.
     fn rest_residual(&self, made: &Made, images: &[[f64; 2]]) -> Vec<f64> {
         let sigma_px = self.rest_sigma_px();
         let seen = self.bench.rest_px.as_flattened().iter();
@@ -388,7 +389,7 @@ impl Problem<'_> {
             .collect()
     }
 
-    /// How residuals answer to the unknowns there.
+    /// Derivatives of the residuals by the unknowns.
     fn slopes(&self, at: &At) -> Result<Slopes> {
         let rates = self.rates(at, &at.states)?;
         let of_load = |(load, rates): (&SeenLoad, &Rates)| {
@@ -407,7 +408,7 @@ impl Problem<'_> {
         })
     }
 
-    /// How what is seen answers to the unknowns, at rest and in some states of the unit's film.
+    /// Derivatives of what is seen by the unknowns, at rest and in some states of the unit's film.
     ///
     /// # Errors
     /// When a state is not stable.
@@ -455,7 +456,7 @@ impl Problem<'_> {
         Ok(rates)
     }
 
-    /// The rates by numbers that change no film: by differences.
+    /// Adds the rates by numbers that do not change the film, by finite differences.
     fn add_camera(&self, at: &At, states: &[Equilibrium], rates: &mut UnitRates) {
         const STEP: f64 = 0.01;
         let here = self.images(at, &at.made, states);
@@ -484,7 +485,7 @@ impl Problem<'_> {
         }
     }
 
-    /// By change: how the dots' images answer, x and y of each, px per unit of the change.
+    /// By change: rates of the dots' images, x and y of each, px per unit of the change.
     fn image_rates(
         &self,
         at: &At,
@@ -502,7 +503,7 @@ impl Problem<'_> {
         Ok(rates)
     }
 
-    /// The step of a load's own unknowns to where they explain most with the unit as it is.
+    /// The Gauss–Newton step of a load's own unknowns, the unit held as it is.
     ///
     /// # Errors
     /// When the state is not stable.
@@ -524,7 +525,7 @@ impl Problem<'_> {
         Ok(LoadEquations::new(slopes, residual, parts)?.step(&[]))
     }
 
-    /// The equations of where the unknowns explain most, and what is known of the numbers there.
+    /// The linearized equations, and the covariance of the numbers.
     ///
     /// # Errors
     /// When a state is not stable.
@@ -549,8 +550,8 @@ impl Problem<'_> {
 }
 
 impl Solved {
-    /// The step of the unknowns from some values to where they explain most; a damped one goes less
-    /// far where little is known.
+    /// The Gauss–Newton step of the unknowns from some values. Damping shortens it most for numbers
+    /// about which the loads say little.
     ///
     /// # Errors
     /// When the equations have no solution.
@@ -563,7 +564,7 @@ impl Solved {
     }
 }
 
-/// The changes of a load: of its force, and of its place.
+/// The changes of a load: three of its force, two of its place.
 fn load_changes() -> impl Iterator<Item = Change> {
     (0..3).map(Change::Force).chain((0..2).map(Change::Place))
 }
@@ -577,7 +578,7 @@ fn rest_px(made: &Made, images: &[[f64; 2]]) -> Vec<f64> {
     images.iter().zip(&made.rest_px).flat_map(of_dot).collect()
 }
 
-/// How far a unit's dots are beside the rest position that a tare takes, x and y of each, px.
+/// Shift of a unit's dots from the rest position as a tare measures it, x and y of each, px.
 fn moved_px(made: &Made, there: &[[f64; 2]], rest: &[[f64; 2]]) -> Vec<f64> {
     let dots = there.iter().zip(rest).zip(&made.rest_px);
     let moved = dots.flat_map(|((there, here), off)| {
@@ -587,8 +588,8 @@ fn moved_px(made: &Made, there: &[[f64; 2]], rest: &[[f64; 2]]) -> Vec<f64> {
     moved.collect()
 }
 
-/// How the residual of a load answers to its own unknowns, from what is seen of a force along x, y
-/// and z, px/N, and of a place along x and y, px/mm.
+/// Derivatives of a load's residual by its own unknowns. `force` is the rate of what is seen by a
+/// force along x, y and z, px/N; `place` that by a place along x and y, px/mm.
 fn own_slopes(
     load: &SeenLoad,
     noise_px: &[f64],
@@ -608,19 +609,19 @@ fn own_slopes(
     forces.chain(place.iter().map(of_place)).collect()
 }
 
-/// The slope of residuals of these uncertainties where what should be seen has this one.
+/// The slope of a residual, from the slope of the predicted coordinates and their uncertainties.
 fn scaled(column: &[f64], sigmas: &[f64]) -> Vec<f64> {
     let pairs = column.iter().zip(sigmas);
     pairs.map(|(rate, sigma)| -rate / sigma).collect()
 }
 
-/// What the mesh leaves of each coordinate of a dot with the tip at a place, standard uncertainty
-/// in parts of how far the dot is moved: a finer mesh moves dots beside the tip otherwise.
+/// Standard uncertainty of each coordinate of a dot due to the mesh, in parts of the dot's motion.
+/// A finer mesh moves dots near the tip differently.
 pub fn mesh_part(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
     0.004 * near_tip(dot_mm, place_mm, 1.3)
 }
 
-/// 1 for a dot at the tip, nothing for one that is much farther from it than a reach, mm.
+/// 1 for a dot at the tip; falls to 0 at distances far beyond `reach_mm`.
 pub fn near_tip(dot_mm: [f64; 2], place_mm: [f64; 2], reach_mm: f64) -> f64 {
     let apart = apart_mm(dot_mm, place_mm) / reach_mm;
     libm::exp(-apart * apart)
@@ -632,7 +633,7 @@ pub fn apart_mm(dot_mm: [f64; 2], place_mm: [f64; 2]) -> f64 {
 }
 
 impl Unknowns {
-    /// A step away.
+    /// These unknowns plus a step, each number within its range.
     pub fn after(&self, step: &Unknowns, priors: &[Prior]) -> Unknowns {
         let numbers = self.numbers.iter().zip(&step.numbers).zip(priors);
         let within = |((at, step), prior): ((&f64, &f64), &Prior)| prior.within(at + step);

@@ -1,5 +1,4 @@
-//! Where a camera sees the dots of a film that finite elements solve, and how that answers to
-//! changes.
+//! Images of the dots of a film that finite elements solve, and their rates by changes of the film.
 
 use std::f64::consts::PI;
 
@@ -8,38 +7,38 @@ use hivtac_twin::{Camera, Disc};
 
 use crate::forward::in_focal_lengths;
 
-/// Points on a ring within a dot over which a rate is averaged. On this ring, in parts of the
-/// radius, their mean is the disc's for polynomials to the third degree.
+/// Points on a ring within a dot over which a rate is averaged, and the ring's radius in parts of
+/// the dot's. Their mean equals the disc's for polynomials to the third degree.
 const RAYS: usize = 6;
 const RING: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Points of a dot's rim at which its displacement is taken; between them it is a sum of waves.
+/// Points of a dot's rim at which its displacement is computed; between them it is a sum of waves.
 const RIM: usize = 12;
 /// Steps by which images are differentiated, mm.
 const STEP_MM: f64 = 1e-3;
 
-/// A film before a camera.
+/// A film in front of a camera.
 pub struct View<'a> {
     pub film: &'a Film,
-    /// Its images count in focal lengths from the axis.
+    /// Images are in its focal lengths, from the axis.
     pub camera: &'a Camera,
-    /// How much farther than nominal the film is from the camera, mm.
+    /// Distance of the film from the camera beyond the nominal one, mm.
     pub farther_mm: f64,
 }
 
 impl View<'_> {
-    /// Where a dot with its centre at a point of the film is seen, focal lengths from the axis.
+    /// Image of a dot with its centre at a point of the film, focal lengths from the axis.
     pub fn image(&self, state: &Equilibrium, dot_mm: [f64; 2]) -> [f64; 2] {
         self.image_of(&Rim::of(dot_mm, |point| {
             self.film.displacement(state, point)
         }))
     }
 
-    /// The same of all dots.
+    /// Images of all dots.
     pub fn images(&self, state: &Equilibrium, dots_mm: &[[f64; 2]]) -> Vec<[f64; 2]> {
         dots_mm.iter().map(|dot| self.image(state, *dot)).collect()
     }
 
-    /// The same of a dot whose rim is displaced so.
+    /// Image of a dot with a displaced rim.
     pub fn image_of(&self, rim: &Rim) -> [f64; 2] {
         let moved = |point: [f64; 2]| {
             let [x, y, z] = rim.at(point);
@@ -48,7 +47,7 @@ impl View<'_> {
         in_focal_lengths(rim.disc.centroid_px(moved, self.camera), self.camera)
     }
 
-    /// How the image of a dot answers to the film's responses, focal lengths per unit.
+    /// Derivatives of a dot's image by the film's responses, focal lengths per unit.
     pub fn rates(
         &self,
         state: &Equilibrium,
@@ -95,13 +94,13 @@ fn mean(dot_mm: [f64; 2], of: impl Fn([f64; 2]) -> [f64; 3]) -> [f64; 3] {
     sum
 }
 
-/// Points of a dot.
+/// The points of a dot over which rates are averaged.
 fn points(dot_mm: [f64; 2]) -> [[f64; 2]; RAYS] {
     let disc = Disc::marker(dot_mm);
     std::array::from_fn(|ray| on_circle(&disc, RING, ray as f64 / RAYS as f64))
 }
 
-/// The point of a disc at a part of its radius, and a part of the whole turn.
+/// The point of a disc at a fraction of its radius and a fraction of the full turn.
 fn on_circle(disc: &Disc, part: f64, turn: f64) -> [f64; 2] {
     let (sin, cos) = libm::sincos(2.0 * PI * turn);
     let radius_mm = part * disc.radius_mm;
@@ -111,15 +110,15 @@ fn on_circle(disc: &Disc, part: f64, turn: f64) -> [f64; 2] {
     ]
 }
 
-/// How a dot's rim is displaced.
+/// Displacement of a dot's rim.
 pub struct Rim {
     disc: Disc,
-    /// By wave along the rim: its cosine's and its sine's part.
+    /// By wave along the rim: coefficients of its cosine and its sine.
     waves: [[[f64; 3]; 2]; RIM / 2],
 }
 
 impl Rim {
-    /// Of a dot with its centre at a point of a film whose points, mm, are displaced so.
+    /// Of a dot with its centre at `dot_mm`, on a film with these displacements, mm.
     pub fn of(dot_mm: [f64; 2], displaced: impl Fn([f64; 2]) -> [f64; 3]) -> Rim {
         let disc = Disc::marker(dot_mm);
         let mut waves = [[[0.0; 3]; 2]; RIM / 2];
@@ -138,7 +137,7 @@ impl Rim {
         Rim { disc, waves }
     }
 
-    /// So many units of a rate away.
+    /// This rim plus `units` times a rate.
     pub fn beside(&self, rate: &Rim, units: f64) -> Rim {
         let mut waves = self.waves;
         let sums = waves.as_flattened_mut().as_flattened_mut().iter_mut();
@@ -151,7 +150,7 @@ impl Rim {
         }
     }
 
-    /// At a point of the rim, or just beside it.
+    /// Displacement of a point at or near the rim.
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         let [cx, cy] = self.disc.centre_mm;
         let (x, y) = (x - cx, y - cy);

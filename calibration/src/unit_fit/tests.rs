@@ -20,7 +20,7 @@ const LOADS: [(f64, [f64; 2], [f64; 2]); 10] = [
     (0.1, [0.0, 0.0], [0.5, -3.0]),
 ];
 
-/// Stretched, of rubber, heavy, hanging over, on larger posts, with dots beside their places.
+/// Stretched, of rubber, heavy, with an overhang, on larger posts, with dots off their places.
 fn mounted() -> Design {
     let mut design = Design {
         fineness: 0.6,
@@ -80,7 +80,7 @@ impl Truth {
         self.film.press_force(at_mm, force_n, &self.rest).unwrap()
     }
 
-    /// Where dots are seen, px, but for a few thousandths that differ from load to load.
+    /// Images of the dots, px, with errors of a few thousandths that differ from load to load.
     fn seen_px(&self, state: &Equilibrium, number: usize) -> [[f64; 2]; 4] {
         let view = View {
             film: &self.film,
@@ -112,7 +112,7 @@ impl Truth {
         }
     }
 
-    /// The same film when gravity pulls another way.
+    /// The same film with gravity in another direction.
     fn turned(&self, down: [f64; 3]) -> Truth {
         let mut design = mounted();
         design.down = down;
@@ -122,7 +122,7 @@ impl Truth {
         truth
     }
 
-    /// How far dots are moved from where they rest, x and y of each, px.
+    /// Shift of the dots from their rest position, x and y of each, px.
     fn moved_px(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> [f64; 8] {
         let [there, here] = [&self.press(force_n, place_mm), &self.rest].map(|state| {
             let seen = self.seen_px(state, 0);
@@ -145,7 +145,7 @@ impl Truth {
 }
 
 impl OwnFilm {
-    /// Of motions in focal lengths. The numbers found are the unit's camera's, too.
+    /// Converts motions from focal lengths to px. The found numbers include the unit's camera.
     fn to_px(&self, moved: &[f64; 8]) -> [f64; 8] {
         let [re, im] = self.per_px;
         let square = re * re + im * im;
@@ -156,7 +156,7 @@ impl OwnFilm {
     }
 }
 
-/// A model file's film of a fit.
+/// A fit's film as a model file holds it.
 fn model_of(fit: &Fit) -> FilmModel {
     let noise = Noise {
         rest_px: [[0.0; 2]; 4],
@@ -178,8 +178,8 @@ fn chip_pose(chip: &Forward<'_>, force_n: [f64; 3], place_mm: [f64; 2]) -> chip:
     )
 }
 
-/// A film that no table holds is found from ten loads, and the chip predicts what it does under
-/// others.
+/// The fit of ten loads finds a film that no table holds, and the chip predicts its motion under
+/// other loads.
 #[test]
 fn a_mounted_film_is_found_from_ten_loads() {
     let truth = Truth::new();
@@ -228,8 +228,8 @@ fn a_mounted_film_is_found_from_ten_loads() {
     }
 }
 
-/// Where gravity is known under the loads, the chip knows how the film moves when it is turned: as
-/// full solutions of the true film do, to a part of what turning it does.
+/// With gravity known under the loads, the chip knows how the film moves when it is turned. It
+/// agrees with full solutions of the true film to a part of what turning does.
 #[test]
 fn a_mounted_film_is_known_turned() {
     let truth = Truth::new();
@@ -289,8 +289,8 @@ fn a_mounted_film_is_known_turned() {
     }
 }
 
-/// What the nominal family explains tells the tip's and the posts' numbers alone: ten loads do not
-/// tell a stretch from a stiffer film.
+/// Loads that the nominal family explains determine the tip's and the posts' numbers alone: ten
+/// loads cannot distinguish a stretched film from a stiffer one.
 #[test]
 fn a_film_of_the_nominal_family_is_found_as_one() {
     let mut design = Design {
@@ -315,7 +315,7 @@ fn a_film_of_the_nominal_family_is_found_as_one() {
     );
 }
 
-/// No film moves two markers apart by 40 px and leaves the others.
+/// No film shifts two markers by 40 px and leaves the others in place.
 #[test]
 fn what_no_film_does_is_refused() {
     let truth = Truth::new();

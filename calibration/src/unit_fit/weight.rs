@@ -17,25 +17,25 @@ use crate::forward::{Moved, Pressed, Weighed, weight};
 const PLACES_MM: [f64; 3] = [-3.8, 0.0, 3.8];
 const TILTS: [[f64; 2]; 4] = [[0.6, 0.0], [-0.6, 0.0], [0.0, 0.6], [0.0, -0.6]];
 
-/// As [`WeightSpec`].
+/// What [`WeightSpec`] holds, as a unit's file keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnWeight {
-    /// Gravity when the unit's loads were put on, parts of g.
+    /// Gravity while the unit's loads were applied, parts of g.
     down: [f64; 3],
     press_n: f32,
     unsure: [f32; 2],
     /// By function of gravity.
     at_rest: Vec<Moved>,
-    /// Terms by size, function of gravity and coordinate, one after the other.
+    /// Coefficients by size, function of gravity, coordinate and term, flattened.
     under_load: Vec<f32>,
 }
 
 impl OwnWeight {
-    /// Of a unit whose loads were put on while gravity was known.
+    /// Of a unit whose loads were applied with gravity known.
     ///
     /// # Errors
-    /// When its film finds no equilibrium when it is turned.
+    /// When its film, turned, finds no equilibrium.
     pub fn new(problem: &Problem<'_>, found: &Found, stiffness_n: [f64; 2]) -> Result<Self> {
         let at = problem.coarse(&found.at)?;
         let weightless = turned(&at, [0.0; 3])?;
@@ -59,15 +59,15 @@ impl OwnWeight {
         })
     }
 
-    /// Checks that it can be a unit's.
+    /// Checks that every value is valid.
     ///
     /// # Errors
-    /// Says what cannot.
+    /// Names the first that is not.
     pub fn check(&self) -> Result<()> {
         self.spec().map(|_| ())
     }
 
-    /// As a model file has it.
+    /// As a model file holds it.
     ///
     /// # Errors
     /// When numbers are missing, too many or not finite.
@@ -99,13 +99,13 @@ impl OwnWeight {
     }
 }
 
-/// A unit's film that is turned.
+/// A unit's film that can be turned.
 struct Turned<'a> {
     problem: &'a Problem<'a>,
-    /// As its loads were put on.
+    /// With gravity as when its loads were applied.
     at: &'a At,
     stiffness_n: [f64; 2],
-    /// Of its dots when it weighs nothing, focal lengths.
+    /// Images of its dots when it weighs nothing, focal lengths.
     images: Moved,
 }
 
@@ -160,7 +160,7 @@ fn turned(at: &At, down: [f64; 3]) -> Result<Film> {
     Ok(at.film.changed(&design)?)
 }
 
-/// Where the unit's dots are seen, focal lengths.
+/// Images of the unit's dots, focal lengths.
 fn images(problem: &Problem<'_>, at: &At, film: &Film, state: &Equilibrium) -> Moved {
     let view = problem.view(&at.made, film);
     let images = view.images(state, &at.made.dots_mm);
