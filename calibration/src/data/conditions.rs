@@ -1,4 +1,4 @@
-//! Under which conditions data was taken and a model holds, in words that files can carry.
+//! The conditions under which data was taken and a model holds, as files name them.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_host::shown::unit_number;
@@ -9,7 +9,7 @@ use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_twin::{Camera, Contact};
 use serde::{Deserialize, Serialize};
 
-/// Everything about frames and labels that a model depends on (`docs/model-file.md`, conditions).
+/// All properties of frames and labels on which a model depends (`docs/model-file.md`, conditions).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Conditions {
@@ -19,24 +19,24 @@ pub struct Conditions {
     pub width: u16,
     /// Rows of a frame.
     pub height: u16,
-    /// What a pixel is.
+    /// Format of a pixel.
     pub pixel_format: PixelFormat,
-    /// Threshold, as the model file has it: lowest and highest hue, saturation and value (OpenCV's
-    /// 8-bit HSV; hue may wrap through 0); the lowest Cr of YUV422 and zeros; the lowest and
-    /// highest luma of mono and zeros.
+    /// Threshold as the model file holds it. RGB565: lowest and highest hue, saturation and value
+    /// (OpenCV's 8-bit HSV; hue may wrap through 0). YUV422: the lowest Cr and zeros. Mono: the
+    /// lowest and highest luma and zeros.
     pub threshold: [u8; 6],
     /// 3×3 dilations of the mask.
     pub dilations: u8,
-    /// How a marker's position is taken from its pixels.
+    /// How a marker's position is computed from its pixels.
     pub centroid: CentroidEstimator,
-    /// What the labels mean; model files leave the friction ratio of `slip` out.
+    /// Meaning of the labels; model files omit the friction ratio of `slip`.
     #[serde(with = "names::contact")]
     pub contact: Contact,
-    /// Where the data came from.
+    /// Origin of the data.
     pub origin: OriginName,
 }
 
-/// Origins by name.
+/// Where data comes from, by name.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OriginName {
@@ -47,15 +47,15 @@ pub enum OriginName {
 }
 
 impl OriginName {
-    /// The unit with this number.
+    /// The origin for the unit with this number.
     pub fn unit(device_id: [u8; 12]) -> Self {
         OriginName::Unit(unit_number(&device_id))
     }
 
-    /// The same as the model file holds it.
+    /// The origin as the model file holds it.
     ///
     /// # Errors
-    /// When the unit's number is no such number.
+    /// When the unit's number is not 24 hexadecimal digits.
     pub fn to_model(&self) -> Result<Origin> {
         let OriginName::Unit(digits) = self else {
             return Ok(Origin::Simulated);
@@ -73,7 +73,7 @@ impl OriginName {
     }
 }
 
-/// What α, β and |F| mean in a contact reading, for reports.
+/// The meaning of α, β and |F| in a contact reading, for reports.
 pub fn meaning(contact: Contact) -> &'static str {
     match contact {
         Contact::Force => "α, β and |F| are the force on the film",
@@ -89,8 +89,7 @@ pub fn meaning(contact: Contact) -> &'static str {
 }
 
 impl Conditions {
-    /// What the scene renders and the pipeline does by default, at a frame size and in a pixel
-    /// format.
+    /// The defaults of scene and pipeline for a frame size and a pixel format.
     pub fn simulated(preset: Preset, width: u16, height: u16, pixel_format: PixelFormat) -> Self {
         Self {
             preset: preset.name().into(),
@@ -108,16 +107,16 @@ impl Conditions {
     /// The simulated camera of these conditions.
     ///
     /// # Errors
-    /// When there is no such camera.
+    /// When the preset or the frame size does not exist.
     pub fn camera(&self) -> Result<Camera> {
         let preset = preset(&self.preset)?;
         Ok(Camera::new(preset, self.width.into(), self.height.into())?)
     }
 
-    /// The same as the model file holds it.
+    /// The conditions as the model file holds them.
     ///
     /// # Errors
-    /// When there is no such preset, or the threshold means nothing.
+    /// When the preset does not exist, or the threshold is invalid.
     pub fn to_model(&self) -> Result<model::Conditions> {
         let preset = preset(&self.preset)?;
         Ok(model::Conditions {
@@ -136,27 +135,27 @@ impl Conditions {
     }
 }
 
-/// The geometry preset of that name.
+/// The geometry preset with this name.
 ///
 /// # Errors
-/// When there is none.
+/// When there is no preset with this name.
 pub fn preset(name: &str) -> Result<Preset> {
     let names = Preset::ALL.map(Preset::name);
     Preset::from_name(name)
         .with_context(|| format!("unknown preset `{name}`: use {}", names.join(", ")))
 }
 
-/// The pixel format of that name.
+/// The pixel format with this name.
 ///
 /// # Errors
-/// When there is none.
+/// When there is no format with this name.
 pub fn pixel_format(name: &str) -> Result<PixelFormat> {
     let mut all = PixelFormat::ALL.into_iter();
     let found = all.find(|format| format.name() == name);
     found.with_context(|| format!("unknown pixel format `{name}`: use rgb565, yuv422 or mono"))
 }
 
-/// What files hold by its name.
+/// Serialization by name.
 mod names {
     pub mod contact {
         use hivtac_twin::Contact;

@@ -1,4 +1,4 @@
-//! Which loads a data set shows.
+//! Chooses the loads that a data set shows.
 
 use std::sync::LazyLock;
 
@@ -15,7 +15,7 @@ pub fn norm([x, y, z]: [f64; 3]) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// α and β in degrees (Section 5), and |F|; a force without size has the angles 0.
+/// α and β in degrees (Section 5), and |F|; a zero force has the angles 0.
 pub fn polar(force: [f64; 3]) -> [f64; 3] {
     if force == [0.0; 3] {
         return force;
@@ -26,28 +26,27 @@ pub fn polar(force: [f64; 3]) -> [f64; 3] {
     [alpha, beta, norm(force)]
 }
 
-/// The force of such a size and direction.
+/// The force with these angles, degrees, and this |F|.
 pub fn from_polar([alpha_deg, beta_deg, magnitude]: [f64; 3]) -> [f64; 3] {
     let (sin_a, cos_a) = libm::sincos(alpha_deg.to_radians());
     let (sin_b, cos_b) = libm::sincos(beta_deg.to_radians());
     [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| part * magnitude)
 }
 
-/// Loads drawn at random: |F|, α, β and the tip's place uniform and independent from nothing to
-/// their limits.
+/// Random loads: |F|, α, β and the tip's place are uniform and independent, from 0 to their limits.
 #[derive(Clone, Copy, Debug)]
 pub struct RandomLoads {
     /// The limits.
     pub range: Range,
-    /// Decides the loads.
+    /// Seed of the loads.
     pub seed: u64,
 }
 
 impl RandomLoads {
-    /// The load of a row; it depends on nothing but the row's number and these settings.
+    /// The load of a row; it depends only on the row's number and these settings.
     ///
     /// # Errors
-    /// When the limits are no limits of a force.
+    /// When the limits cannot be those of a force.
     pub fn load(&self, row: usize) -> Result<Load> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(row as u64);
@@ -70,12 +69,12 @@ impl RandomLoads {
 }
 
 /// The paper's poses (Section 6): α from −10° to 10°, β from −8° to 8°, in steps of 1°, with |F|
-/// uniform from nothing to its limit.
+/// uniform from 0 to its limit.
 #[derive(Clone, Copy, Debug)]
 pub struct PaperPoses {
     /// The largest |F|, N.
     pub force_n: f64,
-    /// Decides the forces.
+    /// Seed of the forces.
     pub seed: u64,
 }
 
@@ -83,10 +82,10 @@ impl PaperPoses {
     /// Largest |α| and |β|, whole degrees.
     const ALPHA: usize = 10;
     const BETA: usize = 8;
-    /// How many there are: 21 · 17.
+    /// Number of poses: 21 · 17.
     pub const COUNT: usize = (2 * Self::ALPHA + 1) * (2 * Self::BETA + 1);
 
-    /// α and β of a pose in degrees; β changes first.
+    /// α and β of a pose in degrees; β changes fastest.
     pub fn angles_deg(pose: usize) -> [f64; 2] {
         let betas = 2 * Self::BETA + 1;
         [
@@ -95,13 +94,13 @@ impl PaperPoses {
         ]
     }
 
-    /// The number of the pose with these angles, when it is one of them.
+    /// The number of the pose with these angles; `None` if there is no such pose.
     pub fn numbered([alpha, beta]: [f64; 2]) -> Option<usize> {
         (0..Self::COUNT).find(|&pose| Self::angles_deg(pose) == [alpha, beta])
     }
 
-    /// The poses that comparisons train on, and the fifth of all that they hold out, each in order;
-    /// always the same.
+    /// Numbers of the poses on which comparisons train, and of the fifth that they hold out. Each
+    /// list is in order and always the same.
     pub fn parts() -> &'static [Vec<usize>; 2] {
         static PARTS: LazyLock<[Vec<usize>; 2]> = LazyLock::new(|| {
             let mut poses: Vec<usize> = (0..PaperPoses::COUNT).collect();
@@ -117,7 +116,7 @@ impl PaperPoses {
     /// The load of a row in a pose below [`Self::COUNT`].
     ///
     /// # Errors
-    /// When the limit is no force.
+    /// When the limit cannot be that of a force.
     pub fn load(&self, pose: usize, row: usize) -> Result<Load> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(row as u64);

@@ -1,4 +1,5 @@
-//! Forces with what the sensor saw: the data that models are made of and judged by.
+//! Forces together with what the sensor saw: the data from which models are made and by which they
+//! are judged.
 //!
 //! ```text
 //! loads → scene → frames → sensing ─┐
@@ -8,10 +9,10 @@
 //! | file | subject |
 //! |---|---|
 //! | `loads`, `range` | which forces, and where |
-//! | `dataset` | frames seen by the sensing itself; the CSV file |
+//! | `dataset` | frames measured by the sensing itself; the CSV file |
 //! | `collect` | data from a real unit and a force gauge |
-//! | `rest` | the untouched film, which all else is compared with |
-//! | `conditions` | what a data set and a model hold for |
+//! | `rest` | the untouched film, the reference of all displacements |
+//! | `conditions` | the conditions under which a data set and a model hold |
 
 pub mod collect;
 pub mod conditions;

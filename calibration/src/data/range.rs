@@ -1,4 +1,4 @@
-//! Which forces and places.
+//! Limits of the forces and places of a data set.
 
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -22,14 +22,15 @@ pub struct Range {
     pub place_mm: f64,
 }
 
-/// Whether a tip so far from the middle is in it.
+/// Whether this reach means the film's middle.
 fn is_middle(place_mm: &f64) -> bool {
     *place_mm == 0.0
 }
 
 impl Range {
-    /// What is rendered for the default model: a tenth beyond the forces and angles that it is
-    /// calibrated for, a twentieth beyond its places, so that their ends are inside the data.
+    /// The range rendered for the default model. It goes a tenth beyond the forces and angles for
+    /// which the model is calibrated, and a twentieth beyond its places, so that their limits lie
+    /// inside the data.
     pub const RENDERED: Self = Self {
         force_n: 0.25,
         alpha_deg: 10.0,

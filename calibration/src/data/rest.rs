@@ -1,4 +1,4 @@
-//! What an untouched film looks like.
+//! The rest position: how an untouched film looks.
 
 use anyhow::{Context, Result};
 use hivtac_sensor::force::features::{COORDINATES, FEATURES, Features};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The rest position.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rest {
-    /// The eleven features, px and at last px²; in files they are whole numbers of 1/65,536.
+    /// The eleven features, px and the last in px²; files hold them as whole multiples of 1/65,536.
     pub features_q16: [Q<16, i64>; FEATURES],
     /// Areas of markers 0–3 in the mask, px.
     pub areas_px: [u32; 4],
@@ -22,12 +22,12 @@ impl Rest {
     }
 }
 
-/// The nearest number of so many px, or px².
+/// The nearest multiple of 1/65,536 to a value in px or px².
 pub fn q16(px: f64) -> Q<16, i64> {
     Q::from_bits((px * f64::from(Px::ONE.0)).round() as i64)
 }
 
-/// The eleven numbers in the paper's order, px and at last px², as features.
+/// The eleven numbers in the paper's order, px and the last in px², as features.
 ///
 /// # Errors
 /// When a coordinate does not fit 32 bits.

@@ -18,11 +18,11 @@ const RINGS: [(f64, u8); 4] = [(0.0, 1), (0.4, 6), (0.7, 10), (0.95, 16)];
 /// A marker's motion at the nodes of its table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampled {
-    /// The nodes along x and along y, mm of the tip's place, growing; 6 to 16 each.
+    /// The nodes along x and along y, mm of the tip's place, ascending; 6 to 16 each.
     pub nodes_mm: [Vec<f64>; 2],
-    /// The direction, of length one, along which the first part of the terms' tilt is; the second
-    /// is across it, from x towards y. Markers that see the load alike, each from its own side,
-    /// need few functions.
+    /// Unit vector along which the first component of the terms' tilt is; the second is across it,
+    /// from x towards y. Markers to which the load looks the same, each from its own side, need few
+    /// functions.
     pub away: [f64; 2],
     /// By node along y and node along x: coefficients of the terms, of motion along x and of motion
     /// along y, focal lengths.

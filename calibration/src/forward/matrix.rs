@@ -1,8 +1,9 @@
 //! Small symmetric matrices in plain loops: the same numbers on every machine.
 
-/// Jacobi's sweeps; eight bring a hundred rows to rounding.
+/// Sweeps of Jacobi's rotations; eight bring a hundred rows to rounding.
 const SWEEPS: usize = 12;
-/// What is left of a row beside those before it counts as nothing below this part of it.
+/// A row whose remainder after elimination of those before it is below this part of it counts as
+/// dependent on them.
 const LEAST_LEFT: f64 = 1e-14;
 
 /// A square matrix, by rows.

@@ -1,4 +1,4 @@
-//! What finds markers in rendered frames: the sensing, or something that it is compared with.
+//! Detectors of markers in rendered frames: the sensing, or a method with which it is compared.
 
 use std::sync::Mutex;
 
@@ -15,29 +15,29 @@ use hivtac_twin::Frame;
 
 use super::{Observation, Recipe};
 
-/// What was found in a frame, or why nothing was.
+/// What was found in a frame, or the reason for a refusal.
 pub type Detection = Result<Observation, String>;
 
 /// Finds markers in frames.
 pub trait MarkerDetector: Send {
-    /// Finds the markers of a frame.
+    /// Finds the markers of a frame; an inner `Err` when it has none.
     ///
     /// # Errors
-    /// When it cannot work at all; a frame without markers is no error.
+    /// When the detector itself fails.
     fn detect(&mut self, frame: &Frame) -> Result<Detection>;
 }
 
-/// Detectors for the same frames: each gives a data set of its own.
+/// Detectors for the same frames; each produces its own data set.
 pub type Detectors<'a> = Vec<Box<dyn MarkerDetector + 'a>>;
 
 /// The sensing as a detector.
 pub struct Sensing<'m>(Box<Sensor<'m>>);
 
 impl Sensing<'static> {
-    /// Finds markers and features but knows no model: refuses only what cannot be markers.
+    /// Finds markers and features without a model: refuses only what cannot be markers.
     ///
     /// # Errors
-    /// When there are no such frames.
+    /// When the recipe's frames do not exist.
     pub fn unmodelled(recipe: &Recipe) -> Result<Self> {
         let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
         let mut sensor = Box::new(Sensor::new());
@@ -53,7 +53,7 @@ impl Sensing<'static> {
 }
 
 impl<'m> Sensing<'m> {
-    /// With a model, tared at the model's own rest position: refuses what the chip refuses.
+    /// With a model, tared at the model's own rest position: refuses the same frames as the chip.
     ///
     /// # Errors
     /// When the model's frames cannot be read.
@@ -81,12 +81,12 @@ impl MarkerDetector for Sensing<'_> {
     }
 }
 
-/// Shows a frame to a sensor.
+/// Measures a frame with a sensor.
 pub fn measure(sensor: &mut Sensor<'_>, frame: &Frame) -> Measurement {
     sensor.measure_frame(&frame.words())
 }
 
-/// The names of the status bits that forbid a force, but not the missing model.
+/// Names of the status bits that forbid a force, except the missing model.
 pub fn reasons(status: Status) -> String {
     let forbids = |name: &&str| {
         let bit = Status::NAMES
@@ -101,7 +101,7 @@ pub fn reasons(status: Status) -> String {
 /// Opens detectors.
 type Open<'a> = dyn Fn() -> Result<Detectors<'a>> + Sync + 'a;
 
-/// Detectors for as many threads as run at a time, opened as they are needed.
+/// One set of detectors per running thread, opened when needed.
 pub(super) struct Pool<'a> {
     open: Box<Open<'a>>,
     idle: Mutex<Vec<Detectors<'a>>>,
@@ -115,7 +115,7 @@ impl<'a> Pool<'a> {
         }
     }
 
-    /// Has all detectors of a set find the markers of a frame.
+    /// Runs all detectors of a set on a frame.
     pub fn detect(&self, frame: &Frame) -> Result<Vec<Detection>> {
         let idle = || self.idle.lock().map_err(|error| anyhow!("{error}"));
         let ready = idle()?.pop();

@@ -1,8 +1,9 @@
-//! Data sets as files: CSV, one row a frame, under comment lines that say what it is.
+//! Reads and writes data sets as CSV files: one row per frame, after comment lines that describe
+//! them.
 //!
 //! The first line names the format, the second holds [`About`] as JSON; both begin with `#`.
-//! Features are written as exact decimals, so that reading gives the very integers that the
-//! pipeline produced.
+//! Features are exact decimals, so that reading returns the very integers that the pipeline
+//! produced.
 
 use std::fs;
 use std::num::ParseIntError;
@@ -19,11 +20,11 @@ use crate::data::rest::q16;
 
 const FORMAT: &str =
     "# hivtac-dataset 2; forces in N in the film frame, features in px (area in px²), areas in px";
-/// Of every data set, before and after [`PLACE_COLUMNS`].
+/// Columns of every data set, before and after [`PLACE_COLUMNS`].
 const FIRST_COLUMNS: [&str; 5] = ["session", "pose", "fx_n", "fy_n", "fz_n"];
-/// Of a data set that knows where the tip is, of some rows at least.
+/// Columns of a data set in which at least some rows have a place of the tip.
 const PLACE_COLUMNS: [&str; 2] = ["x_mm", "y_mm"];
-/// Of one with presses of which nobody knows the place.
+/// Columns of a data set with presses at unknown places.
 const FREE_COLUMNS: [&str; 1] = ["clock_n"];
 const LAST_COLUMNS: [&str; 16] = [
     "x0_px",
@@ -43,18 +44,18 @@ const LAST_COLUMNS: [&str; 16] = [
     "area3_px",
     "status",
 ];
-/// Beyond these there are no numbers, ±: a force's component, N; a tip's coordinate, mm; a feature,
-/// px or px². Sums and differences of such stay far inside their types.
+/// Limits of numbers, ±: a force's component, N; a tip's coordinate, mm; a feature, px or px². Sums
+/// and differences of such numbers stay far inside their types.
 pub const LARGEST_N: f64 = 1e3;
 const LARGEST_MM: f64 = 1e3;
 const LARGEST_FEATURE: f64 = 1048576.0;
-/// No marker has a larger area, px.
+/// The largest area of a marker, px.
 pub const LARGEST_AREA: u32 = 1 << 20;
 
 const FORCE_AT: usize = 2;
 const PLACE_AT: usize = FORCE_AT + 3;
 const CLOCK_AT: usize = PLACE_AT + PLACE_COLUMNS.len();
-/// A direction that is known worse is not known, degrees.
+/// The largest standard uncertainty of a direction, degrees.
 const LARGEST_DEG: f64 = 90.0;
 
 /// The columns of a data set, and where they are.
@@ -101,10 +102,10 @@ impl Dataset {
         fs::write(path, self.to_text()?).with_context(|| format!("cannot write {}", path.display()))
     }
 
-    /// The text of its file.
+    /// The text of the data set's file.
     ///
     /// # Errors
-    /// When something in it cannot be written as text.
+    /// When a value cannot be written as text.
     pub fn to_text(&self) -> Result<Vec<u8>> {
         let mut text = opening(&self.about)?.into_bytes();
         text.extend(lines(&self.about, &self.rows)?);
@@ -121,10 +122,10 @@ impl Dataset {
         Self::parse(&text).with_context(|| format!("{} is not a usable data set", path.display()))
     }
 
-    /// Reads the text of a data set.
+    /// Parses the text of a data set.
     ///
     /// # Errors
-    /// When it is no data set; names the line.
+    /// When it is not a data set; names the line.
     pub fn parse(text: &str) -> Result<Self> {
         let mut lines = text.lines();
         let first = lines.next().unwrap_or_default();
@@ -170,7 +171,7 @@ impl Dataset {
     }
 }
 
-/// Everything before the rows.
+/// The lines before the rows.
 pub(super) fn opening(about: &About) -> Result<String> {
     Ok(format!(
         "{FORMAT}\n# {}\n{}\n",
@@ -179,7 +180,7 @@ pub(super) fn opening(about: &About) -> Result<String> {
     ))
 }
 
-/// The lines of rows of such a data set.
+/// The lines of a data set's rows.
 pub(super) fn lines(about: &About, rows: &[Row]) -> Result<Vec<u8>> {
     let columns = Columns::of(about);
     let mut table = csv::Writer::from_writer(Vec::new());
@@ -220,7 +221,7 @@ fn fields(row: &Row, columns: &Columns) -> Vec<String> {
     fields
 }
 
-/// A line that is to become a row.
+/// A line to be parsed into a row.
 struct Record<'a> {
     record: &'a StringRecord,
     columns: &'a Columns,
@@ -302,7 +303,7 @@ impl Record<'_> {
             .with_context(|| format!("column {}: `{text}`", self.columns.names[column]))
     }
 
-    /// A number within ± `most`.
+    /// A number within ±`most`.
     fn number(&self, column: usize, most: f64) -> Result<f64> {
         let (text, name) = (&self.record[column], self.columns.names[column]);
         match text.parse::<f64>() {

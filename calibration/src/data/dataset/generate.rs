@@ -1,4 +1,4 @@
-//! Data sets from the scene: render a frame, let the sensing measure it.
+//! Generates data sets from the scene: renders a frame and lets the sensing measure it.
 
 use std::ops::Range;
 
@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use super::detector::{Pool, Sensing};
 use super::{Dataset, Recipe, Row};
 
-/// Renders the frames of a recipe on all cores and looks at each with the pipeline. `progress` is
-/// called once for each frame, from any thread.
+/// Renders the frames of a recipe on all cores and measures each with the pipeline. Calls
+/// `progress` once per frame, from any thread.
 ///
 /// # Errors
-/// When the recipe asks for what the scene or the pipeline cannot do.
+/// When the scene or the pipeline does not support the recipe.
 pub fn generate(recipe: &Recipe, progress: impl Fn() + Sync) -> Result<Dataset> {
     let pool = sensing(recipe);
     let rows = Renderer::new(recipe)?.rows(0..recipe.rows(), &pool, progress)?;
@@ -23,12 +23,12 @@ pub fn generate(recipe: &Recipe, progress: impl Fn() + Sync) -> Result<Dataset> 
     })
 }
 
-/// The pipeline, which knows no model yet.
+/// The pipeline without a model.
 pub(super) fn sensing(recipe: &Recipe) -> Pool<'_> {
     Pool::new(|| Ok(vec![Box::new(Sensing::unmodelled(recipe)?)]))
 }
 
-/// Rows of a recipe, each by itself.
+/// Renders single rows of a recipe.
 pub(super) struct Renderer<'a> {
     recipe: &'a Recipe,
     scenes: Vec<Scene>,
@@ -44,7 +44,7 @@ impl<'a> Renderer<'a> {
         })
     }
 
-    /// Some of the rows, in order, each as all detectors of the pool see it.
+    /// These rows in order, each as all detectors of the pool see it.
     pub fn rows(
         &self,
         rows: Range<usize>,
@@ -146,7 +146,7 @@ mod tests {
         }
     }
 
-    /// Rows know the place of the tip where it may be anywhere, and the markers are found there.
+    /// Rows have the tip's place when it may be anywhere, and the markers are found there.
     #[test]
     fn places_are_labelled_where_they_are_known() {
         let mut recipe = small(3);
@@ -166,8 +166,8 @@ mod tests {
         assert!(middle.rows.iter().all(|row| row.tip_mm.is_none()));
     }
 
-    /// The label is the tip's way: a tip that sticks moves the markers much further sideways than a
-    /// force so tilted.
+    /// The label is the tip's direction of motion: a tip that sticks moves the markers much further
+    /// sideways than a force with that tilt.
     #[test]
     fn labels_mean_what_the_contact_reading_says() {
         let shift = |contact: Contact| {

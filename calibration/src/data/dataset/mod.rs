@@ -1,4 +1,4 @@
-//! Data sets: forces with the features that the sensing found in the frames.
+//! Data sets: forces, each with the features that the sensing found in its frame.
 
 mod detector;
 mod file;
@@ -25,45 +25,43 @@ pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};
 
-/// A data set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
-    /// Where it came from and what its numbers mean.
+    /// Its origin and the meaning of its numbers.
     pub about: About,
-    /// Its rows.
     pub rows: Vec<Row>,
 }
 
-/// Where a data set came from and what its numbers mean.
+/// Origin of a data set and meaning of its numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct About {
-    /// What frames and labels are.
+    /// Conditions of frames and labels.
     pub conditions: Conditions,
-    /// What the frames show, in words.
+    /// Description of the scene, in words.
     pub scene: String,
     /// The loads of each session.
     pub loads: Loads,
     /// Frames of the untouched film in each session.
     pub rest: usize,
-    /// How many times the sensor was set up anew.
+    /// Number of sessions: for each, the sensor was set up anew.
     pub sessions: usize,
-    /// Decides loads, sessions and noise.
+    /// Seed of loads, sessions and noise.
     pub seed: u64,
     /// The limits of its forces.
     pub range: Range,
-    /// What is known of rows whose place is not: without it, that the tip was on the film's middle.
+    /// Describes rows without a place. If absent, those rows were pressed on the film's middle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free: Option<Free>,
-    /// Where gravity pulled in the film frame, parts of g (length 1): x right and y down in the
-    /// image, z away from the camera. Absent if nobody knows, or it differs between rows.
+    /// Direction of gravity in the film frame, parts of g (length 1): x right and y down in the
+    /// image, z away from the camera. Absent if unknown, or different between rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub down: Option<[f64; 3]>,
 }
 
-/// Checks that gravity can pull there: a vector of length 1, to 1 %.
+/// Checks a direction of gravity: a vector of length 1, to 1 %.
 ///
 /// # Errors
-/// Says what is wrong with it.
+/// When its length is different.
 pub fn check_down(down: &[f64; 3]) -> Result<()> {
     let length = down.iter().map(|part| part * part).sum::<f64>().sqrt();
     ensure!(
@@ -73,50 +71,49 @@ pub fn check_down(down: &[f64; 3]) -> Result<()> {
     Ok(())
 }
 
-/// Presses of which nobody knows the place: the tip was anywhere on the film.
+/// Presses at unknown places: the tip was anywhere on the film.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Free {
-    /// Standard uncertainty of the direction along each of the two ways across it, degrees.
+    /// Standard uncertainty of the direction along each of the two axes across it, degrees.
     pub direction_deg: f64,
 }
 
-/// Where a row stands.
+/// A row's position in the data set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// Its session, from 0.
     pub session: usize,
-    /// Its pose among the paper's ([`crate::data::loads::PaperPoses`]), if it is in one.
+    /// Its pose among the paper's ([`crate::data::loads::PaperPoses`]), if it has one.
     pub pose: Option<usize>,
 }
 
 /// One frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// Where it stands.
     pub place: Place,
-    /// The force as it is labelled, N, film frame: the force on the film in the contact reading
-    /// `force`, otherwise |F| along the pressing direction.
+    /// The labelled force, N, film frame: the force on the film in the contact reading `force`,
+    /// otherwise
+    /// F| along the pressing direction.
     pub force_n: [f64; 3],
-    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None`
-    /// without a force, and where nobody knows.
+    /// The point of the film under the tip, given by its rest position, mm from the middle; `None`
+    /// without a force, and where unknown.
     pub tip_mm: Option<[f64; 2]>,
-    /// Standard uncertainty of |F| because clocks are known so well, readings are so far apart, and
-    /// the force changed so fast, N; `None` where it was held, or is known from elsewhere.
+    /// Standard uncertainty of |F|, N, from the clocks' lag, the time between readings and the rate
+    /// of the force. `None` where the force was held, or is known otherwise.
     pub clock_n: Option<f64>,
-    /// What was seen, or the status names that say why nothing was.
+    /// What was seen, or names of the status bits that explain why not.
     pub seen: Result<Observation, String>,
 }
 
-/// What is known of a row whose markers were found.
+/// A row whose markers were found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<'a> {
     /// What was seen.
     pub seen: &'a Observation,
-    /// The force as it is labelled, N: [`Row::force_n`].
+    /// The labelled force, N: [`Row::force_n`].
     pub force_n: [f64; 3],
-    /// Where the tip is, mm: [`Row::tip_mm`].
+    /// The tip's place, mm: [`Row::tip_mm`].
     pub tip_mm: Option<[f64; 2]>,
-    /// What clocks leave of |F|, N: [`Row::clock_n`].
+    /// Standard uncertainty of |F| due to the clocks, N: [`Row::clock_n`].
     pub clock_n: Option<f64>,
     /// Its session.
     pub session: usize,
@@ -134,10 +131,10 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// What the pipeline saw in a frame.
+/// What the pipeline measured in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
-    /// The eleven features, px and at last px².
+    /// The eleven features, px and the last in px².
     pub features_q16: [Q<16, i64>; FEATURES],
     /// Areas of markers 0–3 in the mask, px.
     pub areas_px: [u32; 4],
@@ -158,7 +155,7 @@ impl Dataset {
             .filter_map(|row| Some((row.seen.as_ref().ok()?, row.force_n)))
     }
 
-    /// Accepted rows by their numbers; rejected ones are left out.
+    /// The accepted rows among these numbers; rejected ones are left out.
     pub fn pick(&self, rows: &[usize]) -> Vec<Sample<'_>> {
         let picked = rows.iter().map(|&i| &self.rows[i]);
         picked.filter_map(Sample::of).collect()
@@ -169,17 +166,17 @@ impl Dataset {
         self.rows.iter().filter_map(Sample::of)
     }
 
-    /// Whether all its rows know where the tip is, and it may be anywhere.
+    /// Whether the tip may be anywhere and every row has its place.
     pub fn knows_places(&self) -> bool {
         self.about.range.knows_places() && self.about.free.is_none()
     }
 
-    /// Whether a row is of a press of which nobody knows the place.
+    /// Whether a row is a press at an unknown place.
     pub fn is_free(&self, row: &Row) -> bool {
         self.about.free.is_some() && row.tip_mm.is_none() && row.force_n != [0.0; 3]
     }
 
-    /// Without the presses of which nobody knows the place, and their number.
+    /// The data set without presses at unknown places, and their number.
     pub fn without_free(mut self) -> (Self, usize) {
         let (of_all, free) = (self.rows.len(), self.about.free.take());
         if free.is_some() {
@@ -190,7 +187,7 @@ impl Dataset {
         (self, of_all - left)
     }
 
-    /// How many rows were rejected, by status.
+    /// Number of rejected rows, by status.
     pub fn rejected(&self) -> BTreeMap<&str, usize> {
         let mut counts = BTreeMap::new();
         for status in self.rows.iter().filter_map(|row| row.seen.as_ref().err()) {
@@ -199,16 +196,16 @@ impl Dataset {
         counts
     }
 
-    /// The rest position of the first session: what every other session is compared with.
+    /// The rest position of the first session, with which all other sessions are compared.
     ///
     /// # Errors
-    /// When there is no accepted row without force in it.
+    /// When the session has no accepted row without force.
     pub fn rest(&self) -> Result<Rest> {
         self.session_rest(0)
     }
 
-    /// Rewrites every session's features as if it had the first one's rest position: what a tare
-    /// does on the chip.
+    /// Rewrites every session's features as if it had the first one's rest position, as a tare does
+    /// on the chip.
     ///
     /// # Errors
     /// When a session has no accepted row without force.
@@ -311,7 +308,7 @@ mod tests {
         Dataset { about, rows }
     }
 
-    /// As many sessions of one rest row each and poses of `each` rows.
+    /// Sessions of one rest row each, followed by poses of `each` rows.
     pub(super) fn many(sessions: usize, poses: usize, each: usize) -> Dataset {
         let row = |session: usize, pose: Option<usize>, i: usize| Row {
             place: Place { session, pose },

@@ -1,4 +1,4 @@
-//! What a data set shows: camera, sessions, loads.
+//! Recipes of data sets: camera, sessions, loads.
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
@@ -14,19 +14,19 @@ use crate::data::conditions::{Conditions, pixel_format};
 use crate::data::loads::{PaperPoses, RandomLoads};
 use crate::data::range::Range;
 
-/// Which loads.
+/// The loads of each session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loads {
-    /// As many, with force and angles uniform within the range.
+    /// This many, with force and angles uniform within the range.
     Random(usize),
-    /// As many for each of the paper's 357 poses, with the force uniform within the range.
+    /// This many for each of the paper's 357 poses, with the force uniform within the range.
     PaperPoses(usize),
-    /// As many for each of the 286 of them that comparisons train on.
+    /// This many for each of the 286 of them on which comparisons train.
     TrainingPoses(usize),
-    /// As many for each of the 71 that they hold out.
+    /// This many for each of the 71 that comparisons hold out.
     HeldOutPoses(usize),
-    /// What was measured with a unit, in so many poses; nothing to render.
+    /// Measured with a unit, in this many poses; cannot be rendered.
     Measured(usize),
 }
 
@@ -76,7 +76,7 @@ fn random(count: &str) -> Result<Loads, String> {
 }
 
 impl Recipe {
-    /// The frames that the default model of a preset learns from.
+    /// The frames on which the default model of a preset is trained.
     pub fn of(preset: Preset) -> Self {
         let usual = Self {
             preset,
@@ -95,7 +95,7 @@ impl Recipe {
 }
 
 impl Default for Recipe {
-    /// The frames that the default model's network learns from.
+    /// The frames on which the default model's network is trained.
     fn default() -> Self {
         Self {
             preset: Preset::Ov7725,
@@ -114,7 +114,7 @@ impl Default for Recipe {
 }
 
 impl Loads {
-    /// The paper's poses among them, and how many loads each has.
+    /// Its poses among the paper's, and the number of loads of each; `None` without such poses.
     fn poses(self) -> Option<(Poses, usize)> {
         let [training, held_out] = PaperPoses::parts();
         match self {
@@ -126,7 +126,7 @@ impl Loads {
     }
 }
 
-/// Some of the paper's poses, by number.
+/// A selection of the paper's poses, by number.
 enum Poses {
     All,
     Some(&'static [usize]),
@@ -160,13 +160,13 @@ impl Recipe {
         loads.saturating_add(self.rest)
     }
 
-    /// Frames in all.
+    /// Frames of all sessions.
     pub fn rows(&self) -> usize {
         self.session_rows().saturating_mul(self.sessions)
     }
 
     /// # Errors
-    /// When there would be no frame, or more than a file is good for.
+    /// When there would be no frame, or more frames than a file may hold.
     pub(super) fn check(&self) -> Result<()> {
         ensure!(
             !matches!(self.loads, Loads::Measured(_)),
@@ -189,7 +189,7 @@ impl Recipe {
     /// The scene of a session.
     ///
     /// # Errors
-    /// When the scene has no such frame size.
+    /// When the scene does not support the frame size.
     pub fn scene(&self, session: usize) -> Result<Scene> {
         let scene = Scene::preset(
             "rest",
@@ -210,7 +210,7 @@ impl Recipe {
         Ok(scene.with_options(options)?)
     }
 
-    /// Where a row stands: its session and, among the paper's poses, its pose.
+    /// A row's position: its session and, among the paper's poses, its pose.
     pub fn place(&self, row: usize) -> Place {
         let (session, within) = (row / self.session_rows(), row % self.session_rows());
         let loaded = within.checked_sub(self.rest);
@@ -224,7 +224,7 @@ impl Recipe {
     /// The load of a row.
     ///
     /// # Errors
-    /// When the limits are no limits of a force.
+    /// When the limits cannot be those of a force.
     pub fn load(&self, row: usize) -> Result<Load> {
         let within = row % self.session_rows();
         if within < self.rest {
@@ -240,10 +240,10 @@ impl Recipe {
         .with_context(|| format!("row {row}"))
     }
 
-    /// What the file of its data set says about it.
+    /// The header of the data set's file.
     ///
     /// # Errors
-    /// When the scene has no such frame size.
+    /// When the scene does not support the frame size.
     pub fn about(&self) -> Result<About> {
         let scene = self.scene(0)?;
         let options: &Options = scene.options();

@@ -1,4 +1,4 @@
-//! Data sets that go on where they were interrupted.
+//! Generates data sets and continues them after an interruption.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write;
@@ -11,10 +11,10 @@ use super::file::{lines, opening};
 use super::generate::{Renderer, sensing};
 use super::{About, Dataset, Recipe};
 
-/// Rows that are rendered before they are written.
+/// Rows that are rendered before each write.
 const BLOCK: usize = 512;
 
-/// A data set on its way into a file.
+/// A data set that is being written to a file.
 struct Target {
     path: PathBuf,
     about: About,
@@ -31,13 +31,13 @@ impl Target {
     }
 }
 
-/// Writes the data set of a recipe to a file, block by block, and reads it back. What an
-/// interrupted run left there is kept: the file ends up the same. `progress` is told the number of
-/// rows that are done, from any thread.
+/// Writes the data set of a recipe to a file, block by block, and reads it back. Rows of an
+/// interrupted run are kept: the file ends up the same. `progress` gets the number of finished
+/// rows, from any thread.
 ///
 /// # Errors
-/// When the file is another data set or cannot be written, or the recipe asks for what the scene
-/// cannot do.
+/// When the file is a different data set or cannot be written, or the scene does not support the
+/// recipe.
 pub fn generate_file(
     recipe: &Recipe,
     path: &Path,
@@ -48,11 +48,12 @@ pub fn generate_file(
     Dataset::load(path)
 }
 
-/// The same with detectors of its own, for the same frames: each has its file, and says in `files`
-/// what its rows are.
+/// Like [`generate_file`] with several detectors for the same frames. Each has its own file, and
+/// `files` holds the header of each.
 ///
 /// # Errors
-/// As [`generate_file`], and when detectors cannot be opened or are not as many as files.
+/// As [`generate_file`]; and when detectors cannot be opened, or their number differs from the
+/// files'.
 pub fn generate_files<'a>(
     recipe: &Recipe,
     files: Vec<(PathBuf, About)>,
@@ -102,14 +103,14 @@ impl Target {
         format!("cannot go on with {}", self.path.display())
     }
 
-    /// Makes the file begin with its opening; how many whole rows it has.
+    /// Makes the file begin with its header, and returns the number of its whole rows.
     fn begin(&self, rows: usize) -> Result<usize> {
         let bytes = match fs::read(&self.path) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(error.into()),
         };
-        // An interrupted run may have left a part of the opening, too.
+        // An interrupted run may have written a part of the header.
         if self.opening.as_bytes().starts_with(&bytes) {
             fs::write(&self.path, &self.opening)?;
             return Ok(0);
@@ -123,7 +124,7 @@ impl Target {
         Ok(done)
     }
 
-    /// Leaves the first rows only.
+    /// Removes all rows after the first `rows`.
     fn cut(&self, rows: usize) -> Result<()> {
         let bytes = fs::read(&self.path)?;
         let start = self.opening.len();
@@ -178,7 +179,7 @@ mod tests {
         }
     }
 
-    /// Two detectors on the same frames: files that were cut in different places end up the same.
+    /// Two detectors on the same frames: files that were cut at different rows end up the same.
     #[test]
     fn files_of_several_eyes_go_on_together() {
         let directory = tempfile::tempdir().unwrap();

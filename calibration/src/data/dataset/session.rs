@@ -1,4 +1,4 @@
-//! What differs between one day's calibration and another's.
+//! The differences between sessions: how a sensor is mounted, lit and focused anew each time.
 
 use hivtac_twin::{Lens, Mounting, Options};
 use rand::{Rng, SeedableRng};
@@ -10,7 +10,7 @@ pub(super) struct Session {
     /// Shift of the picture in parts of its width.
     shift: [f64; 2],
     roll_deg: f64,
-    /// Change of brightness, in parts.
+    /// Change of brightness, in parts of it.
     brighter: f64,
     gradient: [f64; 2],
     /// Blur in parts of the frame's width.
@@ -18,9 +18,9 @@ pub(super) struct Session {
 }
 
 impl Session {
-    /// Session 0 is the nominal one. The others: the picture up to 1 % of its width off and turned
-    /// by up to 1°, the light up to 20 % off and up to 20 % uneven, the focus up to 1/500 of the
-    /// width wrong (0.64 px at QVGA).
+    /// Session 0 is the nominal one. In the others the picture is shifted by up to 1 % of its width
+    /// and turned by up to 1°. The light differs by up to 20 % and is uneven by up to 20 %; the
+    /// focus is off by up to 1/500 of the width (0.64 px at QVGA).
     pub fn numbered(session: usize, seed: u64) -> Self {
         if session == 0 {
             return Self::default();

@@ -1,4 +1,4 @@
-//! Which rows a training does not see.
+//! Splits rows into those for training and those held out.
 
 use anyhow::{Result, ensure};
 use rand::{SeedableRng, seq::SliceRandom};
@@ -6,12 +6,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::Dataset;
 
-/// One accepted row in so many is held out, at least one.
+/// One accepted row in this many is held out, at least one.
 const PART: usize = 10;
 
 impl Dataset {
-    /// Numbers of the rows to train on and of those held out, each in order; rejected rows are in
-    /// neither. The same seed holds out the same rows.
+    /// Numbers of the rows to train on and of those held out, each in order, without rejected rows.
+    /// The same seed holds out the same rows.
     ///
     /// # Errors
     /// When there are fewer than two accepted rows.
