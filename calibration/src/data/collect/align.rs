@@ -1,10 +1,10 @@
-//! How far the gauge's clock is from the sensor's.
+//! Determines the lag between the gauge's clock and the sensor's.
 //!
 //! The markers' mean radius rises with |F|, but not in proportion. So for every lag a cubic of the
-//! radius is fitted to what the gauge said then, and its correlation with the gauge's force is
-//! taken: at the right lag it is nearly one, and what the cubic leaves is the residual. Lags are
-//! tried on a grid, the best one is refined between its steps. Where the tip is on the film hardly
-//! matters: of presses anywhere within ±4 mm a cubic leaves 2 mN.
+//! radius is fitted to the gauge's force at that time, and correlated with it. At the right lag the
+//! correlation is nearly one; the difference from the cubic is the residual. Lags are tried on a
+//! grid, and the best one is refined between its steps. The tip's place on the film matters little:
+//! for presses anywhere within ±4 mm the residual is 2 mN.
 
 use anyhow::{Result, bail, ensure};
 use rayon::prelude::*;
@@ -12,38 +12,38 @@ use rayon::prelude::*;
 use super::series::Joined;
 use crate::data::dataset::LARGEST_N;
 
-/// What the sensor saw at a time of its own clock.
+/// The markers' radius at a time of the sensor's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadiusSample {
-    /// s.
+    /// Time of the sensor's clock, s.
     pub time_s: f64,
-    /// Mean distance of the markers from their middle, less that at rest, px.
+    /// Mean distance of the markers from their middle, minus that at rest, px.
     pub radius_px: f64,
 }
 
-/// What is looked for, and what is convincing.
+/// The lags to search.
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     /// Lags to try, s.
     pub lags_s: [f64; 2],
-    /// Whether the clocks' rates may differ, too.
+    /// Whether the clocks' rates may differ as well.
     pub drift: bool,
 }
 
-/// How the clocks fit: the gauge's time is `time + lag_s + drift · (time − middle_s)`.
+/// Relation of the clocks: the gauge's time is `time + lag_s + drift · (time − middle_s)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Alignment {
-    /// s.
+    /// The gauge's time minus the sensor's, s.
     pub lag_s: f64,
-    /// Difference of the clocks' rates, in parts.
+    /// Difference of the clocks' rates, relative.
     pub drift: f64,
-    /// The sensor's time for which the lag holds.
+    /// The sensor's time at which the lag holds.
     pub middle_s: f64,
-    /// Correlation of the gauge's force with the one that the radius tells.
+    /// Correlation of the gauge's force with the cubic of the radius.
     pub correlation: f64,
-    /// Root mean square of what the radius leaves of the gauge's force, N.
+    /// Root mean square difference between the gauge's force and the cubic, N.
     pub residual_n: f64,
-    /// The same at the next best lag that is not beside the best one, N.
+    /// The residual at the next best lag outside the best one's minimum, N.
     pub next_n: f64,
     /// Standard deviation of the gauge's force, N.
     pub spread_n: f64,
@@ -51,42 +51,41 @@ pub struct Alignment {
     pub lag_sigma_s: f64,
 }
 
-/// Distance of lags on the grid, s.
+/// Step of the grid of lags, s.
 const STEP_S: f64 = 0.02;
-/// No recording and its gauge are longer together, s: half a day.
+/// The longest span of a recording and its gauge, s: half a day.
 const LONGEST_S: f64 = 43_200.0;
-/// The most frames that are used on the grid; the refinement uses all.
+/// The largest number of frames used on the grid; the refinement uses all.
 const GRID_FRAMES: usize = 1000;
-/// This part of the frames must have a reading.
+/// At least this part of the frames must have a reading.
 const COVERED: f64 = 0.8;
-/// Fewer frames say nothing.
+/// The smallest number of frames for an alignment.
 const FEWEST: usize = 20;
-/// The least spread of the gauge's force, N.
+/// The least standard deviation of the gauge's force, N.
 const LEAST_SPREAD_N: f64 = 0.002;
-/// The least correlation.
 const LEAST_CORRELATION: f64 = 0.95;
-/// How many times larger the residual at the next best lag must be.
+/// The least ratio of the residual at the next best lag to that at the best.
 const LEAST_CONTRAST: f64 = 1.5;
-/// Clocks differ by no more than this, in parts: 500 ppm, five times what crystals do.
+/// The largest difference of clock rates, relative: 500 ppm, five times that of crystals.
 const LARGEST_DRIFT: f64 = 5e-4;
-/// Standard uncertainty of a lag that the best recording leaves, s: readings and frames come as
-/// computer and gauge send them.
+/// The least standard uncertainty of a lag, s. Readings and frames arrive with delays of computer
+/// and gauge.
 const LEAST_LAG_S: f64 = 0.002;
-/// What is left of the force is another one after so long, s.
+/// Time after which residuals of the force are independent, s.
 const FORGOTTEN_S: f64 = 0.5;
-/// The gauge's rate is taken over so long before and after, s.
+/// Half the interval over which the gauge's rate of force is computed, s.
 const RATE_S: f64 = 0.03;
-/// In a shorter recording, s, a difference of rates cannot be told from a lag.
+/// In a shorter recording, s, a difference of rates is indistinguishable from a lag.
 const SHORTEST_FOR_DRIFT_S: f64 = 60.0;
 
 impl Alignment {
-    /// The gauge's time at a time of the sensor.
+    /// The gauge's time at a time of the sensor, s.
     pub fn gauge_time(&self, time_s: f64) -> f64 {
         time_s + self.lag_s + self.drift * (time_s - self.middle_s)
     }
 
-    /// Standard uncertainty of the force at a time of the sensor because the lag is known so well,
-    /// and readings are so far apart, N; nothing where the gauge has none around it.
+    /// Standard uncertainty of the force at a time of the sensor, N. Due to the lag's uncertainty
+    /// and the time between readings. `None` where the gauge has no readings around it.
     pub fn clock_n(&self, gauge: Joined<'_>, time_s: f64) -> Option<f64> {
         let time_s = self.gauge_time(time_s);
         let rate = rate_n_per_s(gauge, time_s)?;
@@ -95,7 +94,7 @@ impl Alignment {
     }
 }
 
-/// How fast the gauge's force changes at a time of its own.
+/// Rate of the gauge's force at a time of its own clock, N/s; `None` without readings around it.
 fn rate_n_per_s(gauge: Joined<'_>, time_s: f64) -> Option<f64> {
     let now = gauge.at(time_s)?;
     let at = |time_s: f64| gauge.at(time_s);
@@ -108,7 +107,7 @@ fn rate_n_per_s(gauge: Joined<'_>, time_s: f64) -> Option<f64> {
     }
 }
 
-/// Finds the lag of the gauge's clock.
+/// Determines the lag of the gauge's clock.
 ///
 /// # Errors
 /// When the peak is not convincing; says why and what to do.
@@ -157,7 +156,7 @@ pub fn align(frames: &[RadiusSample], gauge: Joined<'_>, search: Search) -> Resu
     Ok(found)
 }
 
-/// The lags around the best one over which the residual only rises.
+/// The lags around the best one up to which the residual rises steadily.
 fn hill(
     best: usize,
     steps: usize,
@@ -207,7 +206,8 @@ fn convincing(found: &Alignment, at_an_end: bool) -> Result<()> {
     Ok(())
 }
 
-/// The best lag near one of the grid, and the clocks' difference of rate if it may be one.
+/// The best lag near one of the grid, and the difference of the clocks' rates if `drift` allows
+/// one.
 fn refine(frames: &[RadiusSample], gauge: Joined<'_>, lag_s: f64, drift: bool) -> Alignment {
     let ends = [frames[0].time_s, frames[frames.len() - 1].time_s];
     let middle = f64::midpoint(ends[0], ends[1]);
@@ -239,7 +239,7 @@ fn refine(frames: &[RadiusSample], gauge: Joined<'_>, lag_s: f64, drift: bool) -
     }
 }
 
-/// How well the lag is known: what is left of the force over how fast that changes.
+/// Standard uncertainty of the lag, s: the residual over the rate of the force.
 fn lag_sigma_s(frames: &[RadiusSample], gauge: Joined<'_>, lag_s: f64, residual_n: f64) -> f64 {
     let rates = frames.iter().step_by(frames.len().div_ceil(GRID_FRAMES));
     let rates = rates.filter_map(|frame| rate_n_per_s(gauge, frame.time_s + lag_s));
@@ -253,7 +253,7 @@ fn lag_sigma_s(frames: &[RadiusSample], gauge: Joined<'_>, lag_s: f64, residual_
     found.min(STEP_S).hypot(LEAST_LAG_S)
 }
 
-/// Where a function with one minimum in a range has it, to a thousandth of the range.
+/// The minimum of a function with one minimum in a range, to a thousandth of the range.
 fn golden(cost: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     const PART: f64 = 0.618_033_988_749_894_9;
     let inner = |low: f64, high: f64| [high - PART * (high - low), low + PART * (high - low)];
@@ -273,7 +273,7 @@ fn golden(cost: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// How well a cubic of the radius tells the gauge's force.
+/// Fit of a cubic of the radius to the gauge's force.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fit {
     spread_n: f64,
@@ -282,7 +282,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// At a lag; nothing when too few frames have a reading.
+    /// At a lag; `None` when too few frames have a reading.
     fn of(
         frames: &[RadiusSample],
         gauge: Joined<'_>,
@@ -309,7 +309,8 @@ impl Fit {
             .iter()
             .map(|p| (p.0 - radius).abs())
             .fold(f64::MIN_POSITIVE, f64::max);
-        // Gram–Schmidt on the powers of the radius, scaled to ±1: stable, and no equation to solve.
+        // Gram–Schmidt on the powers of the radius, scaled to ±1: stable, without equations to
+        // solve.
         let mut left: Vec<f64> = pairs.iter().map(|p| p.1 - force).collect();
         let spread = (square(&left) / count).sqrt();
         let x: Vec<f64> = pairs.iter().map(|p| (p.0 - radius) / largest).collect();
@@ -320,7 +321,7 @@ impl Fit {
             for earlier in &basis {
                 remove(&mut next, earlier);
             }
-            // Nothing new: the radius takes too few values.
+            // Dependent on lower powers: the radius takes too few values.
             if square(&next) > 1e-9 * count {
                 let share = remove(&mut left, &next);
                 rises |= power == 1 && share > 0.0;
@@ -334,8 +335,7 @@ impl Fit {
         }
     }
 
-    /// What is left in parts of the spread; all of it where the force does not rise with the
-    /// radius.
+    /// Ratio of residual to spread; 1 if the force does not rise with the radius.
     fn relative(&self) -> f64 {
         if self.rises && self.spread_n > 0.0 {
             self.residual_n / self.spread_n
@@ -353,7 +353,7 @@ fn square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum()
 }
 
-/// Takes the part along `direction` out of `values`; how much that is.
+/// Removes the component along `direction` from `values`, and returns its coefficient.
 fn remove(values: &mut [f64], direction: &[f64]) -> f64 {
     let along: f64 = values.iter().zip(direction).map(|(v, d)| v * d).sum();
     let share = along / square(direction);

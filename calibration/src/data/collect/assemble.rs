@@ -1,4 +1,5 @@
-//! From a recording to a data set: clocks aligned, each frame with the force that pressed it.
+//! Makes a data set of a recording: aligns the clocks and gives each frame the force that pressed
+//! it.
 
 use std::path::PathBuf;
 
@@ -23,16 +24,16 @@ use crate::data::range::Range;
 pub enum Gauge {
     /// In the recording, on the computer's clock.
     AtThePort,
-    /// In files of the gauge's own, on its own clock: one for all runs with poses, or one for each
-    /// of them, in order.
+    /// In the gauge's own files, on its own clock: one file for all runs with poses, or one for
+    /// each of them, in order.
     Files(Vec<Series>),
 }
 
 impl Gauge {
-    /// In these files; at the port where there is none.
+    /// From these files; at the port if there are no files.
     ///
     /// # Errors
-    /// When one cannot be used; says why.
+    /// When one is unusable; says why.
     pub fn of(files: &[PathBuf], unit: Option<Unit>) -> Result<Self> {
         let series = files.iter().map(|path| gauge_file::load(path, unit));
         let series = series.collect::<Result<Vec<_>>>()?.concat();
@@ -46,16 +47,16 @@ impl Gauge {
 /// How a recording becomes a data set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct How {
-    /// The unit of readings that name none, where somebody said it.
+    /// The unit of readings without one, if a person stated it.
     pub unit: Option<Unit>,
-    /// Takes only steady stretches, each one load; of presses anywhere all that there is.
+    /// Takes only steady stretches, each as one load; presses anywhere are always taken whole.
     pub holds: bool,
     /// Standard uncertainty of the direction of presses anywhere, degrees.
     pub direction_deg: f64,
 }
 
 impl Default for How {
-    /// Every frame, of a hand that keeps to the film's normal as well as one does.
+    /// Every frame, with the direction of a hand that keeps well to the film's normal.
     fn default() -> Self {
         Self {
             unit: None,
@@ -65,27 +66,26 @@ impl Default for How {
     }
 }
 
-/// How well a hand keeps to a direction along each of the two ways across it, degrees: a standard
-/// uncertainty.
+/// Standard uncertainty of a hand's direction along each of the two axes across it, degrees.
 pub const DIRECTION_DEG: f64 = 3.0;
 
 /// The largest lag of a gauge at a serial port, s.
 const LARGEST_LAG_S: f64 = 2.0;
-/// Smaller forces are no contact, N.
+/// The least force of a contact, N.
 const LEAST_N: f64 = 0.001;
-/// Noise of the gauge beyond which a force counts as contact, in standard deviations.
+/// A force counts as contact above this many standard deviations of the gauge's noise.
 const CONTACT_SIGMAS: f64 = 4.0;
-/// Half as many samples around one give its time on the computer's clock.
+/// Number of samples on each side of one that determine its time on the computer's clock.
 const AROUND: usize = 16;
 
-/// A frame with its force, before it is a row of a data set.
+/// A frame with its force, before it becomes a row of a data set.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Loaded<'a> {
     pub kept: &'a Kept,
     pub time_s: f64,
     /// |F|, N.
     pub force_n: f64,
-    /// What clocks leave of it, N, where it was not held.
+    /// Standard uncertainty due to the clocks, N; `None` where the force was held.
     pub clock_n: Option<f64>,
 }
 
@@ -106,7 +106,7 @@ pub fn assemble(recording: &Recording, gauge: &Gauge, how: How) -> Result<(Datas
             .iter()
             .filter(|kept| kept.run == run)
             .collect();
-        // A run that ended before its first pose, such as one that was begun by mistake.
+        // A run that ended before its first pose, for example one begun by mistake.
         if kept.iter().all(|kept| kept.pose.is_none()) {
             report.empty_runs += 1;
             continue;
@@ -144,7 +144,7 @@ pub fn assemble(recording: &Recording, gauge: &Gauge, how: How) -> Result<(Datas
     Ok((Dataset { about, rows }, report))
 }
 
-/// Refuses gauge files of which nobody knows to which run they belong.
+/// Refuses gauge files that cannot be assigned to runs.
 fn one_for_each(files: &[Series], recording: &Recording) -> Result<()> {
     let posed = recording.samples.iter().filter(|kept| kept.pose.is_some());
     let mut runs: Vec<usize> = posed.map(|kept| kept.run).collect();
@@ -170,7 +170,7 @@ fn one_for_each(files: &[Series], recording: &Recording) -> Result<()> {
     Ok(())
 }
 
-/// The gauge's lines of a run, both on the computer's clock.
+/// The gauge's lines and the frames' times of a run, both on the computer's clock.
 fn at_the_port(
     recording: &Recording,
     kept: &[&Kept],
@@ -198,14 +198,14 @@ fn at_the_port(
     Aligned::of(series, kept, times, search)
 }
 
-/// When the frames were exposed on the computer's clock, but for a constant: the sensor's clock has
-/// no jitter, the computer's is the gauge's. The median of their difference over the neighbours
-/// joins both.
+/// Exposure times of the frames on the computer's clock, up to a constant. The sensor's clock has
+/// no jitter, and the gauge is on the computer's clock. The median of their difference over
+/// neighbouring samples relates the two.
 fn on_the_computers_clock(kept: &[&Kept]) -> Vec<f64> {
     let device = |kept: &Kept| kept.device_us as f64 / 1e6;
     let late: Vec<f64> = kept.iter().map(|kept| kept.host_s - device(kept)).collect();
     let smooth = |i: usize| {
-        // As many on both sides, so that a steady drift does not matter.
+        // The same number on both sides, so that a steady drift cancels.
         let reach = AROUND.min(i).min(late.len() - 1 - i);
         let mut near = late[i - reach..=i + reach].to_vec();
         near.sort_by(f64::total_cmp);
@@ -240,14 +240,14 @@ fn from_file(files: &[Series], session: usize, kept: &[&Kept]) -> Result<Aligned
 struct Aligned {
     series: Series,
     alignment: Alignment,
-    /// The frames' times on the sensor's clock, s.
+    /// The frames' times, s.
     times: Vec<f64>,
     /// Whether the gauge shows pressing as negative.
     is_turned: bool,
 }
 
 impl Aligned {
-    /// Where no lag fits, the gauge may show pressing as negative: that is as convincing, or not.
+    /// If no lag fits, the gauge may show pressing as negative: then tries the opposite sign.
     fn of(series: Series, kept: &[&Kept], times: Vec<f64>, search: Search) -> Result<Self> {
         let frames = radius_samples(kept, &times)?;
         let (series, alignment, is_turned) = match align(&frames, series.joined(), search) {
@@ -267,7 +267,7 @@ impl Aligned {
     }
 }
 
-/// Times and mean radii of the frames with markers, from the untouched film on.
+/// Times and mean radii of the frames with markers, beginning with the untouched film.
 fn radius_samples(kept: &[&Kept], times: &[f64]) -> Result<Vec<RadiusSample>> {
     let radii: Vec<Option<f64>> = kept
         .iter()
@@ -305,7 +305,7 @@ struct Run<'a> {
     times: &'a [f64],
     gauge: Joined<'a>,
     alignment: Alignment,
-    /// Only steady stretches, each one load.
+    /// Only steady stretches, each as one load.
     holds: bool,
 }
 
@@ -327,8 +327,8 @@ impl Run<'_> {
             least_n,
             ..RunReport::default()
         };
-        // Presses anywhere are taken as they are; loads of a known place, where it is asked for,
-        // only while they were held.
+        // Presses anywhere are taken whole; loads at a known place, if requested, only while they
+        // were held.
         let (mut rows, mut free, mut loaded) = (Vec::new(), Vec::new(), Vec::new());
         for (i, &kept) in self.kept.iter().enumerate() {
             if kept.pose.is_none() {
@@ -398,7 +398,7 @@ fn row(session: usize, kept: &Kept, force_n: f64) -> Result<Row> {
     })
 }
 
-/// The farthest that a pose's tip is from the film's middle along x or y, mm.
+/// The greatest distance of a pose's tip from the film's middle along x or y, mm.
 fn reach_mm(recording: &Recording) -> f64 {
     let poses = recording.samples.iter().filter_map(|kept| kept.pose);
     let places = poses.filter_map(|pose| pose.place_mm);

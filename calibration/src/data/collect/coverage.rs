@@ -1,5 +1,5 @@
-//! What presses anywhere cover: places on the film by how hard it was pressed there, what is still
-//! missing, and both for a person to see.
+//! What presses anywhere cover: places on the film by ranges of force, and what is still missing.
+//! Both as text and maps for a person.
 
 use std::fmt;
 
@@ -7,20 +7,21 @@ use hivtac_host::page::{Covered, Map};
 
 /// Places along x and along y.
 const SIDE: usize = 5;
-/// They reach so far from the film's middle, mm; a press a little farther out counts for the last.
+/// Their reach from the film's middle, mm, and the margin beyond it in which a press counts for the
+/// outermost place.
 const REACH_MM: f64 = 4.0;
 const BEYOND_MM: f64 = 0.8;
-/// Ranges of |F|, mN; more than the last counts for it.
+/// Ranges of |F|, mN; a larger force counts for the last.
 const SIZES_MN: [[u32; 2]; 3] = [[20, 70], [70, 140], [140, 250]];
 const SIZES: usize = SIZES_MN.len();
-/// A place is covered in a range after so long, s.
+/// A place is covered in a range after this time, s.
 const ENOUGH_S: f64 = 0.2;
-/// Where more than this part of a range is missing, it is missing everywhere.
+/// If more than this part of a range is missing, the range is reported as missing everywhere.
 const EVERYWHERE: f64 = 0.6;
 /// Lines of the picture.
 pub const PICTURE_LINES: usize = SIDE + 1;
 
-/// Where a press counts.
+/// The range and place for which a press counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cell {
     size: usize,
@@ -29,7 +30,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Of a press of so many N there; nothing for one that is too weak or too far out.
+    /// The cell of a press with this force, N, at this place; `None` if it is too weak or too far
+    /// out.
     pub fn of(place_mm: [f64; 2], force_n: f64) -> Option<Cell> {
         let [x, y] = place_mm;
         let within = |part: f64| part.abs() <= REACH_MM + BEYOND_MM;
@@ -54,25 +56,25 @@ impl Cell {
         cells.map(|(size, row, column)| Cell { size, row, column })
     }
 
-    /// A hard press in a corner takes a marker out of the picture.
+    /// False for hard presses in a corner: they move a marker out of the picture.
     fn is_needed(&self) -> bool {
         let is_end = |index: usize| index == 0 || index == SIDE - 1;
         !(self.size == SIZES - 1 && is_end(self.row) && is_end(self.column))
     }
 }
 
-/// How long each place was pressed in each range.
+/// Pressed time of each place in each range.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage {
     seconds: [[[f64; SIDE]; SIDE]; SIZES],
 }
 
-/// Places that are missing in a range of |F|.
+/// Missing places in a range of |F|.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Gap {
     size: usize,
     part: &'static str,
-    /// How many.
+    /// Number of places.
     pub cells: usize,
     verb: &'static str,
 }
@@ -91,14 +93,14 @@ const PARTS: [([usize; 2], [usize; 2], &str); 9] = [
 ];
 
 impl Coverage {
-    /// Counts a press that lasted so long; whether its place is covered in its range only now.
+    /// Adds a press of this length. Returns whether this made its place covered in its range.
     pub fn press(&mut self, cell: Cell, seconds: f64) -> bool {
         let was = self.is_covered(cell);
         self.seconds[cell.size][cell.row][cell.column] += seconds.max(0.0);
         !was && self.is_covered(cell)
     }
 
-    /// Takes a place for covered in its range.
+    /// Marks a place as covered in its range.
     pub fn mark(&mut self, cell: Cell) {
         self.press(cell, ENOUGH_S);
     }
@@ -107,20 +109,20 @@ impl Coverage {
         self.seconds[cell.size][cell.row][cell.column] >= ENOUGH_S
     }
 
-    /// How many of the places and ranges that are wanted are covered, and how many there are.
+    /// Number of needed places and ranges that are covered, and of all needed ones.
     pub fn count(&self) -> [usize; 2] {
         let wanted = || Cell::all().filter(Cell::is_needed);
         let covered = wanted().filter(|cell| self.is_covered(*cell));
         [covered.count(), wanted().count()]
     }
 
-    /// Whether nothing is missing.
+    /// Whether everything needed is covered.
     pub fn is_complete(&self) -> bool {
         let [covered, all] = self.count();
         covered == all
     }
 
-    /// What is missing, the largest gap first.
+    /// The missing places, the largest gap first.
     pub fn gaps(&self) -> Vec<Gap> {
         let mut gaps: Vec<Gap> = (0..SIZES).flat_map(|size| self.gaps_of(size)).collect();
         gaps.sort_by_key(|gap| std::cmp::Reverse(gap.cells));
@@ -144,7 +146,7 @@ impl Coverage {
         parts.filter(|gap| gap.cells > 0).collect()
     }
 
-    /// What to do about some places of a range depends on what else was pressed there.
+    /// Advice for missing places of a range depends on the other ranges that were pressed there.
     fn gap(&self, size: usize, part: &'static str, cells: &[Cell]) -> Gap {
         let is_covered_in = |sizes: std::ops::Range<usize>| {
             let covered = |size: usize| {
@@ -166,12 +168,12 @@ impl Coverage {
         }
     }
 
-    /// What to do next, in a sentence; nothing when all is covered.
+    /// What to do next, in a sentence; `None` when all is covered.
     pub fn advice(&self) -> Option<String> {
         self.gaps().first().map(Gap::to_string)
     }
 
-    /// What was not covered, for the end.
+    /// The missing places, for the end of a take; `None` when all is covered.
     pub fn missing(&self) -> Option<String> {
         let gaps = self.gaps();
         let words = gaps.iter().take(MOST_GAPS).map(|gap| {
@@ -186,7 +188,7 @@ impl Coverage {
         (!words.is_empty()).then(|| format!("missing: {}{more}", words.join(", ")))
     }
 
-    /// A map for each range, as the camera sees the film, with what is pressed now.
+    /// A map of each range, as the camera sees the film, with the present press.
     pub fn maps(&self, now: Option<Cell>) -> Vec<Map> {
         let of_size = |size: usize| {
             let row = |row: usize| {
@@ -214,7 +216,7 @@ impl Coverage {
         }
     }
 
-    /// The maps beside each other, for a terminal.
+    /// The maps side by side, for a terminal.
     pub fn picture(&self, now: Option<Cell>) -> [String; PICTURE_LINES] {
         let mut lines: [String; PICTURE_LINES] = Default::default();
         for map in self.maps(now) {
@@ -242,7 +244,7 @@ fn sign(place: Covered, is_pressed: bool) -> char {
     }
 }
 
-/// So many gaps are named at the end.
+/// Number of gaps that are named at the end.
 const MOST_GAPS: usize = 4;
 
 impl fmt::Display for Gap {
@@ -257,7 +259,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Everything pressed but for what is said.
+    /// A coverage of everything except some cells.
     fn all_but(is_left_out: impl Fn(&Cell) -> bool) -> Coverage {
         let mut coverage = Coverage::default();
         let cells = Cell::all().filter(|cell| !is_left_out(cell));

@@ -1,4 +1,4 @@
-//! What a recording leaves on disk: a folder of files that only grow.
+//! Keeps a recording on disk: a folder of files that only grow.
 //!
 //! | file | what |
 //! |---|---|
@@ -9,8 +9,8 @@
 //! | `down.csv` | which way the sensor was held in each run, where that was known |
 //! | `covered.csv` | where and how hard the film was pressed enough, by the sensor's own account, in takes of presses anywhere |
 //!
-//! Every line is written at once, so that an interruption costs at most the line under way, which
-//! the next run removes.
+//! Every line is written at once. An interruption therefore costs at most the unfinished line,
+//! which the next run removes.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{ErrorKind, Write};
@@ -45,13 +45,13 @@ const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
 const COVERED_COLUMNS: &str = "run,x_mm,y_mm,force_n";
 const DOWN_COLUMNS: &str = "run,x,y,z";
 
-/// Directions of gravity in two runs that differ by more, each part in g, are not the same.
+/// Directions of gravity in two runs are different if any component differs by more than this, g.
 const SAME_DOWN: f64 = 0.05;
 
-/// No marker lies beyond it along either side of a frame: 2¹⁰ px in 1/65,536 px. Then a pattern is
-/// no larger than a data set can hold.
+/// Greatest coordinate of a marker along either side of a frame: 2¹⁰ px in 1/65,536 px. Then a
+/// pattern is never larger than a data set can hold.
 const FARTHEST_MARKER: i64 = 1 << 26;
-/// The longest that a sensor runs, µs: most of a century, exact in seconds as `f64`.
+/// The longest time that a sensor runs, µs: most of a century, exact in seconds as `f64`.
 const LARGEST_US: u64 = 1 << 51;
 
 /// A recording's folder, open for writing.
@@ -61,41 +61,41 @@ pub struct Folder {
     takes: File,
     covered: File,
     down: File,
-    /// For whoever listens to the gauge.
+    /// For the thread that listens to the gauge.
     pub gauge: File,
     /// Number of this run, from 0.
     pub run: usize,
     /// Poses whose takes were finished in earlier runs.
     pub done: Vec<Pose>,
-    /// What is known of presses anywhere in earlier runs.
+    /// Coverage and lengths of presses anywhere in earlier runs.
     pub before: Before,
 }
 
-/// What earlier runs left of takes of presses anywhere.
+/// Takes of presses anywhere in earlier runs.
 #[derive(Clone, Debug, Default)]
 pub struct Before {
-    /// How long was recorded in each pose, s.
+    /// Recorded time in each pose, s.
     lasted_s: Vec<(Pose, f64)>,
-    /// Where the film was pressed enough, mm, and how hard, N.
+    /// Covered places, mm, with the force there, N.
     pub covered: Vec<([f64; 2], f64)>,
 }
 
 impl Before {
-    /// How long was recorded in a pose, s.
+    /// Recorded time in a pose, s.
     pub fn lasted_s(&self, pose: Pose) -> f64 {
         let same = self.lasted_s.iter().find(|(other, _)| *other == pose);
         same.map_or(0.0, |(_, seconds)| *seconds)
     }
 }
 
-/// Frames farther apart than this have a pause between them, s.
+/// Frames farther apart than this, s, have a pause between them.
 const PAUSE_S: f64 = 1.0;
 
 impl Folder {
-    /// Opens a recording to go on with it, or begins one.
+    /// Opens a recording to continue it, or begins one.
     ///
     /// # Errors
-    /// When it is of another unit or of other conditions, or cannot be written.
+    /// When it belongs to a different unit or to other conditions, or cannot be written.
     pub fn open(path: &Path, conditions: &Conditions) -> Result<Self> {
         fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))?;
         same_unit(&path.join(UNIT), conditions)?;
@@ -121,7 +121,7 @@ impl Folder {
         })
     }
 
-    /// Notes that the film was pressed enough about there, about so hard.
+    /// Records that the film is covered near this place, mm, at about this force, N.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -130,7 +130,7 @@ impl Folder {
         write_line(&mut self.covered, &line, COVERED)
     }
 
-    /// Notes where gravity pulls in this run, in the film frame.
+    /// Records the direction of gravity in this run, in the film frame.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -139,7 +139,7 @@ impl Folder {
         write_line(&mut self.down, &format!("{},{x},{y},{z}", self.run), DOWN)
     }
 
-    /// Keeps a sample.
+    /// Stores a sample.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -163,7 +163,7 @@ impl Folder {
         write_line(&mut self.samples, &line, SAMPLES)
     }
 
-    /// Notes a finished take.
+    /// Records a finished take.
     ///
     /// # Errors
     /// When it cannot be written.
@@ -182,7 +182,8 @@ impl Folder {
     }
 }
 
-/// Keeps a line of the gauge. Quotes would end the field; no reading has any.
+/// Stores a line of the gauge. Quotes are replaced because they would end the field; no reading has
+/// any.
 ///
 /// # Errors
 /// When it cannot be written.
@@ -209,24 +210,24 @@ fn pair(numbers: Option<[f64; 2]>) -> String {
     numbers.map_or(",".to_owned(), |[a, b]| format!("{a},{b}"))
 }
 
-/// What the model in use says: nothing about the markers.
+/// Status bits that depend on the model in use and say nothing about the markers.
 const OF_THE_MODEL: Status =
     Status(Status::MODEL_MISSING.0 | Status::MODEL_MISMATCH.0 | Status::UNEXPLAINED.0);
 
-/// The names of the bits that say that a frame is none to learn from: without markers, with
-/// implausible ones, or disturbed.
+/// Names of the bits by which a frame is unusable for training: without markers, with implausible
+/// ones, or disturbed.
 fn reasons(sample: &Sample) -> String {
     let bad = Status::NO_FORCE.0 & !OF_THE_MODEL.0 | Status::FRAME_DISTURBED.0;
     let frame = Status(bad & sample.status.0);
     let names: Vec<_> = frame.names().collect();
     if names.is_empty() && sample.markers.is_none() {
-        // A sensor that sends no markers although they were found would be a bug of its firmware.
+        // A sensor that sends no markers although it found them has a bug in its firmware.
         return "markers_not_sent".to_owned();
     }
     names.join(" ")
 }
 
-/// Opens a file to append to; without a line that an interruption cut.
+/// Opens a file to append to, and removes a line that an interruption cut.
 fn append(path: &Path, columns: &str) -> Result<File> {
     let context = || format!("cannot write {}", path.display());
     let text = match fs::read(path) {
@@ -250,7 +251,7 @@ fn append(path: &Path, columns: &str) -> Result<File> {
     Ok(file)
 }
 
-/// Writes the unit into a new recording, or holds it against that of an older one.
+/// Writes the unit into a new recording, or compares it with that of an existing one.
 fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
     match fs::read_to_string(path) {
         Ok(text) => {
@@ -273,7 +274,7 @@ fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
     }
 }
 
-/// Under which conditions a unit's data are taken, from what it says of itself.
+/// The conditions of a unit's data, from the unit's own hello.
 ///
 /// # Errors
 /// When this program does not know its preset.
@@ -294,31 +295,31 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
     })
 }
 
-/// Everything that was recorded.
+/// A whole recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// The unit, and how it looks at its frames.
+    /// The unit, and how it reads its frames.
     pub conditions: Conditions,
-    /// Where gravity pulled in the film frame, parts of g, if known of all runs.
+    /// Direction of gravity in the film frame, parts of g, if known for all runs.
     pub down: Option<[f64; 3]>,
-    /// In the order they came.
+    /// In order of arrival.
     pub samples: Vec<Kept>,
-    /// Lines of the gauge at a serial port: run, time of the computer in s, text.
+    /// Lines of the gauge at a serial port: run, computer time in s, text.
     pub gauge_lines: Vec<(usize, f64, String)>,
 }
 
-/// A sample that was kept.
+/// A recorded sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
-    /// Its run.
+    /// Its run, from 0.
     pub run: usize,
-    /// When it came, s of the computer since the run began.
+    /// Time of arrival, s of the computer since the run began.
     pub host_s: f64,
-    /// When it was exposed, µs of the sensor.
+    /// Time of exposure, µs of the sensor.
     pub device_us: u64,
-    /// The pose, or nothing for the untouched film.
+    /// The pose; `None` for the untouched film.
     pub pose: Option<Pose>,
-    /// The markers, or the status names that say why there are none, or none to trust.
+    /// The markers, or names of the status bits by which they are missing or unreliable.
     pub seen: Result<[Marker; 4], String>,
 }
 
@@ -330,11 +331,10 @@ struct GaugeLine {
 }
 
 impl Recording {
-    /// Reads a folder.
+    /// Reads a folder, without a cut last line.
     ///
     /// # Errors
-    /// When it is no recording, or a file of it is damaged; names the line. A last line that was
-    /// cut is left out.
+    /// When it is not a recording, or one of its files is damaged; names the line.
     pub fn read(path: &Path) -> Result<Self> {
         let unit = path.join(UNIT);
         let text = fs::read_to_string(&unit).with_context(|| {
@@ -352,11 +352,11 @@ impl Recording {
             .with_context(|| path.display().to_string())
     }
 
-    /// The recording in the texts of its files: `unit.json`, `samples.csv`, `gauge.csv` and
+    /// Parses a recording from the texts of its files: `unit.json`, `samples.csv`, `gauge.csv` and
     /// `down.csv`.
     ///
     /// # Errors
-    /// When one is damaged, names the file and the line; when the sensor was turned between runs.
+    /// When one is damaged; names the file and the line. When the sensor was turned between runs.
     pub fn parse(unit: &str, samples: &str, gauge: &str, down: &str) -> Result<Self> {
         let conditions =
             serde_json::from_str(unit).with_context(|| format!("{UNIT} is damaged"))?;
@@ -376,12 +376,12 @@ impl Recording {
         recording.down = recording.held(&rows([DOWN, down], direction, DOWN_COLUMNS)?)?;
         let lines = recording.samples.len() + recording.gauge_lines.len();
         let runs = recording.runs();
-        // Each run that left a line follows another one that did.
+        // Each run that left a line follows one that did.
         ensure!(runs <= lines, "{lines} lines cannot be of {runs} runs");
         Ok(recording)
     }
 
-    /// How long presses anywhere were recorded in each pose, s.
+    /// Recorded time of presses anywhere in each pose, s.
     fn lasted_s(&self) -> Vec<(Pose, f64)> {
         let mut lasted: Vec<(Pose, f64)> = Vec::new();
         for frames in self.samples.windows(2) {
@@ -402,7 +402,7 @@ impl Recording {
         lasted
     }
 
-    /// Where gravity pulled in all runs with samples, if known: from the lines of its file.
+    /// Direction of gravity in all runs with samples, if known, from the lines of its file.
     fn held(&self, lines: &[(usize, [f64; 3])]) -> Result<Option<[f64; 3]>> {
         let Some((first, down)) = lines.first() else {
             return Ok(None);
@@ -419,7 +419,7 @@ impl Recording {
         Ok(self.samples.iter().all(is_known).then_some(*down))
     }
 
-    /// How many runs there are.
+    /// Number of runs.
     pub fn runs(&self) -> usize {
         let after = |run: usize| run.saturating_add(1);
         let last = self.samples.iter().map(|kept| after(kept.run)).max();
@@ -428,7 +428,7 @@ impl Recording {
     }
 }
 
-/// The whole lines of one of the folder's tables.
+/// The complete lines of one of the folder's tables.
 fn rows<T>(
     [name, text]: [&str; 2],
     parse: impl Fn(&csv::StringRecord) -> Result<T>,
@@ -516,7 +516,7 @@ fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Optio
     poses::parse(&texts.join(",")).map(Some)
 }
 
-/// What [`Folder::covered`] noted.
+/// Reads what [`Folder::covered`] recorded.
 fn read_covered(path: &Path) -> Result<Vec<([f64; 2], f64)>> {
     let text =
         fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -527,7 +527,7 @@ fn read_covered(path: &Path) -> Result<Vec<([f64; 2], f64)>> {
     rows([COVERED, &text], press, COVERED_COLUMNS)
 }
 
-/// The poses whose takes were finished in a folder; none where nothing was recorded yet.
+/// The poses whose takes were finished in a folder; empty before the first recording.
 ///
 /// # Errors
 /// When their list cannot be read, or is damaged.
@@ -682,7 +682,7 @@ mod tests {
         let recording = Recording::read(path).unwrap();
         let near = recording.down.unwrap().into_iter().zip([0.0, 0.6, -0.8]);
         assert!(near.into_iter().all(|(a, b)| (a - b).abs() < 1e-6));
-        // In a third run nobody says.
+        // In a third run the direction is unknown.
         let mut folder = Folder::open(path, &conditions()).unwrap();
         folder.sample(0.5, None, &sample(1, true)).unwrap();
         assert_eq!(Recording::read(path).unwrap().down, None);

@@ -1,4 +1,4 @@
-//! A take of presses anywhere, while it goes on: what is covered, shown a few times a second.
+//! Follows a take of presses anywhere: shows its coverage a few times a second.
 
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -8,28 +8,27 @@ use hivtac_wire::message::Sample;
 
 use super::coverage::{Cell, Coverage, PICTURE_LINES};
 
-/// A take ends before its time when all is covered, but not before, s.
+/// A complete coverage ends a take early, but not before this time, s.
 const LEAST_S: f64 = 60.0;
-/// The film is looked at this often on a terminal, and spoken of this often elsewhere, in s of the
-/// sensor.
+/// Intervals of the display on a terminal, and of lines elsewhere, the latter in s of the sensor.
 const SHOW_EVERY: Duration = Duration::from_millis(200);
 const SAY_EVERY_S: f64 = 10.0;
-/// Two frames are no longer apart, s: a pause is no press.
+/// The longest time between two frames of a press, s; longer ones are pauses.
 const LONGEST_FRAME_S: f64 = 0.1;
 
-/// What such a take has so far.
+/// The state of such a take.
 #[derive(Debug)]
 pub(super) struct FreeTake {
     coverage: Coverage,
-    /// What was recorded in earlier runs, s.
+    /// Recorded in earlier runs, s.
     before_s: f64,
-    /// The length that was asked for, s.
+    /// The requested length, s.
     length_s: f64,
     first_us: Option<u64>,
     last_us: u64,
-    /// Whether the sensor tells places at all.
+    /// Whether the sensor's model gives places.
     tells_places: bool,
-    /// What is pressed now: where, mm, and how hard, N.
+    /// The present press: place, mm, and force, N.
     now: Option<([f64; 2], f64)>,
     shown: Instant,
     is_drawn: bool,
@@ -37,7 +36,7 @@ pub(super) struct FreeTake {
 }
 
 impl FreeTake {
-    /// One of such a length, after some that was recorded and covered already.
+    /// A take of this length, s, with the time and coverage of earlier runs.
     pub fn new(length_s: f64, before_s: f64, covered: &[([f64; 2], f64)]) -> Self {
         let mut coverage = Coverage::default();
         for (place_mm, force_n) in covered {
@@ -59,8 +58,8 @@ impl FreeTake {
         }
     }
 
-    /// Takes a frame; |F| is the gauge's where there is one. What became covered by it, if
-    /// something did: where, mm, and how hard, N.
+    /// Adds a frame; |F| is the gauge's if there is one. Returns the place, mm, and force, N, that
+    /// it made covered, if any.
     pub fn sample(&mut self, sample: &Sample, gauge_n: Option<f64>) -> Option<([f64; 2], f64)> {
         self.first_us.get_or_insert(sample.time_us);
         let step_s = sample.time_us.saturating_sub(self.last_us) as f64 / 1e6;
@@ -83,18 +82,18 @@ impl FreeTake {
         (self.last_us - first_us.min(self.last_us)) as f64 / 1e6
     }
 
-    /// How much of it is left, s.
+    /// The remaining time, s.
     fn left_s(&self) -> f64 {
         (self.length_s - self.before_s - self.lasted_s()).max(0.0)
     }
 
-    /// Whether more of it would tell little: the time is over, or all is covered.
+    /// Whether the take can end: its time is over, or everything is covered.
     pub fn is_over(&self) -> bool {
         let lasted_s = self.before_s + self.lasted_s();
         self.left_s() == 0.0 || lasted_s >= LEAST_S && self.coverage.is_complete()
     }
 
-    /// Shows what is covered and what is missing: as a map on a terminal, elsewhere as a line.
+    /// Shows the coverage and what is missing: a map on a terminal, a line elsewhere.
     pub fn show(&mut self, sample: &Sample) {
         let mut terminal = std::io::stderr();
         if !terminal.is_terminal() {
@@ -114,7 +113,7 @@ impl FreeTake {
         }
     }
 
-    /// The map, what is pressed, and what to do; each line as if it were alone on the terminal.
+    /// The map, the present press, and the advice; each line stands alone on the terminal.
     fn block(&self, sample: &Sample) -> String {
         let picture = self.coverage.picture(self.cell());
         let lines = picture
@@ -132,7 +131,7 @@ impl FreeTake {
         }
     }
 
-    /// What a page is told in the end.
+    /// The final state for a page.
     pub fn told_at_the_end(&self) -> page::Coverage {
         page::Coverage {
             maps: self.coverage.maps(None),
@@ -141,13 +140,13 @@ impl FreeTake {
         }
     }
 
-    /// Where what is pressed now counts.
+    /// The cell for which the present press counts.
     fn cell(&self) -> Option<Cell> {
         let (place_mm, force_n) = self.now?;
         Cell::of(place_mm, force_n)
     }
 
-    /// What is pressed now, in words.
+    /// The present press, in words.
     fn pressed(&self, sample: &Sample) -> String {
         match self.now {
             Some(([x, y], force_n)) => {
@@ -158,7 +157,7 @@ impl FreeTake {
         }
     }
 
-    /// What is covered and what to do, on one line.
+    /// Coverage and advice on one line.
     fn line(&self) -> String {
         let left_s = self.left_s();
         if !self.tells_places {
@@ -173,7 +172,7 @@ impl FreeTake {
         format!("{covered} of {all} covered, {left_s:.0} s left; {advice}")
     }
 
-    /// What there is in the end.
+    /// The final summary.
     pub fn end(&self) -> String {
         if !self.tells_places {
             return "The sensor told no place: what is covered is not known. With a model that \

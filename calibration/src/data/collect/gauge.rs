@@ -1,4 +1,4 @@
-//! What a force gauge says: lines of text with one reading each (`docs/calibration.md`).
+//! Parses a force gauge's output: lines of text with one reading each (`docs/calibration.md`).
 //!
 //! A reading is `[what] [sign] digits [mark digits] [unit] [letters]`, spaces between the parts but
 //! not within a number:
@@ -7,15 +7,15 @@
 //! +0.123N    -0.123 N    0,123    123.4mN    0.0452 lbF    +0.123NTO    ST,+00012.3  g
 //! ```
 //!
-//! `what` is a balance's: `ST` steady, `US` not, `GS` gross, `NT` net; `S S` and `S D` likewise.
-//! The letters after the unit are those of common gauges: `T` or `C` for the present force (`P`: a
-//! held peak, which is no reading of now), then `O`, `H` or `L` for how it compares with the
-//! gauge's own limits (`E`: overload). Before these, `K` and `O` are kgf and lbf.
+//! `what` comes from balances: `ST` steady, `US` unsteady, `GS` gross, `NT` net; `S S` and `S D`
+//! likewise. The letters after the unit are those of common gauges. First `T` or `C` for the
+//! present force (`P`: a held peak, not a present reading). Then `O`, `H` or `L` for its comparison
+//! with the gauge's own limits (`E`: overload). Before these letters, `K` and `O` are kgf and lbf.
 
 pub use super::gauge_unit::Unit;
 use crate::data::dataset;
 
-/// No gauge for a fingertip reads more, ± N; a data set holds the difference of any two.
+/// The largest reading of a gauge for a fingertip, ± N; a data set holds the difference of any two.
 const LARGEST_N: f64 = dataset::LARGEST_N / 2.0;
 
 /// Why a line is not used.
@@ -23,20 +23,20 @@ const LARGEST_N: f64 = dataset::LARGEST_N / 2.0;
 pub enum Bad {
     /// Not a reading: a cut line, noise, an answer to something else.
     NoReading,
-    /// A unit that is not known, or none where none was agreed on.
+    /// An unknown unit, or no unit where none was agreed on.
     Unit,
-    /// The gauge says that the force is beyond its range.
+    /// The gauge reports that the force is beyond its range.
     Overload,
-    /// A force that no gauge for a fingertip reads: a wrong unit, or digits run together.
+    /// A force beyond that of any gauge for a fingertip: a wrong unit, or digits run together.
     TooLarge,
     /// A held peak instead of the present force.
     Peak,
-    /// Its time is no number, or not after the one before.
+    /// Its time is not a number, or not after the previous one.
     Time,
 }
 
 impl Bad {
-    /// In words.
+    /// The reason in words.
     pub fn words(self) -> &'static str {
         match self {
             Bad::NoReading => "no reading",
@@ -49,7 +49,7 @@ impl Bad {
     }
 }
 
-/// What a line says.
+/// The reading of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// The force with the gauge's sign, N.
@@ -58,19 +58,18 @@ pub struct Reading {
     pub names_unit: bool,
 }
 
-/// The force (N, with the gauge's sign) that a line says. `usual` is taken where the line names no
-/// unit.
+/// The force of a line, N, with the gauge's sign. `usual` is the unit of lines without one.
 ///
 /// # Errors
-/// Why the line is not to be used.
+/// The reason not to use the line.
 pub fn reading(line: &str, usual: Unit) -> Result<f64, Bad> {
     read(line, usual).map(|reading| reading.force_n)
 }
 
-/// The same, and whether the line names its unit.
+/// The reading of a line. `usual` is the unit of lines without one.
 ///
 /// # Errors
-/// Why the line is not to be used.
+/// The reason not to use the line.
 pub fn read(line: &str, usual: Unit) -> Result<Reading, Bad> {
     let text = without_heading(line.trim())?;
     if says_overload(text) {
@@ -98,8 +97,8 @@ pub fn read(line: &str, usual: Unit) -> Result<Reading, Bad> {
     })
 }
 
-/// A number without sign, with a point or a comma as its decimal mark: digits on both sides of it.
-/// Rust reads `5.` and `.5` as well; a gauge that sends those has lost characters.
+/// A number without sign, with a point or a comma as its decimal mark and digits on both sides of
+/// it. Rust also parses `5.` and `.5`, but a gauge that sends those has lost characters.
 pub(super) fn number(digits: &str) -> Option<f64> {
     let is_whole = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
     let whole = match digits.split_once(['.', ',']) {
@@ -110,7 +109,7 @@ pub(super) fn number(digits: &str) -> Option<f64> {
     (whole && value.is_finite()).then_some(value)
 }
 
-/// The sign of a number, and what follows it; the minus may be a typesetter's.
+/// The sign of a number, and the text after it; the minus may be a typographic one.
 pub(super) fn signed(text: &str) -> (f64, &str) {
     if let Some(rest) = text.strip_prefix(['-', '\u{2212}', '\u{2013}']) {
         return (-1.0, rest.trim_start());
@@ -118,7 +117,7 @@ pub(super) fn signed(text: &str) -> (f64, &str) {
     (1.0, text.strip_prefix('+').unwrap_or(text).trim_start())
 }
 
-/// What a balance says before the number, left out.
+/// The text after the words that a balance puts before the number.
 fn without_heading(text: &str) -> Result<&str, Bad> {
     let mut rest = text;
     while let Some((word, after)) = rest.split_once(',') {
@@ -139,7 +138,7 @@ fn without_heading(text: &str) -> Result<&str, Bad> {
     Ok(rest)
 }
 
-/// The unit that letters begin with, and the letters after it.
+/// The unit at the start of a text, and the letters after it.
 fn unit(rest: &str) -> (Option<Unit>, &str) {
     let imada = |letter: char, name: &str| {
         let letters = rest.strip_prefix(letter)?;
@@ -153,7 +152,7 @@ fn unit(rest: &str) -> (Option<Unit>, &str) {
         .unwrap_or((None, rest))
 }
 
-/// The usual ways of gauges to show that there is more than they can measure.
+/// Whether a text is one of the usual overload messages of gauges.
 fn says_overload(text: &str) -> bool {
     let body = text.trim_start_matches(['+', '-', ' ']);
     let word = body.to_ascii_uppercase();
@@ -290,7 +289,7 @@ mod tests {
             prop_assert!((found.unwrap() - value * unit).abs() < 1e-9);
         }
 
-        /// White space within a number is a lost digit, or two numbers.
+        /// White space within a number means a lost digit, or two numbers.
         #[test]
         fn digits_apart_are_no_number(a in 0_u32..1000, b in 0_u32..1000, space in "[ \u{a0}\t]+") {
             prop_assert_eq!(read(&format!("{a}{space}{b} N")), Err(Bad::NoReading));

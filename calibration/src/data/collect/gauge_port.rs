@@ -1,4 +1,4 @@
-//! A gauge at a serial port: its lines, with the computer's time.
+//! Reads a gauge at a serial port: its lines, with the computer's time.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
@@ -30,27 +30,27 @@ pub struct GaugeArgs {
     pub gauge_unit: Option<Unit>,
 }
 
-/// How often a gauge is asked that only answers.
+/// Interval at which a gauge that only answers is asked.
 const ASK_EVERY: Duration = Duration::from_millis(20);
-/// Longest wait of one read.
+/// The longest wait of one read.
 const PATIENCE: Duration = Duration::from_millis(5);
-/// A line that is longer is noise.
+/// The longest line; a longer one is noise.
 const LONGEST_LINE: usize = 256;
 
-/// A gauge that is listened to, in a thread of its own.
+/// A gauge and the thread that listens to it.
 #[derive(Debug)]
 pub struct GaugePort {
     thread: Option<JoinHandle<Result<()>>>,
     end: Arc<AtomicBool>,
     readings: Arc<AtomicUsize>,
-    /// The newest, the bits of an `f64` in N.
+    /// The newest reading, bits of an `f64` in N.
     newest: Arc<AtomicU64>,
     unread: Arc<Mutex<Option<(String, Bad)>>>,
     name: String,
 }
 
 impl GaugePort {
-    /// Opens the port and keeps every line in `file`, with the time since `begun`.
+    /// Opens the port and stores every line in `file`, with the time since `begun`.
     ///
     /// # Errors
     /// When the port cannot be opened.
@@ -99,10 +99,10 @@ impl GaugePort {
         }))
     }
 
-    /// Readings so far. An error when the gauge was lost.
+    /// Number of readings until now.
     ///
     /// # Errors
-    /// Why nobody listens any more.
+    /// When the gauge was lost; says why.
     pub fn readings(&mut self) -> Result<usize> {
         if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             self.finish()?;
@@ -110,13 +110,13 @@ impl GaugePort {
         Ok(self.readings.load(Ordering::Relaxed))
     }
 
-    /// The first line that was no reading, and why it was none.
+    /// The first line that was not a reading, and the reason.
     fn unread(&self) -> Option<(String, Bad)> {
         let unread = self.unread.lock();
         unread.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Why nothing is heard of it: what it sends instead, or that it sends nothing.
+    /// Why there are no readings: the invalid lines that it sends, or that it sends nothing.
     pub fn silence(&self) -> String {
         let name = &self.name;
         match self.unread() {
@@ -133,12 +133,12 @@ impl GaugePort {
         }
     }
 
-    /// Whether it sent lines, and none of them was a reading.
+    /// Whether it sent lines, but not a single valid reading.
     pub fn is_unreadable(&self) -> bool {
         self.readings.load(Ordering::Relaxed) == 0 && self.unread().is_some()
     }
 
-    /// What it shows, N; nothing before its first reading.
+    /// Its newest reading, N; `None` before the first.
     pub fn newest_n(&self) -> Option<f64> {
         let newest = f64::from_bits(self.newest.load(Ordering::Relaxed));
         (!newest.is_nan()).then_some(newest)
@@ -147,7 +147,7 @@ impl GaugePort {
     /// Stops listening.
     ///
     /// # Errors
-    /// When the gauge was lost, or its lines could not be kept.
+    /// When the gauge was lost, or its lines could not be stored.
     pub fn finish(&mut self) -> Result<()> {
         self.end.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {

@@ -1,10 +1,10 @@
-//! Units of force, as gauges and headings name them.
+//! Units of force as gauges and headings name them.
 
 use anyhow::{Result, bail};
 
-/// Newtons in one step of a unit. Of the first three the case counts, since a `MN` is none.
+/// Newtons per unit. Case counts for these three, because `MN` is not one of them.
 const EXACT: [(&str, f64); 3] = [("N", 1.0), ("mN", 1e-3), ("kN", 1e3)];
-/// Those that gauges write as they like: `lbF`, `gF`, `Kgf`. A balance shows forces as masses.
+/// Units whose case varies between gauges: `lbF`, `gF`, `Kgf`. A balance shows forces as masses.
 const ANY_CASE: [(&str, f64); 8] = [
     ("gf", GRAM),
     ("kgf", 1e3 * GRAM),
@@ -26,21 +26,21 @@ impl Unit {
     /// The newton.
     pub const NEWTON: Unit = Unit(1.0);
 
-    /// The unit of a name, if it is one.
+    /// The unit with this name, if it is one.
     pub fn named(name: &str) -> Option<Unit> {
         let exact = EXACT.iter().find(|(unit, _)| *unit == name);
         let any_case = || ANY_CASE.iter().find(|(u, _)| u.eq_ignore_ascii_case(name));
         exact.or_else(any_case).map(|(_, size)| Unit(*size))
     }
 
-    /// The unit that a text begins with, the longest that does, and what follows.
+    /// The unit with the longest name at the start of a text, and the text after it.
     pub fn at_start(text: &str) -> Option<(Unit, &str)> {
         let ends = (1..=text.len().min(LONGEST)).rev();
         let mut parts = ends.filter_map(|end| text.split_at_checked(end));
         parts.find_map(|(name, rest)| Some((Unit::named(name)?, rest)))
     }
 
-    /// Which of the usual units make this span of readings one that the film can hold.
+    /// Usual units in which this span of readings is one that the film can hold.
     pub fn that_would_fit(span: f64) -> Vec<&'static str> {
         let usual = ["mN", "gf", "N", "ozf", "lbf", "kgf"];
         let fits = |name: &&str| {
@@ -53,7 +53,7 @@ impl Unit {
 
 /// Letters of the longest name.
 const LONGEST: usize = 3;
-/// What presses of a film that holds 0.25 N span, N.
+/// The least and the largest span of presses, N, on a film that holds 0.25 N.
 const LEAST_SPAN_N: f64 = 0.015;
 const LARGEST_SPAN_N: f64 = 0.5;
 

@@ -1,19 +1,19 @@
-//! Steady stretches: a force that is held is one known load, and needs no exact clocks.
+//! Finds steady stretches: a held force is one known load, and does not need exact clocks.
 
 use super::assemble::Loaded;
 
-/// A stretch lasts at least so long, s.
+/// The shortest stretch, s.
 const SHORTEST_S: f64 = 0.3;
-/// Within it the force strays no farther than this from its mean: in parts of it, and in standard
-/// deviations of the gauge's noise.
+/// The largest deviation of the force from its mean in a stretch: in parts of the mean, and in
+/// standard deviations of the gauge's noise. The largest of these limits holds.
 const STRAY: f64 = 0.02;
 const STRAY_SIGMAS: f64 = 4.0;
-/// Nor less than this, N.
+/// Its lower limit, N.
 const STRAY_N: f64 = 0.000_5;
-/// Frames farther apart belong to different stretches, s.
+/// Frames farther apart than this, s, belong to different stretches.
 const GAP_S: f64 = 0.2;
 
-/// The frames of all steady stretches, each with the mean force of its own.
+/// The frames of all steady stretches, each with the mean force of its stretch.
 pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>> {
     let mut steady = Vec::new();
     let mut rest = frames;
@@ -23,7 +23,7 @@ pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>>
         let lasted = these[length - 1].time_s - these[0].time_s;
         if lasted >= SHORTEST_S {
             let mean = these.iter().map(|f| f.force_n).sum::<f64>() / length as f64;
-            // A frame more at each end may lie on the ramp.
+            // The first and last frames may lie on the ramp.
             let inner = &these[1..length - 1];
             steady.extend(inner.iter().map(|frame| Loaded {
                 force_n: mean,
@@ -37,7 +37,7 @@ pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>>
     steady
 }
 
-/// How many of the first frames are within reach of their own mean, in one pose.
+/// Length of the stretch at the start: frames in one pose near their common mean force.
 fn stretch(frames: &[Loaded<'_>], noise_n: f64) -> usize {
     let first = &frames[0];
     let (mut low, mut high, mut sum) = (first.force_n, first.force_n, 0.0);

@@ -1,4 +1,5 @@
-//! Data from a real unit: what the sensor saw, what a force gauge said, and the pose that was set.
+//! Collects data from a real unit: the sensor's samples, a force gauge's readings, and the set
+//! poses.
 //!
 //! ```text
 //! sensor ─samples with markers─┐
@@ -6,7 +7,7 @@
 //! person ─poses────────────────┘
 //! ```
 //!
-//! Recording only keeps what comes ([`folder`]); clocks are aligned afterwards, and as often as
+//! Recording only stores what arrives ([`folder`]); clocks are aligned afterwards, as often as
 //! wanted.
 
 pub mod align;

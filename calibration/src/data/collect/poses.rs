@@ -1,4 +1,4 @@
-//! Which poses to take: typed, or from a list.
+//! The poses of a recording: typed by a person, or from a list.
 
 use std::fmt;
 use std::io::BufRead;
@@ -9,19 +9,19 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail, ensure};
 use hivtac_host::stop;
 
-/// Largest |α| and |β|, degrees: beyond, a press is no press.
+/// Largest |α| and |β| of a press, degrees.
 const LARGEST_DEG: f64 = 60.0;
 
-/// The farthest that a stage puts the tip from the film's middle along x and y, mm.
+/// The greatest distance of a stage's tip from the film's middle along x and y, mm.
 const LARGEST_MM: f64 = hivtac_twin::film::MAX_PLACE_MM;
 
-/// How the tip is set against the film.
+/// The direction and place of the tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// α and β, degrees.
     pub angles_deg: [f64; 2],
-    /// Where the stage has the tip, from the film's middle along x and y, mm; nothing where
-    /// somebody presses anywhere and nobody notes where.
+    /// The stage's place of the tip, from the film's middle along x and y, mm; `None` for presses
+    /// anywhere, whose places are not recorded.
     pub place_mm: Option<[f64; 2]>,
 }
 
@@ -32,7 +32,7 @@ impl Pose {
         place_mm: Some([0.0; 2]),
     };
 
-    /// Anywhere on the film, about along such an axis.
+    /// Anywhere on the film, roughly along this axis.
     pub fn anywhere(angles_deg: [f64; 2]) -> Pose {
         Pose {
             angles_deg,
@@ -57,12 +57,12 @@ impl fmt::Display for Pose {
     }
 }
 
-/// Reads a list of poses: α and β in degrees, then x and y of the tip in mm where it is not in the
-/// middle; separated by comma, semicolon, tab or space. Empty lines, lines that begin with `#`, and
-/// a first line of names are passed over.
+/// Reads a list of poses: α and β in degrees, then x and y of the tip in mm if it is not in the
+/// middle. Separators are comma, semicolon, tab or space. Empty lines, lines that begin with `#`,
+/// and a first line of names are skipped.
 ///
 /// # Errors
-/// When it cannot be read, or a line is no pose; names the line.
+/// When it cannot be read, or a line is not a pose; names the line.
 pub fn load(path: &Path) -> Result<Vec<Pose>> {
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -79,10 +79,10 @@ pub fn load(path: &Path) -> Result<Vec<Pose>> {
     Ok(poses)
 }
 
-/// α and β, degrees, and where they are said x and y, mm.
+/// Parses α and β, degrees, and optionally x and y, mm.
 ///
 /// # Errors
-/// When the text is neither two nor four such numbers of a press.
+/// When the text is not two or four such numbers within the limits of a press.
 pub fn parse(text: &str) -> Result<Pose> {
     const WRITE: &str = "write α and β in degrees, such as `4, -3`, and where the tip is not in \
                          the middle x and y in mm, such as `4, -3, 2.5, 0`";
@@ -107,10 +107,10 @@ pub fn parse(text: &str) -> Result<Pose> {
     })
 }
 
-/// α and β, degrees, of a tip that may be anywhere.
+/// Parses α and β, degrees, of a tip that may be anywhere.
 ///
 /// # Errors
-/// When the text is not two such numbers of a press.
+/// When the text is not two such numbers within the limits of a press.
 pub fn parse_axis(text: &str) -> Result<Pose> {
     let pose = parse(text)?;
     let numbers = text.split([',', ';', '\t', ' ']);
@@ -122,23 +122,23 @@ pub fn parse_axis(text: &str) -> Result<Pose> {
     Ok(Pose::anywhere(pose.angles_deg))
 }
 
-/// What a person is asked for: a pose, and a force in it.
+/// A pose, and how to press in it, as a person is asked for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
     /// The pose.
     pub pose: Pose,
-    /// How to set it, and that Enter goes on.
+    /// Instruction for setting it; Enter continues.
     pub set: String,
-    /// How to press, while it is recorded.
+    /// Instruction for pressing, while it is recorded.
     pub press: String,
     /// Length of the take, s of the sensor's clock.
     pub seconds: f64,
-    /// A take in which the sensor feels nothing is taken again.
+    /// Whether a take without a force from the sensor is repeated.
     pub must_be_felt: bool,
 }
 
 impl Task {
-    /// A pose in which forces go up and down for so many seconds.
+    /// A pose in which forces rise and fall for this many seconds.
     pub fn any_force(pose: Pose, seconds: f64) -> Task {
         Task {
             pose,
@@ -149,7 +149,7 @@ impl Task {
         }
     }
 
-    /// Presses anywhere, about along the pose's axis, for so many seconds.
+    /// Presses anywhere, roughly along the pose's axis, for this many seconds.
     pub fn anywhere(pose: Pose, seconds: f64) -> Task {
         let axis = match pose.angles_deg {
             [0.0, 0.0] => "about straight down".to_owned(),
@@ -169,7 +169,7 @@ impl Task {
     }
 }
 
-/// What is left of a list after some poses were done; a pose that is listed twice is done twice.
+/// The list without the poses that were done; a pose that is listed twice is done twice.
 pub fn left<T: Clone>(list: &[T], done: &[Pose], pose: impl Fn(&T) -> Pose) -> Vec<T> {
     let mut done = done.to_vec();
     let mut left = Vec::new();
@@ -182,12 +182,12 @@ pub fn left<T: Clone>(list: &[T], done: &[Pose], pose: impl Fn(&T) -> Pose) -> V
     left
 }
 
-/// What a person says, line by line, without keeping Ctrl-C waiting.
+/// A person's input, line by line; Ctrl-C works while waiting.
 #[derive(Debug)]
 pub struct Person(Receiver<String>);
 
 impl Person {
-    /// Whoever is at standard input.
+    /// The person at standard input.
     pub fn at_the_terminal() -> Self {
         let (sender, receiver) = channel();
         std::thread::spawn(move || {
@@ -201,10 +201,10 @@ impl Person {
         Self(receiver)
     }
 
-    /// Asks, and waits for a line; nothing when there will be none any more.
+    /// Asks, and waits for a line; `None` at the end of input.
     ///
     /// # Errors
-    /// When it was asked to end (Ctrl-C).
+    /// When the program was asked to end (Ctrl-C).
     pub fn ask(&self, question: &str) -> Result<Option<String>> {
         eprintln!("{question}");
         loop {

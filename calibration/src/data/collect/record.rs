@@ -1,4 +1,4 @@
-//! Recording: the sensor's samples, the gauge's lines and the poses, into a folder.
+//! Records the sensor's samples, the gauge's lines and the poses into a folder.
 
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -66,7 +66,7 @@ pub struct FreeArgs {
 }
 
 impl FreeArgs {
-    /// The one task of presses anywhere, when they are asked for.
+    /// The task of presses anywhere, if they are requested.
     pub fn task(&self) -> Option<Task> {
         Some(Task::anywhere(self.axis, self.free?))
     }
@@ -83,10 +83,10 @@ fn free_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A number of seconds of a command line.
+/// A number of seconds from a command line.
 ///
 /// # Errors
-/// When it is none, or beyond what makes sense.
+/// When it is not a number, or outside 0 to 36,000.
 pub fn seconds(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(seconds) if seconds > 0.0 && seconds <= 36_000.0 => Ok(seconds),
@@ -94,23 +94,23 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Fewer frames of the untouched film are no rest position.
+/// The fewest frames of the untouched film that determine a rest position.
 const FEWEST_AT_REST: usize = 8;
 
-/// A load of which the sensor feels less was none, N: with a model of another unit it feels half to
-/// twice of what there is.
+/// Readings below this (N) count as no load. With a model of a different unit, the sensor reports
+/// half to twice the actual force.
 const LEAST_FELT_N: f64 = 0.005;
-/// Time between two lines of live numbers.
+/// Time between two updates of the live numbers.
 const SHOW_EVERY: Duration = Duration::from_millis(200);
 
-/// Frames of the sensor's own rest position, and what they may take beyond its usual patience.
+/// Frames for the sensor's own rest position, and the time allowed for them beyond the usual wait.
 const TARE_FRAMES: u16 = 64;
 const TARE_PATIENCE: Duration = Duration::from_secs(30);
 
-/// Records until the list is done, the person says so, or Ctrl-C.
+/// Records until the list is done, the person ends it, or Ctrl-C.
 ///
 /// # Errors
-/// When sensor, gauge or folder fail. What was recorded until then stays.
+/// When sensor, gauge or folder fail. What was recorded before stays.
 pub fn record(args: &RecordArgs) -> Result<()> {
     let list = args.poses.as_deref().map(poses::load).transpose()?;
     let tasks = list.map(|list| {
@@ -123,11 +123,11 @@ pub fn record(args: &RecordArgs) -> Result<()> {
     record_tasks(args, free.or(tasks))
 }
 
-/// Records these tasks but those that were done; without any, poses that are typed. `args.poses`
-/// is not looked at.
+/// Records these tasks except those already done; without tasks, records typed poses. Ignores
+/// `args.poses`.
 ///
 /// # Errors
-/// When sensor, gauge or folder fail. What was recorded until then stays.
+/// When sensor, gauge or folder fail. What was recorded before stays.
 pub fn record_tasks(args: &RecordArgs, tasks: Option<Vec<Task>>) -> Result<()> {
     stop::install()?;
     let patience = Duration::from_secs_f64(args.timeout);
@@ -168,13 +168,13 @@ struct Recorder {
     gauge: Option<GaugePort>,
     begun: Instant,
     person: Person,
-    /// When live numbers were last shown.
+    /// When the live numbers were last shown.
     shown: Instant,
-    /// What the gauge showed while nothing touched the film, N.
+    /// The gauge's reading while nothing touched the film, N.
     zero_n: Option<f64>,
-    /// The take of presses anywhere that goes on.
+    /// The present take of presses anywhere.
     free: Option<FreeTake>,
-    /// The live page, when it is wanted.
+    /// The live page, if requested.
     watched: Option<Watched>,
 }
 
@@ -225,9 +225,9 @@ impl Recorder {
         Ok(())
     }
 
-    /// Has the sensor take its rest position: it refuses bad markers, and what it then says of
-    /// markers under a force is against their own places. Notes which way the sensor is held, where
-    /// it knows.
+    /// Makes the sensor take its rest position. It then refuses bad markers, and compares markers
+    /// under a force with their own rest places. Records the direction of gravity, if the sensor
+    /// knows it.
     fn tare(&mut self) -> Result<()> {
         let request = Request::Tare {
             frames: TARE_FRAMES,
@@ -245,7 +245,7 @@ impl Recorder {
         }
     }
 
-    /// The next task, once its pose is set; nothing at the end.
+    /// The next task, once its pose is set; `None` at the end.
     fn next_task(&self, list: Option<&mut Vec<Task>>, seconds: f64) -> Result<Option<Task>> {
         let Some(list) = list else {
             return self.typed_task(seconds);
@@ -258,7 +258,7 @@ impl Recorder {
         Ok(answer.filter(|text| text != "done").map(|_| task))
     }
 
-    /// What is left of a take of presses anywhere.
+    /// The remainder of a take of presses anywhere.
     fn anywhere(&self, task: &Task) -> FreeTake {
         let before = &self.folder.before;
         let before_s = before.lasted_s(task.pose);
@@ -286,7 +286,7 @@ impl Recorder {
         }
     }
 
-    /// Records for so long on the sensor's clock.
+    /// Records for this many seconds of the sensor's clock.
     fn take(&mut self, task: Option<&Task>, seconds: f64) -> Result<Take> {
         let pose = task.map(|task| task.pose);
         let text = match task {
@@ -334,8 +334,9 @@ impl Recorder {
         Ok(take)
     }
 
-    /// Says what a take gave, and refuses one of a load of which the gauge said nothing: a gauge
-    /// that is asked may be slow to begin at rest, but one whose lines are no readings stays so.
+    /// Prints a take's summary, and refuses a take under load without gauge readings. At rest there
+    /// may be none yet: a gauge that must be asked may begin slowly. But one that sends only
+    /// invalid lines does not recover.
     fn sum_up(&self, take: &Take, readings: Option<usize>, is_rest: bool) -> Result<()> {
         let heard = readings.map_or(String::new(), |count| format!(", {count} gauge readings"));
         eprintln!(
@@ -351,7 +352,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Whether a take has what it was to have.
+    /// Whether a take is complete.
     fn is_over(&self, take: &Take, length_us: u64) -> bool {
         match (&self.free, take.first_us) {
             (_, None) => false,
@@ -360,7 +361,7 @@ impl Recorder {
         }
     }
 
-    /// Why nothing is heard of the gauge.
+    /// Why the gauge gives no readings.
     fn silence(&self) -> String {
         let gauge = self.gauge.as_ref();
         gauge.map_or(String::new(), GaugePort::silence)
@@ -401,7 +402,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Live numbers on one line of a terminal, a few times a second.
+    /// Shows live numbers on one line of a terminal, a few times a second.
     fn show(&mut self, sample: &Sample, gauge_n: Option<f64>) {
         let mut terminal = std::io::stderr();
         if self.shown.elapsed() < SHOW_EVERY || !terminal.is_terminal() {
@@ -412,7 +413,7 @@ impl Recorder {
     }
 }
 
-/// What gauge and sensor show now, each as wide as the last.
+/// The present readings of gauge and sensor, in constant width.
 fn live(gauge_n: Option<f64>, sample: &Sample) -> String {
     let gauge = gauge_n.map_or(String::new(), |n| format!("gauge {:7.1} mN, ", 1e3 * n));
     let sensor = match &sample.force {

@@ -1,4 +1,4 @@
-//! What became of a recording, for a person.
+//! Reports to a person what a recording contained.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,7 +10,7 @@ use super::align::Alignment;
 pub struct Report {
     /// Those with a pose.
     pub runs: Vec<RunReport>,
-    /// How many were without.
+    /// Number of runs without a pose.
     pub empty_runs: usize,
 }
 
@@ -19,19 +19,19 @@ pub struct Report {
 pub struct RunReport {
     /// Its number.
     pub run: usize,
-    /// How the clocks fit.
+    /// The relation of the clocks.
     pub alignment: Alignment,
-    /// What the gauge showed with the film untouched, N.
+    /// The gauge's reading with the film untouched, N.
     pub zero_n: f64,
     /// Its standard deviation then, N.
     pub noise_n: f64,
-    /// Smaller forces were taken for no contact, N.
+    /// Smaller forces counted as no contact, N.
     pub least_n: f64,
     /// Frames of the untouched film.
     pub at_rest: usize,
     /// Frames under a force.
     pub pressed: usize,
-    /// Those of them that were pressed anywhere.
+    /// Frames among them that were pressed anywhere.
     pub anywhere: usize,
     /// Frames in a pose without contact.
     pub no_contact: usize,
@@ -39,18 +39,18 @@ pub struct RunReport {
     pub pulled: usize,
     /// Frames in a pose without a gauge reading.
     pub without_reading: usize,
-    /// Frames that were left out because the force was not held.
+    /// Frames left out because the force was not steady.
     pub unsteady: usize,
     /// Frames of the data set whose markers were not found, by status.
     pub rejected: BTreeMap<String, usize>,
-    /// Whether the gauge shows pressing as negative, and its sign was turned round.
+    /// Whether the gauge shows pressing as negative, and its sign was reversed.
     pub is_turned: bool,
     /// What was wrong with the gauge's lines.
     pub complaint: Option<String>,
 }
 
 impl Report {
-    /// For the data set's header.
+    /// The description in the data set's header.
     pub fn sentence(&self) -> String {
         let worst = |of: fn(&RunReport) -> f64| self.runs.iter().map(of).fold(0.0, f64::max);
         format!(

@@ -1,4 +1,4 @@
-//! A gauge's readings in time, and what it said between them.
+//! A gauge's readings over time, and the force between them.
 
 use std::collections::BTreeMap;
 
@@ -6,36 +6,35 @@ use anyhow::{Result, bail};
 
 use super::gauge::{Bad, Unit, read};
 
-/// Readings of a gauge on its own clock. Where a line was bad, the readings around it are not
-/// joined.
+/// Readings of a gauge on its own clock. Readings on both sides of a bad line are not joined.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
     /// (time in s, force in N); `None` for a bad line. Times rise.
     points: Vec<(f64, Option<f64>)>,
-    /// How many lines were not used, by cause.
+    /// Number of unused lines, by cause.
     pub bad: BTreeMap<Bad, usize>,
-    /// The first of them: line number and text.
+    /// The first unused line: number and text.
     pub first_bad: Option<(usize, String)>,
-    /// How many readings named no unit.
+    /// Number of readings without a unit.
     unnamed: usize,
-    /// Where its clock started again: the line, and the time before, s.
+    /// If its clock started again: the line, and the last time before that, s.
     pub begins: Option<(usize, f64)>,
 }
 
-/// No clock counts farther, ± s: three centuries, beyond the seconds since 1970 and what a sensor's
-/// counter holds. Sums and differences of such stay exact to microseconds.
+/// The largest time of a clock, ± s: three centuries, beyond the seconds since 1970 and a sensor's
+/// counter. Sums and differences of such times stay exact to microseconds.
 pub const LARGEST_S: f64 = 1e10;
-/// Readings of presses of a film that holds 0.25 N span no more, N: with a unit, and where none is
-/// said.
+/// The largest span of readings of presses, N, on a film that holds 0.25 N: with a unit, and
+/// without any stated unit.
 const LARGEST_SPAN_N: f64 = 5.0;
 const UNNAMED_SPAN_N: f64 = 0.5;
-/// One reading in so many may be a knock, either way.
+/// One reading in this many may come from a knock, on either side.
 const RARE: usize = 200;
-/// Readings farther apart than this many usual distances are not joined.
+/// Readings farther apart than this many median distances are not joined.
 const GAP: f64 = 5.0;
 
 impl Series {
-    /// Takes a line that came at `time_s`.
+    /// Adds a line that arrived at `time_s`.
     pub fn push(&mut self, number: usize, time_s: Option<f64>, text: &str, unit: Unit) {
         let last = self.points.last().map_or(f64::NEG_INFINITY, |p| p.0);
         let time = time_s.filter(|t| t.abs() <= LARGEST_S && *t > last);
@@ -57,7 +56,7 @@ impl Series {
         }
     }
 
-    /// One whose clock started again, at a line of its file, after so many s.
+    /// A series whose clock started again at `line` of its file, after `last_s`.
     pub(super) fn after(line: usize, last_s: f64) -> Self {
         Self {
             begins: Some((line, last_s)),
@@ -65,16 +64,16 @@ impl Series {
         }
     }
 
-    /// Refuses readings that no press of the film gives: a unit that nobody said, or another than
-    /// was said.
+    /// Refuses readings that no press of the film gives because their unit was not stated, or is
+    /// different from the stated one.
     ///
     /// # Errors
-    /// When they span more than the film can be pressed; says which unit would fit. `is_said` is
-    /// whether somebody said the unit of readings that name none.
+    /// When they span more than a press of the film can; names the units that would fit. `is_said`
+    /// is whether a person stated the unit of readings without one.
     pub fn plausible(&self, is_said: bool) -> Result<()> {
         let mut forces: Vec<f64> = self.points.iter().filter_map(|point| point.1).collect();
         forces.sort_by(f64::total_cmp);
-        // A knock against the gauge is no unit.
+        // Knocks against the gauge do not count.
         let few = forces.len() / RARE;
         let [Some(least), Some(most)] = [
             forces.get(few),
@@ -108,7 +107,7 @@ impl Series {
         bail!("{unit}readings span {span_n:.3} N, and the film holds 0.25 N: {hint}");
     }
 
-    /// The same with the other sign.
+    /// The series with the opposite sign.
     #[must_use]
     pub fn turned_round(mut self) -> Self {
         for (_, force) in &mut self.points {
@@ -117,7 +116,7 @@ impl Series {
         self
     }
 
-    /// How many readings there are.
+    /// Number of readings.
     pub fn readings(&self) -> usize {
         self.points
             .iter()
@@ -125,12 +124,12 @@ impl Series {
             .count()
     }
 
-    /// The first and the last time, s; nothing without readings.
+    /// The first and the last time, s; `None` without readings.
     pub fn span(&self) -> Option<[f64; 2]> {
         Some([self.points.first()?.0, self.points.last()?.0])
     }
 
-    /// Joins the readings, ready to be asked.
+    /// Joins the readings for queries at any time.
     pub fn joined(&self) -> Joined<'_> {
         let mut steps: Vec<f64> = self.points.windows(2).map(|p| p[1].0 - p[0].0).collect();
         steps.sort_by(f64::total_cmp);
@@ -141,7 +140,7 @@ impl Series {
         }
     }
 
-    /// What was not used, in words; nothing when everything was.
+    /// The unused lines, in words; `None` when all were used.
     pub fn complaint(&self) -> Option<String> {
         let (line, text) = self.first_bad.as_ref()?;
         let causes: Vec<String> = self
@@ -165,8 +164,8 @@ pub struct Joined<'a> {
 }
 
 impl Joined<'_> {
-    /// The force at a time (N), when the readings on both sides are good and near enough to each
-    /// other.
+    /// The force at a time, N. `None` unless the readings on both sides are good and near enough to
+    /// each other.
     pub fn at(&self, time_s: f64) -> Option<f64> {
         let after = self.points.partition_point(|p| p.0 < time_s);
         let (t1, f1) = *self.points.get(after)?;
@@ -178,8 +177,8 @@ impl Joined<'_> {
         (t1 - t0 <= self.longest_s).then(|| f0 + (f1 - f0) * (time_s - t0) / (t1 - t0))
     }
 
-    /// How far the force may be beside the straight line between two readings, N: by how the lines
-    /// before and after it lie.
+    /// Largest deviation of the force from the straight line between two readings, N, estimated
+    /// from the slopes of the lines before and after it.
     pub fn bent_n(&self, time_s: f64) -> f64 {
         let after = self.points.partition_point(|p| p.0 < time_s).max(1);
         let line = |after: usize| {
@@ -202,7 +201,7 @@ impl Joined<'_> {
 mod tests {
     use super::*;
 
-    /// A reading a second.
+    /// One reading per second.
     fn series(readings: &[&str]) -> Series {
         let mut series = Series::default();
         for (second, text) in readings.iter().enumerate() {

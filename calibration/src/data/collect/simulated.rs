@@ -1,4 +1,4 @@
-//! What a gauge would have said of a simulated press: for tests, and to try a calibration without a
+//! Simulates a gauge's file for a simulated press: for tests, and to try a calibration without a
 //! gauge.
 
 use std::fmt::Write;
@@ -50,7 +50,7 @@ pub struct SimulatedGauge {
 }
 
 impl Default for SimulatedGauge {
-    /// A usual one: 0.5 mN of noise, a zero that is off, and some damaged lines.
+    /// A typical one: 0.5 mN of noise, a zero error, and some damaged lines.
     fn default() -> Self {
         Self {
             ahead_s: 0.0,
@@ -74,7 +74,7 @@ impl SimulateArgs {
     /// Writes the gauge's file.
     ///
     /// # Errors
-    /// When the log cannot be used or the file not be written.
+    /// When the log is unusable or the file cannot be written.
     pub fn run(self) -> Result<()> {
         let text = fs::read_to_string(&self.truth)
             .with_context(|| format!("cannot read {}", self.truth.display()))?;
@@ -93,11 +93,10 @@ impl SimulateArgs {
 }
 
 impl SimulatedGauge {
-    /// The gauge's file for a force in time, (s, N), between whose points it is taken to be
-    /// straight.
+    /// The gauge's file for forces over time, (s, N), joined by straight lines.
     ///
     /// # Errors
-    /// When there are no two points, or the gauge has no rate.
+    /// When there are fewer than two points, or the gauge's rate is invalid.
     pub fn lines(&self, forces: &[(f64, f64)]) -> Result<String> {
         ensure!(forces.len() > 1, "the truth log has no two exposures");
         ensure!(
@@ -114,7 +113,7 @@ impl SimulatedGauge {
                 .clamp(1, forces.len() - 1);
             let ((t0, f0), (t1, f1)) = (forces[after - 1], forces[after]);
             let force = f0 + (f1 - f0) * ((time - t0) / (t1 - t0)).clamp(0.0, 1.0);
-            // The sum of twelve uniform numbers is as good as Gaussian here.
+            // The sum of twelve uniform numbers is close enough to Gaussian here.
             let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
             let shown = force + self.zero_n + self.noise_n * noise;
             let clock = self.ahead_s + first + (time - first) * (1.0 + self.drift_ppm * 1e-6);

@@ -1,11 +1,11 @@
-//! What a take gave so far: samples, and what is heard of the gauge.
+//! Counts a take's samples and gauge readings.
 
 use std::time::{Duration, Instant};
 
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
 
-/// What a take gave.
+/// The content of a take.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Take {
     pub samples: usize,
@@ -14,14 +14,14 @@ pub(super) struct Take {
     pub first_us: Option<u64>,
     pub last_us: u64,
     pub last_sequence: Option<u32>,
-    /// The largest |F| that the sensor felt, N; nothing without a force.
+    /// The largest |F| that the sensor reported, N; `None` without a force.
     pub felt_n: Option<f64>,
-    /// What the gauge showed, N: sum and number.
+    /// The gauge's readings, N: sum and number.
     pub gauge: (f64, f64),
 }
 
 impl Take {
-    /// What the gauge showed on average, N.
+    /// Mean of the gauge's readings, N; `None` without readings.
     pub fn gauge_n(&self) -> Option<f64> {
         let (sum, count) = self.gauge;
         (count > 0.0).then(|| sum / count)
@@ -46,15 +46,15 @@ impl Take {
     }
 }
 
-/// No gauge is silent for longer while it is listened to.
+/// The longest silence of a working gauge.
 const SILENT: Duration = Duration::from_secs(10);
 
-/// What is heard of a gauge during a take.
+/// The gauge's readings during a take.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Heard {
-    /// Readings before it.
+    /// Number of readings before it.
     before: Option<usize>,
-    /// Readings so far, and when they were last more.
+    /// Number of readings so far, and when it last changed.
     last: Option<usize>,
     at: Instant,
 }
@@ -68,7 +68,7 @@ impl Heard {
         }
     }
 
-    /// Whether there was no reading for too long, now that there are so many.
+    /// Whether the gauge has been silent for too long, at this number of readings.
     pub fn is_silent(&mut self, readings: Option<usize>) -> bool {
         if readings != self.last {
             (self.last, self.at) = (readings, Instant::now());
@@ -76,7 +76,7 @@ impl Heard {
         readings.is_some() && self.at.elapsed() > SILENT
     }
 
-    /// How many came.
+    /// Number of readings since the take began.
     pub fn since(&self, readings: Option<usize>) -> Option<usize> {
         Some(readings? - self.before?)
     }

@@ -1,4 +1,5 @@
-//! A recording on a live page: what the sensor says, what is recorded, and what it covers.
+//! Shows a recording on a live page: the sensor's samples, the state of the recording, and its
+//! coverage.
 
 use std::sync::Arc;
 use std::thread;
@@ -11,10 +12,10 @@ use hivtac_wire::message::{DeviceHello, Sample};
 
 use super::take::Take;
 
-/// Time between two tellings of what is covered.
+/// Time between two updates of the coverage.
 const TELL_EVERY: Duration = Duration::from_millis(200);
 
-/// What the page is told.
+/// The state that the page shows.
 pub(super) struct Watched {
     feed: Arc<Feed>,
     told: Told,
@@ -22,10 +23,10 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    /// Serves the page as long as the program runs, and says where.
+    /// Serves the page as long as the program runs, and prints its address.
     ///
     /// # Errors
-    /// When this computer has no port for it.
+    /// When this computer has no free port.
     pub fn serve(link: &Link, hello: &DeviceHello, patience: Duration) -> Result<Self> {
         let feed = Arc::new(Feed::default());
         let sensor = Sensor {
@@ -47,13 +48,13 @@ impl Watched {
         Ok(watched)
     }
 
-    /// How the recording stands.
+    /// Updates the state of the recording.
     pub fn recording(&mut self, on: bool, text: String) {
         self.told.recording = Recording { on, text };
         self.tell();
     }
 
-    /// A sample came, of a take that has so much; `coverage` says what it covers.
+    /// Adds a sample of a take with this content; `coverage` computes what it covers.
     pub fn sample(
         &mut self,
         sample: &Sample,
@@ -74,7 +75,7 @@ impl Watched {
         self.tell();
     }
 
-    /// A take of presses anywhere has ended: what there is of it.
+    /// Ends a take of presses anywhere, with its final coverage.
     pub fn ended(&mut self, coverage: Coverage) {
         self.told.coverage = Some(coverage);
         self.recording(

@@ -25,13 +25,14 @@ pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};
 
+/// Rows, and what they mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     /// Its origin and the meaning of its numbers.
     pub about: About,
+    /// One row per frame.
     pub rows: Vec<Row>,
 }
-
 /// Origin of a data set and meaning of its numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct About {
@@ -81,6 +82,7 @@ pub struct Free {
 /// A row's position in the data set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
+    /// Its session, from 0.
     pub session: usize,
     /// Its pose among the paper's ([`crate::data::loads::PaperPoses`]), if it has one.
     pub pose: Option<usize>,
@@ -89,6 +91,7 @@ pub struct Place {
 /// One frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
+    /// Its session and its pose.
     pub place: Place,
     /// The labelled force, N, film frame: the force on the film in the contact reading `force`,
     /// otherwise

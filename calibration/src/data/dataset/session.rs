@@ -19,7 +19,7 @@ pub(super) struct Session {
 
 impl Session {
     /// Session 0 is the nominal one. In the others the picture is shifted by up to 1 % of its width
-    /// and turned by up to 1°. The light differs by up to 20 % and is uneven by up to 20 %; the
+    /// and turned by up to 1°. The light differs by up to 20 % and is uneven by up to 20 %. The
     /// focus is off by up to 1/500 of the width (0.64 px at QVGA).
     pub fn numbered(session: usize, seed: u64) -> Self {
         if session == 0 {

@@ -6,19 +6,19 @@ use super::super::gauge::Unit;
 use super::super::series::Series;
 use super::*;
 
-/// A hand that presses again and again, never twice alike: |F| in N.
+/// A hand that presses repeatedly, differently each time: |F| in N.
 fn hand(time_s: f64) -> f64 {
     let swing = |hz: f64, phase: f64| (std::f64::consts::TAU * hz * time_s + phase).sin();
     let force = 0.08 + 0.06 * swing(0.31, 0.3) + 0.04 * swing(0.173, 1.0) + 0.02 * swing(0.77, 2.0);
     force.max(0.0)
 }
 
-/// The markers' radius rises ever more slowly.
+/// The markers' radius, px: it rises less and less with force.
 fn radius(force_n: f64) -> f64 {
     30.0 * force_n.sqrt()
 }
 
-/// A gauge that is `lag_s` ahead, runs faster by `drift`, and sees the force with noise.
+/// A gauge `lag_s` ahead and faster by `drift`, whose readings have noise.
 fn gauge(of: impl Fn(f64) -> f64, span_s: f64, lag_s: f64, drift: f64, noise_n: f64) -> Series {
     let mut random = ChaCha8Rng::seed_from_u64(4);
     let mut series = Series::default();
@@ -80,7 +80,7 @@ fn a_clock_that_runs_faster_is_followed() {
     }
 }
 
-/// The refusal's words.
+/// The message of the refusal.
 fn refused(frames: &[RadiusSample], series: &Series, search: Search) -> String {
     align(frames, series.joined(), search)
         .unwrap_err()

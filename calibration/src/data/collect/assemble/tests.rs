@@ -8,8 +8,9 @@ use crate::data::conditions::Conditions;
 use crate::data::dataset::Recipe;
 use hivtac_twin::Load;
 
-/// Weights that somebody puts on and takes off by hand, and the file that they write of it: when
-/// each surely hung and surely did not, in whole seconds of a watch that is 100 s ahead.
+/// Weights that a person puts on and takes off by hand, and that person's file of them. It lists
+/// when each weight certainly hung and certainly did not, in whole seconds of a watch that is 100 s
+/// ahead.
 const WEIGHTS_G: [f64; 4] = [5.0, 10.0, 15.0, 20.0];
 /// When each is put on and taken off, s.
 const TIMES_S: [[f64; 2]; 4] = [[6.4, 15.2], [20.7, 27.6], [32.3, 44.9], [49.5, 55.1]];
@@ -92,7 +93,7 @@ fn pressed_n(row: &Row) -> f64 {
     ((x_px - 204.0) / 40.0).powi(2)
 }
 
-/// Every frame that is kept has the force of the weight that hung on it, to 0.1 mN.
+/// Every frame that is kept has the force of the weight that hung then, to 0.1 mN.
 #[test]
 fn weights_and_a_watch_are_a_gauge() {
     let gauge = Gauge::Files(vec![notes("g")]);
@@ -113,7 +114,7 @@ fn weights_and_a_watch_are_a_gauge() {
     assert!(frames.iter().all(|&count| count > 39), "{frames:?}");
 }
 
-/// A gauge that was mounted the other way round is as good.
+/// A gauge that was mounted the other way round gives the same rows.
 #[test]
 fn a_gauge_that_shows_pressing_as_negative_is_turned_round() {
     let turned = Gauge::Files(vec![notes("g").turned_round()]);
@@ -128,7 +129,7 @@ fn a_gauge_that_shows_pressing_as_negative_is_turned_round() {
     assert_eq!(found.rows, expected.rows);
 }
 
-/// A clock that starts again in the middle of a run says nothing of when.
+/// A clock that starts again in the middle of a run makes its times ambiguous.
 #[test]
 fn a_clock_that_starts_again_is_named() {
     let mut again = Series::after(31, 155.0);
@@ -142,7 +143,7 @@ fn a_clock_that_starts_again_is_named() {
     assert!(error.contains("line 31 (after 155 s)"), "{error}");
 }
 
-/// Forces that no data set could hold never get into one.
+/// Forces beyond a data set's limits never enter one.
 #[test]
 fn a_gauge_in_kilonewtons_has_no_readings() {
     let gauge = Gauge::Files(vec![notes("kN")]);
@@ -154,15 +155,15 @@ fn a_gauge_in_kilonewtons_has_no_readings() {
     );
 }
 
-/// A hand that presses anywhere: each touch of a second and a half at its own place, along its own
-/// direction, as hard as it likes, and never still.
+/// A hand that presses anywhere: each touch lasts a second and a half at its own place and along
+/// its own direction, with its own and never constant force.
 fn touch(time_s: f64) -> Option<Load> {
     if time_s < 0.0 {
         return None;
     }
     let number = (time_s / 1.5).floor();
     let part = time_s / 1.5 - number;
-    // Parts of an irrational number are spread evenly.
+    // Multiples of an irrational number, modulo 1, are spread evenly.
     let spread = |by: f64| 2.0 * (number * by).fract() - 1.0;
     let most_n = 0.11 + 0.1 * spread(0.324_7);
     let wobble = 1.0 + 0.15 * (9.0 * part + number).sin();
@@ -215,7 +216,7 @@ fn free_recording(seconds: u32) -> (Recording, Series) {
     (recording, gauge)
 }
 
-/// Clocks are found wherever the tip is, and rows say what is known: no place, the size, the axis.
+/// Clocks are aligned wherever the tip is; rows have the force and the axis, but no place.
 #[test]
 fn presses_anywhere_are_rows_without_a_place() {
     let (recording, series) = free_recording(40);
@@ -243,7 +244,7 @@ fn presses_anywhere_are_rows_without_a_place() {
     assert_eq!(again, dataset);
 }
 
-/// A recording that has both keeps what is known of each row.
+/// A recording with both kinds of loads keeps each row's own knowledge.
 #[test]
 fn loads_in_the_middle_stay_there_beside_presses_anywhere() {
     let mut both = recording();

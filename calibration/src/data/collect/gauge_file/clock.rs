@@ -1,11 +1,13 @@
-//! Times of a gauge's file, and where its clock starts again.
+//! Reads the times of a gauge's file, and finds where its clock starts again.
 
 use crate::data::collect::gauge::{number, signed};
 
-/// So many lines after a step back go on from there: one alone is a wrong time.
+/// After a step back, this many rising times mean a clock that started again; a single one is
+/// wrong.
 const GOES_ON: usize = 4;
 
-/// Seconds of a text: a number, or hours, minutes and seconds with colons.
+/// The seconds of a text: a number, or hours, minutes and seconds with colons. `None` for other
+/// texts.
 pub(super) fn seconds(text: &str) -> Option<f64> {
     let parts: Vec<&str> = text.trim().split(':').collect();
     match parts.as_slice() {
@@ -26,12 +28,12 @@ pub(super) fn seconds(text: &str) -> Option<f64> {
 /// Where a clock starts again.
 #[derive(Debug)]
 pub(super) struct Clock {
-    /// Numbers of the rows at which it does.
+    /// Numbers of the rows at which it starts again.
     begins: Vec<usize>,
 }
 
 impl Clock {
-    /// Of the times of a file's rows.
+    /// From the times of a file's rows.
     pub fn of(times: &[Option<f64>]) -> Self {
         let mut begins = Vec::new();
         let mut last = f64::NEG_INFINITY;
@@ -51,7 +53,7 @@ impl Clock {
     }
 }
 
-/// Whether times go on rising from here, all below `before`.
+/// Whether the next times rise steadily from here, all below `before`.
 fn goes_on(times: &[Option<f64>], before: f64) -> bool {
     let next: Vec<f64> = times.iter().flatten().take(GOES_ON).copied().collect();
     let rises = next.windows(2).all(|pair| pair[0] < pair[1]);

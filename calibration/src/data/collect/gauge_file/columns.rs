@@ -1,13 +1,13 @@
-//! Which column of a gauge's file is what: separators, headings, units.
+//! Finds the columns of a gauge's file: separators, headings, units.
 
 use anyhow::{Result, bail, ensure};
 
 use super::clock::seconds;
 use crate::data::collect::gauge::Unit;
 
-/// A table is found within so many lines.
+/// A table must begin within this many lines.
 const HEADING_LINES: usize = 100;
-/// What headings of times, readings and units are called; and what is another force than that.
+/// Names of headings of times, readings and units; and names of forces other than the present one.
 const TIMES: [&str; 8] = [
     "time", "zeit", "temps", "tiempo", "tempo", "elapsed", "seconds", "t",
 ];
@@ -17,7 +17,7 @@ const FORCES: [&str; 12] = [
 ];
 const UNITS: [&str; 3] = ["unit", "units", "einheit"];
 const OTHERS: [&str; 6] = ["peak", "max", "min", "limit", "set", "spitze"];
-/// Seconds in a unit of a heading of times.
+/// Seconds per unit in a heading of times.
 const TIME_UNITS: [(&str, f64); 6] = [
     ("s", 1.0),
     ("sec", 1.0),
@@ -31,15 +31,15 @@ const TIME_UNITS: [(&str, f64); 6] = [
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
     separator: Separator,
-    /// Number of the first line of the table among those that say something.
+    /// Index of the table's first line among the lines that are not empty.
     first: usize,
     time: usize,
     force: usize,
-    /// That of a column with nothing but units.
+    /// The column that contains only units.
     unit: Option<usize>,
-    /// The unit that the heading names, and its line.
+    /// The unit named by the heading, its name, and the heading's line.
     heading: Option<(Unit, String, usize)>,
-    /// Seconds in a step of the times.
+    /// Seconds per unit of the times.
     time_scale: f64,
 }
 
@@ -48,13 +48,13 @@ pub(super) struct Columns {
 pub(super) struct Row {
     /// Its number in the file.
     pub line: usize,
-    /// Nothing where it is no time.
+    /// The time, s; `None` where it is invalid.
     pub time_s: Option<f64>,
-    /// The reading, with its unit where a column says it.
+    /// The reading, with its unit where a column has it.
     pub reading: String,
 }
 
-/// What stands between columns.
+/// The separator between columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Separator {
     Mark(char),
@@ -63,7 +63,8 @@ enum Separator {
 }
 
 impl Separator {
-    /// The one that most lines have: a comma may be a decimal mark where there is another one.
+    /// The separator that most lines have. A comma may be a decimal mark where there is a different
+    /// one.
     fn of(lines: &[(usize, &str)]) -> Self {
         let looked_at = &lines[..lines.len().min(HEADING_LINES)];
         let has = |mark: &char| {
@@ -74,7 +75,7 @@ impl Separator {
         mark.map_or(Separator::Spaces, Separator::Mark)
     }
 
-    /// A line's fields; a mark within quotes separates nothing.
+    /// A line's fields; a mark within quotes is not a separator.
     fn fields(self, line: &str) -> Vec<String> {
         let Separator::Mark(mark) = self else {
             let line = line.trim();
@@ -92,7 +93,7 @@ impl Separator {
                     .for_each(|field| field.push(c)),
             }
         }
-        // A mark at a line's end separates nothing, either.
+        // Neither is a mark at a line's end.
         while fields.len() > 2 && fields.last().is_some_and(|field| field.trim().is_empty()) {
             fields.pop();
         }
@@ -102,10 +103,10 @@ impl Separator {
 }
 
 impl Columns {
-    /// Of the lines of a file that say something, with their numbers.
+    /// From the lines of a file that are not empty, with their numbers.
     ///
     /// # Errors
-    /// When there is no table, or more than one way to take it.
+    /// When there is no table, or more than one reading of it.
     pub fn of(lines: &[(usize, &str)]) -> Result<Self> {
         let separator = Separator::of(lines);
         let fields = |(_, line): &(usize, &str)| separator.fields(line);
@@ -145,10 +146,10 @@ impl Columns {
         })
     }
 
-    /// The unit of readings that name none, where the file or somebody says it.
+    /// The unit of readings without one, if the file or a person states it.
     ///
     /// # Errors
-    /// When both say another one.
+    /// When both state different units.
     pub fn unit(&self, said: Option<Unit>) -> Result<Option<Unit>> {
         if let (Some(said), Some((unit, name, line))) = (said, &self.heading) {
             ensure!(
@@ -176,8 +177,8 @@ impl Columns {
     }
 }
 
-/// A comma between columns and in numbers, too, cannot be told apart; nor can a comma that parts
-/// thousands be told from a decimal one where the file has points as well.
+/// Refuses a file with ambiguous commas. These are commas both between columns and in numbers, and
+/// commas that may separate thousands or decimals, in a file that also has points.
 fn one_decimal_mark(separator: Separator, lines: &[(usize, &str)], first: &[String]) -> Result<()> {
     let is_digits = |field: &String| {
         let digits = field.trim_start_matches(['-', '+', '\u{2212}']);
@@ -217,7 +218,7 @@ fn words(name: &str) -> Vec<String> {
     words.map(str::to_lowercase).collect()
 }
 
-/// The column that is called so; nothing where none is.
+/// The column with one of these names; `None` without one.
 fn one_named(names: &[String], called: &[&str], line: usize) -> Result<Option<usize>> {
     let is_called = |name: &String| {
         let words = words(name);
@@ -240,15 +241,15 @@ fn one_named(names: &[String], called: &[&str], line: usize) -> Result<Option<us
     Ok(columns.first().copied())
 }
 
-/// A column that has a unit and nothing else.
+/// A column that contains only a unit.
 fn column_of_units(first: &[String]) -> Option<usize> {
     first.iter().position(|field| Unit::named(field).is_some())
 }
 
-/// What a balance says of its reading, in a column of its own.
+/// A balance's states of its reading, in a column of their own.
 const STATES: [&str; 5] = ["ST", "US", "OL", "GS", "NT"];
 
-/// The one column that is left for readings.
+/// The single remaining column, for readings.
 fn only_other(first: &[String], time: usize, unit: Option<usize>, line: usize) -> Result<usize> {
     let is_left = |column: &usize| {
         let is_state = STATES.contains(&first[*column].as_str());
@@ -265,7 +266,8 @@ fn only_other(first: &[String], time: usize, unit: Option<usize>, line: usize) -
     }
 }
 
-/// What a heading has in brackets, after a slash, or as its last word.
+/// The text in a heading's brackets, after its slash, or its last word; and whether it is in
+/// brackets.
 fn said_unit(name: &str) -> Option<(&str, bool)> {
     let bracketed = name.split_once(['(', '[']).map(|(_, rest)| rest);
     if let Some(inside) = bracketed.and_then(|rest| rest.split([')', ']']).next()) {
@@ -275,7 +277,7 @@ fn said_unit(name: &str) -> Option<(&str, bool)> {
     (last.len() < name.len()).then_some((last, false))
 }
 
-/// The longest name of a unit: more in brackets is a remark.
+/// The longest name of a unit; longer text in brackets is a remark.
 const LONGEST_UNIT: usize = 5;
 
 /// The unit of a heading of readings.
@@ -293,7 +295,7 @@ fn force_unit(name: &str, line: usize) -> Result<Option<(Unit, String, usize)>> 
     Ok(found.map(|found| (found, unit.to_owned(), line)))
 }
 
-/// Seconds in a step of the times of such a heading.
+/// Seconds per unit of the times under this heading.
 fn time_scale(name: &str, line: usize) -> Result<f64> {
     let Some((unit, is_bracketed)) = said_unit(name) else {
         return Ok(1.0);

@@ -1,6 +1,7 @@
-//! Bytes to text: UTF-8, or UTF-16 as programs under Windows write it.
+//! Decodes a file's bytes to text: UTF-8, or UTF-16 as programs under Windows write it.
 
-/// The text of a file. What is no character becomes `\u{fffd}`, and its line no reading.
+/// The text of a file. An invalid character becomes `\u{fffd}`, which makes its line an invalid
+/// reading.
 pub(super) fn text(bytes: &[u8]) -> String {
     let little = |pair: [u8; 2]| u16::from_le_bytes(pair);
     let big = |pair: [u8; 2]| u16::from_be_bytes(pair);
@@ -8,7 +9,7 @@ pub(super) fn text(bytes: &[u8]) -> String {
         [0xff, 0xfe, rest @ ..] => utf16(rest, little),
         [0xfe, 0xff, rest @ ..] => utf16(rest, big),
         [0xef, 0xbb, 0xbf, rest @ ..] => String::from_utf8_lossy(rest).into_owned(),
-        // Digits and separators are ASCII: without a mark every second byte is 0.
+        // Digits and separators are ASCII: without a byte order mark, every second byte is 0.
         [a, 0, b, 0, ..] if *a != 0 && *b != 0 => utf16(bytes, little),
         [0, a, 0, b, ..] if *a != 0 && *b != 0 => utf16(bytes, big),
         _ => String::from_utf8_lossy(bytes).into_owned(),

@@ -1,4 +1,4 @@
-//! What a gauge, its maker's program or a spreadsheet wrote by itself: a table of times and
+//! Reads files that a gauge, its maker's program or a spreadsheet wrote: tables of times and
 //! readings.
 //!
 //! | file | subject |
@@ -7,8 +7,8 @@
 //! | `columns` | which column is what, and in which unit |
 //! | `clock` | times, and a clock that starts again |
 //!
-//! What can be understood in one way only is read. Otherwise the file is refused, with the line,
-//! the cause, and what helps.
+//! A file with a single possible meaning is read. Any other is refused, with the line, the cause,
+//! and what helps.
 
 mod clock;
 mod columns;
@@ -23,18 +23,18 @@ use super::series::Series;
 use clock::Clock;
 use columns::Columns;
 
-/// Reads a gauge's file: one series, or several when its clock starts again. `unit` is that of
-/// readings that name none, where somebody said it.
+/// Reads a gauge's file: one series, or several when its clock starts again. `unit` is the unit of
+/// readings without one, if a person stated it.
 ///
 /// # Errors
-/// When it cannot be read, has no readings, or can be understood in more than one way.
+/// When it cannot be read, has no readings, or has more than one possible meaning.
 pub fn load(path: &Path, unit: Option<Unit>) -> Result<Vec<Series>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let text = encoding::text(&bytes);
     parse(&text, unit).with_context(|| path.display().to_string())
 }
 
-/// Reads the text of such a file.
+/// Parses the text of such a file.
 ///
 /// # Errors
 /// As [`load`].
@@ -66,7 +66,7 @@ pub fn parse(text: &str, unit: Option<Unit>) -> Result<Vec<Series>> {
     Ok(series)
 }
 
-/// Refuses a file of which hardly anything is a reading.
+/// Refuses a file with hardly any readings.
 fn enough(series: &Series, first_line: Option<usize>) -> Result<()> {
     let (readings, bad) = (series.readings(), series.bad.values().sum::<usize>());
     let complaint = series.complaint().map_or_else(

@@ -11,7 +11,7 @@ fn forces(text: &str) -> Vec<Option<f64>> {
 
 const EXPECTED: [f64; 3] = [0.0, 0.1, -0.05];
 
-/// The same three readings as instruments, programs and spreadsheets write them.
+/// The same three readings in the formats of instruments, programs and spreadsheets.
 #[test]
 fn files_of_all_kinds_say_the_same() {
     for text in [
@@ -61,7 +61,7 @@ fn files_of_all_kinds_say_the_same() {
     }
 }
 
-/// What can be understood in two ways, or in none, is refused with its line and what helps.
+/// Ambiguous and meaningless files are refused, with the line and what helps.
 #[test]
 fn what_is_not_clear_is_refused_with_what_helps() {
     for (text, unit, words) in [
@@ -184,7 +184,7 @@ fn a_file_that_cannot_be_used_is_named() {
 }
 
 proptest::proptest! {
-    /// Any text is read or refused, and what is read is in order.
+    /// Any text is read or refused, and readings that are accepted are in order.
     #[test]
     fn any_text_is_a_series_or_refused(text in "[0-9.,;:\t \nN\"mg#+-]{0,200}") {
         match parse(&text, None) {
@@ -196,7 +196,7 @@ proptest::proptest! {
         }
     }
 
-    /// What is written in one way is read as it was.
+    /// Tables in an unambiguous format are read as they were written.
     #[test]
     fn tables_come_back(
         steps in proptest::collection::vec(-250_i32..=250, 2..40),
